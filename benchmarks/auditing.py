@@ -31,8 +31,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # for tests.*
 
-from fuzzytree.auditing.engine import arrangement as grounds
-from fuzzytree.auditing.engine.arrangement import ground, rule_strengths
+from fuzzytree.auditing.engine import arrangement as arrangements
+from fuzzytree.auditing.engine.arrangement import arrange, rule_strengths
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import State
@@ -76,11 +76,11 @@ class Asked(NamedTuple):
 
 def asked(base: RuleBase, budget_s: float) -> Asked:
     """Ask of each rule whether it ever wins."""
-    grounds.ground.cache_clear()
+    arrangements.arrange.cache_clear()
     box = unit_domain(base)
     start = time.process_time()
-    given = ground(base, box)
-    levels = len(given.laid[1].low) if base.semantics.conjunction == "min" else 0
+    arrangement = arrange(base, box)
+    levels = len(arrangement.bands.low) if base.semantics.conjunction == "min" else 0
     cut_s = time.process_time() - start
     states: list[State] = []
     each: list[float] = []
@@ -88,7 +88,7 @@ def asked(base: RuleBase, budget_s: float) -> Asked:
         rivals = [n for n, one in enumerate(base.rules, 1) if one.then != rule.then]
         clock = Clock(budget_s, now=time.process_time)
         start = time.process_time()
-        states.append(wins(given, number, rivals, clock))
+        states.append(wins(arrangement, number, rivals, clock))
         each.append(time.process_time() - start)
     point = {name: Fraction(3, 8) for name in base.inputs}
     start = time.process_time()

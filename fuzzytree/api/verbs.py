@@ -694,7 +694,7 @@ def audit(
         settings=chosen,
         select=select,
         ignore=ignore,
-        clock=Clock(chosen.budget_s, tell=progress),
+        clock=Clock(chosen.budget_s, report=progress),
         file=read.file,
         data=read.data,
         row=row,
@@ -908,7 +908,7 @@ def diff(
     from fuzzytree.auditing.findings.records import AuditSettings
     from fuzzytree.auditing.findings.subject import AuditRows
 
-    clock = Clock(budget_s, tell=progress)
+    clock = Clock(budget_s, report=progress)
     models: list[Document] = []
     files: list[ModelFile | None] = []
     for model in (old, new):

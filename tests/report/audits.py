@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -107,7 +107,9 @@ def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Aud
         data=SourceFile("grasps.csv", "b" * 64),
         rows=4,
         policy=Policy("min", "strongest"),
-        domain=Domain((Side("force", 0.0, 5.0, "model"), Side("slip", 0.0, 1.0))),
+        domain=Domain(
+            (DomainSide("force", 0.0, 5.0, "model"), DomainSide("slip", 0.0, 1.0))
+        ),
         settings=AuditSettings(),
         answers=answers,
         unasked=(

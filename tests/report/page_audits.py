@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -160,7 +160,8 @@ def audit_of(
         fields: Others of the audit.
     """
     sides = [
-        Side(v.name, v.low or 0.0, v.high or 1.0, "model") for v in model.variables
+        DomainSide(v.name, v.low or 0.0, v.high or 1.0, "model")
+        for v in model.variables
     ]
     made = Audit(
         version="0.1.0",

@@ -6,7 +6,7 @@ import re
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.records import LIMITS, SourceFile
 from fuzzytree.report.audit import (
@@ -141,7 +141,7 @@ def test_what_a_terminal_would_obey_is_written_as_an_escape() -> None:
 def test_the_head_shows_no_name_as_it_should_not_be_shown() -> None:
     audit = every_state()
     evil = "\x1b[31m\u202e\n"
-    domain = Domain((Side(evil, 0.0, 5.0), Side("L" * 10_000, 0.0, 1.0)))
+    domain = Domain((DomainSide(evil, 0.0, 5.0), DomainSide("L" * 10_000, 0.0, 1.0)))
     data = SourceFile(evil, "b" * 64)
     lines = [*audit_lines(replace(audit, model=evil, domain=domain, data=data))]
     assert all(line.isprintable() for line in lines)

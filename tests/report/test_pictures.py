@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Span
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import (
@@ -202,7 +202,7 @@ def test_a_histogram_counts_the_rows_inside() -> None:
 def test_a_combination_reaches_what_its_inputs_allow() -> None:
     mix = Variable("mix", parts=(Part("a", 2.0, 1.0), Part("b", -1.0)))
     rules = RuleBase("r", ("k",), (Variable("a"), Variable("b"), mix), ALWAYS)
-    domain = Domain((Side("a", 0.0, 2.0), Side("b", 0.0, 3.0)))
+    domain = Domain((DomainSide("a", 0.0, 2.0), DomainSide("b", 0.0, 3.0)))
     found = axes_of(rules, domain)["mix"]
     assert (found.low, found.high) == (-5.0, 2.0)
     assert axes_of(rules, Domain(()))["mix"].low is None
@@ -221,7 +221,9 @@ def test_a_sliver_has_a_second_map_near_it() -> None:
 
 def test_a_witness_outside_of_a_map_is_not_drawn_on_its_edge() -> None:
     rules = rule_base()
-    axes = axes_of(rules, Domain((Side("pressure", 0, 10), Side("area", 0, 100))))
+    axes = axes_of(
+        rules, Domain((DomainSide("pressure", 0, 10), DomainSide("area", 0, 100)))
+    )
     pair = axes["pressure"], axes["area"]
     window = windows(*pair, {})[0][1]
     for at, count in ((Fraction(5), 1), (Fraction(11), 0)):

@@ -19,10 +19,14 @@ import numpy as np
 
 from fuzzytree.auditing.diff.difference_records import DecisionEvidence
 from fuzzytree.auditing.diff.matching import have_same_classes
-from fuzzytree.auditing.engine.arrangement import Answered, answer_at, difference_at
+from fuzzytree.auditing.engine.arrangement import (
+    ExactPrediction,
+    difference_at,
+    prediction_at,
+)
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.equivalence import OF, alike, region
+from fuzzytree.auditing.engine.equivalence import OF, difference_region, equivalence
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -136,7 +140,7 @@ def decisions(
     if found.witnesses:
         answers = [*_witness_answers(pair, found), *answers]
     else:
-        clock.tell("proving that decisions are equal", 0.3)
+        clock.report("proving that decisions are equal", 0.3)
         state = _alike(pair, clock)
         if isinstance(state, Witness):
             found.add_point(point_of(state.point))
@@ -155,7 +159,7 @@ def _alike(pair: RulePair, clock: Clock) -> State:
     """Return whether both answer alike; the budget is kept even within a box."""
     try:
         with enforced(clock):
-            state = alike(pair.old, pair.new, pair.domain, clock)
+            state = equivalence(pair.old, pair.new, pair.domain, clock)
     except OutOfTimeError:
         state = Bracket(OF, 0.0, 1.0, "the budget was spent within a box")
     if isinstance(state, Bracket) and have_same_classes(pair.old, pair.new):
@@ -222,12 +226,12 @@ def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
     told = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
     for number, (labels, (_, name, found_at)) in enumerate(told[:_MOST_TOLD]):
         point = found_at if name else _simple(pair, labels, found_at)
-        one, other = answer_at(pair.old, point), answer_at(pair.new, point)
+        one, other = prediction_at(pair.old, point), prediction_at(pair.new, point)
         state = difference_at(pair.old, pair.new, point)
         assert state is not None  # only such points are kept
         spans: tuple[Span, ...] = ()
         if number < _MOST_REGIONS:
-            spans = region(pair.old, pair.new, pair.domain, point)
+            spans = difference_region(pair.old, pair.new, pair.domain, point)
         state = msgspec.structs.replace(state, region=spans)
         sentence = f"the old model answers {_answered(one)}, the new one "
         sentence += _answered(other)
@@ -257,13 +261,13 @@ def _simple(
     """Return a point of few digits at which both models answer the same as here."""
 
     def holds(tried: Mapping[str, Fraction]) -> bool:
-        both = (answer_at(model, tried).label for model in (pair.old, pair.new))
+        both = (prediction_at(model, tried).label for model in (pair.old, pair.new))
         return tuple(both) == labels
 
     return simplified(point, pair.domain, holds)
 
 
-def _answered(one: Answered) -> str:
+def _answered(one: ExactPrediction) -> str:
     if not one.rule:
         return f"{answer_text(one.label)}, for no rule fires"
     how = f"rule {one.rule}, the first of equals" if one.is_tie else f"rule {one.rule}"
@@ -329,7 +333,10 @@ class _Found:
         self, point: dict[str, Fraction], margin: float = 0.0, name: str = ""
     ) -> None:
         """Keep a point, if its pair of classes has no clearer one."""
-        one, other = answer_at(self.pair.old, point), answer_at(self.pair.new, point)
+        one, other = (
+            prediction_at(self.pair.old, point),
+            prediction_at(self.pair.new, point),
+        )
         self.old_rules |= {one.rule} - {0}
         self.new_rules |= {other.rule} - {0}
         self.has_tie |= one.is_tie or other.is_tie

@@ -16,7 +16,7 @@ from fuzzytree.auditing.diff.difference_records import (
 from fuzzytree.auditing.diff.structure import draft_changes
 from fuzzytree.auditing.diff.system_differences import system_changes
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side, limited
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, limited
 from fuzzytree.auditing.findings.audit import source_of
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.locations import ModelFile
@@ -89,7 +89,7 @@ def joined_domain(
             raise ValueError(
                 f"limits for {name!r}, which is no input; {name_choice(name, inputs)}"
             )
-    sides: dict[str, Side] = {}
+    sides: dict[str, DomainSide] = {}
     for model in (old, new):
         asked = None
         if rows is not None:
@@ -102,7 +102,7 @@ def joined_domain(
                 sides[side.variable] = side
             elif known is not None and known.origin == side.origin:
                 low, high = min(known.low, side.low), max(known.high, side.high)
-                sides[side.variable] = Side(side.variable, low, high, side.origin)
+                sides[side.variable] = DomainSide(side.variable, low, high, side.origin)
     given = Domain(tuple(sides.values()))
     if limits:
         given = limited(given, limits, union(old, new))
@@ -157,9 +157,9 @@ def difference(
         ]
         models = deciding_model(old, titles[0]), deciding_model(new, titles[1])
         pair = _pair(*models, domain)
-        clock.tell("comparing rules", 0.0)
+        clock.report("comparing rules", 0.0)
         found = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
-        clock.tell("comparing decisions", 0.1)
+        clock.report("comparing decisions", 0.1)
         answers, evidence = decisions(pair, rows, settings, clock)
         told = [(grade(one, evidence), one.old, one.new) for one in found]
     changes = [_placed(change, paths, both, files) for change, *paths in told]

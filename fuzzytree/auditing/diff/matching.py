@@ -12,15 +12,15 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from fuzzytree.auditing.engine.contenders import Key
-from fuzzytree.auditing.engine.pieces import Piece, pieces
+from fuzzytree.auditing.engine.contenders import AxisKey
+from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape, shapes_of
 
 How = Literal["same", "class", "curves", "clauses"]
 
 _MOST_LEFT = 400  # rules on either side, of which each two are compared
 
-ClauseKey = tuple[Key, bool, frozenset[int]]
+ClauseKey = tuple[AxisKey, bool, frozenset[int]]
 NamedKey = tuple[str, bool, frozenset[str]]
 
 
@@ -59,7 +59,7 @@ class Curves:
     """Numbers for curves: equal ones for curves of equal degrees everywhere."""
 
     def __init__(self) -> None:
-        self._numbers: dict[tuple[Piece, ...], int] = {}
+        self._numbers: dict[tuple[PolynomialPiece, ...], int] = {}
         self._known: dict[Shape, int] = {}
 
     def number(self, shape: Shape) -> int:
@@ -70,12 +70,14 @@ class Curves:
         return self._known[shape]
 
 
-def _joined(laid: Sequence[Piece]) -> Iterable[Piece]:
+def _joined(laid: Sequence[PolynomialPiece]) -> Iterable[PolynomialPiece]:
     """Yield pieces, neighbours of one formula as one."""
     runs = itertools.groupby(laid, lambda piece: (piece.polynomial, piece.cap))
     for (polynomial, cap), run in runs:
         first, *rest = run
-        yield Piece(first.low, rest[-1].high if rest else first.high, polynomial, cap)
+        yield PolynomialPiece(
+            first.low, rest[-1].high if rest else first.high, polynomial, cap
+        )
 
 
 class RuleKeys:
@@ -91,7 +93,7 @@ class RuleKeys:
         self, rules: RuleBase, curves: Curves, names: Mapping[str, str] | None = None
     ) -> None:
         shapes = shapes_of(rules.variables)
-        keys: dict[str, Key] = {v.name: v.parts or v.name for v in rules.variables}
+        keys: dict[str, AxisKey] = {v.name: v.parts or v.name for v in rules.variables}
         numbers = {place: curves.number(shape) for place, shape in shapes.items()}
         self.rules = rules.rules
         self.names = names or {}

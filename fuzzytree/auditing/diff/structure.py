@@ -17,9 +17,9 @@ from fuzzytree.auditing.diff.matching import (
     matching,
     words_of,
 )
-from fuzzytree.auditing.engine.contenders import Key
+from fuzzytree.auditing.engine.contenders import AxisKey
 from fuzzytree.auditing.engine.domain import Domain, span
-from fuzzytree.auditing.engine.measures import distance
+from fuzzytree.auditing.engine.measures import curve_distance
 from fuzzytree.auditing.engine.states import answer_text, listed
 from fuzzytree.auditing.findings.records import Measure
 from fuzzytree.model.rulebase import (
@@ -305,7 +305,7 @@ def variable_drafts(
         yield from _term_drafts(variable, match, paths, users, curves, ends)
 
 
-def _key(variable: Variable) -> Key:
+def _key(variable: Variable) -> AxisKey:
     return variable.parts or variable.name
 
 
@@ -469,7 +469,7 @@ def _changed_term(
     text = f"the curve of {name} of {variable!r} has changed"
     measures: tuple[Measure, ...] = ()
     if low <= high:
-        found = distance(terms[0].shape, terms[1].shape, low, high)
+        found = curve_distance(terms[0].shape, terms[1].shape, low, high)
         most, at = outwards(found.high)[1], float(found.at)
         text += f", by {most:.3g} at most, near {at:.6g}"
         if not found.high:

@@ -179,7 +179,7 @@ def _sampled(
     asked.append(("domain", low * (1.0 - u) + high * u, drawn))
     left = 0
     for place, (subject, values, how) in enumerate(asked):
-        clock.tell("comparing numbers", place / len(asked))
+        clock.report("comparing numbers", place / len(asked))
         count = values.shape[1]
         if count:
             hits, seen = found.add(values, clock.share(1.0 / (len(asked) - place)))

@@ -21,9 +21,9 @@ import numpy as np
 
 from fuzzytree.auditing.engine.axes import Cells, crossings, cut
 from fuzzytree.auditing.engine.domain import Domain, span, variable_value
-from fuzzytree.auditing.engine.levels import Level, level_at, told_apart
+from fuzzytree.auditing.engine.levels import AlgebraicLevel, level_at, separate_levels
 from fuzzytree.auditing.engine.linear import ZERO
-from fuzzytree.auditing.engine.pieces import ALWAYS, Element, Place, places
+from fuzzytree.auditing.engine.pieces import ALWAYS, ChangePoint, RuleCurve, places
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Variable, shapes_of
@@ -48,7 +48,7 @@ class TooManyCellsError(MemoryError):
     """Curves cross so often that their cells are too many to be kept."""
 
 
-class Axis(msgspec.Struct, frozen=True, eq=False, dict=True):
+class RuleAxis(msgspec.Struct, frozen=True, eq=False, dict=True):
     """What the rules ask of one variable.
 
     Attributes:
@@ -59,11 +59,11 @@ class Axis(msgspec.Struct, frozen=True, eq=False, dict=True):
     """
 
     variable: Variable
-    elements: tuple[Element, ...]
-    asked: tuple[tuple[tuple[int, ...], ...], ...]
+    elements: tuple[RuleCurve, ...]
+    clauses: tuple[tuple[tuple[int, ...], ...], ...]
 
     @functools.cached_property
-    def found(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[ChangePoint, ...]:
         """All places where something changes."""
         return _places(self.elements)
 
@@ -73,7 +73,7 @@ class Axis(msgspec.Struct, frozen=True, eq=False, dict=True):
         return crossings(self.elements)
 
 
-class Laid(NamedTuple):
+class AxisGrid(NamedTuple):
     """An axis on the box.
 
     Attributes:
@@ -90,7 +90,7 @@ class Laid(NamedTuple):
         may_be_zero_at: The same, as far as it can be told.
     """
 
-    axis: Axis
+    axis: RuleAxis
     cells: Cells
     of: IntArray
     of_start: IntArray
@@ -121,7 +121,7 @@ class Bands(NamedTuple):
         return self.low[band + 1] if band + 1 < len(self.low) else Fraction(1)
 
 
-class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
+class Arrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
     """A rule base on a box.
 
     Attributes:
@@ -135,12 +135,12 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     rules: RuleBase
     domain: Domain
-    axes: tuple[Axis, ...]
+    axes: tuple[RuleAxis, ...]
     ends: tuple[tuple[Fraction, Fraction], ...] | None
     is_fine: bool = False
 
     @functools.cached_property
-    def laid(self) -> tuple[tuple[Laid, ...], Bands]:
+    def _grids(self) -> tuple[tuple[AxisGrid, ...], Bands]:
         """The axes on the box, and the critical levels of all of them.
 
         Raises:
@@ -153,9 +153,19 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
             name = axis.variable.name
             if name not in self._cut:  # who comes back after a spent budget goes on
                 self._cut[name] = cut(
-                    axis.elements, axis.found, low, high, is_fine=self.is_fine
+                    axis.elements, axis.places, low, high, is_fine=self.is_fine
                 )
-        return _laid(self.axes, [*self._cut.values()], is_fine=self.is_fine)
+        return _grids_of(self.axes, [*self._cut.values()], is_fine=self.is_fine)
+
+    @property
+    def grids(self) -> tuple[AxisGrid, ...]:
+        """The axes on the box."""
+        return self._grids[0]
+
+    @property
+    def bands(self) -> Bands:
+        """The critical levels of all axes."""
+        return self._grids[1]
 
     @functools.cached_property
     def _cut(self) -> dict[str, Cells]:
@@ -169,26 +179,26 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
         def is_within(counts: Iterator[int]) -> bool:
             size = 0
             for axis, count in zip(self.axes, counts, strict=False):
-                size += (count + 1) * (len(axis.elements) + len(axis.asked))
+                size += (count + 1) * (len(axis.elements) + len(axis.clauses))
                 if size > most:  # the rest is not counted
                     return False
             return True
 
         # Counting takes much less time than finding.
         return is_within(axis.crossings for axis in self.axes) and is_within(
-            len(axis.found) for axis in self.axes
+            len(axis.places) for axis in self.axes
         )
 
     @functools.cached_property
     def near_levels(self) -> tuple[list[float], list[float]]:
         """The lower and the upper ends of all bands, as floats near them."""
-        bands = self.laid[1]
+        bands = self.bands
         return [*map(float, bands.low)], [*map(float, bands.high)]
 
     @functools.cached_property
-    def fine(self) -> Ground:
+    def fine(self) -> Arrangement:
         """The same ground with levels known as fractions."""
-        return Ground(self.rules, self.domain, self.axes, self.ends, is_fine=True)
+        return Arrangement(self.rules, self.domain, self.axes, self.ends, is_fine=True)
 
     def opens(self, variable: str) -> bool:
         """Return whether the lower end of a variable is left out."""
@@ -202,39 +212,35 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
 
 
 @functools.lru_cache(maxsize=4)  # many questions are asked of the same
-def ground(rules: RuleBase, domain: Domain) -> Ground:
+def arrange(rules: RuleBase, domain: Domain) -> Arrangement:
     """Return a rule base made ready for questions on a box.
-
-    Args:
-        rules: The rules.
-        domain: A side for each input, and for combinations that are limited besides.
 
     Raises:
         ValueError: If an input has no side.
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.auditing.engine.domain import Side
+        >>> from fuzzytree.auditing.engine.domain import DomainSide
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1))
-        >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))
-        >>> ground(rules, box).is_empty
+        >>> box = Domain(tuple(DomainSide(name, -1.0, 1.0) for name in rules.inputs))
+        >>> arrange(rules, box).is_empty
         False
     """
     missing = [name for name in rules.inputs if domain.side(name) is None]
     if missing:
         raise ValueError(f"the domain has no side for {missing[0]!r}")
     axes = _axes(rules)
-    return Ground(rules, domain, axes, _ends(axes, domain))
+    return Arrangement(rules, domain, axes, _ends(axes, domain))
 
 
-def narrowed(given: Ground, domain: Domain) -> Ground:
+def restricted(base: Arrangement, domain: Domain) -> Arrangement:
     """Return the same rules on another box; the axes' places are kept."""
-    return Ground(given.rules, domain, given.axes, _ends(given.axes, domain))
+    return Arrangement(base.rules, domain, base.axes, _ends(base.axes, domain))
 
 
 def _ends(
-    axes: Sequence[Axis], domain: Domain
+    axes: Sequence[RuleAxis], domain: Domain
 ) -> tuple[tuple[Fraction, Fraction], ...] | None:
     ends: list[tuple[Fraction, Fraction]] = []
     for axis in axes:
@@ -249,26 +255,29 @@ _places = functools.lru_cache(maxsize=1 << 12)(places)
 
 
 @functools.lru_cache(maxsize=64)
-def _axes(rules: RuleBase) -> tuple[Axis, ...]:
+def _axes(rules: RuleBase) -> tuple[RuleAxis, ...]:
     shapes = shapes_of(rules.variables)
-    made: list[Axis] = []
+    items: list[RuleAxis] = []
     for variable in rules.variables:
-        elements: dict[Element, int] = {Element(ALWAYS): 0}
-        asked = tuple(
-            _asked(variable.name, rule.when, shapes, elements) for rule in rules.rules
+        elements: dict[RuleCurve, int] = {RuleCurve(ALWAYS): 0}
+        clauses = tuple(
+            _clauses_on(variable.name, rule.when, shapes, elements)
+            for rule in rules.rules
         )
         is_last = variable is rules.variables[-1]
-        if any(asked) or (is_last and not made):  # rules that ask nothing have one too
+        if any(clauses) or (
+            is_last and not items
+        ):  # rules that ask nothing have one too
             of = tuple(elements)
-            made.append(Axis(variable, of, asked))
-    return tuple(made)
+            items.append(RuleAxis(variable, of, clauses))
+    return tuple(items)
 
 
-def _asked(
+def _clauses_on(
     variable: str,
     when: Sequence[Clause],
     shapes: Mapping[tuple[str, str], object],
-    elements: dict[Element, int],
+    elements: dict[RuleCurve, int],
 ) -> tuple[tuple[int, ...], ...]:
     """Return what a rule asks of a variable: the least of the largest of elements."""
     checkpoint()
@@ -278,7 +287,7 @@ def _asked(
             continue
         of = [
             elements.setdefault(
-                Element(shapes[variable, term], clause.negated),  # type: ignore[arg-type]
+                RuleCurve(shapes[variable, term], clause.negated),  # type: ignore[arg-type]
                 len(elements),
             )
             for term in clause.terms
@@ -288,9 +297,9 @@ def _asked(
     return tuple(groups)
 
 
-def _laid(
-    axes: Sequence[Axis], cells: Sequence[Cells], *, is_fine: bool
-) -> tuple[tuple[Laid, ...], Bands]:
+def _grids_of(
+    axes: Sequence[RuleAxis], cells: Sequence[Cells], *, is_fine: bool
+) -> tuple[tuple[AxisGrid, ...], Bands]:
     if not axes:  # rules that ask nothing, and have a strength of 1
         one = [Fraction(1)]
         return (), Bands(one, one, np.array([True]))
@@ -300,9 +309,9 @@ def _laid(
     high = np.concatenate([[0.0], *(side[1].ravel() for side in ends)])
     band, bands = _bands(low, high)
     if is_fine:
-        sure = told_apart(band, low, high, partial(_level, axes, cells))
+        sure = separate_levels(band, low, high, partial(_level, axes, cells))
         band, bands = _bands(low, high, sure)
-    made: list[Laid] = []
+    items: list[AxisGrid] = []
     start = 1
     for axis, of in zip(axes, cells, strict=True):
         size = of.left[0].size
@@ -312,8 +321,8 @@ def _laid(
         )
         start += 2 * size
         ends_of_cells = right[:, :-1], left[:, 1:]
-        made.append(
-            Laid(
+        items.append(
+            AxisGrid(
                 axis,
                 of,
                 _chosen(axis, of.rank),
@@ -327,7 +336,7 @@ def _laid(
                 of.left[0] == 0,
             )
         )
-    return tuple(made), bands
+    return tuple(items), bands
 
 
 def _bands(
@@ -355,8 +364,8 @@ def _bands(
 
 
 def _level(
-    axes: Sequence[Axis], cells: Sequence[Cells], number: int
-) -> Level | Fraction | None:
+    axes: Sequence[RuleAxis], cells: Sequence[Cells], number: int
+) -> AlgebraicLevel | Fraction | None:
     """Return a critical level by its number: 0, then all of each axis and side."""
     number -= 1
     for axis, of in zip(axes, cells, strict=True):
@@ -368,18 +377,18 @@ def _level(
                 return Fraction((of.right if number >= size else of.left)[0, row, zone])
             if of.is_vague[zone]:
                 return None
-            found = axis.found or ()  # they were cut there
-            place = found[bisect_right(found, low, key=lambda one: one.low) - 1]
+            result = axis.places or ()  # they were cut there
+            place = result[bisect_right(result, low, key=lambda one: one.low) - 1]
             return level_at(axis.elements[row], place, low, high)
         number -= 2 * size
     return Fraction(0)
 
 
-def _chosen(axis: Axis, rank: IntArray) -> IntArray:
+def _chosen(axis: RuleAxis, rank: IntArray) -> IntArray:
     """Return which element is each rule's degree, given the order in some cells."""
-    chosen = np.zeros((len(axis.asked), len(rank)), dtype=np.int64)
+    chosen = np.zeros((len(axis.clauses), len(rank)), dtype=np.int64)
     every = np.arange(len(rank))
-    for number, groups in enumerate(axis.asked):
+    for number, groups in enumerate(axis.clauses):
         checkpoint()
         best: IntArray | None = None
         for group in groups:
@@ -395,20 +404,9 @@ def _chosen(axis: Axis, rank: IntArray) -> IntArray:
     return chosen
 
 
-def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]:
-    """Return every rule's exact strength at a point of the inputs.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.auditing.engine.domain import Side
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(1))
-        >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))
-        >>> point = dict.fromkeys(rules.inputs, Fraction(1, 3))
-        >>> max(strengths_at(ground(rules, box), point))
-        Fraction(1, 1)
-    """
-    return rule_strengths(given.rules, point)
+def strengths_at(base: Arrangement, point: Mapping[str, Fraction]) -> list[Fraction]:
+    """Return every rule's exact strength at a point of the inputs."""
+    return rule_strengths(base.rules, point)
 
 
 def rule_strengths(
@@ -420,17 +418,17 @@ def rule_strengths(
     is_product = rules.semantics.conjunction == "product"
     shapes = shapes_of(rules.variables)
     clauses = dict.fromkeys(c for rule in every for c in rule.when)
-    asked = {clause.variable for clause in clauses}
+    used = {clause.variable for clause in clauses}
     values = {
-        v.name: variable_value(v, point) for v in rules.variables if v.name in asked
+        v.name: variable_value(v, point) for v in rules.variables if v.name in used
     }
     degrees: dict[Clause, Fraction] = {}
     for clause in clauses:
         value = values[clause.variable]
-        found = max(
+        result = max(
             exact_degree(shapes[clause.variable, t], value) for t in clause.terms
         )
-        degrees[clause] = 1 - found if clause.negated else found
+        degrees[clause] = 1 - result if clause.negated else result
     one = Fraction(1)
     each = [[degrees[clause] for clause in rule.when] for rule in every]
     if is_product:
@@ -441,7 +439,7 @@ def rule_strengths(
 # --- predictions at a point
 
 
-class Answered(NamedTuple):
+class ExactPrediction(NamedTuple):
     """What a rule base says at a point, exactly.
 
     Attributes:
@@ -458,32 +456,32 @@ class Answered(NamedTuple):
     margin: Fraction
 
 
-def answer_at(rules: RuleBase, point: Mapping[str, Fraction]) -> Answered:
+def prediction_at(rules: RuleBase, point: Mapping[str, Fraction]) -> ExactPrediction:
     """Return what a rule base says at a point that need not be of doubles.
 
     Example:
         >>> from fuzzytree.model.rulebase import Rule
-        >>> answer_at(RuleBase("a", ("x",), (), (Rule((), "x"),)), {}).label
+        >>> prediction_at(RuleBase("a", ("x",), (), (Rule((), "x"),)), {}).label
         'x'
     """
     strengths = rule_strengths(rules, point)
     best = max(strengths)
     if best == 0:
-        return Answered(rules.semantics.uncovered, 0, False, ZERO)
+        return ExactPrediction(rules.semantics.uncovered, 0, False, ZERO)
     winner = strengths.index(best)
     label = rules.rules[winner].then
     others = [
         s for s, rule in zip(strengths, rules.rules, strict=True) if rule.then != label
     ]
     margin = best - max(others, default=ZERO)
-    return Answered(label, winner + 1, strengths.count(best) > 1, margin)
+    return ExactPrediction(label, winner + 1, strengths.count(best) > 1, margin)
 
 
 def difference_at(
     old: RuleBase, new: RuleBase, point: Mapping[str, Fraction]
 ) -> Witness | None:
     """Return a point as a witness that two rule bases answer otherwise there, if so."""
-    one, other = answer_at(old, point), answer_at(new, point)
+    one, other = prediction_at(old, point), prediction_at(new, point)
     if one.label == other.label:
         return None
     return Witness(

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.pieces import ONE, ZERO, Element, Place, pieces
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, ChangePoint, RuleCurve, pieces
 from fuzzytree.auditing.engine.polynomials import (
     Root,
     composed,
@@ -83,8 +83,8 @@ class Cells(NamedTuple):
 
 
 def cut(
-    elements: Sequence[Element],
-    found: Iterable[Place],
+    elements: Sequence[RuleCurve],
+    result: Iterable[ChangePoint],
     low: Fraction,
     high: Fraction,
     *,
@@ -92,15 +92,10 @@ def cut(
 ) -> Cells:
     """Return an axis between two ends, cut at places.
 
-    Args:
-        elements: The curves on the axis.
-        found: All places where they change.
-        low: The lower end.
-        high: The upper end, not below the lower one.
-        is_fine: Whether bounds of values are fractions, narrow without limit, instead
-            of doubles.
+    `high`: the upper end, not below the lower one; `is_fine`: whether bounds of values
+    are fractions, narrow without limit, instead of doubles.
     """
-    zones, is_vague = _zones(found, low, high, is_fine=is_fine)
+    zones, is_vague = _zones(result, low, high, is_fine=is_fine)
     rank, is_zero = _ranks(elements, zones)
     start = _order([element.degree(low) for element in elements])
     left, right = (_fine_values if is_fine else _values)(elements, zones)
@@ -118,12 +113,12 @@ def cut(
 
 
 def _zones(
-    found: Iterable[Place], low: Fraction, high: Fraction, *, is_fine: bool
+    result: Iterable[ChangePoint], low: Fraction, high: Fraction, *, is_fine: bool
 ) -> tuple[tuple[tuple[Fraction, Fraction], ...], BoolArray]:
     within: list[tuple[Fraction, Fraction, bool]] = [(low, low, False)]
     if low < high:
         within.append((high, high, False))
-    for place in found:
+    for place in result:
         if place.high <= low or place.low >= high:
             continue
         if _is_at(place, low) or _is_at(place, high):
@@ -147,7 +142,7 @@ def _zones(
     return zones, np.array([is_vague for _, _, is_vague in merged])
 
 
-def _is_at(place: Place, end: Fraction) -> bool:
+def _is_at(place: ChangePoint, end: Fraction) -> bool:
     """Return whether a place that is known within bounds is an end, exactly."""
     if place.of is None or not place.low <= end <= place.high:
         return False
@@ -166,7 +161,7 @@ def _bits(root: Root) -> int:
 
 
 def _ranks(
-    elements: Sequence[Element], zones: Sequence[tuple[Fraction, Fraction]]
+    elements: Sequence[RuleCurve], zones: Sequence[tuple[Fraction, Fraction]]
 ) -> tuple[IntArray, BoolArray]:
     """Return the order of elements in each cell, and which are 0 in it.
 
@@ -187,12 +182,12 @@ def _ranks(
     ranks = np.zeros((len(points), len(elements)), dtype=np.int64)
     for cell, point in enumerate(points):
         if is_double[cell]:
-            given = _order_of_bounds(low[:, cell], high[:, cell], order[:, cell])
+            order_here = _order_of_bounds(low[:, cell], high[:, cell], order[:, cell])
         else:
-            given = None
-        if given is None:
-            given = _order([element.degree(point) for element in elements])
-        ranks[cell] = given
+            order_here = None
+        if order_here is None:
+            order_here = _order([element.degree(point) for element in elements])
+        ranks[cell] = order_here
     is_zero = (high == 0.0) & is_double
     for row, cell in np.argwhere((low == 0.0) & ~is_zero | ~is_double).tolist():
         is_zero[row, cell] = elements[row].degree(points[cell]) == 0
@@ -200,7 +195,7 @@ def _ranks(
 
 
 def _zeros_at(
-    elements: Sequence[Element],
+    elements: Sequence[RuleCurve],
     zones: Sequence[tuple[Fraction, Fraction]],
     left: Values,
 ) -> BoolArray:
@@ -242,14 +237,14 @@ def _order(values: Sequence[Fraction]) -> list[int]:
 # --- values at zones
 
 
-def _enclosed(element: Element, x: FloatArray, slack: FloatArray | None) -> Enclosure:
+def _enclosed(element: RuleCurve, x: FloatArray, slack: FloatArray | None) -> Enclosure:
     checkpoint()
-    found = degree_enclosure(element.shape, Value(x, slack))
-    return clause_enclosure(Clause("", ("",), element.is_complement), [found])
+    result = degree_enclosure(element.shape, Value(x, slack))
+    return clause_enclosure(Clause("", ("",), element.is_complement), [result])
 
 
 def _values(
-    elements: Sequence[Element], zones: Sequence[tuple[Fraction, Fraction]]
+    elements: Sequence[RuleCurve], zones: Sequence[tuple[Fraction, Fraction]]
 ) -> tuple[Values, Values]:
     left = np.zeros((2, len(elements), len(zones)))
     exact = np.array([Fraction(float(a)) == b for a, b in zones])
@@ -276,16 +271,16 @@ def _values(
 @functools.lru_cache(maxsize=1 << 12)
 def _steps(shape: Shape) -> tuple[Fraction, ...]:
     """Return the values at which a shape is not continuous."""
-    laid = pieces(shape)
+    parts = pieces(shape)
     return tuple(
         a.high
-        for a, b in itertools.pairwise(laid)
+        for a, b in itertools.pairwise(parts)
         if a.high is not None and a.degree(a.high) != b.degree(a.high)
     )
 
 
 def _fine_values(
-    elements: Sequence[Element], zones: Sequence[tuple[Fraction, Fraction]]
+    elements: Sequence[RuleCurve], zones: Sequence[tuple[Fraction, Fraction]]
 ) -> tuple[Values, Values]:
     shape = (2, len(elements), len(zones))
     left, right = np.empty(shape, dtype=object), np.empty(shape, dtype=object)
@@ -301,7 +296,7 @@ def _fine_values(
 
 
 def _range(
-    element: Element, low: Fraction, high: Fraction
+    element: RuleCurve, low: Fraction, high: Fraction
 ) -> tuple[Fraction, Fraction]:
     """Return bounds of a curve's values on a narrow closed interval."""
     ends: list[Fraction] = []
@@ -326,7 +321,7 @@ _NEAR = 1e-12  # degrees that may be equal, but for rounding
 _STEPS = 256  # between the first and the last end of a piece
 
 
-def crossings(elements: Sequence[Element]) -> int:
+def crossings(elements: Sequence[RuleCurve]) -> int:
     """Return how often curves cross at least, as far as some points show it.
 
     Pairs that change their order from one point to the next are counted. Few curves are
@@ -335,7 +330,7 @@ def crossings(elements: Sequence[Element]) -> int:
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> lines = [Points((0.0, 1.0), (k / 98, 1.0 - k / 98)) for k in range(99)]
-        >>> crossings([Element(line) for line in lines])
+        >>> crossings([RuleCurve(curve_axis) for curve_axis in lines])
         4851
     """
     if len(elements) < _FEW:
@@ -353,8 +348,8 @@ def crossings(elements: Sequence[Element]) -> int:
     x = np.quantile(sorted(ends), np.linspace(0.0, 1.0, _STEPS))
     degrees = np.empty((len(elements), len(x)))
     for row, element in enumerate(elements):
-        found = degree_enclosure(element.shape, Value(x, None)).low
-        degrees[row] = 1.0 - found if element.is_complement else found
+        result = degree_enclosure(element.shape, Value(x, None)).low
+        degrees[row] = 1.0 - result if element.is_complement else result
     count = 0
     for row in range(1, len(elements)):
         checkpoint()

@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Ground, ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import Arrangement, arrange, strengths_at
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Point
-from fuzzytree.auditing.engine.space import Pair, Seen, Space
+from fuzzytree.auditing.engine.space import BoxReach, RulePair, Space
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -49,7 +49,7 @@ _MOST_PARTS = 24_000_000  # of inputs, in all boxes that wait
 _TRIES = 4  # middles of boxes that are evaluated exactly, for each batch
 
 
-class Verdict(NamedTuple):
+class BoxVerdict(NamedTuple):
     """What boxes can reach.
 
     Attributes:
@@ -63,7 +63,7 @@ class Verdict(NamedTuple):
     worth: FloatArray
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The result of a search for the largest value of something.
 
     Attributes:
@@ -83,7 +83,7 @@ class Found(NamedTuple):
 
 def search(
     space: Space,
-    judge: Callable[[Seen, IntArray], Verdict],
+    judge: Callable[[BoxReach, IntArray], BoxVerdict],
     exact: Callable[[Point], tuple[Fraction, Point] | None],
     clock: Clock,
     *,
@@ -92,7 +92,7 @@ def search(
     patience: int = 0,
     limit: float = math.inf,
     is_first_enough: bool = False,
-) -> Found:
+) -> SearchResult:
     """Return the largest value of something on a domain, within bounds.
 
     Args:
@@ -109,8 +109,8 @@ def search(
     best, point = floor, None
     most = min(_MOST_BOXES, _MOST_PARTS // len(space.lines))
     if space.root_count > most:
-        return Found(None, floor, math.inf, 0, TOO_MANY)
-    size = len(space.lines) * len(space.lines[0].asked.rules)
+        return SearchResult(None, floor, math.inf, 0, TOO_MANY)
+    size = len(space.lines) * len(space.lines[0].use.rules)
     batch = min(_BATCH, max(_MOST_SEEN // size, 64))
     boxes = space.roots()
     new, verdict = len(boxes), judge(space.look(boxes), boxes)
@@ -120,12 +120,12 @@ def search(
         for row in np.argsort(-verdict.value[:new], kind="stable")[:_TRIES].tolist():
             if not verdict.value[row] >= float(best):
                 break
-            found = exact(space.point(boxes[row]))
-            if found is not None and found[0] > best:
-                best, point = found
+            result = exact(space.point(boxes[row]))
+            if result is not None and result[0] > best:
+                best, point = result
         threshold = outwards(best)[0]
         kept = verdict.bound > threshold
-        boxes, verdict = boxes[kept], Verdict(*(one[kept] for one in verdict))
+        boxes, verdict = boxes[kept], BoxVerdict(*(one[kept] for one in verdict))
         bound = max(float(np.max(verdict.bound, initial=-math.inf)), stuck)
         why = None
         if point is not None and is_first_enough:
@@ -141,7 +141,7 @@ def search(
         elif looked > limit or len(boxes) > most:
             why = TOO_MANY
         if why is not None:
-            return Found(point, best, max(bound, outwards(best)[1]), looked, why)
+            return SearchResult(point, best, max(bound, outwards(best)[1]), looked, why)
         chosen = _highest(verdict.bound, batch)
         taken, rest = boxes[chosen], np.ones(len(boxes), dtype=bool)
         rest[chosen] = False
@@ -155,7 +155,7 @@ def search(
         new = len(children)
         looked += new
         boxes = np.concatenate([children, boxes[rest]])
-        verdict = Verdict(
+        verdict = BoxVerdict(
             *(np.concatenate([a, b[rest]]) for a, b in zip(below, verdict, strict=True))
         )
 
@@ -166,11 +166,11 @@ def _highest(bound: FloatArray, count: int) -> IntArray:
     return np.argpartition(-bound, count)[:count]
 
 
-def filled(given: Ground, point: Mapping[str, Fraction]) -> Point:
+def filled(base: Arrangement, point: Mapping[str, Fraction]) -> Point:
     """Return a point with the middle of the domain for inputs that do not matter."""
     whole: Point = {}
-    for name in given.rules.inputs:
-        side = given.domain.side(name)
+    for name in base.rules.inputs:
+        side = base.domain.side(name)
         assert side is not None  # checked when the ground was made
         middle = Fraction(side.low * 0.5 + side.high * 0.5)
         whole[name] = point.get(name, middle)
@@ -178,10 +178,10 @@ def filled(given: Ground, point: Mapping[str, Fraction]) -> Point:
 
 
 def simplified(
-    given: Ground, point: Mapping[str, Fraction], holds: Callable[[Point], bool]
+    base: Arrangement, point: Mapping[str, Fraction], holds: Callable[[Point], bool]
 ) -> Point:
     """Return a point of few digits near another one at which something holds."""
-    sides = [given.domain.side(name) for name in point]
+    sides = [base.domain.side(name) for name in point]
     for digits in range(1, 17):
         near: Point = {}
         for (name, value), side in zip(point.items(), sides, strict=True):
@@ -190,7 +190,7 @@ def simplified(
             places = digits - math.floor(math.log10(span)) - 1 if span > 0.0 else 0
             rough = round(float(value), min(places, 320))
             near[name] = Fraction(min(max(rough, side.low), side.high))
-        if is_within(given, near) and holds(near):
+        if is_within(base, near) and holds(near):
             return near
     return dict(point)
 
@@ -219,36 +219,19 @@ def wins_by_boxes(
 ) -> State:
     """Return whether a rule is somewhere stronger than each of some others.
 
-    Args:
-        rules: The rules.
-        domain: Where it is asked.
-        rule: The number of the rule, from 1.
-        rivals: The numbers of the others; without any it is asked whether the rule
-            fires at all.
-        clock: How much time there is; no limit unless given.
-        tolerance: A lead that is for certain no larger than this is not sought on.
+    `tolerance`: A lead that is for certain no larger than this is not sought on.
 
     Returns:
         `Proved`: it never is. `Witness`: it is, at a point that was evaluated in
         fractions. `Bracket`: the largest lead is between these.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.auditing.engine.domain import Side
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(1), conjunction="product")
-        >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
-        >>> found = wins_by_boxes(rules, box, 1, {2, 3})
-        >>> found.claims[0].kind, found.claims[0].rivals
-        ('beats', (2, 3))
     """
     lead = _Lead(rules, domain, rule, rivals)
-    found = lead.search(clock or Clock(), tolerance, is_first_enough=True)
-    if found.point is not None:
-        return lead.witness(found.point)
-    if not found.why:
-        return Proved(_why(found))
-    return lead.bracket(found)
+    result = lead.search(clock or Clock(), tolerance, is_first_enough=True)
+    if result.point is not None:
+        return lead.witness(result.point)
+    if not result.why:
+        return Proved(_why(result))
+    return lead.bracket(result)
 
 
 def largest_lead_by_boxes(
@@ -262,13 +245,7 @@ def largest_lead_by_boxes(
 ) -> Bracket:
     """Return by how much, at most, a rule is stronger than each of some others.
 
-    Args:
-        rules: The rules.
-        domain: Where it is asked.
-        rule: The number of the rule, from 1.
-        rivals: The numbers of the others.
-        clock: How much time there is; no limit unless given.
-        tolerance: How near the bracket's ends should come to each other.
+    `tolerance`: how near the bracket's ends should come to each other.
 
     Returns:
         A bracket; both ends are 0 for a rule that never is.
@@ -284,15 +261,15 @@ class _Lead:
         self, rules: RuleBase, domain: Domain, rule: int, rivals: Collection[int]
     ) -> None:
         self.rule, self.rivals = rule, tuple(sorted(rivals))
-        self.given = ground(rules, domain)
+        self.base = arrange(rules, domain)
         self.chosen = (rule - 1, *(number - 1 for number in self.rivals))
-        self.pairs = [Pair(rule - 1, other) for other in self.chosen[1:]]
-        self.space = Space(self.given, self.chosen, self.pairs)
+        self.pairs = [RulePair(rule - 1, other) for other in self.chosen[1:]]
+        self.space = Space(self.base, self.chosen, self.pairs)
 
     def search(
         self, clock: Clock, tolerance: float, *, is_first_enough: bool = False
-    ) -> Found:
-        def run(limit: float) -> Found:
+    ) -> SearchResult:
+        def run(limit: float) -> SearchResult:
             return search(
                 self.space,
                 self._judge,
@@ -308,16 +285,16 @@ class _Lead:
         first = run(_EASY)
         if first.why != TOO_MANY:
             return first
-        self.space = Space(self.given, self.chosen, self.pairs, is_ordered=True)
-        found = run(math.inf)
-        return found._replace(boxes=first.boxes + found.boxes)
+        self.space = Space(self.base, self.chosen, self.pairs, is_ordered=True)
+        result = run(math.inf)
+        return result._replace(boxes=first.boxes + result.boxes)
 
-    def _judge(self, seen: Seen, boxes: IntArray) -> Verdict:
+    def _judge(self, reach: BoxReach, boxes: IntArray) -> BoxVerdict:
         del boxes
-        table = seen.table
+        table = reach.table
         high = table.high[:, 0]
         if not self.rivals:
-            bound, worth = high, np.stack([w[:, 0] for w in seen.widths], axis=1)
+            bound, worth = high, np.stack([w[:, 0] for w in reach.widths], axis=1)
         else:
             bound = np.min(high[:, np.newaxis] - table.low[:, 1:], axis=1)
             bound *= 1.0 + 4 * U
@@ -333,46 +310,46 @@ class _Lead:
                 bound = np.minimum(bound, (high - most) * (1.0 + 4 * U))
             bound = np.where(is_over, -np.inf, bound)
             is_open = table.least <= 1.0
-            parts = zip(seen.spreads, seen.widths, strict=True)
+            parts = zip(reach.spreads, reach.widths, strict=True)
             worth = np.stack(
                 [(s * is_open).sum(axis=1) + w[:, 0] for s, w in parts], axis=1
             )
         value = table.at[:, 0] - table.at[:, 1:].max(axis=1, initial=0.0)
-        is_over = (high == 0.0) | seen.is_empty
-        return Verdict(np.where(is_over, -np.inf, bound), value, worth)
+        is_over = (high == 0.0) | reach.is_empty
+        return BoxVerdict(np.where(is_over, -np.inf, bound), value, worth)
 
     def lead(self, point: Mapping[str, Fraction]) -> Fraction:
-        strengths = strengths_at(self.given, point)
+        strengths = strengths_at(self.base, point)
         best = max((strengths[n - 1] for n in self.rivals), default=Fraction(0))
         return strengths[self.rule - 1] - best
 
     def _exact(self, point: Point) -> tuple[Fraction, Point] | None:
-        whole = filled(self.given, point)
-        return (self.lead(whole), whole) if is_within(self.given, whole) else None
+        whole = filled(self.base, point)
+        return (self.lead(whole), whole) if is_within(self.base, whole) else None
 
     def claims(self) -> tuple[Claim, ...]:
         return (Claim("beats", rules=(self.rule,), rivals=self.rivals),)
 
     def witness(self, point: Point) -> Witness:
         least = self.lead(point) / 2
-        plain = simplified(self.given, point, lambda p: self.lead(p) >= least)
+        plain = simplified(self.base, point, lambda p: self.lead(p) >= least)
         return Witness(coordinates(plain), self.claims())
 
-    def bracket(self, found: Found) -> Bracket:
-        has_point = found.point is not None
+    def bracket(self, result: SearchResult) -> Bracket:
+        has_point = result.point is not None
         return Bracket(
             f"the largest lead of rule {self.rule}",
-            max(outwards(found.value)[0], 0.0),
-            min(max(found.bound, 0.0), 1.0),
-            _why(found),
-            coordinates(found.point or {}),
+            max(outwards(result.value)[0], 0.0),
+            min(max(result.bound, 0.0), 1.0),
+            _why(result),
+            coordinates(result.point or {}),
             self.claims() if has_point else (),
         )
 
 
-def _why(found: Found) -> str:
-    text = f"{counted(found.boxes, 'box', 'boxes')} visited"
-    return f"{found.why}: {text}" if found.why else f"{text}, none is left"
+def _why(result: SearchResult) -> str:
+    text = f"{counted(result.boxes, 'box', 'boxes')} visited"
+    return f"{result.why}: {text}" if result.why else f"{text}, none is left"
 
 
 # --- the strongest rule where it is weakest
@@ -387,11 +364,7 @@ def least_cover_by_boxes(
 ) -> Bracket:
     """Return how strong the strongest rule is where that is least.
 
-    Args:
-        rules: The rules.
-        domain: Where it is asked.
-        clock: How much time there is; no limit unless given.
-        tolerance: How near the bracket's ends should come to each other.
+    `tolerance`: how near the bracket's ends should come to each other.
 
     Returns:
         A bracket; its point is where the strongest rule is as weak as `high`.
@@ -408,11 +381,7 @@ def below_by_boxes(
 ) -> State:
     """Return whether all rules are somewhere weaker than a level; 0 asks for none.
 
-    Args:
-        rules: The rules.
-        domain: Where it is asked.
-        epsilon: The level, in [0, 1]. For 0 it is asked whether no rule fires.
-        clock: How much time there is; no limit unless given.
+    `epsilon`: the level, in [0, 1]. For 0 it is asked whether no rule fires.
 
     Returns:
         `Proved`: some rule reaches the level everywhere. `Witness`: none does here.
@@ -421,12 +390,12 @@ def below_by_boxes(
     level = Fraction(epsilon)
     cover = _Cover(rules, domain, is_zero_wanted=not level)
     floor = -level if level else Fraction(-1, 2**1100)
-    found = cover.search(clock or Clock(), floor, 0.0, is_first_enough=True)
-    if found.point is not None:
-        return cover.witness(found.point, level)
-    if not found.why:
-        return Proved(_why(found))
-    return cover.bracket(found)
+    result = cover.search(clock or Clock(), floor, 0.0, is_first_enough=True)
+    if result.point is not None:
+        return cover.witness(result.point, level)
+    if not result.why:
+        return Proved(_why(result))
+    return cover.bracket(result)
 
 
 class _Cover:
@@ -435,9 +404,9 @@ class _Cover:
     def __init__(
         self, rules: RuleBase, domain: Domain, *, is_zero_wanted: bool = False
     ) -> None:
-        self.given = ground(rules, domain)
+        self.base = arrange(rules, domain)
         self.numbers = tuple(range(1, len(rules.rules) + 1))
-        self.space = Space(self.given, range(len(rules.rules)))
+        self.space = Space(self.base, range(len(rules.rules)))
         self.is_zero_wanted = is_zero_wanted
 
     def search(
@@ -447,7 +416,7 @@ class _Cover:
         tolerance: float,
         *,
         is_first_enough: bool = False,
-    ) -> Found:
+    ) -> SearchResult:
         return search(
             self.space,
             self._judge,
@@ -458,40 +427,40 @@ class _Cover:
             is_first_enough=is_first_enough,
         )
 
-    def _judge(self, seen: Seen, boxes: IntArray) -> Verdict:
+    def _judge(self, reach: BoxReach, boxes: IntArray) -> BoxVerdict:
         rows = np.arange(len(boxes))
-        strongest = seen.table.at.argmax(axis=1)
-        bound = np.where(seen.is_empty, -np.inf, -seen.table.low.max(axis=1))
-        worth = np.stack([width[rows, strongest] for width in seen.widths], axis=1)
-        return Verdict(bound, -seen.table.at[rows, strongest], worth)
+        strongest = reach.table.at.argmax(axis=1)
+        bound = np.where(reach.is_empty, -np.inf, -reach.table.low.max(axis=1))
+        worth = np.stack([width[rows, strongest] for width in reach.widths], axis=1)
+        return BoxVerdict(bound, -reach.table.at[rows, strongest], worth)
 
     def strongest(self, point: Mapping[str, Fraction]) -> Fraction:
-        return max(strengths_at(self.given, point))
+        return max(strengths_at(self.base, point))
 
     def _exact(self, point: Point) -> tuple[Fraction, Point] | None:
-        whole = filled(self.given, point)
-        if not is_within(self.given, whole):
+        whole = filled(self.base, point)
+        if not is_within(self.base, whole):
             return None
-        found = self.strongest(whole)
-        return None if self.is_zero_wanted and found else (-found, whole)
+        result = self.strongest(whole)
+        return None if self.is_zero_wanted and result else (-result, whole)
 
     def witness(self, point: Point, level: Fraction) -> Witness:
         def holds(near: Point) -> bool:
-            found = self.strongest(near)
-            return found < level if level else not found
+            result = self.strongest(near)
+            return result < level if level else not result
 
         claims = (Claim("below", rules=self.numbers, level=str(level)),)
-        return Witness(coordinates(simplified(self.given, point, holds)), claims)
+        return Witness(coordinates(simplified(self.base, point, holds)), claims)
 
-    def bracket(self, found: Found) -> Bracket:
-        point = found.point or filled(self.given, {})
-        is_known = found.point is not None or is_within(self.given, point)
+    def bracket(self, result: SearchResult) -> Bracket:
+        point = result.point or filled(self.base, {})
+        is_known = result.point is not None or is_within(self.base, point)
         high = self.strongest(point) if is_known else Fraction(1)
         return Bracket(
             "the strength of the strongest rule where it is weakest",
-            min(max(-found.bound, 0.0), 1.0),
+            min(max(-result.bound, 0.0), 1.0),
             outwards(high)[1],
-            _why(found),
+            _why(result),
             coordinates(point) if is_known else (),
         )
 
@@ -510,33 +479,27 @@ def highest_by_boxes(
 ) -> Bracket:
     """Return the highest level that two rules reach at the same input.
 
-    Args:
-        rules: The rules.
-        domain: Where it is asked.
-        one: The number of a rule, from 1.
-        other: The number of another one.
-        clock: How much time there is; no limit unless given.
-        tolerance: How near the bracket's ends should come to each other.
+    `tolerance`: how near the bracket's ends should come to each other.
 
     Returns:
         A bracket; its point is where both reach `low`.
     """
-    given = ground(rules, domain)
-    space = Space(given, (one - 1, other - 1))
+    base = arrange(rules, domain)
+    space = Space(base, (one - 1, other - 1))
 
-    def judge(seen: Seen, boxes: IntArray) -> Verdict:
+    def judge(reach: BoxReach, boxes: IntArray) -> BoxVerdict:
         del boxes
-        bound = np.where(seen.is_empty, -np.inf, seen.table.high.min(axis=1))
-        worth = np.stack([width.sum(axis=1) for width in seen.widths], axis=1)
-        return Verdict(bound, seen.table.at.min(axis=1), worth)
+        bound = np.where(reach.is_empty, -np.inf, reach.table.high.min(axis=1))
+        worth = np.stack([width.sum(axis=1) for width in reach.widths], axis=1)
+        return BoxVerdict(bound, reach.table.at.min(axis=1), worth)
 
     def exact(point: Point) -> tuple[Fraction, Point] | None:
-        whole = filled(given, point)
-        strengths = strengths_at(given, whole)
+        whole = filled(base, point)
+        strengths = strengths_at(base, whole)
         both = min(strengths[one - 1], strengths[other - 1])
-        return (both, whole) if is_within(given, whole) else None
+        return (both, whole) if is_within(base, whole) else None
 
-    found = search(
+    result = search(
         space,
         judge,
         exact,
@@ -544,12 +507,12 @@ def highest_by_boxes(
         floor=Fraction(0),
         tolerance=tolerance,
     )
-    reached = Claim("reaches", rules=(one, other), level=str(found.value))
+    reached = Claim("reaches", rules=(one, other), level=str(result.value))
     return Bracket(
         f"the highest level that rules {one} and {other} both reach",
-        outwards(found.value)[0],
-        min(found.bound, 1.0),
-        _why(found),
-        coordinates(found.point or {}),
-        (reached,) if found.point is not None else (),
+        outwards(result.value)[0],
+        min(result.bound, 1.0),
+        _why(result),
+        coordinates(result.point or {}),
+        (reached,) if result.point is not None else (),
     )

@@ -1,4 +1,4 @@
-"""A budget of time: who works long asks it between two steps."""
+"""A budget of time, checked between the steps of long work."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from typing import Final
 from fuzzytree.model.interrupts import watched
 
 GRACE_S: Final = 0.25
-"""For who asked the clock to tell what is known."""
+"""Seconds beyond the budget in which a caller can return what is known."""
 
 Progress = Callable[[str, float], None]
 
 
 class OutOfTimeError(Exception):
-    """The budget is spent; whoever catches it keeps what is proved so far."""
+    """The budget is spent; what was proved before it remains valid."""
 
 
 class Clock:
-    """Counts down a budget, and tells how far the work is.
+    """Counts down a budget, and reports progress.
 
     Args:
         budget_s: Seconds from now; infinite unless given.
-        tell: Told what is being done and which share of all is done, in [0, 1].
+        report: Called with the current step and the share of all work, in [0, 1].
         now: A clock in seconds that never goes back.
 
     Raises:
@@ -39,14 +39,14 @@ class Clock:
         self,
         budget_s: float = float("inf"),
         *,
-        tell: Progress | None = None,
+        report: Progress | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         if not budget_s > 0.0:
             raise ValueError(f"the budget must be above 0 seconds, not {budget_s!r}")
         self._now = now
         self._end = now() + budget_s
-        self._tell = tell
+        self._report = report
 
     @property
     def left_s(self) -> float:
@@ -63,30 +63,30 @@ class Clock:
         if self.is_over:
             raise OutOfTimeError
 
-    def share(self, part: float, *, tell: Progress | None = None) -> Clock:
-        """Return a clock that ends after a part of what is left; it tells `tell`."""
-        return Clock(max(self.left_s * part, 1e-3), tell=tell, now=self._now)
+    def share(self, part: float, *, report: Progress | None = None) -> Clock:
+        """Return a clock that ends after a part of the remaining time."""
+        return Clock(max(self.left_s * part, 1e-3), report=report, now=self._now)
 
-    def tell(self, text: str, share: float) -> None:
-        """Tell what is being done."""
-        if self._tell is not None:
-            self._tell(text, share)
+    def report(self, text: str, share: float) -> None:
+        """Report the current step, and the share of the work that is done."""
+        if self._report is not None:
+            self._report(text, share)
 
 
 @contextlib.contextmanager
 def enforced(clock: Clock) -> Generator[None]:
-    """Have every step of the work within ask a clock, a moment after it is over.
+    """Stop the steps of the work within that run on after a clock is over.
 
-    Whoever holds the clock asks it first and can keep what is known; the steps below,
-    which know no clock, end what forgets to: curves, roots, cells, boxes.
+    Code with the clock checks it first and can return what is known. `GRACE_S` later,
+    the checkpoints of all steps without it raise: curves, roots, cells, boxes.
 
     Raises:
         OutOfTimeError: From the step that is late.
     """
 
-    def ask() -> None:
+    def check() -> None:
         if clock.left_s < -GRACE_S:
             raise OutOfTimeError
 
-    with watched(ask):
+    with watched(check):
         yield

@@ -18,7 +18,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.engine.pieces import ONE, ZERO, Piece, piece_at, pieces
+from fuzzytree.auditing.engine.pieces import (
+    ONE,
+    ZERO,
+    PolynomialPiece,
+    piece_at,
+    pieces,
+)
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     composed,
@@ -29,14 +35,14 @@ from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Conjunction, Part, RuleBase, Shape, shapes_of
 from fuzzytree.numerics.exact import outwards
 
-Key = str | tuple[Part, ...]
+AxisKey = str | tuple[Part, ...]
 """What an axis is known by in any model: an input, or the summands of a combination."""
 
-Asked = tuple[bool, tuple[Shape, ...]]
+ClauseCurves = tuple[bool, tuple[Shape, ...]]
 """A clause: whether it is negated, and the curves that it takes the largest of, each
 once and in an order that depends on nothing but them."""
 
-Numbered = tuple[int, int]
+ClauseNumber = tuple[int, int]
 """A clause in a rule: the number of its axis, and its number there."""
 
 Bounds = tuple[Fraction, Fraction]
@@ -47,7 +53,7 @@ NEVER, ALWAYS = 0, 1
 _MOST_CROSSED = 400  # pairs of pieces, of which crossings are looked for
 
 
-class Stretch(NamedTuple):
+class AxisPart(NamedTuple):
     """A part of an axis: `low < x <= high`, and `low` itself where it is closed."""
 
     low: Fraction
@@ -55,7 +61,7 @@ class Stretch(NamedTuple):
     is_closed: bool = False
 
 
-class Seen(NamedTuple):
+class ClauseBounds(NamedTuple):
     """A clause on a stretch.
 
     Attributes:
@@ -71,37 +77,32 @@ class Seen(NamedTuple):
     is_below: bool = False
 
 
-class Axis:
-    """An axis with the clauses that two models ask of it.
+class SharedAxis:
+    """An axis with the clauses that two models ask of it."""
 
-    Args:
-        key: What it is known by.
-        whole: All of it that is asked about.
-    """
-
-    def __init__(self, key: Key, whole: Stretch) -> None:
+    def __init__(self, key: AxisKey, whole: AxisPart) -> None:
         self.key = key
         self.whole = whole
-        self.clauses: dict[Asked, int] = {}
+        self.clauses: dict[ClauseCurves, int] = {}
         self._forms: dict[object, int] = {NEVER: NEVER, ALWAYS: ALWAYS}
-        self._seen: dict[Stretch, tuple[Seen, ...]] = {}
-        self._above: dict[tuple[Stretch, int, int], bool] = {}
+        self._known_bounds: dict[AxisPart, tuple[ClauseBounds, ...]] = {}
+        self._above: dict[tuple[AxisPart, int, int], bool] = {}
 
-    def number(self, asked: Asked) -> int:
+    def number(self, clause: ClauseCurves) -> int:
         """Return the number of a clause, which is new or known."""
-        return self.clauses.setdefault(asked, len(self.clauses))
+        return self.clauses.setdefault(clause, len(self.clauses))
 
-    def seen(self, stretch: Stretch) -> tuple[Seen, ...]:
+    def bounds_on(self, stretch: AxisPart) -> tuple[ClauseBounds, ...]:
         """Return every clause on a stretch."""
-        found = self._seen.get(stretch)
-        if found is None:
-            found = tuple(self._see(asked, stretch) for asked in self.clauses)
-            self._seen[stretch] = found
-        return found
+        result = self._known_bounds.get(stretch)
+        if result is None:
+            result = tuple(self._see(clause, stretch) for clause in self.clauses)
+            self._known_bounds[stretch] = result
+        return result
 
-    def _see(self, asked: Asked, stretch: Stretch) -> Seen:
+    def _see(self, clause: ClauseCurves, stretch: AxisPart) -> ClauseBounds:
         checkpoint()
-        is_negated, shapes = asked
+        is_negated, shapes = clause
         parts = [_clipped(shape, stretch) for shape in shapes]
         bounds = [_bounds(part) for part in parts]
         low = max(one for one, _ in bounds)
@@ -126,17 +127,17 @@ class Axis:
         elif low == high:
             form = low
         number = self._forms.setdefault(form, len(self._forms))
-        return Seen(number, outwards(low)[0], outwards(high)[1], is_below)
+        return ClauseBounds(number, outwards(low)[0], outwards(high)[1], is_below)
 
-    def is_above(self, one: int, other: int, stretch: Stretch) -> bool:
+    def is_above(self, one: int, other: int, stretch: AxisPart) -> bool:
         """Return whether a clause is at least as true as another on all of a stretch.
 
         False where it is not known.
         """
         key = (stretch, one, other)
         if key not in self._above:
-            asked = list(self.clauses)
-            self._above[key] = _clause_is_above(asked[one], asked[other], stretch)
+            clause = list(self.clauses)
+            self._above[key] = _clause_is_above(clause[one], clause[other], stretch)
         return self._above[key]
 
     @functools.cached_property
@@ -151,11 +152,11 @@ class Axis:
     def marks(self) -> tuple[Fraction, ...]:
         """Where a curve changes its formula or crosses another, within the whole."""
         shapes = list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
-        found = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
+        result = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
         for one, other in itertools.combinations(shapes, 2):
             if len(pieces(one)) * len(pieces(other)) <= _MOST_CROSSED:
-                found.update(_crossings(one, other, self.whole))
-        return self._inside(found)
+                result.update(_crossings(one, other, self.whole))
+        return self._inside(result)
 
     def _inside(self, marks: Iterable[Fraction]) -> tuple[Fraction, ...]:
         low, high = self.whole.low, self.whole.high
@@ -169,37 +170,35 @@ def _edges(shape: Shape) -> Iterator[Fraction]:
             yield one.high
 
 
-def laid(
-    models: Iterable[RuleBase], ends: Iterable[tuple[Key, Stretch]]
-) -> tuple[tuple[Axis, ...], list[list[tuple[Numbered, ...]]]]:
+def common_axes(
+    models: Iterable[RuleBase], ends: Iterable[tuple[AxisKey, AxisPart]]
+) -> tuple[tuple[SharedAxis, ...], list[list[tuple[ClauseNumber, ...]]]]:
     """Lay models on common axes.
 
-    Args:
-        models: The rule bases.
-        ends: For each axis that one of them asks, the stretch that is asked about.
+    `ends`: for each axis that one of them asks, the stretch that is asked about.
 
     Returns:
         The axes; and for each model the clauses of each of its rules.
     """
-    axes = [Axis(key, whole) for key, whole in ends]
+    axes = [SharedAxis(key, whole) for key, whole in ends]
     places = {axis.key: place for place, axis in enumerate(axes)}
-    rules: list[list[tuple[Numbered, ...]]] = []
+    rules: list[list[tuple[ClauseNumber, ...]]] = []
     for model in models:
         keys = {v.name: v.parts or v.name for v in model.variables}
         shapes = shapes_of(model.variables)
         rules.append([])
         for rule in model.rules:
-            when: list[Numbered] = []
+            when: list[ClauseNumber] = []
             for clause in rule.when:
                 place = places[keys[clause.variable]]
                 curves = {shapes[clause.variable, t] for t in clause.terms}
-                asked = (clause.negated, tuple(sorted(curves, key=repr)))
-                when.append((place, axes[place].number(asked)))
+                curves_of = (clause.negated, tuple(sorted(curves, key=repr)))
+                when.append((place, axes[place].number(curves_of)))
             rules[-1].append(tuple(when))
     return tuple(axes), rules
 
 
-class Laid(NamedTuple):
+class ClippedPiece(NamedTuple):
     """A piece of a curve, ended by a stretch: on `low <= x <= high`."""
 
     low: Fraction
@@ -208,41 +207,43 @@ class Laid(NamedTuple):
     cap: Fraction
 
 
-def _clipped(shape: Shape, stretch: Stretch) -> tuple[Laid, ...]:
+def _clipped(shape: Shape, stretch: AxisPart) -> tuple[ClippedPiece, ...]:
     """Return a curve's pieces on a stretch, those of equal formulas joined."""
-    found: list[Laid] = []
+    result: list[ClippedPiece] = []
     if stretch.is_closed:
         piece = piece_at(pieces(shape), stretch.low)
         if stretch.low == stretch.high or piece.high == stretch.low:
             degree = piece.degree(stretch.low)
-            found.append(Laid(stretch.low, stretch.low, (degree,), ONE))
+            result.append(ClippedPiece(stretch.low, stretch.low, (degree,), ONE))
     for part in _parts(pieces(shape), stretch):
-        last = found[-1] if found else None
+        last = result[-1] if result else None
         if last and last[2:] == part[2:]:
-            found[-1] = last._replace(high=part.high)
+            result[-1] = last._replace(high=part.high)
         else:
-            found.append(part)
-    return tuple(found)
+            result.append(part)
+    return tuple(result)
 
 
-def _parts(laid_out: Iterable[Piece], stretch: Stretch) -> Iterator[Laid]:
-    for piece in laid_out:
+def _parts(
+    parts: Iterable[PolynomialPiece], stretch: AxisPart
+) -> Iterator[ClippedPiece]:
+    for piece in parts:
         low = stretch.low if piece.low is None else max(piece.low, stretch.low)
         high = stretch.high if piece.high is None else min(piece.high, stretch.high)
         if low >= high:
             continue
         least, most = spread(piece.polynomial, low, high)
         if most <= 0:
-            yield Laid(low, high, (ZERO,), ONE)
+            yield ClippedPiece(low, high, (ZERO,), ONE)
         elif least >= piece.cap:
-            yield Laid(low, high, (piece.cap,), ONE)
+            yield ClippedPiece(low, high, (piece.cap,), ONE)
         else:
             # A cap that is not reached makes no difference.
             cap = ONE if most <= piece.cap else piece.cap
-            yield Laid(low, high, difference(piece.polynomial, (ZERO,)), cap)
+            yield ClippedPiece(low, high, difference(piece.polynomial, (ZERO,)), cap)
 
 
-def _falls_short(parts: tuple[Laid, ...], stretch: Stretch) -> bool:
+def _falls_short(parts: tuple[ClippedPiece, ...], stretch: AxisPart) -> bool:
     """Return whether a curve reaches its upper bound nowhere but at an open low end."""
     _, high = _bounds(parts)
     first, *others = parts
@@ -256,7 +257,7 @@ def _falls_short(parts: tuple[Laid, ...], stretch: Stretch) -> bool:
     return start <= first.cap and bool(rest) and max(rest) < start
 
 
-def _bounds(parts: tuple[Laid, ...]) -> Bounds:
+def _bounds(parts: tuple[ClippedPiece, ...]) -> Bounds:
     low, high = ONE, ZERO
     for part in parts:
         least, most = spread(part.polynomial, part.low, part.high)
@@ -303,7 +304,7 @@ def _bends(
     )
 
 
-def _clause_is_above(one: Asked, other: Asked, stretch: Stretch) -> bool:
+def _clause_is_above(one: ClauseCurves, other: ClauseCurves, stretch: AxisPart) -> bool:
     if one[0] != other[0]:
         return False
     uppers, lowers = (other[1], one[1]) if one[0] else (one[1], other[1])
@@ -313,7 +314,7 @@ def _clause_is_above(one: Asked, other: Asked, stretch: Stretch) -> bool:
     )
 
 
-def _curve_is_above(upper: Shape, lower: Shape, stretch: Stretch) -> bool:
+def _curve_is_above(upper: Shape, lower: Shape, stretch: AxisPart) -> bool:
     if stretch.is_closed and _degree(upper, stretch.low) < _degree(lower, stretch.low):
         return False
     return all(
@@ -323,7 +324,7 @@ def _curve_is_above(upper: Shape, lower: Shape, stretch: Stretch) -> bool:
 
 
 def _formula_is_above(
-    above: Piece, below: Piece, low: Fraction, high: Fraction
+    above: PolynomialPiece, below: PolynomialPiece, low: Fraction, high: Fraction
 ) -> bool:
     _, most = spread(below.polynomial, low, high)
     if most <= 0:
@@ -342,8 +343,8 @@ def _degree(shape: Shape, at: Fraction) -> Fraction:
 
 
 def _overlaps(
-    one: Shape, other: Shape, stretch: Stretch
-) -> Iterator[tuple[Piece, Piece, Fraction, Fraction]]:
+    one: Shape, other: Shape, stretch: AxisPart
+) -> Iterator[tuple[PolynomialPiece, PolynomialPiece, Fraction, Fraction]]:
     """Yield the pieces of two curves that meet on a stretch, with where they do."""
     others = pieces(other)
     for piece in pieces(one):
@@ -358,7 +359,7 @@ def _overlaps(
                 yield piece, match, start, end
 
 
-def _crossings(one: Shape, other: Shape, stretch: Stretch) -> Iterator[Fraction]:
+def _crossings(one: Shape, other: Shape, stretch: AxisPart) -> Iterator[Fraction]:
     """Yield a point at, or beside, each crossing of two curves within a stretch."""
     for first, second, low, high in _overlaps(one, other, stretch):
         gap = difference(first.polynomial, second.polynomial)
@@ -374,7 +375,7 @@ def _near(value: Fraction) -> Fraction:
 # --- rules on a box
 
 
-Box = tuple[Stretch, ...]
+Box = tuple[AxisPart, ...]
 """A stretch of each axis."""
 
 _MOST_PAIRED = 12  # rules that may win, of which each two are compared
@@ -396,16 +397,16 @@ class Contender(NamedTuple):
     """
 
     then: str
-    form: tuple[Numbered, ...]
-    clauses: tuple[Numbered, ...]
-    bounds: Mapping[Numbered, tuple[float, float]]
+    form: tuple[ClauseNumber, ...]
+    clauses: tuple[ClauseNumber, ...]
+    bounds: Mapping[ClauseNumber, tuple[float, float]]
     low: float
     high: float
     is_below: bool
     place: int
 
 
-class Left(NamedTuple):
+class Remainder(NamedTuple):
     """What is left of a rule base on a box.
 
     Attributes:
@@ -419,38 +420,32 @@ class Left(NamedTuple):
     margin: float
 
 
-def left_on(
+def contenders_on(
     rules: RuleBase,
-    asked: Sequence[tuple[Numbered, ...]],
-    axes: Sequence[Axis],
+    clause: Sequence[tuple[ClauseNumber, ...]],
+    axes: Sequence[SharedAxis],
     box: Box,
     among: Iterable[int] | None = None,
-) -> Left:
+) -> Remainder:
     """Return which rules may win on a box.
 
-    Args:
-        rules: The rules.
-        asked: The clauses of each of them; see
-            `fuzzytree.auditing.engine.contenders.laid`.
-        axes: The axes.
-        box: A stretch of each.
-        among: The places of the rules that may win on a box around this one, in order;
-            all unless given.
+    `among`: the places of the rules that may win on a box around this one, in order;
+    all unless given.
     """
     conjunction = rules.semantics.conjunction
-    seen = [axis.seen(s) for axis, s in zip(axes, box, strict=True)]
-    made: list[Contender] = []
-    for place in range(len(asked)) if among is None else among:
+    bounds = [axis.bounds_on(s) for axis, s in zip(axes, box, strict=True)]
+    items: list[Contender] = []
+    for place in range(len(clause)) if among is None else among:
         checkpoint()
         then = rules.rules[place].then
-        found = _on_box(then, asked[place], seen, conjunction, place)
-        if found is not None and found.high > 0.0:
-            made.append(found)
-    top = max((rule.low for rule in made), default=0.0)
-    first = next((rule.place for rule in made if rule.low == top), 0)
+        result = _on_box(then, clause[place], bounds, conjunction, place)
+        if result is not None and result.high > 0.0:
+            items.append(result)
+    top = max((rule.low for rule in items), default=0.0)
+    first = next((rule.place for rule in items if rule.low == top), 0)
     may_win = [
         rule
-        for rule in made
+        for rule in items
         if rule.high > top
         or (rule.high == top and rule.place <= first and not rule.is_below)
     ]
@@ -466,26 +461,26 @@ def left_on(
         ]
     else:
         may_win = _first_of_equals(may_win)
-    margin = _margin(made)
+    margin = _margin(items)
     if len(may_win) <= _MOST_PAIRED:
         margin = min(margin, _paired_margin(may_win, conjunction))
-    return Left(may_win, top > 0.0, margin)
+    return Remainder(may_win, top > 0.0, margin)
 
 
 def _on_box(
     then: str,
-    clauses: tuple[Numbered, ...],
-    seen: Sequence[Sequence[Seen]],
+    clauses: tuple[ClauseNumber, ...],
+    known: Sequence[Sequence[ClauseBounds]],
     conjunction: Conjunction,
     place: int,
 ) -> Contender | None:
     """Return a rule on a box, None if it never fires there."""
-    form: list[Numbered] = []
-    kept: list[Numbered] = []
-    bounds: dict[Numbered, tuple[float, float]] = {}
+    form: list[ClauseNumber] = []
+    kept: list[ClauseNumber] = []
+    bounds: dict[ClauseNumber, tuple[float, float]] = {}
     short: list[float] = []
     for axis, number in clauses:
-        kind, low, high, is_short = seen[axis][number]
+        kind, low, high, is_short = known[axis][number]
         if kind == NEVER:
             return None
         if kind == ALWAYS or (conjunction == "min" and (axis, kind) in form):
@@ -514,16 +509,16 @@ def _joined(degrees: Sequence[float], conjunction: Conjunction, *, up: bool) -> 
     lowest = min(degrees, default=1.0)
     if conjunction == "min" or len(degrees) < 2:
         return lowest
-    found = 1.0
+    result = 1.0
     for degree in degrees:
-        found = math.nextafter(found * degree, math.inf if up else -math.inf)
-    return min(found, lowest) if up else max(found, 0.0)
+        result = math.nextafter(result * degree, math.inf if up else -math.inf)
+    return min(result, lowest) if up else max(result, 0.0)
 
 
 def _beats(
     one: Contender,
     other: Contender,
-    axes: Sequence[Axis],
+    axes: Sequence[SharedAxis],
     box: Box,
     conjunction: Conjunction,
 ) -> bool:
@@ -547,9 +542,9 @@ def _beats(
 
 
 def _is_above(
-    mine: Sequence[Numbered],
-    theirs: Sequence[Numbered],
-    axes: Sequence[Axis],
+    mine: Sequence[ClauseNumber],
+    theirs: Sequence[ClauseNumber],
+    axes: Sequence[SharedAxis],
     box: Box,
     conjunction: Conjunction,
 ) -> bool:
@@ -579,7 +574,7 @@ def _is_plain(rule: Contender) -> bool:
 
 def _split(
     one: Contender, other: Contender
-) -> tuple[list[Numbered], list[Numbered], list[Numbered]]:
+) -> tuple[list[ClauseNumber], list[ClauseNumber], list[ClauseNumber]]:
     """Return the clauses of one rule alone, of the other alone, and of both."""
     mine = dict(zip(one.form, one.clauses, strict=True))
     theirs = dict(zip(other.form, other.clauses, strict=True))
@@ -642,7 +637,9 @@ def _margin(rules: Sequence[Contender]) -> float:
     )
 
 
-def same(one: Left, other: Left, conjunctions: Sequence[Conjunction]) -> bool:
+def same_contenders(
+    one: Remainder, other: Remainder, conjunctions: Sequence[Conjunction]
+) -> bool:
     """Return whether the same rules are left of both, in an order that says the same.
 
     The order of neighbours of one class says nothing.

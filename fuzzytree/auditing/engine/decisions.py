@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import Ground, answer_at, ground
+from fuzzytree.auditing.engine.arrangement import Arrangement, arrange, prediction_at
 from fuzzytree.auditing.engine.bounding import simplified
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import uncovered
@@ -57,13 +57,8 @@ _NOTHING: Final = 2.0**-1000
 _CHUNK: Final = 1 << 15  # points that are evaluated at once
 
 
-class Around:
-    """Rules, on boxes of a domain.
-
-    Args:
-        rules: The rules.
-        domain: A side for each input.
-    """
+class StrengthBounds:
+    """Rules, on boxes of a domain."""
 
     def __init__(self, rules: RuleBase, domain: Domain) -> None:
         self.rules, self.inputs = rules, rules.inputs
@@ -76,9 +71,7 @@ class Around:
     def ball(self, centres: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
         """Return the ends of boxes that hold all of the domain within a radius.
 
-        Args:
-            centres: Shape (inputs, points).
-            radius: In widths of the inputs' ranges.
+        `centres`: shape (inputs, points); `radius`: in widths of the inputs' ranges.
         """
         reach = radius * self.width
         reach = reach * (1.0 + 4 * U) + 4 * U * np.abs(centres) + 2.0**-1000
@@ -89,23 +82,10 @@ class Around:
     def reached(self, low: FloatArray, high: FloatArray) -> Enclosure:
         """Return what each rule's strength lies between on boxes.
 
-        Args:
-            low: Shape (inputs, boxes): the lower ends.
-            high: The upper ends, the same.
+        `low`: shape (inputs, boxes): the lower ends.
 
         Returns:
             Both of shape (rules, boxes).
-
-        Example:
-            >>> from fuzzytree.semantics.lowering import rules_from_tree
-            >>> from fuzzytree.auditing.engine.domain import Side
-            >>> from fuzzytree.testing import random_tree
-            >>> rules = rules_from_tree(random_tree(1))
-            >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
-            >>> origin = np.zeros((len(rules.inputs), 1))
-            >>> found = Around(rules, box).reached(origin, origin)
-            >>> found.low.max().tolist(), found.high.max().tolist()
-            (1.0, 1.0)
         """
         rules, count = self.rules.rules, low.shape[1]
         edges: dict[str, FloatArray] = {}
@@ -172,13 +152,10 @@ class Around:
     ) -> BoolArray:
         """Return which boxes are for certain decided as their class everywhere.
 
-        Args:
-            low: Shape (inputs, boxes): the lower ends.
-            high: The upper ends, the same.
-            labels: The class of each box; None is no class.
+        `low`: shape (inputs, boxes): the lower ends.
         """
         reached = self.reached(low, high)
-        found = np.zeros(len(labels), dtype=bool)
+        result = np.zeros(len(labels), dtype=bool)
         for label in dict.fromkeys(labels):
             at = np.array([one == label for one in labels])
             own = self._own(label)
@@ -187,8 +164,8 @@ class Around:
             clear = least > others
             if self.rules.semantics.uncovered == label:
                 clear |= others == 0.0
-            found[at] = clear
-        return found
+            result[at] = clear
+        return result
 
     def _own(self, label: str | None) -> BoolArray:
         return np.array([rule.then == label for rule in self.rules.rules])
@@ -203,9 +180,9 @@ class Around:
         own = self._own(label)
         parts: list[FloatArray] = [np.zeros(0)]
         for start in range(0, points.shape[1], _CHUNK):
-            found = near_strengths(self.rules, points[:, start : start + _CHUNK])
-            mine = found[own].max(axis=0, initial=0.0)
-            ahead = mine - found[~own].max(axis=0, initial=0.0)
+            result = near_strengths(self.rules, points[:, start : start + _CHUNK])
+            mine = result[own].max(axis=0, initial=0.0)
+            ahead = mine - result[~own].max(axis=0, initial=0.0)
             if self.rules.semantics.uncovered != label:
                 ahead = np.where(mine == 0.0, ahead - _NOTHING, ahead)
             parts.append(ahead)
@@ -220,9 +197,7 @@ class Around:
         by the same share of their ranges, each to the side on which the margin falls.
         Where that leads nowhere, points are drawn. Nothing is claimed.
 
-        Args:
-            centres: Shape (inputs, points).
-            labels: The class of each point.
+        `centres`: shape (inputs, points).
 
         Returns:
             Points, and how far they are; infinity where none was met.
@@ -281,25 +256,25 @@ class Around:
         """Return for each point the nearest of some others, and how far it is."""
         if not others.shape[1]:
             return [(0, np.inf)] * points.shape[1]
-        found: list[tuple[int, float]] = []
+        result: list[tuple[int, float]] = []
         for column in points.T:
             away = self._away(others, column[:, np.newaxis])
             place = int(away.argmin())
-            found.append((place, float(away[place])))
-        return found
+            result.append((place, float(away[place])))
+        return result
 
     def _away(self, points: FloatArray, centres: FloatArray) -> FloatArray:
         width = np.where(self.width > 0.0, self.width, np.inf)
-        found: FloatArray = np.max(np.abs(points - centres) / width, axis=0)
-        return found
+        result: FloatArray = np.max(np.abs(points - centres) / width, axis=0)
+        return result
 
 
 def columns(
     points: Sequence[Mapping[str, Fraction]], inputs: Sequence[str]
 ) -> FloatArray:
     """Return points as an array of shape (inputs, points)."""
-    made = [[float(point[name]) for point in points] for name in inputs]
-    return np.array(made, dtype=np.float64).reshape(len(inputs), len(points))
+    items = [[float(point[name]) for point in points] for name in inputs]
+    return np.array(items, dtype=np.float64).reshape(len(inputs), len(points))
 
 
 # --- decisions
@@ -308,24 +283,13 @@ def columns(
 _DRAWN: Final = 256  # points in which another decision is looked for first
 
 
-def decision_at(given: Ground, point: Mapping[str, Fraction]) -> str | None:
-    """Return the class that rules decide for at a point, exactly.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.auditing.engine.domain import Domain, Side
-        >>> from fuzzytree.auditing.engine.arrangement import ground
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(3))
-        >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
-        >>> decision_at(ground(rules, box), dict.fromkeys(rules.inputs, Fraction(0)))
-        'class 2'
-    """
-    return answer_at(given.rules, point).label
+def decision_at(base: Arrangement, point: Mapping[str, Fraction]) -> str | None:
+    """Return the class that rules decide for at a point, exactly."""
+    return prediction_at(base.rules, point).label
 
 
 def other_decision(
-    given: Ground,
+    base: Arrangement,
     label: str | None,
     clock: Clock | None = None,
     *,
@@ -333,35 +297,31 @@ def other_decision(
 ) -> State:
     """Return whether some point of a box is decided otherwise than as a class.
 
-    Args:
-        given: The rules and the box.
-        label: The class; None is no class.
-        clock: How much time there is; no limit unless given.
-        of: What claims call the rules.
+    `of`: what claims call the rules.
 
     Returns:
         `Proved`: none is. `Witness`: one is; it claims the decision there. Any other
         state leaves it open.
     """
     clock = clock or Clock()
-    if given.is_empty:
+    if base.is_empty:
         return Proved("the domain has no point")
-    contest = _Contest(given, label)
-    if contest.is_over:
+    rivalry = _Rivalry(base, label)
+    if rivalry.is_over:
         return Proved("bounds on the box leave no other decision")
-    values = drawn_in(given, _DRAWN)
+    values = drawn_in(base, _DRAWN)
     if values is None:
         return Proved("the domain has no point")
-    drawn = _drawn(given, label, values)
+    drawn = _drawn(base, label, values)
     if drawn is not None:
-        claim = Claim("decides", of=of, label=decision_at(given, drawn))
+        claim = Claim("decides", of=of, label=decision_at(base, drawn))
         return Witness(coordinates(drawn), (claim,))
     left_open: State | None = None
-    asked = 0
-    for state in contest.asked(clock):
-        asked += 1
+    count = 0
+    for state in rivalry.results(clock):
+        count += 1
         if isinstance(state, Witness):
-            other = decision_at(given, point_of(state.point))
+            other = decision_at(base, point_of(state.point))
             assert other != label  # the claims of the witness say so
             claim = Claim("decides", of=of, label=other)
             return Witness(state.point, (claim,), state.region)
@@ -369,27 +329,22 @@ def other_decision(
             left_open = left_open or state
             if clock.is_over:
                 break
-    return left_open or Proved(f"{asked} questions about other decisions answered no")
+    return left_open or Proved(f"{count} questions about other decisions answered no")
 
 
-class _Contest:
-    """The rules that may matter to whether a class decides everywhere on a box.
+class _Rivalry:
+    """The rules that may matter to whether a class decides everywhere on a box."""
 
-    Args:
-        given: The rules and the box.
-        label: The class.
-    """
-
-    def __init__(self, given: Ground, label: str | None) -> None:
-        self.given = given
-        self.is_own = np.array([rule.then == label for rule in given.rules.rules])
-        ends = ends_of(given.rules, given.domain)
-        reached = Around(given.rules, given.domain).reached(*ends)
+    def __init__(self, base: Arrangement, label: str | None) -> None:
+        self.base = base
+        self.is_own = np.array([rule.then == label for rule in base.rules.rules])
+        ends = ends_of(base.rules, base.domain)
+        reached = StrengthBounds(base.rules, base.domain).reached(*ends)
         self.low, self.high = reached.low[:, 0], reached.high[:, 0]
         own = self.low[self.is_own]
         self.least = float(own.max(initial=0.0))
         self.may_be_bare = (
-            given.rules.semantics.uncovered != label and not self.low.max() > 0.0
+            base.rules.semantics.uncovered != label and not self.low.max() > 0.0
         )
 
     @property
@@ -397,7 +352,7 @@ class _Contest:
         """Whether no rule of another class comes up to the class's own."""
         return not self.may_be_bare and not self._others(is_tie=True)
 
-    def asked(self, clock: Clock) -> Iterator[State]:
+    def results(self, clock: Clock) -> Iterator[State]:
         """Yield the answer to each question of which one must be yes, quick ones first.
 
         Own rules that are below another one on all of the box are no rivals.
@@ -406,24 +361,24 @@ class _Contest:
         ahead, level = self._others(is_tie=False), self._others(is_tie=True)
         # Of few rules axes have few places; the others matter only to what is bare.
         kept = sorted({*own, *level})
-        given, number_of = self._among(kept)
+        base, number_of = self._among(kept)
         mine = [number_of[number] for number in own]
         for number in ahead:
-            yield wins(given, number_of[number], mine, clock)
+            yield wins(base, number_of[number], mine, clock)
         if self.may_be_bare:
-            yield uncovered(self.given, clock)
+            yield uncovered(self.base, clock)
         for number in map(number_of.__getitem__, level):
             after = [rival for rival in mine if rival > number]
             if after:
                 before = [rival for rival in mine if rival < number]
-                yield decides_by_order(given, number, before, after, clock)
+                yield decides_by_order(base, number, before, after, clock)
 
-    def _among(self, kept: Sequence[int]) -> tuple[Ground, dict[int, int]]:
+    def _among(self, kept: Sequence[int]) -> tuple[Arrangement, dict[int, int]]:
         """Return the box with some rules only, and their numbers among these."""
-        rules = self.given.rules
+        rules = self.base.rules
         few = replace(rules, rules=tuple(rules.rules[number - 1] for number in kept))
         numbers = {number: place for place, number in enumerate(kept, 1)}
-        return ground(few, self.given.domain), numbers
+        return arrange(few, self.base.domain), numbers
 
     def _others(self, *, is_tie: bool) -> list[int]:
         """Return the numbers of other rules that may be as strong, or stronger."""
@@ -433,22 +388,22 @@ class _Contest:
         return [number + 1 for number in np.flatnonzero(fits).tolist()]
 
 
-def _drawn(given: Ground, label: str | None, values: FloatArray) -> Point | None:
+def _drawn(base: Arrangement, label: str | None, values: FloatArray) -> Point | None:
     """Return a point that is decided otherwise, if one of some that are drawn is."""
-    low, high = ends_of(given.rules, given.domain)
-    strengths = near_strengths(given.rules, np.clip(values, low, high))
-    is_own = np.array([rule.then == label for rule in given.rules.rules])
+    low, high = ends_of(base.rules, base.domain)
+    strengths = near_strengths(base.rules, np.clip(values, low, high))
+    is_own = np.array([rule.then == label for rule in base.rules.rules])
     own = np.max(strengths, axis=0, where=is_own[:, np.newaxis], initial=0.0)
     others = np.max(strengths, axis=0, where=~is_own[:, np.newaxis], initial=0.0)
     best = int(np.argmax(others - own))
     point = {
         name: Fraction(float(value))
-        for name, value in zip(given.rules.inputs, values[:, best], strict=True)
+        for name, value in zip(base.rules.inputs, values[:, best], strict=True)
     }
-    if not _is_other(given, point, label):
+    if not _is_other(base, point, label):
         return None
-    return simplified(given, point, lambda near: decision_at(given, near) != label)
+    return simplified(base, point, lambda near: decision_at(base, near) != label)
 
 
-def _is_other(given: Ground, point: Point, label: str | None) -> bool:
-    return is_within(given, point) and decision_at(given, point) != label
+def _is_other(base: Arrangement, point: Point, label: str | None) -> bool:
+    return is_within(base, point) and decision_at(base, point) != label

@@ -21,7 +21,7 @@ value, k spreads around the fitted sets, the span of the curves, nowhere (no ans
 depends on the variable), the user."""
 
 
-class Side(Value, frozen=True):
+class DomainSide(Value, frozen=True):
     """The values of one variable that are asked about: `low <= x <= high`.
 
     Attributes:
@@ -42,9 +42,9 @@ class Side(Value, frozen=True):
 class Domain(Value, frozen=True):
     """A box: a side for each input, and for combinations that are limited besides."""
 
-    sides: tuple[Side, ...]
+    sides: tuple[DomainSide, ...]
 
-    def side(self, variable: str) -> Side | None:
+    def side(self, variable: str) -> DomainSide | None:
         """Return the side of a variable, None if it has none."""
         return next((one for one in self.sides if one.variable == variable), None)
 
@@ -58,12 +58,6 @@ def limited(
 
     Raises:
         ValueError: If a variable is unknown, or ends are swapped or not finite.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> tree = random_tree(1)
-        >>> limited(Domain(()), {tree.inputs[0]: (0.0, 1.0)}, tree).sides[0].high
-        1.0
     """
     variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
     names = [variable.name for variable in variables]
@@ -82,7 +76,7 @@ def limited(
                 "the smaller one stands first"
             )
     sides = [side for side in domain.sides if side.variable not in limits]
-    sides += [Side(name, low, high) for name, (low, high) in limits.items()]
+    sides += [DomainSide(name, low, high) for name, (low, high) in limits.items()]
     order = {name: place for place, name in enumerate(names)}
     return Domain(tuple(sorted(sides, key=lambda side: order[side.variable])))
 
@@ -157,8 +151,8 @@ def contains(
     """Return whether a point of the inputs is in a domain, exactly.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import Side
-        >>> box = Domain((Side("x", 0.0, 1.0, is_open=True),))
+        >>> from fuzzytree.auditing.engine.domain import DomainSide
+        >>> box = Domain((DomainSide("x", 0.0, 1.0, is_open=True),))
         >>> contains(box, [Variable("x")], {"x": Fraction(0)})
         False
     """

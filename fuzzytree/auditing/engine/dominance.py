@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Ground, Laid
+from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.factors import (
     Factored,
     is_single,
@@ -39,14 +39,14 @@ if TYPE_CHECKING:
     BoolArray = npt.NDArray[np.bool_]
     ByteArray = npt.NDArray[np.int8]
 
-Verdict = Literal["always", "not", "open"]
+Dominance = Literal["always", "not", "open"]
 """It holds everywhere, it does not, or it is too near to tell."""
 
 FAR = 1 << 40
 """A number above that of every band."""
 
 
-class _Side(NamedTuple):
+class _AxisDegrees(NamedTuple):
     """One axis, rule by rule; levels are numbers of bands.
 
     Attributes:
@@ -74,29 +74,31 @@ class _Side(NamedTuple):
     is_reached: BoolArray
 
 
-class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
+class RulePairs(msgspec.Struct, frozen=True, eq=False, dict=True):
     """The rules of a ground, ready to be compared two by two.
 
     Attributes:
-        ground: The rules and the box, which is not empty.
+        base: The rules and the box, which is not empty.
     """
 
-    ground: Ground
+    base: Arrangement
 
     @functools.cached_property
-    def fine(self) -> Compared:
+    def fine(self) -> RulePairs:
         """The same with levels known as fractions."""
-        return Compared(self.ground.fine)
+        return RulePairs(self.base.fine)
 
     @functools.cached_property
-    def sides(self) -> tuple[_Side, ...]:
+    def sides(self) -> tuple[_AxisDegrees, ...]:
         """The axes, rule by rule."""
-        domain = self.ground.domain
-        made: list[_Side] = []
-        for laid in self.ground.laid[0]:
-            side = domain.side(laid.axis.variable.name)
-            made.append(_side(laid, has_start=side is None or not side.is_open))
-        return tuple(made)
+        domain = self.base.domain
+        items: list[_AxisDegrees] = []
+        for grid in self.base.grids:
+            side = domain.side(grid.axis.variable.name)
+            items.append(
+                _axis_degrees(grid, has_start=side is None or not side.is_open)
+            )
+        return tuple(items)
 
     @functools.cached_property
     def tops(self) -> tuple[IntArray, IntArray, BoolArray]:
@@ -105,7 +107,7 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
         Shapes (rules,), (axes, rules) and (axes, rules).
         """
         sides = self.sides
-        count = len(self.ground.rules.rules)
+        count = len(self.base.rules.rules)
         tops = np.array([side.top for side in sides]).reshape(len(sides), count)
         reached = np.array([s.is_reached for s in sides]).reshape(tops.shape)
         rest = np.full_like(tops, FAR)
@@ -120,19 +122,19 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
     @functools.cached_property
     def fires(self) -> BoolArray:
         """Whether each rule fires anywhere, if axes are free."""
-        found = np.ones(len(self.ground.rules.rules), dtype=bool)
-        for side, laid in zip(self.sides, self.ground.laid[0], strict=True):
+        result = np.ones(len(self.base.rules.rules), dtype=bool)
+        for side, grid in zip(self.sides, self.base.grids, strict=True):
             # Continuous from the left: one place between two cells is as these are.
-            single = [is_single(laid, *zone) for zone in laid.cells.zones]
+            single = [is_single(grid, *zone) for zone in grid.cells.zones]
             zones = side.is_zero_at[:, 1:] | np.array(single[1:], bool)
             start = side.is_zero_at[:, 0] if side.has_start else np.True_
-            found &= ~(side.is_zero.all(axis=1) & zones.all(axis=1) & start)
-        return found
+            result &= ~(side.is_zero.all(axis=1) & zones.all(axis=1) & start)
+        return result
 
     @functools.cached_property
     def factored(self) -> Factored:
         """The rules' degrees as polynomials."""
-        return Factored(self.ground)
+        return Factored(self.base)
 
     @functools.cached_property
     def ratios(self) -> FloatArray:
@@ -144,23 +146,8 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
         """Whether degrees are multiplied."""
         return self.factored.is_product
 
-    def never_weaker(self, strong: int, weak: int) -> Verdict:
-        """Return whether a rule is nowhere weaker than another one.
-
-        Args:
-            strong: The number of the rule, from 1.
-            weak: The number of the other one.
-
-        Example:
-            >>> from fuzzytree.semantics.lowering import rules_from_tree
-            >>> from fuzzytree.auditing.engine.domain import Domain, Side
-            >>> from fuzzytree.auditing.engine.arrangement import ground
-            >>> from fuzzytree.testing import random_tree
-            >>> rules = rules_from_tree(random_tree(1))
-            >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))
-            >>> Compared(ground(rules, box)).never_weaker(1, 1)
-            'always'
-        """
+    def never_weaker(self, strong: int, weak: int) -> Dominance:
+        """Return whether a rule is nowhere weaker than another one."""
         if self.is_product:
             if self.ratios[strong - 1, weak - 1] > 1.0:
                 return "not"
@@ -168,19 +155,14 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
             if most is None or most.low > 1:
                 return "not"
             return "always" if most.high <= 1 else "open"
-        found = int(self._weaker(weak - 1)[strong - 1])
-        if found == 2 and not self.ground.is_fine:
+        result = int(self._weaker(weak - 1)[strong - 1])
+        if result == 2 and not self.base.is_fine:
             return self.fine.never_weaker(strong, weak)
-        verdicts: tuple[Verdict, ...] = ("always", "not", "open")
-        return verdicts[found]
+        verdicts: tuple[Dominance, ...] = ("always", "not", "open")
+        return verdicts[result]
 
-    def above(self, strong: int, weak: int) -> Verdict:
-        """Return whether a rule is stronger than another wherever that fires.
-
-        Args:
-            strong: The number of the rule, from 1.
-            weak: The number of the other one, which fires somewhere.
-        """
+    def above(self, strong: int, weak: int) -> Dominance:
+        """Return whether a rule is stronger than another wherever that fires."""
         verdict = self.never_weaker(strong, weak)
         if verdict != "always":
             return verdict
@@ -191,7 +173,7 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
             is_met = meets(self.factored, strong - 1, weak - 1)
             return "not" if is_met else "open"
         may, surely = self._not_above(weak - 1)
-        if may[strong - 1] and not surely[strong - 1] and not self.ground.is_fine:
+        if may[strong - 1] and not surely[strong - 1] and not self.base.is_fine:
             return self.fine.above(strong, weak)
         if not may[strong - 1]:
             return "always"
@@ -207,22 +189,22 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
         key = "weaker", weak
         if key in self._known:
             return self._known[key]
-        found = np.zeros(len(self.ground.rules.rules), dtype=np.int64)
+        result = np.zeros(len(self.base.rules.rules), dtype=np.int64)
         for side, rest in zip(self.sides, self.tops[1], strict=True):
             below = side.rank < side.rank[weak]
             least = np.where(below, side.least, FAR).min(axis=1, initial=FAR)
             if side.has_start:
                 start = side.start_rank < side.start_rank[weak]
                 least = np.minimum(least, np.where(start, side.at[:, 0], FAR))
-            near = (least == rest[weak]) & ~self._is_sharp(least) & (found == 0)
-            found = np.where(least < rest[weak], 1, np.where(near, 2, found))
-        self._known[key] = found.astype(np.int8)
+            near = (least == rest[weak]) & ~self._is_sharp(least) & (result == 0)
+            result = np.where(least < rest[weak], 1, np.where(near, 2, result))
+        self._known[key] = result.astype(np.int8)
         return self._known[key]
 
     def _not_above(self, weak: int) -> tuple[BoolArray, BoolArray]:
         """For each rule: whether it may be, and is, no stronger where one fires."""
         _, rests, reached = self.tops
-        may = np.full(len(self.ground.rules.rules), not self.sides)
+        may = np.full(len(self.base.rules.rules), not self.sides)
         surely = may.copy()
         for side, rest, is_reached in zip(self.sides, rests, reached, strict=True):
             high, may_meet = rest[weak], is_reached[weak]
@@ -245,18 +227,18 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def _is_sharp(self, bands: IntArray) -> BoolArray:
         """Return whether bands are one level each; what is far is."""
-        sharp = np.append(self.ground.laid[1].is_sharp, np.True_)
+        sharp = np.append(self.base.bands.is_sharp, np.True_)
         return sharp[np.minimum(bands, len(sharp) - 1)]
 
 
-def _side(laid: Laid, *, has_start: bool) -> _Side:
-    cells, of = laid.cells, laid.of
+def _axis_degrees(grid: AxisGrid, *, has_start: bool) -> _AxisDegrees:
+    cells, of = grid.cells, grid.of
     every = np.arange(of.shape[1])
     rank = cells.rank[every, of]
-    least, most = laid.least[of, every], laid.most[of, every]
-    element = np.column_stack([laid.of_start, of])  # seen from the left
+    least, most = grid.least[of, every], grid.most[of, every]
+    element = np.column_stack([grid.of_start, of])  # seen from the left
     zones = np.arange(element.shape[1])
-    at = laid.at[element, zones]
+    at = grid.at[element, zones]
     first = 0 if has_start else 1
     top = np.maximum(
         most.max(axis=1, initial=-1), at[:, first:].max(axis=1, initial=-1)
@@ -264,14 +246,14 @@ def _side(laid: Laid, *, has_start: bool) -> _Side:
     is_flat = (least == most) & (most == top[:, np.newaxis])
     is_reached = is_flat.any(axis=1)
     is_reached |= (at[:, first:] == top[:, np.newaxis]).any(axis=1)
-    return _Side(
+    return _AxisDegrees(
         rank,
         least,
         most,
         at,
-        laid.is_zero[of, every],
-        laid.is_zero_at[element, zones],
-        cells.start_rank[laid.of_start],
+        grid.is_zero[of, every],
+        grid.is_zero_at[element, zones],
+        cells.start_rank[grid.of_start],
         has_start,
         top,
         is_reached,

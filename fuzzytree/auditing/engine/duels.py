@@ -21,7 +21,7 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from fuzzytree.auditing.engine.arrangement import (
-    Ground,
+    Arrangement,
     TooManyCellsError,
     strengths_at,
 )
@@ -30,7 +30,7 @@ from fuzzytree.auditing.engine.bounding import wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import Point
 from fuzzytree.auditing.engine.options import (
-    Contest,
+    Duel,
     choices,
     cover,
     parts_of,
@@ -50,7 +50,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import (
     START,
-    Stretch,
+    AxisStretch,
     coupled,
     is_within,
     point_with,
@@ -63,7 +63,7 @@ _MOST_CHOICES = 2_000  # of values for axes that share inputs, in one question
 _DEEPEST = 4  # halvings of levels for axes that share inputs
 
 
-class Question(NamedTuple):
+class LevelQuestion(NamedTuple):
     """Is there a point at which some level separates rules from rivals?
 
     Attributes:
@@ -80,33 +80,35 @@ class Question(NamedTuple):
     of: str
 
 
-def searched(given: Ground, question: Question, clock: Clock) -> State:
+def search_level(base: Arrangement, question: LevelQuestion, clock: Clock) -> State:
     """Return whether there is such a point: `Proved` if there is none."""
-    return _Search(given, question, clock).state()
+    return _Search(base, question, clock).state()
 
 
 class _Search:
     """One question, with what was visited for it."""
 
-    def __init__(self, given: Ground, question: Question, clock: Clock) -> None:
-        self.given, self.question, self.clock = given, question, clock
-        self.groups = coupled(given)
+    def __init__(
+        self, base: Arrangement, question: LevelQuestion, clock: Clock
+    ) -> None:
+        self.base, self.question, self.clock = base, question, clock
+        self.groups = coupled(base)
         self.levels = self.choices = 0
         self.is_open = False
 
     def state(self) -> State:
-        if not self.given.axes:
-            point = point_with(self.given, {})
-            found = None if point is None else self._checked(self.given, point)
-            return found or Proved("no rule asks anything")
+        if not self.base.axes:
+            point = point_with(self.base, {})
+            result = None if point is None else self._checked(self.base, point)
+            return result or Proved("no rule asks anything")
         try:
-            found = self._sought() if self.groups else None
-            if found is not None:
-                return found
-            found = self._at_levels(self.given)
-            if found is None and self._may_hide_in_bands(self.given):
-                found = self._at_levels(self.given.fine)
-                if found is None and self._may_hide_in_bands(self.given.fine):
+            result = self._sought() if self.groups else None
+            if result is not None:
+                return result
+            result = self._at_levels(self.base)
+            if result is None and self._may_hide_in_bands(self.base):
+                result = self._at_levels(self.base.fine)
+                if result is None and self._may_hide_in_bands(self.base.fine):
                     return self._bracket(
                         self._widest_band(), "two critical levels are too near to tell"
                     )
@@ -114,8 +116,8 @@ class _Search:
             return self._bracket(1.0, "the budget was spent")
         except TooManyCellsError as error:
             return self._bracket(1.0, str(error))
-        if found is not None:
-            return found
+        if result is not None:
+            return result
         if self.is_open:
             return self._bracket(
                 1.0, "the inputs of its variables depend on each other"
@@ -125,18 +127,18 @@ class _Search:
     def _sought(self) -> Witness | None:
         """Return a witness that floats led to, if there is one."""
         ours, rivals, _, _ = self.question
-        point = leader(self.given, ours, rivals)
-        found = self._checked(self.given, point)
-        if found is None:
+        point = leader(self.base, ours, rivals)
+        result = self._checked(self.base, point)
+        if result is None:
             return None
-        plain = plainer(self.given, point, ours, rivals)
-        return self._checked(self.given, plain) or found
+        plain = plainer(self.base, point, ours, rivals)
+        return self._checked(self.base, plain) or result
 
-    def _contest(self, given: Ground) -> Contest:
+    def _contest(self, base: Arrangement) -> Duel:
         ours, rivals, _, _ = self.question
-        return Contest(given, tuple(n - 1 for n in ours), tuple(n - 1 for n in rivals))
+        return Duel(base, tuple(n - 1 for n in ours), tuple(n - 1 for n in rivals))
 
-    def _levels(self, contest: Contest) -> Iterator[tuple[int, Fraction]]:
+    def _levels(self, contest: Duel) -> Iterator[tuple[int, Fraction]]:
         """Yield bands from which up to another level nothing changes, and that level.
 
         With a ceiling, what is left below only grows with the level: the highest do.
@@ -148,18 +150,18 @@ class _Search:
             if below:
                 yield below[-1], min(ceiling, bands.low_after(below[-1]))
             return
-        lows, highs = contest.ground.near_levels
-        found: list[tuple[float, int, int]] = []
+        lows, highs = contest.base.near_levels
+        result: list[tuple[float, int, int]] = []
         above = len(lows) - 1
         for band in events:
             if band + 1 < len(lows):
-                found.append((highs[band] - lows[above], -band, above))
+                result.append((highs[band] - lows[above], -band, above))
                 above = band
         # Between levels far apart the lead is large, and so is the box around it.
-        for _, band, above in sorted(found):
+        for _, band, above in sorted(result):
             yield -band, bands.low[above]
 
-    def _doubtful(self, contest: Contest) -> Iterator[int]:
+    def _doubtful(self, contest: Duel) -> Iterator[int]:
         """Yield bands within which the order of levels is not known and matters."""
         bands, ceiling = contest.bands, self.question.ceiling
         if ceiling is not None:
@@ -174,9 +176,9 @@ class _Search:
                 yield band
 
     def _how(self) -> str:
-        contest = self._contest(self.given)
+        contest = self._contest(self.base)
         cells = sum(len(options.where) for options in contest.all_options)
-        axes = len(self.given.axes)
+        axes = len(self.base.axes)
         levels, parts = counted(self.levels, "level"), counted(cells, "cell")
         text = f"{levels} with {parts} on {counted(axes, 'axis', 'axes')} visited"
         if not self.choices:
@@ -187,12 +189,12 @@ class _Search:
         return Bracket(self.question.of, 0.0, high, f"{why}: {self._how()}")
 
     def _widest_band(self) -> float:
-        bands = self.given.fine.laid[1]
+        bands = self.base.fine.bands
         widest = max(b - a for a, b in zip(bands.low, bands.high, strict=True))
         return outwards(widest)[1]
 
-    def _at_levels(self, given: Ground) -> Witness | None:
-        contest = self._contest(given)
+    def _at_levels(self, base: Arrangement) -> Witness | None:
+        contest = self._contest(base)
         known: dict[tuple[tuple[int, ...], ...], tuple[int, ...] | None] = {}
         for band, above in self._levels(contest):
             self.levels += 1
@@ -200,21 +202,21 @@ class _Search:
             if families not in known:
                 known[families] = cover(families, contest.full, self.clock)
             chosen = known[families]
-            found = None
+            result = None
             if chosen is not None:
                 levels = contest.bands.high[band], above
-                found = (
+                result = (
                     self._among_inputs(contest, band, levels)
                     if self.groups
                     else self._witness(contest, band, levels, chosen)
                 )
-            if found is not None:
-                return found
+            if result is not None:
+                return result
         return None
 
-    def _may_hide_in_bands(self, given: Ground) -> bool:
+    def _may_hide_in_bands(self, base: Arrangement) -> bool:
         """Return whether what is asked may happen within a band."""
-        contest = self._contest(given)
+        contest = self._contest(base)
         known: dict[tuple[tuple[int, ...], ...], bool] = {}
         for band in self._doubtful(contest):
             self.levels += 1
@@ -229,38 +231,38 @@ class _Search:
 
     def _witness(
         self,
-        contest: Contest,
+        contest: Duel,
         band: int,
         levels: tuple[Fraction, Fraction],
         chosen: Sequence[int],
     ) -> Witness | None:
         level = between(*levels)
-        wanted: dict[int, Stretch] = {}
-        left = contest.full
+        wanted: dict[int, AxisStretch] = {}
+        missing = contest.full
         # Axes that leave many rivals below come first: few axes then matter.
         order = sorted(range(len(chosen)), key=lambda a: -chosen[a].bit_count())
         for axis in order:
-            part = self._part(contest, axis, band, level, chosen[axis] & left)
+            part = self._part(contest, axis, band, level, chosen[axis] & missing)
             if part is None:
                 self._lost()
                 return None
             wanted[axis] = part
-            left &= ~chosen[axis]
-        point = point_with(contest.ground, wanted)
-        found = None if point is None else self._checked(contest.ground, point)
-        if found is None:
+            missing &= ~chosen[axis]
+        point = point_with(contest.base, wanted)
+        result = None if point is None else self._checked(contest.base, point)
+        if result is None:
             self._lost()
-        return found
+        return result
 
     def _lost(self) -> None:
         """Note that an option that is open could not be made a point."""
         self.is_open = True
 
     def _part(
-        self, contest: Contest, axis: int, band: int, level: Fraction, mask: int
-    ) -> Stretch | None:
+        self, contest: Duel, axis: int, band: int, level: Fraction, mask: int
+    ) -> AxisStretch | None:
         """Return values of an axis that leave some rivals below a level."""
-        options, laid = contest.options[axis], contest.ground.laid[0][axis]
+        options, grid = contest.options[axis], contest.base.grids[axis]
         bits = [n for n in range(len(contest.rivals)) if mask >> n & 1]
         fits = (options.top > band) & (options.where >= START)
         fits &= (options.floor[:, bits] <= band).all(axis=1)
@@ -270,23 +272,23 @@ class _Search:
             cell = int(options.where[number])
             rivals = [contest.rivals[n] for n in bits]
             part = stretch(
-                laid,
+                grid,
                 cell,
                 level,
-                [weakest(laid, contest.ours, cell)],
-                {weakest(laid, [rival], cell) for rival in rivals},
+                [weakest(grid, contest.ours, cell)],
+                {weakest(grid, [rival], cell) for rival in rivals},
             )
             if part is not None:
                 return part
         return None
 
-    def _checked(self, given: Ground, point: Point) -> Witness | None:
+    def _checked(self, base: Arrangement, point: Point) -> Witness | None:
         """Return a point as a witness, if it is one in fractions."""
         ours, rivals, ceiling, _ = self.question
-        strengths = strengths_at(given, point)
+        strengths = strengths_at(base, point)
         mine = min((strengths[n - 1] for n in ours), default=ceiling or Fraction(1))
         best = max((strengths[n - 1] for n in rivals), default=Fraction(0))
-        if not (mine > best and is_within(given, point)):
+        if not (mine > best and is_within(base, point)):
             return None
         claims: tuple[Claim, ...]
         if ceiling is not None:
@@ -299,13 +301,13 @@ class _Search:
                     for n in ours
                 ),
             )
-        region = region_around(given, point, ours, rivals, between=(best, mine))
+        region = region_around(base, point, ours, rivals, between=(best, mine))
         return Witness(coordinates(point), claims, region)
 
     # --- axes that share inputs
 
     def _among_inputs(
-        self, contest: Contest, band: int, levels: tuple[Fraction, Fraction]
+        self, contest: Duel, band: int, levels: tuple[Fraction, Fraction]
     ) -> Witness | None:
         """Return a witness at levels between two, where options do not change.
 
@@ -321,10 +323,10 @@ class _Search:
             for wanted in self._choices(
                 contest, band, (middle, middle), is_outer=False
             ):
-                point = point_with(contest.ground, wanted)
-                found = None if point is None else self._checked(contest.ground, point)
-                if found is not None:
-                    return found
+                point = point_with(contest.base, wanted)
+                result = None if point is None else self._checked(contest.base, point)
+                if result is not None:
+                    return result
             if depth == _DEEPEST:
                 self._lost()
                 continue
@@ -340,20 +342,17 @@ class _Search:
 
     def _choices(
         self,
-        contest: Contest,
+        contest: Duel,
         band: int,
         levels: tuple[Fraction, Fraction],
         *,
         is_outer: bool,
-    ) -> Iterator[dict[int, Stretch]]:
+    ) -> Iterator[dict[int, AxisStretch]]:
         """Yield values of the axes that leave all rivals below, and some point has.
 
-        Args:
-            contest: The question.
-            band: The band below the levels.
-            levels: The rule must reach the lower one, the rivals stay below the upper.
-            is_outer: Whether what may suffice at some level between counts; the free
-                axes are then not told.
+        `levels`: the rule must reach the lower one, the rivals stay below the upper;
+        `is_outer`: whether what may suffice at some level between counts; the free axes
+        are then not told.
         """
         joined = sorted({axis for group in self.groups for axis in group})
         free = [a for a in range(len(contest.options)) if a not in joined]
@@ -373,21 +372,21 @@ class _Search:
         }
         rest = union(mask for family in families for mask in family)
         for wanted, covered in choices(
-            contest.ground, parts, contest.full, rest, {}, self._tell
+            contest.base, parts, contest.full, rest, {}, self._tell
         ):
-            left = contest.full & ~covered
-            chosen = cover(families, left, self.clock)
+            missing = contest.full & ~covered
+            chosen = cover(families, missing, self.clock)
             if chosen is None:
                 continue
             if is_outer:
                 yield wanted
                 continue
-            found = {
-                axis: self._part(contest, axis, band, levels[0], mask & left)
+            result = {
+                axis: self._part(contest, axis, band, levels[0], mask & missing)
                 for axis, mask in zip(free, chosen, strict=True)
             }
-            whole = {axis: part for axis, part in found.items() if part is not None}
-            if len(whole) == len(found):
+            whole = {axis: part for axis, part in result.items() if part is not None}
+            if len(whole) == len(result):
                 yield wanted | whole
 
 
@@ -398,52 +397,34 @@ _TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
 
 
 def wins(
-    given: Ground, rule: int, rivals: Collection[int], clock: Clock | None = None
+    base: Arrangement, rule: int, rivals: Collection[int], clock: Clock | None = None
 ) -> State:
     """Return whether a rule is somewhere stronger than each of some others.
-
-    Args:
-        given: The rules and the box.
-        rule: The number of the rule, from 1.
-        rivals: The numbers of the others; without any it is asked whether the rule
-            fires at all.
-        clock: How much time there is; no limit unless given.
 
     Returns:
         `Proved`: it never is. `Witness`: it is, at a point that was evaluated in
         fractions. `Bracket`: the largest lead, where time or inputs that depend on each
         other leave it open.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.auditing.engine.domain import Domain, Side
-        >>> from fuzzytree.auditing.engine.arrangement import ground
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(1))
-        >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
-        >>> found = wins(ground(rules, box), 1, {2, 3})
-        >>> [(one.kind, one.rules, one.rivals, one.level) for one in found.claims]
-        [('beats', (1,), (2, 3), None), ('strength', (1,), (), '1')]
     """
     clock = clock or Clock()
     others = tuple(sorted(rivals))
-    if given.is_empty:
+    if base.is_empty:
         return Proved("the domain has no point")
     by_boxes = partial(
-        wins_by_boxes, given.rules, given.domain, rule, others, tolerance=_TOLERANCE
+        wins_by_boxes, base.rules, base.domain, rule, others, tolerance=_TOLERANCE
     )
-    if given.rules.semantics.conjunction == "product" or not given.is_kept:
+    if base.rules.semantics.conjunction == "product" or not base.is_kept:
         return by_boxes(clock)
-    question = Question((rule,), others, None, f"the largest lead of rule {rule}")
+    question = LevelQuestion((rule,), others, None, f"the largest lead of rule {rule}")
     # Half of the time for cells, the rest for boxes: they see that clauses cancel, and
     # know inputs that depend on each other.
-    found = searched(given, question, clock.share(0.5))
-    if not isinstance(found, Bracket):
-        return found
+    result = search_level(base, question, clock.share(0.5))
+    if not isinstance(result, Bracket):
+        return result
     other = by_boxes(clock.share(0.9))
     if not isinstance(other, Bracket):
         return other
-    return min(found, other, key=lambda one: one.high)
+    return min(result, other, key=lambda one: one.high)
 
 
 # --- by how much a rule leads
@@ -453,7 +434,7 @@ _STEPS = 10  # halvings of the upper end
 
 
 def largest_lead(
-    given: Ground,
+    base: Arrangement,
     rule: int,
     rivals: Collection[int],
     won: Witness,
@@ -467,69 +448,66 @@ def largest_lead(
     cells are not asked for, so this bounds the lead from above. From below it is the
     best point that floats led to, evaluated in fractions.
 
-    Args:
-        given: The rules and the box.
-        rule: The number of the rule, from 1.
-        rivals: The numbers of the others.
-        won: A point at which the rule wins.
-        enough: Once a lead of this much is found, the upper end is not worked out.
-        clock: How much time there is; no limit unless given.
+    `won`: A point at which the rule wins; `enough`: once a lead of this much is found,
+    the upper end is not worked out.
     """
     clock = clock or Clock()
     others = tuple(sorted(rivals))
     best = point_of(won.point)
-    low = _lead(given, best, rule, others)
+    low = _lead(base, best, rule, others)
     if low < enough:
-        found = leader(given, (rule,), others)
-        if is_within(given, found) and _lead(given, found, rule, others) > low:
-            best = plainer(given, found, (rule,), others)
-            low = _lead(given, best, rule, others)
+        result = leader(base, (rule,), others)
+        if is_within(base, result) and _lead(base, result, rule, others) > low:
+            best = plainer(base, result, (rule,), others)
+            low = _lead(base, best, rule, others)
     name = f"the largest lead of rule {rule}"
     claims = (
         Claim("beats", rules=(rule,), rivals=others),
-        *_strengths(given, best, (rule, *others)),
+        *_strengths(base, best, (rule, *others)),
     )
     high, why = Fraction(1), "a lead that large is enough"
     if low < enough:
-        if given.rules.semantics.conjunction == "product" or not given.is_kept:
+        if base.rules.semantics.conjunction == "product" or not base.is_kept:
             from fuzzytree.auditing.engine.bounding import largest_lead_by_boxes
 
-            wide = largest_lead_by_boxes(given.rules, given.domain, rule, others, clock)
+            wide = largest_lead_by_boxes(base.rules, base.domain, rule, others, clock)
             high, why = Fraction(wide.high), wide.why
         else:
-            high, why = _bound(given, rule, others, low, clock)
+            high, why = _bound(base, rule, others, low, clock)
     return Bracket(
         name, outwards(low)[0], outwards(high)[1], why, coordinates(best), claims
     )
 
 
-def _lead(given: Ground, point: Point, rule: int, rivals: Collection[int]) -> Fraction:
-    strengths = strengths_at(given, point)
+def _lead(
+    base: Arrangement, point: Point, rule: int, rivals: Collection[int]
+) -> Fraction:
+    strengths = strengths_at(base, point)
     return strengths[rule - 1] - max(
         (strengths[number - 1] for number in rivals), default=Fraction(0)
     )
 
 
 def _strengths(
-    given: Ground, point: Point, rules: Collection[int]
+    base: Arrangement, point: Point, rules: Collection[int]
 ) -> tuple[Claim, ...]:
     """Return claims of the strengths of a rule and of the strongest of others."""
-    strengths = strengths_at(given, point)
+    strengths = strengths_at(base, point)
     first, *others = rules
-    told = [first]
+    strongest = [first]
     if others:
-        told.append(max(others, key=lambda number: strengths[number - 1]))
+        strongest.append(max(others, key=lambda number: strengths[number - 1]))
     return tuple(
         Claim("strength", rules=(number,), level=str(strengths[number - 1]))
-        for number in told
+        for number in strongest
     )
 
 
 def _bound(
-    given: Ground, rule: int, rivals: tuple[int, ...], low: Fraction, clock: Clock
+    base: Arrangement, rule: int, rivals: tuple[int, ...], low: Fraction, clock: Clock
 ) -> tuple[Fraction, str]:
     """Return what the lead does not exceed, and how that is known."""
-    contest = Contest(given, (rule - 1,), tuple(number - 1 for number in rivals))
+    contest = Duel(base, (rule - 1,), tuple(number - 1 for number in rivals))
     high = Fraction(1)
     try:
         for step in range(_STEPS):
@@ -546,7 +524,7 @@ def _bound(
     return high, "the places within the cells are not asked for"
 
 
-def _may_reach(contest: Contest, lead: Fraction, clock: Clock) -> bool:
+def _may_reach(contest: Duel, lead: Fraction, clock: Clock) -> bool:
     """Return whether a lead cannot be excluded."""
     bands = contest.bands
     for band in contest.events:

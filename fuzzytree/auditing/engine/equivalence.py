@@ -25,16 +25,16 @@ from typing import Final, Literal, NamedTuple
 from fuzzytree.auditing.engine.arrangement import difference_at
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.contenders import (
-    Axis,
+    AxisKey,
+    AxisPart,
     Box,
+    ClauseNumber,
     Contender,
-    Key,
-    Left,
-    Numbered,
-    Stretch,
-    laid,
-    left_on,
-    same,
+    Remainder,
+    SharedAxis,
+    common_axes,
+    contenders_on,
+    same_contenders,
 )
 from fuzzytree.auditing.engine.domain import Domain, linear_form, span
 from fuzzytree.auditing.engine.linear import ZERO, Row, feasible
@@ -44,20 +44,17 @@ from fuzzytree.model.rulebase import RuleBase, Variable
 Point = Mapping[str, Fraction]
 
 
-class Places:
+class BoxPoints:
     """The inputs of some rule bases on a domain, and where axes take them.
 
-    Args:
-        models: The rule bases.
-        keys: The axes; see `fuzzytree.auditing.engine.contenders`.
-        domain: A side for each input.
+    `keys`: the axes; see `fuzzytree.auditing.engine.contenders`.
 
     Raises:
         ValueError: If an input has no side.
     """
 
     def __init__(
-        self, models: Sequence[RuleBase], keys: Sequence[Key], domain: Domain
+        self, models: Sequence[RuleBase], keys: Sequence[AxisKey], domain: Domain
     ) -> None:
         self.inputs = tuple(dict.fromkeys(n for model in models for n in model.inputs))
         self.keys = keys
@@ -72,17 +69,17 @@ class Places:
             for name in self.inputs
         ]
         self._limits = [
-            _row(v.parts, self._place, Stretch(Fraction(one.low), Fraction(one.high)))
+            _row(v.parts, self._place, AxisPart(Fraction(one.low), Fraction(one.high)))
             for model in models
             for v in model.variables
             if v.parts and (one := sides.get(v.name)) is not None
         ]
 
-    def some(self, box: Sequence[Stretch]) -> list[Point]:
+    def some(self, box: Sequence[AxisPart]) -> list[Point]:
         """Return points of a box, where axes are inputs: its middle and its far end."""
-        given = dict(zip(map(str, self.keys), box, strict=True))
+        open_box = dict(zip(map(str, self.keys), box, strict=True))
         whole = {
-            name: given.get(name, Stretch(low, high))
+            name: open_box.get(name, AxisPart(low, high))
             for name, (low, high) in zip(self.inputs, self._ranges, strict=True)
         }
         return [
@@ -90,14 +87,14 @@ class Places:
             {name: one.high for name, one in whole.items()},
         ]
 
-    def solved(self, box: Sequence[Stretch]) -> Point | None:
+    def solved(self, box: Sequence[AxisPart]) -> Point | None:
         """Return a point whose axes lie in a box, None if there is none."""
         rows = [
             _row(key, self._place, one, is_open=not one.is_closed)
             for key, one in zip(self.keys, box, strict=True)
         ]
-        found = feasible(self._ranges, [*rows, *self._limits])
-        return None if found is None else dict(zip(self.inputs, found, strict=True))
+        result = feasible(self._ranges, [*rows, *self._limits])
+        return None if result is None else dict(zip(self.inputs, result, strict=True))
 
     def in_doubles(self, point: Point) -> Point | None:
         """Return the doubles nearest to a point, if they are on the domain."""
@@ -109,27 +106,27 @@ class Places:
         return near if is_within else None
 
 
-def middle(stretch: Stretch) -> Fraction:
+def middle(part: AxisPart) -> Fraction:
     """Return the double nearest to the middle, or the middle if no double is inside.
 
     Example:
-        >>> middle(Stretch(Fraction(0), Fraction(1)))
+        >>> middle(AxisPart(Fraction(0), Fraction(1)))
         Fraction(1, 2)
     """
-    exact = (stretch.low + stretch.high) / 2
+    exact = (part.low + part.high) / 2
     near = Fraction(float(exact))
-    return near if stretch.low < near < stretch.high else exact
+    return near if part.low < near < part.high else exact
 
 
 def _row(
-    key: Key, place: Mapping[str, int], stretch: Stretch, *, is_open: bool = False
+    key: AxisKey, place: Mapping[str, int], part: AxisPart, *, is_open: bool = False
 ) -> Row:
     """Return that an axis lies on a stretch, as an inequality of the inputs."""
     if isinstance(key, str):
         weights = {place[key]: Fraction(1)}
-        return Row(weights, stretch.low, stretch.high, is_open)
+        return Row(weights, part.low, part.high, is_open)
     weights, constant = linear_form(Variable("", parts=key), place)
-    return Row(weights, stretch.low - constant, stretch.high - constant, is_open)
+    return Row(weights, part.low - constant, part.high - constant, is_open)
 
 
 def _holds(row: Row, values: Sequence[Fraction]) -> bool:
@@ -154,7 +151,7 @@ _HALVINGS = 60  # of what a region may still grow by
 _DEEPEST = 60  # halvings of a box in which both answer otherwise, but no double is met
 
 
-def alike(
+def equivalence(
     old: RuleBase,
     new: RuleBase,
     domain: Domain,
@@ -164,13 +161,6 @@ def alike(
 ) -> State:
     """Decide whether two rule bases answer alike on all of a domain.
 
-    Args:
-        old: A rule base.
-        new: Another one.
-        domain: A side for each input of either.
-        clock: How much time is left.
-        most: The most boxes that are looked at.
-
     Returns:
         `Proved`: they answer alike. `Witness`: they do not, here. `Bracket`: they can
         differ only where the margin of one of them is at most so large.
@@ -179,15 +169,15 @@ def alike(
         >>> from fuzzytree.model.rulebase import Rule
         >>> one = RuleBase("one", ("a", "b"), (), (Rule((), "a"),))
         >>> two = RuleBase("two", ("a", "b"), (), (Rule((), "b"),))
-        >>> alike(one, one, Domain(()), Clock()).how
+        >>> equivalence(one, one, Domain(()), Clock()).how
         'both answer alike in every box: 1 box settled'
-        >>> alike(one, two, Domain(()), Clock()).claims[1].label
+        >>> equivalence(one, two, Domain(()), Clock()).claims[1].label
         'b'
     """
     return _Search(old, new, domain).run(clock, most)
 
 
-class _Open(NamedTuple):
+class _OpenBox(NamedTuple):
     """A box that is open.
 
     Attributes:
@@ -203,7 +193,7 @@ class _Open(NamedTuple):
     rules: tuple[tuple[int, ...] | None, ...] = (None, None)
 
 
-class _Found(NamedTuple):
+class _Cut(NamedTuple):
     """What keeps a box open: the margin on it, and where to halve it, if anywhere."""
 
     margin: float
@@ -211,11 +201,11 @@ class _Found(NamedTuple):
     rules: tuple[tuple[int, ...] | None, ...]
 
 
-class _Todo:
+class _Queue:
     """The boxes that are open, in two orders."""
 
-    def __init__(self, first: _Open) -> None:
-        self._open: dict[int, _Open] = {}
+    def __init__(self, first: _OpenBox) -> None:
+        self._open: dict[int, _OpenBox] = {}
         self._by_margin: list[tuple[float, int]] = []
         self._by_age: deque[int] = deque()
         self._count = 0
@@ -237,19 +227,19 @@ class _Todo:
         return self.margin <= TOUCHING and self._oldest.depth > _DEEP
 
     @property
-    def _oldest(self) -> _Open:
+    def _oldest(self) -> _OpenBox:
         while self._by_age[0] not in self._open:
             self._by_age.popleft()
         return self._open[self._by_age[0]]
 
-    def put(self, box: _Open) -> None:
+    def put(self, box: _OpenBox) -> None:
         """Add a box."""
         self._open[self._count] = box
         heapq.heappush(self._by_margin, (-box.margin, self._count))
         self._by_age.append(self._count)
         self._count += 1
 
-    def take(self) -> _Open:
+    def take(self) -> _OpenBox:
         """Remove the oldest box, or the one with the largest margin, by turns."""
         margin, number = -self.margin, self._by_margin[0][1]
         if self._count % 4 or not margin:
@@ -264,39 +254,39 @@ class _Search:
 
     def __init__(self, old: RuleBase, new: RuleBase, domain: Domain) -> None:
         self.models = (old, new)
-        asked = _asked(old, new)
+        clauses = _variables_of(old, new)
         ends = [
-            (key, Stretch(*span(variable, domain), True))
-            for key, variable in asked.items()
+            (key, AxisPart(*span(variable, domain), True))
+            for key, variable in clauses.items()
         ]
         self.is_empty = any(whole.low > whole.high for _, whole in ends)
-        self.axes, self.rules = laid((old, new), ends)
-        self.places = Places(self.models, list(asked), domain)
+        self.axes, self.rules = common_axes((old, new), ends)
+        self.places = BoxPoints(self.models, list(clauses), domain)
 
     def run(self, clock: Clock, most: int) -> State:
         """Settle boxes: by turns the largest, and where the margin may be largest."""
         if self.is_empty:
             return Proved("no point of the inputs is within the domain")
         whole = tuple(axis.whole for axis in self.axes)
-        todo = _Todo(_Open(1.0, whole, 0))
+        todo = _Queue(_OpenBox(1.0, whole, 0))
         settled, stuck = 0, -1.0
         while todo:
             margin = max(todo.margin, stuck)
             if settled + len(todo) > most or clock.is_over or todo.is_touching:
                 return self._open(margin, settled, len(todo), clock)
             if not settled % 64:
-                clock.tell("settling boxes", settled / (settled + len(todo)))
+                clock.report("settling boxes", settled / (settled + len(todo)))
             box = todo.take()
-            found = self._look(box)
-            if isinstance(found, Witness):
-                return found
-            if found is None or found.cut is None:
+            result = self._look(box)
+            if isinstance(result, Witness):
+                return result
+            if result is None or result.cut is None:
                 settled += 1
-                stuck = stuck if found is None else max(stuck, found.margin)
+                stuck = stuck if result is None else max(stuck, result.margin)
                 continue
-            for half in _halves(box.box, *found.cut):
-                margin = min(found.margin, 1.0)
-                todo.put(_Open(margin, half, box.depth + 1, found.rules))
+            for half in _halves(box.box, *result.cut):
+                margin = min(result.margin, 1.0)
+                todo.put(_OpenBox(margin, half, box.depth + 1, result.rules))
         if stuck >= 0.0:
             why = "no double is known that reaches what is open"
             return Bracket(OF, 0.0, stuck, why)
@@ -316,18 +306,20 @@ class _Search:
             f"{why}: {settled} boxes are settled, and {left} are open",
         )
 
-    def _look(self, given: _Open) -> Witness | _Found | None:
+    def _look(self, open_box: _OpenBox) -> Witness | _Cut | None:
         """Settle a box (None), find a witness in it, or say how to halve it."""
-        _, box, depth, among = given
+        _, box, depth, among = open_box
         one, other = (
-            left_on(model, asked, self.axes, box, known)
-            for model, asked, known in zip(self.models, self.rules, among, strict=True)
+            contenders_on(model, clauses, self.axes, box, known)
+            for model, clauses, known in zip(
+                self.models, self.rules, among, strict=True
+            )
         )
         first, second = self._answers(0, one), self._answers(1, other)
         if len(first) == 1 and first == second:
             return None
         old, new = (model.semantics for model in self.models)
-        if (one.is_sure or old.uncovered == new.uncovered) and same(
+        if (one.is_sure or old.uncovered == new.uncovered) and same_contenders(
             one, other, (old.conjunction, new.conjunction)
         ):
             return None
@@ -343,23 +335,23 @@ class _Search:
         is_beyond = is_apart and (depth > _DEEPEST or not self.places.has_sums)
         cut = None if is_beyond else self._cut(box, [*one.rules, *other.rules])
         rules = tuple(tuple(rule.place for rule in left.rules) for left in (one, other))
-        return _Found(min(one.margin, other.margin), cut, rules)
+        return _Cut(min(one.margin, other.margin), cut, rules)
 
     def answers(self, box: Box) -> tuple[set[str | None], set[str | None]] | None:
         """Return the one answer of each model on all of a box, None if one has more."""
         one, other = (
-            self._answers(number, left_on(model, asked, self.axes, box))
-            for number, (model, asked) in enumerate(
+            self._answers(number, contenders_on(model, clauses, self.axes, box))
+            for number, (model, clauses) in enumerate(
                 zip(self.models, self.rules, strict=True)
             )
         )
         return (one, other) if len(one) == len(other) == 1 else None
 
-    def _answers(self, model: int, left: Left) -> set[str | None]:
-        found: set[str | None] = {rule.then for rule in left.rules}
+    def _answers(self, model: int, left: Remainder) -> set[str | None]:
+        result: set[str | None] = {rule.then for rule in left.rules}
         if not left.is_sure:
-            found.add(self.models[model].semantics.uncovered)
-        return found
+            result.add(self.models[model].semantics.uncovered)
+        return result
 
     def _points(self, box: Box, *, is_wanted: bool) -> list[Point] | None:
         """Return points of a box to try; None if no input reaches it."""
@@ -393,7 +385,7 @@ class _Search:
     def _widest(self, box: Box, rules: Sequence[Contender]) -> int | None:
         """Return the axis on which a degree that matters varies most."""
         is_min = all(m.semantics.conjunction == "min" for m in self.models)
-        common: set[Numbered] = set()
+        common: set[ClauseNumber] = set()
         if rules and not is_min:
             common = set.intersection(*({*rule.form} for rule in rules))
         doubt: dict[int, tuple[float, float]] = {}
@@ -401,21 +393,21 @@ class _Search:
             for clause, form in zip(rule.clauses, rule.form, strict=True):
                 low, high = rule.bounds[clause]
                 high = min(high, rule.high) if is_min else high
-                stretch, whole = box[clause[0]], self.axes[clause[0]].whole
-                if stretch.low == stretch.high or low > high:
+                part, whole = box[clause[0]], self.axes[clause[0]].whole
+                if part.low == part.high or low > high:
                     continue
                 # A factor of all rules says nothing of who is stronger.
                 width = 0.0 if form in common else high - low
-                length = float((stretch.high - stretch.low) / (whole.high - whole.low))
+                length = float((part.high - part.low) / (whole.high - whole.low))
                 known = doubt.get(clause[0], (0.0, length))
                 doubt[clause[0]] = max(known, (width, length))
         return max(doubt, key=lambda one: (doubt[one], -one), default=None)
 
 
-def _cut_at(axis: Axis, stretch: Stretch) -> Fraction:
+def _cut_at(axis: SharedAxis, part: AxisPart) -> Fraction:
     """Return where a stretch is cut: near its middle, at a mark of the axis if any."""
-    low, high, is_closed = stretch
-    centre = middle(stretch)
+    low, high, is_closed = part
+    centre = middle(part)
     place = bisect_left(axis.marks, centre)
     near = [
         mark
@@ -425,24 +417,24 @@ def _cut_at(axis: Axis, stretch: Stretch) -> Fraction:
     return min(near, key=lambda mark: abs(mark - centre), default=centre)
 
 
-def _asked(old: RuleBase, new: RuleBase) -> dict[Key, Variable]:
+def _variables_of(old: RuleBase, new: RuleBase) -> dict[AxisKey, Variable]:
     """Return the variables that some rule of either model asks, by their keys."""
-    found: dict[Key, Variable] = {}
+    result: dict[AxisKey, Variable] = {}
     for model in (old, new):
-        asked = {clause.variable for rule in model.rules for clause in rule.when}
+        clauses = {clause.variable for rule in model.rules for clause in rule.when}
         for variable in model.variables:
-            if variable.name in asked:
-                found.setdefault(variable.parts or variable.name, variable)
-    return found
+            if variable.name in clauses:
+                result.setdefault(variable.parts or variable.name, variable)
+    return result
 
 
 def _halves(box: Box, axis: int, at: Fraction) -> Iterator[Box]:
     low, high, is_closed = box[axis]
-    for part in (Stretch(low, at, is_closed), Stretch(at, high)):
+    for part in (AxisPart(low, at, is_closed), AxisPart(at, high)):
         yield (*box[:axis], part, *box[axis + 1 :])
 
 
-def region(
+def difference_region(
     old: RuleBase, new: RuleBase, domain: Domain, point: Point
 ) -> tuple[Span, ...]:
     """Return a closed box around a point on which both answer as they do there.
@@ -450,11 +442,7 @@ def region(
     Variables of which any value on the domain will do are left out. It is found by
     stretching one side after the other, so a larger box may exist.
 
-    Args:
-        old: A rule base.
-        new: Another one.
-        domain: A side for each input of either.
-        point: Where they answer otherwise.
+    `point`: where they answer otherwise.
 
     Returns:
         Nothing where a combination is asked, or the point is not on the domain.
@@ -463,11 +451,11 @@ def region(
     if search.places.has_sums or search.places.in_doubles(point) != point:
         return ()
     at = [point[str(axis.key)] for axis in search.axes]
-    box = tuple(Stretch(x, x, True) for x in at)
+    box = tuple(AxisPart(x, x, True) for x in at)
     wanted = search.answers(box)
     spans: list[Span] = []
     for place, axis in enumerate(search.axes):
-        whole = Stretch(axis.whole.low, axis.whole.high, True)
+        whole = AxisPart(axis.whole.low, axis.whole.high, True)
         wide = (*box[:place], whole, *box[place + 1 :])
         if search.answers(wide) == wanted:
             box = wide
@@ -491,8 +479,8 @@ def _stretched(
     def moved(end: Fraction) -> Box:
         low, high, _ = box[place]
         ends = (end, high) if field == "low" else (low, end)
-        stretch = Stretch(*ends, True)
-        return (*box[:place], stretch, *box[place + 1 :])
+        part = AxisPart(*ends, True)
+        return (*box[:place], part, *box[place + 1 :])
 
     best, beyond = (
         getattr(one, field) for one in (box[place], search.axes[place].whole)

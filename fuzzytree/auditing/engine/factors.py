@@ -15,9 +15,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Ground, Laid
-from fuzzytree.auditing.engine.measures import Bounds, local, sizes, values_near
-from fuzzytree.auditing.engine.pieces import ONE, ZERO, Element
+from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
+from fuzzytree.auditing.engine.measures import (
+    Bounds,
+    local_polynomial,
+    sizes,
+    values_near,
+)
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, RuleCurve
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     derivative,
@@ -46,25 +51,25 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
     """The rules of a ground, axis by axis.
 
     Attributes:
-        ground: The rules and the box, which is not empty.
+        base: The rules and the box, which is not empty.
     """
 
-    ground: Ground
+    base: Arrangement
 
     @property
     def is_product(self) -> bool:
         """Whether degrees are multiplied."""
-        return self.ground.rules.semantics.conjunction == "product"
+        return self.base.rules.semantics.conjunction == "product"
 
     @property
-    def laid(self) -> tuple[Laid, ...]:
+    def grids(self) -> tuple[AxisGrid, ...]:
         """The axes on the box."""
-        return self.ground.laid[0]
+        return self.base.grids
 
     @functools.cached_property
-    def asked(self) -> tuple[tuple[tuple[Group, ...], ...], ...]:
+    def clauses(self) -> tuple[tuple[tuple[Group, ...], ...], ...]:
         """For each axis and rule, its clauses there."""
-        shapes = shapes_of(self.ground.rules.variables)
+        shapes = shapes_of(self.base.rules.variables)
         return tuple(
             tuple(
                 tuple(
@@ -72,9 +77,9 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
                     for clause in rule.when
                     if clause.variable == axis.variable.name
                 )
-                for rule in self.ground.rules.rules
+                for rule in self.base.rules.rules
             )
-            for axis in self.ground.axes
+            for axis in self.base.axes
         )
 
     @functools.cached_property
@@ -89,23 +94,23 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
         return self._known[key]
 
     def _polynomial(self, axis: int, rule: int, cell: int) -> Polynomial:
-        laid = self.laid[axis]
-        low, high = laid.cells.between[cell]
+        grid = self.grids[axis]
+        low, high = grid.cells.between[cell]
         at = (low + high) / 2
-        found: Polynomial = (ONE,)
+        result: Polynomial = (ONE,)
         for one in self.chosen(axis, rule, cell):
-            found = multiplied(found, local(laid.axis.elements[one], at))
-        return found
+            result = multiplied(result, local_polynomial(grid.axis.elements[one], at))
+        return result
 
     def chosen(self, axis: int, rule: int, cell: int) -> tuple[int, ...]:
         """Return the elements of which a rule's degree is the product in a cell."""
-        laid = self.laid[axis]
+        grid = self.grids[axis]
         if not self.is_product:
-            return (int(laid.of[rule, cell]),)
-        rank = laid.cells.rank[cell]
+            return (int(grid.of[rule, cell]),)
+        rank = grid.cells.rank[cell]
         return tuple(
             (min if is_least else max)(of, key=lambda one: int(rank[one]))
-            for of, is_least in self.asked[axis][rule]
+            for of, is_least in self.clauses[axis][rule]
         )
 
     def is_below(self, axis: int, one: int, other: int, cell: int) -> bool:
@@ -113,24 +118,19 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
         low, high = self.chosen(axis, one, cell), self.chosen(axis, other, cell)
         if len(low) > 1 or len(high) > 1:
             return low == high
-        rank = self.laid[axis].cells.rank[cell]  # element 0 is 1 everywhere
+        rank = self.grids[axis].cells.rank[cell]  # element 0 is 1 everywhere
         return bool(rank[low[0] if low else 0] <= rank[high[0] if high else 0])
 
     def near(self, one: int, most: Fraction) -> BoolArray:
-        """Return which rules are not seen to be far from one, at places between cells.
-
-        Args:
-            one: The number of the rule, from 0.
-            most: How far is not far.
-        """
+        """Return which rules may be near one, by their degrees between cells."""
         if (one, most) not in self._near:
             checkpoint()
             limit = float(most)
-            found: BoolArray = np.ones(len(self.ground.rules.rules), dtype=bool)
+            result: BoolArray = np.ones(len(self.base.rules.rules), dtype=bool)
             for low, high in self.at_zones:
                 is_far = (low[one] - high > limit) | (low - high[one] > limit)
-                found &= ~is_far.any(axis=1)
-            self._near[one, most] = found
+                result &= ~is_far.any(axis=1)
+            self._near[one, most] = result
         return self._near[one, most]
 
     @functools.cached_property
@@ -139,19 +139,19 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def at_start(self, axis: int, rule: int) -> Fraction:
         """Return a rule's degree at the lower end of an axis."""
-        laid = self.laid[axis]
-        at = laid.cells.zones[0][0]
-        found = ONE
-        for of, is_least in self.asked[axis][rule]:
-            degrees = [laid.axis.elements[one].degree(at) for one in of]
+        grid = self.grids[axis]
+        at = grid.cells.zones[0][0]
+        result = ONE
+        for of, is_least in self.clauses[axis][rule]:
+            degrees = [grid.axis.elements[one].degree(at) for one in of]
             degree = min(degrees) if is_least else max(degrees)
-            found = found * degree if self.is_product else min(found, degree)
-        return found
+            result = result * degree if self.is_product else min(result, degree)
+        return result
 
     def has_start(self, axis: int) -> bool:
         """Return whether the lower end of an axis belongs to the box."""
-        name = self.laid[axis].axis.variable.name
-        side = self.ground.domain.side(name)
+        name = self.grids[axis].axis.variable.name
+        side = self.base.domain.side(name)
         return side is None or not side.is_open
 
     @functools.cached_property
@@ -160,11 +160,11 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
 
         Each of shape (rules, zones).
         """
-        found: list[tuple[FloatArray, FloatArray]] = []
-        for axis, laid in enumerate(self.laid):
-            low, high = laid.cells.left.astype(np.float64)
-            found.append((self._joined(axis, low, -1), self._joined(axis, high, 1)))
-        return tuple(found)
+        result: list[tuple[FloatArray, FloatArray]] = []
+        for axis, grid in enumerate(self.grids):
+            low, high = grid.cells.left.astype(np.float64)
+            result.append((self._joined(axis, low, -1), self._joined(axis, high, 1)))
+        return tuple(result)
 
     @functools.cached_property
     def tops(self) -> tuple[FloatArray, ...]:
@@ -172,37 +172,37 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
 
         Each of shape (rules, 1 + cells): the lower end itself comes first.
         """
-        found: list[FloatArray] = []
-        for axis, laid in enumerate(self.laid):
-            left = laid.cells.left[1].astype(np.float64)
-            right = laid.cells.right[1].astype(np.float64)
+        result: list[FloatArray] = []
+        for axis, grid in enumerate(self.grids):
+            left = grid.cells.left[1].astype(np.float64)
+            right = grid.cells.right[1].astype(np.float64)
             cells = np.maximum(right[:, :-1], left[:, 1:])
-            found.append(self._joined(axis, np.column_stack([left[:, 0], cells]), 1))
-        return tuple(found)
+            result.append(self._joined(axis, np.column_stack([left[:, 0], cells]), 1))
+        return tuple(result)
 
     def _joined(self, axis: int, degrees: FloatArray, towards: int) -> FloatArray:
         """Return rules' degrees from those of elements, rounded down or up."""
-        rules = self.asked[axis]
-        found = np.ones((len(rules), degrees.shape[1]))
+        rules = self.clauses[axis]
+        result = np.ones((len(rules), degrees.shape[1]))
         for number, groups in enumerate(rules):
             for of, is_least in groups:
                 each = degrees[list(of)]
                 degree = each.min(axis=0) if is_least else each.max(axis=0)
                 if self.is_product:
-                    found[number] *= degree
+                    result[number] *= degree
                 else:
-                    found[number] = np.minimum(found[number], degree)
+                    result[number] = np.minimum(result[number], degree)
         # A product of n doubles carries n roundings, a conversion one more.
         off = 2.0**-50 * max(map(len, rules), default=1)
-        return np.asarray(found * (1.0 + towards * off))
+        return np.asarray(result * (1.0 + towards * off))
 
 
 def _group(
     clause: Clause,
-    elements: tuple[Element, ...],
+    elements: tuple[RuleCurve, ...],
     shapes: Mapping[tuple[str, str], Shape],
 ) -> Group:
-    of = (Element(shapes[clause.variable, t], clause.negated) for t in clause.terms)
+    of = (RuleCurve(shapes[clause.variable, t], clause.negated) for t in clause.terms)
     return tuple(elements.index(one) for one in of), clause.negated
 
 
@@ -215,8 +215,8 @@ def least_ratios(of: Factored) -> FloatArray:
     Returns:
         Shape (rules, rules): `[q, r]`, seen only at the places between cells.
     """
-    count = len(of.ground.rules.rules)
-    found = np.ones((count, count))
+    count = len(of.base.rules.rules)
+    result = np.ones((count, count))
     for axis, (low, high) in enumerate(of.at_zones):
         first = 0 if of.has_start(axis) else 1
         for weak in range(count):
@@ -224,8 +224,8 @@ def least_ratios(of: Factored) -> FloatArray:
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 each = low[weak, first:] / high[:, first:] * (1.0 - 2.0**-50)
                 each = np.nan_to_num(each, nan=0.0, posinf=np.inf)
-                found[:, weak] *= each.max(axis=1, initial=0.0)
-    return np.nan_to_num(found, nan=0.0, posinf=np.inf)
+                result[:, weak] *= each.max(axis=1, initial=0.0)
+    return np.nan_to_num(result, nan=0.0, posinf=np.inf)
 
 
 def largest_ratio(of: Factored, strong: int, weak: int) -> Bounds | None:
@@ -233,30 +233,25 @@ def largest_ratio(of: Factored, strong: int, weak: int) -> Bounds | None:
 
     Under the product, for free axes it is the product of the suprema on each axis.
 
-    Args:
-        of: The rules.
-        strong: The number of the rule below the line, from 0.
-        weak: The number of the one above it.
-
     Returns:
         0 if `weak` never fires; None if there is no bound; up to `UNKNOWN` if none was
         found.
     """
     low = high = ONE
     is_known = True
-    for axis in range(len(of.laid)):
-        found = _axis_ratio(of, axis, strong, weak)
-        if found is None:
+    for axis in range(len(of.grids)):
+        result = _axis_ratio(of, axis, strong, weak)
+        if result is None:
             return None
-        low, high = low * found.low, high * found.high
-        is_known &= found.high < UNKNOWN
+        low, high = low * result.low, high * result.high
+        is_known &= result.high < UNKNOWN
     return Bounds(low, high if is_known else UNKNOWN)
 
 
 def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | None:
-    if of.asked[axis][strong] == of.asked[axis][weak]:
+    if of.clauses[axis][strong] == of.clauses[axis][weak]:
         return Bounds(ONE, ONE)
-    zones = of.laid[axis].cells.zones
+    zones = of.grids[axis].cells.zones
     low, high = ZERO, ZERO
     if of.has_start(axis):
         top, bottom = of.at_start(axis, weak), of.at_start(axis, strong)
@@ -265,14 +260,14 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
         if top:
             low = high = top / bottom
     below: list[bool] = []
-    for cell, (a, b) in enumerate(of.laid[axis].cells.between):
+    for cell, (a, b) in enumerate(of.grids[axis].cells.between):
         checkpoint()
         r, q = (of.polynomial(axis, rule, cell) for rule in (weak, strong))
         below.append(of.is_below(axis, weak, strong, cell))
-        found = quotient(r, q, a, b)
-        if found is None:
+        result = quotient(r, q, a, b)
+        if result is None:
             return None
-        low, high = max(low, found.low), max(high, found.high)
+        low, high = max(low, result.low), max(high, result.high)
     lows, highs = of.at_zones[axis]
     for number, (a, b) in enumerate(zones):
         if a == b:
@@ -281,7 +276,7 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
         most, least = Fraction(highs[weak, number]), Fraction(lows[strong, number])
         if not most:
             continue
-        if all(beside) and is_single(of.laid[axis], a, b):
+        if all(beside) and is_single(of.grids[axis], a, b):
             high = max(high, ONE) if low < ONE else high
             continue
         high = max(high, most / least if least else UNKNOWN)
@@ -293,21 +288,16 @@ def meets(of: Factored, strong: int, weak: int) -> bool:
 
     They are then equally strong somewhere. It is looked for where curves coincide and
     at the ends of cells.
-
-    Args:
-        of: The rules.
-        strong: The number of a rule, from 0.
-        weak: The number of another one, which fires somewhere.
     """
-    return all(_is_met(of, axis, strong, weak) for axis in range(len(of.laid)))
+    return all(_is_met(of, axis, strong, weak) for axis in range(len(of.grids)))
 
 
 def _is_met(of: Factored, axis: int, one: int, other: int) -> bool:
-    if of.asked[axis][one] == of.asked[axis][other]:
+    if of.clauses[axis][one] == of.clauses[axis][other]:
         return True
     if of.has_start(axis) and of.at_start(axis, one) == of.at_start(axis, other) != 0:
         return True
-    cells = of.laid[axis].cells
+    cells = of.grids[axis].cells
     for cell, (_, high) in enumerate(cells.between):
         mine, theirs = (of.polynomial(axis, rule, cell) for rule in (one, other))
         if mine == theirs and any(mine):
@@ -318,14 +308,14 @@ def _is_met(of: Factored, axis: int, one: int, other: int) -> bool:
     return False
 
 
-def is_single(laid: Laid, low: Fraction, high: Fraction) -> bool:
+def is_single(grid: AxisGrid, low: Fraction, high: Fraction) -> bool:
     """Return whether a zone is one place: no cell lies hidden in it."""
     if low == high:
         return True
-    zones = laid.cells.zones
+    zones = grid.cells.zones
     if low == zones[0][0] or high == zones[-1][1]:
         return False  # an end beside a place
-    places = laid.axis.found
+    places = grid.axis.places
     met = [p for p in places if p.low <= high and p.high >= low]
     roots_of = {monic(p.of[0]) for p in met if p.of}
     return len(roots_of) == 1 and all(p.of and p.of[1].is_sure for p in met)
@@ -336,11 +326,8 @@ def quotient(
 ) -> Bounds | None:
     """Return the supremum of a quotient of polynomials between two values.
 
-    Args:
-        top: At least 0 there.
-        bottom: At least 0 there, and positive inside unless it is 0 everywhere.
-        low: The lower value.
-        high: The upper one, above it.
+    `top`: at least 0 there; `bottom`: at least 0 there, and positive inside unless it
+    is 0 everywhere.
 
     Returns:
         0 where `top` is 0 everywhere; None if the quotient has no bound; up to
@@ -386,7 +373,7 @@ def quotient(
 # --- distances
 
 
-class Distance(NamedTuple):
+class RuleDistance(NamedTuple):
     """How far two rules' degrees are apart at most.
 
     Attributes:
@@ -402,22 +389,18 @@ class Distance(NamedTuple):
     at: Fraction
 
 
-def distance(of: Factored, one: int, other: int, most: Fraction) -> Distance | None:
+def rule_distance(
+    of: Factored, one: int, other: int, most: Fraction
+) -> RuleDistance | None:
     """Return how far two rules are apart, None if it is more than `most`.
 
     Under the minimum strengths differ by at most the largest distance on an axis, under
     the product by at most the sum of them.
-
-    Args:
-        of: The rules.
-        one: The number of a rule, from 0.
-        other: The number of another.
-        most: More is not of interest.
     """
     if not of.near(one, most)[other]:
         return None
-    each, whole, found = Bounds(ZERO, ZERO), ZERO, (0, ZERO)
-    for axis, laid in enumerate(of.laid):
+    each, whole, result = Bounds(ZERO, ZERO), ZERO, (0, ZERO)
+    for axis, grid in enumerate(of.grids):
         gap = Bounds(ZERO, ZERO)
         for at, near in _gaps(of, axis, one, other):
             if near.low > most:
@@ -425,22 +408,22 @@ def distance(of: Factored, one: int, other: int, most: Fraction) -> Distance | N
             if near.high > gap.high:
                 gap = near
                 if near.high > each.high:
-                    each, found = near, (axis, at)
+                    each, result = near, (axis, at)
         if not each.high:
-            found = found if axis else (0, laid.cells.zones[0][0])
+            result = result if axis else (0, grid.cells.zones[0][0])
         whole = whole + gap.high if of.is_product else max(whole, gap.high)
-    return None if each.low > most else Distance(each, whole, *found)
+    return None if each.low > most else RuleDistance(each, whole, *result)
 
 
 def _gaps(
     of: Factored, axis: int, one: int, other: int
 ) -> Iterator[tuple[Fraction, Bounds]]:
     """Yield places of an axis with how far two rules' degrees are apart there."""
-    zones = of.laid[axis].cells.zones
+    zones = of.grids[axis].cells.zones
     if of.has_start(axis):
         gap = abs(of.at_start(axis, one) - of.at_start(axis, other))
         yield zones[0][0], Bounds(gap, gap)
-    for cell, (low, high) in enumerate(of.laid[axis].cells.between):
+    for cell, (low, high) in enumerate(of.grids[axis].cells.between):
         above, below = (of.polynomial(axis, rule, cell) for rule in (one, other))
         checkpoint()
         if above == below:

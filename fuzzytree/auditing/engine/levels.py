@@ -15,7 +15,14 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from fuzzytree.auditing.engine.pieces import ONE, ZERO, Element, Place, piece_at, pieces
+from fuzzytree.auditing.engine.pieces import (
+    ONE,
+    ZERO,
+    ChangePoint,
+    RuleCurve,
+    piece_at,
+    pieces,
+)
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     Root,
@@ -40,7 +47,7 @@ if TYPE_CHECKING:
 _BITS: Final = (0, 512, 1024, 4096)  # to which places are known, one after another
 
 
-class Level(NamedTuple):
+class AlgebraicLevel(NamedTuple):
     """A value of a curve at an irrational place.
 
     Attributes:
@@ -72,16 +79,9 @@ class Level(NamedTuple):
 
 @functools.lru_cache(maxsize=1 << 14)
 def level_at(
-    element: Element, place: Place, low: Fraction, high: Fraction
-) -> Level | Fraction | None:
-    """Return a curve's value at an irrational place, None if it is not known for sure.
-
-    Args:
-        element: The curve.
-        place: The place.
-        low: At most the place, and nearer to it than the place's own bounds.
-        high: At least the place.
-    """
+    element: RuleCurve, place: ChangePoint, low: Fraction, high: Fraction
+) -> AlgebraicLevel | Fraction | None:
+    """Return a curve's value at an irrational place; None if it is not certain."""
     if place.of is None or not place.of[1].is_sure:
         return None
     polynomial, root = place.of[0], Root(low, high)
@@ -93,16 +93,16 @@ def level_at(
     _, own = division(own, polynomial)
     if len(own) == 1:
         return min(max(own[0], least), most)
-    level = Level(own, polynomial, root, least, most)
+    level = AlgebraicLevel(own, polynomial, root, least, most)
     low, high = level.between(_BITS[0])
     known = level if least < low and high < most else _clipped(level)
     # A fraction of few digits in so narrow an interval is hardly there by chance.
     near = ((low + high) / 2).limit_denominator(1 << 64)
-    is_near = isinstance(known, Level) and low <= near <= high
+    is_near = isinstance(known, AlgebraicLevel) and low <= near <= high
     return near if is_near and _compared(level, near) == 0 else known
 
 
-def _clipped(level: Level) -> Level | Fraction | None:
+def _clipped(level: AlgebraicLevel) -> AlgebraicLevel | Fraction | None:
     """Return the end of its range that a value is at or beyond, or the value."""
     for end, sign in ((level.least, -1), (level.most, 1)):
         order = _compared(level, end)
@@ -113,7 +113,7 @@ def _clipped(level: Level) -> Level | Fraction | None:
     return level
 
 
-def _compared(one: Level, other: Level | Fraction) -> int | None:
+def _compared(one: AlgebraicLevel, other: AlgebraicLevel | Fraction) -> int | None:
     """Return the sign of one value minus another; None if they are too near to tell."""
     for bits in _BITS:
         checkpoint()
@@ -134,7 +134,7 @@ def _compared(one: Level, other: Level | Fraction) -> int | None:
     return None
 
 
-def _relation(level: Level | Fraction) -> Polynomial:
+def _relation(level: AlgebraicLevel | Fraction) -> Polynomial:
     if isinstance(level, Fraction):
         return (-level, ONE)
     return relation(level.polynomial, level.of)
@@ -150,9 +150,7 @@ def _joint(one: Polynomial, other: Polynomial) -> Polynomial:
 def relation(polynomial: Polynomial, of: Polynomial) -> Polynomial:
     """Return what is 0 at the values of p where q is 0: p's relation modulo q.
 
-    Args:
-        polynomial: p.
-        of: q, of degree 1 at least.
+    `of`: q, of degree 1 at least.
 
     Example:
         >>> square = (Fraction(0), Fraction(0), Fraction(1))
@@ -165,18 +163,20 @@ def relation(polynomial: Polynomial, of: Polynomial) -> Polynomial:
     power: Polynomial = (ONE,)
     for degree in range(size + 1):
         row = [*power, *(ZERO,) * (size - len(power))]
-        told = [ZERO] * degree + [ONE]
+        combination = [ZERO] * degree + [ONE]
         for pivot, known, by in rows:
             share = row[pivot]
             if share:
                 row = [a - share * b for a, b in zip(row, known, strict=True)]
                 for place, one in enumerate(by):
-                    told[place] -= share * one
+                    combination[place] -= share * one
         left = [place for place, one in enumerate(row) if one]
         if not left:
-            return tuple(told)
+            return tuple(combination)
         scale = row[left[0]]
-        rows.append((left[0], [a / scale for a in row], [a / scale for a in told]))
+        rows.append(
+            (left[0], [a / scale for a in row], [a / scale for a in combination])
+        )
         _, power = division(multiplied(power, polynomial), of)
     raise AssertionError  # size + 1 rows of size numbers are dependent
 
@@ -184,10 +184,10 @@ def relation(polynomial: Polynomial, of: Polynomial) -> Polynomial:
 # --- many levels
 
 
-Span = tuple[Fraction, Fraction]
+LevelSpan = tuple[Fraction, Fraction]
 
 
-def parted(levels: Sequence[Level | Fraction]) -> list[Span] | None:
+def parted(levels: Sequence[AlgebraicLevel | Fraction]) -> list[LevelSpan] | None:
     """Return bounds of levels: the same for equal ones, apart for others.
 
     None if some are too near to tell.
@@ -196,23 +196,25 @@ def parted(levels: Sequence[Level | Fraction]) -> list[Span] | None:
         >>> two = (Fraction(-2), Fraction(0), Fraction(1))
         >>> root = roots(two, Fraction(1), Fraction(2))[0]
         >>> side, square = (ZERO, Fraction(1, 2)), (ZERO, ZERO, Fraction(1, 4))
-        >>> a, b = (Level(one, two, root) for one in (side, square))
-        >>> found = parted([a, b, Fraction(1, 2), a])
-        >>> found[0] == found[3], found[1] == found[2], found[0][0] > found[1][1]
+        >>> a, b = (AlgebraicLevel(one, two, root) for one in (side, square))
+        >>> result = parted([a, b, Fraction(1, 2), a])
+        >>> result[0] == result[3], result[1] == result[2], result[0][0] > result[1][1]
         (True, True, True)
     """
-    unlike: list[Level | Fraction] = []
+    unlike: list[AlgebraicLevel | Fraction] = []
     member: list[int] = []
-    known: dict[Level | Fraction, int] = {}
+    known: dict[AlgebraicLevel | Fraction, int] = {}
     # Rational ones first: what equals them is told by them.
-    order = sorted(range(len(levels)), key=lambda n: isinstance(levels[n], Level))
+    order = sorted(
+        range(len(levels)), key=lambda n: isinstance(levels[n], AlgebraicLevel)
+    )
     for number in order:
         level = levels[number]
         if level not in known:
-            found = _place_of(level, unlike)
-            if found is None:
+            result = _place_of(level, unlike)
+            if result is None:
                 return None
-            known[level] = found
+            known[level] = result
         member.append(known[level])
     for bits in _BITS:
         spans = [
@@ -226,7 +228,9 @@ def parted(levels: Sequence[Level | Fraction]) -> list[Span] | None:
     return None
 
 
-def _place_of(level: Level | Fraction, unlike: list[Level | Fraction]) -> int | None:
+def _place_of(
+    level: AlgebraicLevel | Fraction, unlike: list[AlgebraicLevel | Fraction]
+) -> int | None:
     """Return the number of what a level equals among unlike ones; it may be added."""
     for number, other in enumerate(unlike):
         if isinstance(level, Fraction):
@@ -241,19 +245,15 @@ def _place_of(level: Level | Fraction, unlike: list[Level | Fraction]) -> int | 
     return len(unlike) - 1
 
 
-def told_apart(
+def separate_levels(
     band: IntArray,
     low: npt.NDArray[np.object_],
     high: npt.NDArray[np.object_],
-    level_of: Callable[[int], Level | Fraction | None],
+    level_of: Callable[[int], AlgebraicLevel | Fraction | None],
 ) -> list[int]:
     """Set bounds of levels of one band to be the same, or apart, where that is known.
 
-    Args:
-        band: The band of each level.
-        low: The lower bounds, which are changed.
-        high: The upper ones.
-        level_of: What a level is, by number.
+    `low`: the lower bounds, which are changed; `level_of`: what a level is, by number.
 
     Returns:
         The numbers of those that are known exactly now.

@@ -47,10 +47,6 @@ def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | N
     shares of what the row can reach, is at least half of the largest possible one. Its
     coordinates are doubles of few digits where that leaves it inside.
 
-    Args:
-        ranges: The closed range of each variable.
-        rows: The inequalities.
-
     Example:
         >>> unit = (Fraction(0), Fraction(1))
         >>> both = Row({0: Fraction(1), 1: Fraction(1)}, low=Fraction(2))
@@ -61,16 +57,12 @@ def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | N
     """
     if any(low > high for low, high in ranges):
         return None
-    found = solved(ranges, rows)
-    return None if isinstance(found, Row) else found
+    result = solved(ranges, rows)
+    return None if isinstance(result, Row) else result
 
 
 def solved(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | Row | None:
     """Return a point that satisfies all inequalities, or why there is none.
-
-    Args:
-        ranges: The closed range of each variable; none is empty.
-        rows: The inequalities.
 
     Returns:
         As `feasible`; but where the rows have nothing in common with the ranges, even
@@ -82,8 +74,8 @@ def solved(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | Row
         >>> unit = (Fraction(0), Fraction(1))
         >>> one = Row({0: Fraction(1), 1: Fraction(1)}, low=Fraction(3))
         >>> two = Row({0: Fraction(1), 1: Fraction(-1)}, low=Fraction(0))
-        >>> found = solved([unit, unit], [one, two])
-        >>> {place: str(w) for place, w in found.weights.items()}, str(found.low)
+        >>> result = solved([unit, unit], [one, two])
+        >>> {place: str(w) for place, w in result.weights.items()}, str(result.low)
         ({0: '1', 1: '1'}, '3')
     """
     reaches = [_reach(ranges, row) for row in rows]
@@ -136,8 +128,10 @@ def _simplified(
     point: list[Fraction], ranges: Sequence[Range], rows: Sequence[Row]
 ) -> list[Fraction]:
     """Return a point of few digits that satisfies the rows as well, one by one."""
-    found = list(point)
-    totals = [sum((w * found[i] for i, w in row.weights.items()), ZERO) for row in rows]
+    result = list(point)
+    totals = [
+        sum((w * result[i] for i, w in row.weights.items()), ZERO) for row in rows
+    ]
     for place, (least, most) in enumerate(ranges):
         low, high = least, most
         touched = [n for n, row in enumerate(rows) if row.weights.get(place)]
@@ -146,17 +140,17 @@ def _simplified(
             ends = [
                 None
                 if bound is None
-                else found[place] + (bound - totals[number]) / weight
+                else result[place] + (bound - totals[number]) / weight
                 for bound in (row.low, row.high)
             ]
             below, above = ends if weight > 0 else reversed(ends)
             low = low if below is None else max(low, below)
             high = high if above is None else min(high, above)
-        step = simple(low, high) - found[place]
-        found[place] += step
+        step = simple(low, high) - result[place]
+        result[place] += step
         for number in touched:
             totals[number] += rows[number].weights[place] * step
-    return found
+    return result
 
 
 class _Tableau:
@@ -227,10 +221,10 @@ class _Tableau:
         multiples[broken] = Fraction(sign)
         weights: dict[int, Fraction] = {}
         low = ZERO
-        for number, (given, constant, _) in self.sides.items():
+        for number, (sums_of, constant, _) in self.sides.items():
             times = multiples.get(number, ZERO)
             low -= times * constant
-            for place, weight in given.items():
+            for place, weight in sums_of.items():
                 weights[place] = weights.get(place, ZERO) + times * weight
         return Row({place: w for place, w in weights.items() if w}, low)
 
@@ -241,11 +235,11 @@ class _Tableau:
             if self.slack not in self.sums:
                 moving, sign = self.slack, 1
             else:
-                found = self._helpful(self.slack, is_up=True)
-                if found is None:
+                result = self._helpful(self.slack, is_up=True)
+                if result is None:
                     return self.values[self.slack]
-                moving = found
-                sign = 1 if self.sums[self.slack][found] > 0 else -1
+                moving = result
+                sign = 1 if self.sums[self.slack][result] > 0 else -1
             room, blocking = self._room(moving, sign)
             self._move(moving, sign * room)
             if blocking is not None:
@@ -356,8 +350,8 @@ def simple(low: Fraction, high: Fraction) -> Fraction:
     size = len(str(largest.numerator)) - len(str(largest.denominator))
     for power in range(size, size - _MOST_DIGITS - 2, -1):
         unit = Fraction(10) ** power
-        found = round(middle / unit) * unit
-        if low < (near := _nearest(found)) < high:
+        result = round(middle / unit) * unit
+        if low < (near := _nearest(result)) < high:
             return near
     near = _nearest(middle)
     return near if low < near < high else middle

@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.axes import Cells, cut
 from fuzzytree.auditing.engine.pieces import (
     ONE,
     ZERO,
-    Element,
+    RuleCurve,
     piece_at,
     pieces,
     places,
@@ -58,11 +58,11 @@ class Bounds(NamedTuple):
         return str(self.low) if self.low == self.high else None
 
 
-Seen = tuple[Bounds, Fraction]
+CurveValue = tuple[Bounds, Fraction]
 """A value, and a point where a curve has it or comes near it."""
 
 
-class Line(NamedTuple):
+class CurveAxis(NamedTuple):
     """Curves on an axis between two ends, cut into cells.
 
     Attributes:
@@ -71,7 +71,7 @@ class Line(NamedTuple):
         is_open: Whether the lower end itself is left out.
     """
 
-    elements: tuple[Element, ...]
+    elements: tuple[RuleCurve, ...]
     cells: Cells
     is_open: bool = False
 
@@ -81,9 +81,9 @@ class Line(NamedTuple):
         return self.cells.zones[0][0], self.cells.zones[-1][1]
 
 
-def line(
+def curve_axis(
     shapes: Sequence[Shape], low: Fraction, high: Fraction, *, is_open: bool = False
-) -> Line:
+) -> CurveAxis:
     """Return shapes on an axis, cut where something changes.
 
     Raises:
@@ -92,33 +92,33 @@ def line(
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> ramp = Points((0.0, 2.0), (0.0, 1.0))
-        >>> found = line([ramp], Fraction(-1), Fraction(1))
-        >>> tuple(map(int, found.ends))
+        >>> result = curve_axis([ramp], Fraction(-1), Fraction(1))
+        >>> tuple(map(int, result.ends))
         (-1, 1)
     """
     if low > high:
         raise ValueError(f"no axis from {low} to {high}")
-    elements = tuple(Element(shape) for shape in shapes)
+    elements = tuple(RuleCurve(shape) for shape in shapes)
     cells = cut(elements, places(elements), low, high)
-    return Line(elements, cells, is_open)
+    return CurveAxis(elements, cells, is_open)
 
 
-def apart(shapes: Sequence[Shape], low: Fraction, high: Fraction) -> Line:
+def separate_axis(shapes: Sequence[Shape], low: Fraction, high: Fraction) -> CurveAxis:
     """Return shapes on an axis, cut where one of them changes; not where two cross.
 
     In a cell each curve is one polynomial, but their order may change: enough for sums.
     """
-    elements = tuple(Element(shape) for shape in shapes)
-    found = [place for element in elements for place in places([element])]
-    return Line(elements, cut(elements, found, low, high))
+    elements = tuple(RuleCurve(shape) for shape in shapes)
+    result = [place for element in elements for place in places([element])]
+    return CurveAxis(elements, cut(elements, result, low, high))
 
 
-def local(element: Element, at: Fraction) -> Polynomial:
+def local_polynomial(element: RuleCurve, at: Fraction) -> Polynomial:
     """Return the polynomial that a curve is in the cell of a point, clipped or not.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
-        >>> local(Element(Points((0.0, 2.0), (0.0, 1.0)), True), Fraction(1))
+        >>> local_polynomial(RuleCurve(Points((0.0, 2.0), (0.0, 1.0)), True), ONE)
         (Fraction(1, 1), Fraction(-1, 2))
     """
     checkpoint()
@@ -169,17 +169,15 @@ def sizes(
         yield at, Bounds(ZERO if value.low < 0 < value.high else near, far)
 
 
-def area(of: Line, chosen: Callable[[int, Fraction], Polynomial]) -> Bounds:
+def area(of: CurveAxis, chosen: Callable[[int, Fraction], Polynomial]) -> Bounds:
     """Return the area under a curve with degrees in [0, 1] on a line.
 
-    Args:
-        of: The line.
-        chosen: Given a cell's number and a point of it, the curve's polynomial there.
+    `chosen`: given a cell's number and a point of it, the curve's polynomial there.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
-        >>> ramp = line([Points((0.0, 2.0), (0.0, 1.0))], Fraction(0), Fraction(3))
-        >>> area(ramp, lambda cell, at: local(ramp.elements[0], at)).exact
+        >>> ramp = curve_axis([Points((0.0, 2.0), (0.0, 1.0))], ZERO, Fraction(3))
+        >>> area(ramp, lambda cell, at: local_polynomial(ramp.elements[0], at)).exact
         '2'
     """
     total = sum(
@@ -194,27 +192,27 @@ def area(of: Line, chosen: Callable[[int, Fraction], Polynomial]) -> Bounds:
     return Bounds(total, total + slack)
 
 
-def heights(of: Line) -> tuple[Seen, ...]:
+def heights(of: CurveAxis) -> tuple[CurveValue, ...]:
     """Return the supremum of each curve on a line, and a point where it is near.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
-        >>> ramp = line([Points((0.0, 2.0), (0.0, 1.0))], Fraction(0), Fraction(1))
+        >>> ramp = curve_axis([Points((0.0, 2.0), (0.0, 1.0))], ZERO, ONE)
         >>> heights(ramp)[0][0].exact
         '1/2'
     """
     return tuple(_height(of, one) for one in range(len(of.elements)))
 
 
-def _height(of: Line, one: int) -> Seen:
-    found = [(bounds, at) for bounds, at in walk(of, one)]
-    most = max(bounds.high for bounds, _ in found)
-    low = max(bounds.low for bounds, _ in found)
-    at = next(at for bounds, at in found if bounds.low == low)
+def _height(of: CurveAxis, one: int) -> CurveValue:
+    result = [(bounds, at) for bounds, at in walk(of, one)]
+    most = max(bounds.high for bounds, _ in result)
+    low = max(bounds.low for bounds, _ in result)
+    at = next(at for bounds, at in result if bounds.low == low)
     return Bounds(low, most), at
 
 
-def walk(of: Line, one: int) -> Iterator[Seen]:
+def walk(of: CurveAxis, one: int) -> Iterator[CurveValue]:
     """Yield a curve's values from left to right; it is monotone between neighbours.
 
     At a step both its values are yielded, each with a point where it is reached or
@@ -225,14 +223,16 @@ def walk(of: Line, one: int) -> Iterator[Seen]:
         at = (a + b) / 2
         has_here = number > 0 or not of.is_open or len(zones) == 1
         if has_here:
-            yield seen(of, one, number), at
+            yield value_at_place(of, one, number), at
         if number + 1 < len(zones):
-            after = seen(of, one, number, is_after=True)
-            if not has_here or after != seen(of, one, number):
+            after = value_at_place(of, one, number, is_after=True)
+            if not has_here or after != value_at_place(of, one, number):
                 yield after, at
 
 
-def seen(of: Line, one: int, zone: int, *, is_after: bool = False) -> Bounds:
+def value_at_place(
+    of: CurveAxis, one: int, zone: int, *, is_after: bool = False
+) -> Bounds:
     """Return a curve's value at a place, or its limit from above."""
     low, high = of.cells.zones[zone]
     if low == high:
@@ -279,7 +279,7 @@ class Overlap(NamedTuple):
         return Bounds(self.shared.low / self.joined.high, min(high, ONE))
 
 
-def overlap(of: Line) -> Overlap:
+def overlap(of: CurveAxis) -> Overlap:
     """Return how much the two curves of a line share, exactly but for slivers.
 
     Raises:
@@ -288,17 +288,19 @@ def overlap(of: Line) -> Overlap:
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
-        >>> from fuzzytree.auditing.engine.measures import line
-        >>> found = overlap(line([down, up], Fraction(0), Fraction(1)))
-        >>> found.jaccard.exact, found.possibility.exact
+        >>> from fuzzytree.auditing.engine.measures import curve_axis
+        >>> result = overlap(curve_axis([down, up], Fraction(0), Fraction(1)))
+        >>> result.jaccard.exact, result.possibility.exact
         ('1/3', '1/2')
     """
     if len(of.elements) != 2:
         raise ValueError(f"two curves overlap, not {len(of.elements)}")
     rank = of.cells.rank
     lower = [int(a > b) for a, b in rank]
-    shared = area(of, lambda cell, at: local(of.elements[lower[cell]], at))
-    joined = area(of, lambda cell, at: local(of.elements[1 - lower[cell]], at))
+    shared = area(of, lambda cell, at: local_polynomial(of.elements[lower[cell]], at))
+    joined = area(
+        of, lambda cell, at: local_polynomial(of.elements[1 - lower[cell]], at)
+    )
     met = [
         (
             Bounds(min(a.low, b.low), min(a.high, b.high)),
@@ -338,17 +340,17 @@ def most_shared(shapes: Sequence[Shape], low: float, high: float) -> FloatArray:
     cells = [shape_ranges(shape, edges)[1] for shape in shapes]
     least = np.array([one.low for one in cells])
     most = np.array([one.high for one in cells])
-    found = np.ones((len(shapes), len(shapes)))
+    result = np.ones((len(shapes), len(shapes)))
     for place in range(len(shapes)):
         shared = np.minimum(most, most[place]).sum(axis=1)
         joined = np.maximum(least, least[place]).sum(axis=1)
         # Edges and sums are off by roundings, which are far below this.
-        found[place] = (shared + 1e-6) / np.maximum(joined - 1e-6, 1e-12)
-    return np.minimum(found, 1.0)
+        result[place] = (shared + 1e-6) / np.maximum(joined - 1e-6, 1e-12)
+    return np.minimum(result, 1.0)
 
 
 def _both(
-    of: Line,
+    of: CurveAxis,
 ) -> Iterator[tuple[tuple[Bounds, Fraction], tuple[Bounds, Fraction]]]:
     """Yield the values of two curves at the same places, seen from both sides."""
     zones = of.cells.zones
@@ -360,19 +362,20 @@ def _both(
         ):
             if is_asked:
                 one, other = (
-                    seen(of, which, number, is_after=is_after) for which in (0, 1)
+                    value_at_place(of, which, number, is_after=is_after)
+                    for which in (0, 1)
                 )
                 yield (one, at), (other, at)
 
 
-def _crossings(of: Line) -> Iterator[tuple[Fraction, Bounds]]:
+def _crossings(of: CurveAxis) -> Iterator[tuple[Fraction, Bounds]]:
     before = 0
     since = 0
     for cell, (a, b) in enumerate(of.cells.rank):
         order = int(a > b) - int(a < b)
         if order and before and order != before:
             low, high = of.cells.zones[since]
-            yield (low + high) / 2, seen(of, 0, since)
+            yield (low + high) / 2, value_at_place(of, 0, since)
         if order:
             before, since = order, cell + 1
 
@@ -380,12 +383,12 @@ def _crossings(of: Line) -> Iterator[tuple[Fraction, Bounds]]:
 # --- dips and clipping
 
 
-def dips(values: Sequence[Seen], least: Fraction) -> Iterator[tuple[Seen, Seen, Seen]]:
+def dips(
+    values: Sequence[CurveValue], least: Fraction
+) -> Iterator[tuple[CurveValue, CurveValue, CurveValue]]:
     """Yield where a walk falls and rises again by at least some amount.
 
-    Args:
-        values: A walk.
-        least: The least depth that counts, above 0.
+    `least`: the least depth that counts, above 0.
 
     Yields:
         The peak before, the valley, and the peak behind it.
@@ -397,7 +400,7 @@ def dips(values: Sequence[Seen], least: Fraction) -> Iterator[tuple[Seen, Seen, 
         >>> [[int(at) for _, at in dip] for dip in dips(walked, Fraction(1, 2))]
         [[1, 2, 3]]
     """
-    before: Seen | None = None
+    before: CurveValue | None = None
     peak = valley = bottom = values[0]
     is_rising = True
     for value in values:
@@ -417,14 +420,14 @@ def dips(values: Sequence[Seen], least: Fraction) -> Iterator[tuple[Seen, Seen, 
         yield before, bottom, peak
 
 
-def outside(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
+def excesses(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
     """Yield where a shape's polynomials leave [0, 1] before they are clipped.
 
     Example:
         >>> from fuzzytree.model.rulebase import Band, Flank
         >>> bulge = Band(0.0, 1.0, right=Flank(1.0, 2.0, (4.0, -3.0)))
         >>> [(round(float(e.depth), 3), e.is_above)
-        ...  for e in outside(bulge, Fraction(0), Fraction(3))]
+        ...  for e in excesses(bulge, Fraction(0), Fraction(3))]
         [(0.333, True)]
     """
     for piece in pieces(shape):
@@ -439,9 +442,9 @@ def outside(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
             for start, end in itertools.pairwise(ends):
                 if sign * value_at(over, (start + end) / 2) <= 0:
                     continue
-                found = [*extremes(over, start, end)]
+                result = [*extremes(over, start, end)]
                 at, depth = max(
-                    ((at, sign * (v.low + v.high) / 2) for at, v in found),
+                    ((at, sign * (v.low + v.high) / 2) for at, v in result),
                     key=lambda one: one[1],
                 )
                 yield Excess(start, end, at, depth, sign > 0)
@@ -474,7 +477,7 @@ class Excess(NamedTuple):
 # --- distance of two curves
 
 
-class Distance(NamedTuple):
+class CurveDistance(NamedTuple):
     """The largest difference of two curves on an interval.
 
     Attributes:
@@ -488,7 +491,9 @@ class Distance(NamedTuple):
     at: Fraction
 
 
-def distance(one: Shape, other: Shape, low: Fraction, high: Fraction) -> Distance:
+def curve_distance(
+    one: Shape, other: Shape, low: Fraction, high: Fraction
+) -> CurveDistance:
     """Return how far two curves are apart at most on a closed interval.
 
     The interval is cut where a curve changes; in each cell both are polynomials, whose
@@ -498,13 +503,13 @@ def distance(one: Shape, other: Shape, low: Fraction, high: Fraction) -> Distanc
         >>> from fuzzytree.model.rulebase import Points
         >>> steep = Points((0.0, 1.0), (0.0, 1.0))
         >>> slow = Points((0.0, 2.0), (0.0, 1.0))
-        >>> found = distance(steep, slow, Fraction(0), Fraction(4))
-        >>> str(found.low), str(found.high), str(found.at)
+        >>> result = curve_distance(steep, slow, Fraction(0), Fraction(4))
+        >>> str(result.low), str(result.high), str(result.at)
         ('1/2', '1/2', '1')
     """
-    found = [*_gaps(one, other, low, high)]
-    least, at = max(((gap.low, at) for at, gap in found), key=lambda best: best[0])
-    return Distance(least, max(gap.high for _, gap in found), at)
+    result = [*_gaps(one, other, low, high)]
+    least, at = max(((gap.low, at) for at, gap in result), key=lambda best: best[0])
+    return CurveDistance(least, max(gap.high for _, gap in result), at)
 
 
 def _gaps(
@@ -514,17 +519,19 @@ def _gaps(
 
     What is reached only from above is told of the place that it is approached at.
     """
-    laid = apart([one, other], low, high)
-    first, second = laid.elements
+    axis = separate_axis([one, other], low, high)
+    first, second = axis.elements
     start = abs(first.degree(low) - second.degree(low))
     yield low, Bounds(start, start)
-    for a, b in laid.cells.between:
+    for a, b in axis.cells.between:
         middle = (a + b) / 2
-        gap = difference(local(first, middle), local(second, middle))
+        gap = difference(
+            local_polynomial(first, middle), local_polynomial(second, middle)
+        )
         yield from sizes(gap, a, b)
     # Where a curve changes at an irrational place, that is known as a narrow interval.
-    lows, highs = laid.cells.left
-    for number, (a, b) in enumerate(laid.cells.zones):
+    lows, highs = axis.cells.left
+    for number, (a, b) in enumerate(axis.cells.zones):
         if a < b:
             sides = (0, 1), (1, 0)
             most = max(

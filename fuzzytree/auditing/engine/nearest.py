@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.domain import Domain, Point, Side, linear_form
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, Point, linear_form
 from fuzzytree.auditing.engine.linear import (
     ZERO,
     Range,
@@ -88,7 +88,7 @@ def distance(
     An input that the domain fixes at one value does not count.
 
     Example:
-        >>> box = Domain((Side("x", 0.0, 4.0), Side("y", 0.0, 1.0)))
+        >>> box = Domain((DomainSide("x", 0.0, 4.0), DomainSide("y", 0.0, 1.0)))
         >>> zero = {"x": Fraction(0), "y": Fraction(0)}
         >>> str(distance(box, zero, {"x": Fraction(1), "y": Fraction(1, 8)}))
         '1/4'
@@ -103,7 +103,7 @@ def distance(
     )
 
 
-def width_of(side: Side) -> Fraction:
+def width_of(side: DomainSide) -> Fraction:
     """Return how wide a side is."""
     return Fraction(side.high) - Fraction(side.low)
 
@@ -112,21 +112,23 @@ def ball(domain: Domain, centre: Mapping[str, Fraction], radius: Fraction) -> Do
     """Return all of a domain within a radius of a point, and next to nothing more.
 
     Example:
-        >>> box = Domain((Side("x", 0.0, 4.0),))
+        >>> box = Domain((DomainSide("x", 0.0, 4.0),))
         >>> ball(box, {"x": Fraction(1)}, Fraction(1, 2)).sides[0].high
         3.0
     """
     return Domain(tuple(_near(side, centre, radius) for side in domain.sides))
 
 
-def _near(side: Side, centre: Mapping[str, Fraction], radius: Fraction) -> Side:
+def _near(
+    side: DomainSide, centre: Mapping[str, Fraction], radius: Fraction
+) -> DomainSide:
     if side.variable not in centre:  # a combination
         return side
     at, reach = centre[side.variable], radius * width_of(side)
     low = max(side.low, outwards(at - reach)[0])
     high = min(side.high, outwards(at + reach)[1])
     is_open = side.is_open and low == side.low
-    return Side(side.variable, low, high, side.origin, is_open)
+    return DomainSide(side.variable, low, high, side.origin, is_open)
 
 
 def nearest(
@@ -157,7 +159,7 @@ def nearest(
     search = _Search(domain, centre, ask, is_one, clock or Clock())
     if clear is not None:
         search.low = clear
-    return search.found(within, near)
+    return search.run(within, near)
 
 
 def nearest_box(
@@ -168,16 +170,13 @@ def nearest_box(
     The lower bound is the distance itself; where a box is open at that end, no point of
     it has just this distance, and the point is a little farther.
 
-    Args:
-        domain: In whose widths distance is measured.
-        centre: From where.
-        targets: Boxes within the domain, none empty, each with a side for every input.
+    `domain`: in whose widths distance is measured.
 
     Example:
-        >>> line = Domain((Side("x", 0.0, 4.0),))
-        >>> right = Domain((Side("x", 2.0, 4.0, is_open=True),))
-        >>> found = nearest_box(line, {"x": Fraction(1)}, [right])
-        >>> str(found.low), 2 < found.point["x"] < Fraction("2.01")
+        >>> curve_axis = Domain((DomainSide("x", 0.0, 4.0),))
+        >>> right = Domain((DomainSide("x", 2.0, 4.0, is_open=True),))
+        >>> result = nearest_box(curve_axis, {"x": Fraction(1)}, [right])
+        >>> str(result.low), 2 < result.point["x"] < Fraction("2.01")
         ('1/4', True)
     """
     best: tuple[Fraction, int] | None = None
@@ -199,14 +198,16 @@ def nearest_box(
     return Nearest(best[0], distance(domain, centre, point), point)
 
 
-def _gap(side: Side, whole: Side, centre: Mapping[str, Fraction]) -> Fraction:
+def _gap(
+    side: DomainSide, whole: DomainSide, centre: Mapping[str, Fraction]
+) -> Fraction:
     """Return how far a value is from a side, in shares of the whole side's width."""
     at = centre[side.variable]
     gap = max(Fraction(side.low) - at, at - Fraction(side.high), Fraction(0))
     return gap / width_of(whole) if gap else gap
 
 
-def _closest(side: Side, at: Fraction, slack: Fraction) -> Fraction:
+def _closest(side: DomainSide, at: Fraction, slack: Fraction) -> Fraction:
     """Return a plain value of a side that is all but the closest to another."""
     low, high = Fraction(side.low), Fraction(side.high)
     if low < at <= high or (at == low and not side.is_open):
@@ -234,7 +235,7 @@ class _Search:
         self.point: Point | None = None
         self.why = ""
 
-    def found(self, within: Fraction | None, near: Iterable[Point]) -> Nearest:
+    def run(self, within: Fraction | None, near: Iterable[Point]) -> Nearest:
         try:
             if self.is_one(self.centre):
                 return Nearest(Fraction(0), Fraction(0), dict(self.centre))
@@ -284,9 +285,9 @@ class _Search:
         return False
 
     def _keep(self, point: Point) -> None:
-        found = distance(self.domain, self.centre, point)
-        if self.high is None or found < self.high:
-            self.high, self.point = found, point
+        result = distance(self.domain, self.centre, point)
+        if self.high is None or result < self.high:
+            self.high, self.point = result, point
 
     def _drawn(self, point: Point) -> Point:
         """Return a point of the kind between a witness and the centre."""
@@ -340,13 +341,7 @@ class Polytope(NamedTuple):
 def polytope_of(
     box: Domain, inputs: Sequence[str], variables: Mapping[str, Variable]
 ) -> Polytope:
-    """Return a box of inputs and combinations as a polytope.
-
-    Args:
-        box: A side for each input, and for any combinations.
-        inputs: The names of the inputs.
-        variables: The combinations, by name, and any others.
-    """
+    """Return a box of inputs and combinations as a polytope."""
     number = {name: place for place, name in enumerate(inputs)}
     sides = {side.variable: side for side in box.sides}
     ranges = tuple(
@@ -370,10 +365,8 @@ def polytope_of(
 class Polytopes:
     """Some polytopes of a domain, of which the nearest is asked for.
 
-    Args:
-        domain: In whose widths distance is measured.
-        inputs: The names of the inputs.
-        parts: The polytopes; those without a point may be among them.
+    `domain`: in whose widths distance is measured; `parts`: the polytopes; those
+    without a point may be among them.
     """
 
     def __init__(
@@ -381,7 +374,7 @@ class Polytopes:
     ) -> None:
         self.domain, self.inputs, self.parts = domain, inputs, parts
         wholes = {side.variable: side for side in domain.sides}
-        self.wholes: list[Side] = [wholes[name] for name in inputs]
+        self.wholes: list[DomainSide] = [wholes[name] for name in inputs]
         self.widths = [width_of(side) for side in self.wholes]
         self._empty: dict[int, bool] = {}
         self._bound = _Bound(parts, self.widths)
@@ -396,17 +389,12 @@ class Polytopes:
 
         The lower bound is the distance itself, or less by next to nothing.
 
-        Args:
-            centre: A point of the domain.
-            chosen: The positions of the polytopes that count.
-            clock: How much time there is; no limit unless given.
-
         Example:
-            >>> line = Domain((Side("x", 0.0, 4.0),))
-            >>> right = Domain((Side("x", 2.0, 4.0, is_open=True),))
-            >>> asked = Polytopes(line, ["x"], [polytope_of(right, ["x"], {})])
-            >>> found = asked.nearest({"x": Fraction(1)}, [0])
-            >>> str(found.low), 2 < found.point["x"] < Fraction("2.01")
+            >>> curve_axis = Domain((DomainSide("x", 0.0, 4.0),))
+            >>> right = Domain((DomainSide("x", 2.0, 4.0, is_open=True),))
+            >>> parts = Polytopes(curve_axis, ["x"], [polytope_of(right, ["x"], {})])
+            >>> result = parts.nearest({"x": Fraction(1)}, [0])
+            >>> str(result.low), 2 < result.point["x"] < Fraction("2.01")
             ('1/4', True)
         """
         at = [centre[name] for name in self.inputs]
@@ -460,15 +448,15 @@ class Polytopes:
         while enough is None or low < enough:
             step = max(beyond * NARROW, LEAST) / 2
             beyond = simple(beyond + step / 2, beyond + step)
-            found = solved(self._ball(part, at, beyond), part.rows)
-            if isinstance(found, Row):
-                goal = found.low if found.low is not None else ZERO
-                radius = self._radius(part, at, (found.weights, goal), low)
+            result = solved(self._ball(part, at, beyond), part.rows)
+            if isinstance(result, Row):
+                goal = result.low if result.low is not None else ZERO
+                radius = self._radius(part, at, (result.weights, goal), low)
                 if radius is None:
                     return None
                 low = beyond = max(low, radius)
-            elif found is not None:
-                return low, _plainer(found, at, part)
+            elif result is not None:
+                return low, _plainer(result, at, part)
             elif self._is_empty(place):
                 return None
         return low, None
@@ -482,11 +470,11 @@ class Polytopes:
 
     def _gap(self, part: Polytope, at: Sequence[Fraction]) -> Fraction:
         """Return how far a polytope's box is from a point."""
-        found = ZERO
+        result = ZERO
         for x, (low, high), width in zip(at, part.ranges, self.widths, strict=True):
             gap = max(low - x, x - high, ZERO)
-            found = max(found, gap / width if gap else ZERO)
-        return found
+            result = max(result, gap / width if gap else ZERO)
+        return result
 
     def _ball(
         self, part: Polytope, at: Sequence[Fraction], radius: Fraction
@@ -534,13 +522,13 @@ def _plainer(
     values: Sequence[Fraction], at: Sequence[Fraction], part: Polytope
 ) -> list[Fraction]:
     """Return a point of a polytope with as many values of the centre as may be."""
-    found = list(values)
+    result = list(values)
     for place, (low, high) in enumerate(part.ranges):
-        other = [*found[:place], at[place], *found[place + 1 :]]
+        other = [*result[:place], at[place], *result[place + 1 :]]
         touched = (row for row in part.rows if row.weights.get(place))
         if low <= at[place] <= high and all(holds(row, other) for row in touched):
-            found = other
-    return found
+            result = other
+    return result
 
 
 class _Bound:
@@ -570,7 +558,7 @@ class _Bound:
             some = 8 * (len(x) + 4) * U
             size = np.maximum(np.abs(self.low), np.abs(self.high)) + np.abs(x)
             gap = np.maximum(self.low - x, x - self.high) - some * size
-            found = np.max(gap / self.width, axis=1, initial=0.0)
+            result = np.max(gap / self.width, axis=1, initial=0.0)
             reach = np.abs(self.weights) @ np.where(
                 self.width < np.inf, self.width, 0.0
             )
@@ -578,7 +566,7 @@ class _Bound:
             lack = self.goal - self.weights @ x - some * size
             is_short = (lack > 0.0) & (reach > 0.0)
             radius = np.divide(lack, reach, out=np.zeros_like(lack), where=is_short)
-            np.maximum.at(found, self.owner, radius)
-        floor = np.maximum(found * (1.0 - some) - 2.0**-1000, 0.0)
+            np.maximum.at(result, self.owner, radius)
+        floor = np.maximum(result * (1.0 - some) - 2.0**-1000, 0.0)
         known: FloatArray = np.where(np.isfinite(floor), floor, 0.0)
         return list(known.tolist())

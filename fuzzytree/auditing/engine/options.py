@@ -24,11 +24,11 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Bands, Ground, Laid
+from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, Bands
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.witnesses import (
     START,
-    Stretch,
+    AxisStretch,
     point_with,
     stretch,
     widest,
@@ -61,10 +61,7 @@ def cover(
 ) -> tuple[int, ...] | None:
     """Return an option of each family that together cover `full`, or None.
 
-    Args:
-        families: The options on each axis, as sets of bits.
-        full: What must be covered.
-        clock: Asked between two axes.
+    `full`: what must be covered; `clock`: asked between two axes.
 
     Raises:
         OutOfTimeError: If the clock is over.
@@ -113,7 +110,7 @@ NEVER = np.iinfo(np.int64).max
 _MOST_BITS = 63
 
 
-class Options(msgspec.Struct, frozen=True, eq=False, dict=True):
+class AxisOptions(msgspec.Struct, frozen=True, eq=False, dict=True):
     """The options on one axis.
 
     Attributes:
@@ -167,16 +164,16 @@ class Options(msgspec.Struct, frozen=True, eq=False, dict=True):
         return self._masks[key]
 
 
-class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
+class Duel(msgspec.Struct, frozen=True, eq=False, dict=True):
     """Some rules, taken together as their minimum, against rivals.
 
     Attributes:
-        ground: Where.
+        base: Where.
         ours: The positions of the rules; without any it is a rule that asks nothing.
         rivals: The positions of the rivals.
     """
 
-    ground: Ground
+    base: Arrangement
     ours: tuple[int, ...]
     rivals: tuple[int, ...]
 
@@ -188,27 +185,27 @@ class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
     @property
     def bands(self) -> Bands:
         """The critical levels."""
-        return self.ground.laid[1]
+        return self.base.bands
 
     @functools.cached_property
-    def options(self) -> tuple[Options, ...]:
+    def options(self) -> tuple[AxisOptions, ...]:
         """The options on each axis, without those that another one makes useless."""
         return tuple(map(_undominated, self.all_options))
 
     @functools.cached_property
-    def all_inner(self) -> tuple[Options, ...]:
+    def all_inner(self) -> tuple[AxisOptions, ...]:
         """All but lower ends: these are surfaces, but where an axis is one value."""
         return tuple(map(_inner, self.all_options))
 
     @functools.cached_property
-    def inner_options(self) -> tuple[Options, ...]:
+    def inner_options(self) -> tuple[AxisOptions, ...]:
         """Of these the ones that no other one makes useless."""
         return tuple(map(_undominated, self.all_inner))
 
     @functools.cached_property
-    def all_options(self) -> tuple[Options, ...]:
+    def all_options(self) -> tuple[AxisOptions, ...]:
         """The options on each axis."""
-        return tuple(_options(self, laid) for laid in self.ground.laid[0])
+        return tuple(_options(self, grid) for grid in self.base.grids)
 
     @functools.cached_property
     def events(self) -> tuple[int, ...]:
@@ -226,63 +223,63 @@ class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
         return _events(self.all_options)
 
 
-def _events(every: Iterable[Options]) -> tuple[int, ...]:
-    found = {0}  # without rivals nothing happens down to the lowest level
+def _events(every: Iterable[AxisOptions]) -> tuple[int, ...]:
+    result = {0}  # without rivals nothing happens down to the lowest level
     for options in every:
-        found.update(options.events.tolist())
-    return tuple(sorted(found, reverse=True))
+        result.update(options.events.tolist())
+    return tuple(sorted(result, reverse=True))
 
 
-def weakest(laid: Laid, rules: Sequence[int], cell: int) -> int:
+def weakest(grid: AxisGrid, rules: Sequence[int], cell: int) -> int:
     """Return the element that is the least of some rules' degrees in a cell."""
-    rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
-    of = laid.of_start if cell == START else laid.of[:, cell]
+    rank = grid.cells.start_rank if cell == START else grid.cells.rank[cell]
+    of = grid.of_start if cell == START else grid.of[:, cell]
     chosen = [int(of[rule]) for rule in rules] or [0]
     return min(chosen, key=lambda one: int(rank[one]))
 
 
-def _options(contest: Contest, laid: Laid) -> Options:
+def _options(contest: Duel, grid: AxisGrid) -> AxisOptions:
     checkpoint()
-    cells = laid.cells
+    cells = grid.cells
     count = len(cells.rank)
     columns = np.arange(count)
     rivals = np.array(contest.rivals, dtype=np.int64)
     mine = np.zeros(count, dtype=np.int64)  # the curve that is always 1
     for rule in contest.ours:
-        other = laid.of[rule]
+        other = grid.of[rule]
         mine = np.where(
             cells.rank[columns, other] < cells.rank[columns, mine], other, mine
         )
-    theirs = laid.of[rivals]
+    theirs = grid.of[rivals]
     is_below = cells.rank[columns, theirs] < cells.rank[columns, mine]
-    floor = np.where(is_below, laid.least[theirs, columns], NEVER).T
-    top = laid.most[mine, columns]
+    floor = np.where(is_below, grid.least[theirs, columns], NEVER).T
+    top = grid.most[mine, columns]
     parts = [(columns, top, floor)]
-    if not contest.ground.opens(laid.axis.variable.name):
-        parts.append(_start(contest, laid, rivals))
-    parts.append(_zones(contest, laid))
+    if not contest.base.opens(grid.axis.variable.name):
+        parts.append(_start(contest, grid, rivals))
+    parts.append(_zones(contest, grid))
     where, tops, floors = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Options(where, tops, floors)
+    return AxisOptions(where, tops, floors)
 
 
 def _start(
-    contest: Contest, laid: Laid, rivals: IntArray
+    contest: Duel, grid: AxisGrid, rivals: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return the option of the axis's lower end, which no cell holds."""
-    mine = weakest(laid, contest.ours, START)
-    theirs = laid.of_start[rivals]
-    rank = laid.cells.start_rank
-    floor = np.where(rank[theirs] < rank[mine], laid.at[theirs, 0], NEVER)
-    return np.array([START]), laid.at[mine, :1], floor[np.newaxis]
+    mine = weakest(grid, contest.ours, START)
+    theirs = grid.of_start[rivals]
+    rank = grid.cells.start_rank
+    floor = np.where(rank[theirs] < rank[mine], grid.at[theirs, 0], NEVER)
+    return np.array([START]), grid.at[mine, :1], floor[np.newaxis]
 
 
-def _zones(contest: Contest, laid: Laid) -> tuple[IntArray, IntArray, IntArray]:
+def _zones(contest: Duel, grid: AxisGrid) -> tuple[IntArray, IntArray, IntArray]:
     """Return options of places with more than one in them: whatever may be there."""
-    vague = np.flatnonzero(laid.cells.is_vague)
+    vague = np.flatnonzero(grid.cells.is_vague)
 
     def bands_of(rule: int) -> tuple[IntArray, IntArray]:
-        groups = laid.axis.asked[rule]
-        at = laid.at[:, vague]
+        groups = grid.axis.clauses[rule]
+        at = grid.at[:, vague]
         low = high = np.full(len(vague), np.iinfo(np.int64).max - 1)
         if not groups:
             low = high = at[0]
@@ -291,21 +288,21 @@ def _zones(contest: Contest, laid: Laid) -> tuple[IntArray, IntArray, IntArray]:
             high = np.minimum(high, at[list(group)].max(axis=0))
         return low, high
 
-    tops = [laid.at[0, vague], *(bands_of(rule)[1] for rule in contest.ours)]
+    tops = [grid.at[0, vague], *(bands_of(rule)[1] for rule in contest.ours)]
     top = np.min(tops, axis=0)
     floor = np.array([bands_of(rule)[0] for rule in contest.rivals], dtype=np.int64)
     floor = floor.reshape(len(contest.rivals), len(vague)).T
     return -2 - vague, top, floor
 
 
-def _inner(options: Options) -> Options:
+def _inner(options: AxisOptions) -> AxisOptions:
     kept = options.where != START
     if not (options.where >= 0).any():
         return options
-    return Options(options.where[kept], options.top[kept], options.floor[kept])
+    return AxisOptions(options.where[kept], options.top[kept], options.floor[kept])
 
 
-def _undominated(options: Options) -> Options:
+def _undominated(options: AxisOptions) -> AxisOptions:
     """Leave out options that another one is at least as good as at every level."""
     if len(options.where) > 400:  # the comparison takes its square
         return options
@@ -317,13 +314,15 @@ def _undominated(options: Options) -> Options:
         checkpoint()
         is_better &= floor[:, np.newaxis, rival] <= floor[:, rival]
     chosen = order[~np.triu(is_better, 1).any(axis=0)]
-    return Options(options.where[chosen], options.top[chosen], options.floor[chosen])
+    return AxisOptions(
+        options.where[chosen], options.top[chosen], options.floor[chosen]
+    )
 
 
 # --- axes that share inputs
 
 
-Part = tuple[Stretch, int]
+Part = tuple[AxisStretch, int]
 """A stretch of an axis, and the rivals that it leaves below, as bits."""
 
 
@@ -334,56 +333,56 @@ def union(masks: Iterable[int]) -> int:
         >>> union([0b001, 0b100])
         5
     """
-    found = 0
+    result = 0
     for mask in masks:
-        found |= mask
-    return found
+        result |= mask
+    return result
 
 
 def at_most(calls: int, clock: Clock | None = None) -> Callable[[], None]:
     """Return what raises OutOfTimeError when called too often, or too late."""
     left = iter(range(calls))
 
-    def tell() -> None:
+    def count() -> None:
         if clock is not None:
             clock.check()
         if next(left, None) is None:
             raise OutOfTimeError
 
-    return tell
+    return count
 
 
 def choices(
-    given: Ground,
+    base: Arrangement,
     parts: Mapping[int, Sequence[Part]],
     goal: int,
     rest: int,
-    held: Mapping[int, Stretch],
-    tell: Callable[[], None],
-) -> Iterator[tuple[dict[int, Stretch], int]]:
+    extra: Mapping[int, AxisStretch],
+    count: Callable[[], None],
+) -> Iterator[tuple[dict[int, AxisStretch], int]]:
     """Yield choices that some point has, each with what it leaves below.
 
     Args:
-        given: The rules and the box.
+        base: The rules and the box.
         parts: What each axis can be.
         goal: What must be left below, by the other axes too.
         rest: What the other axes can leave below.
-        held: What axes must be besides.
-        tell: Called before inequalities are solved; it may raise.
+        extra: The required values of further axes.
+        count: Called before inequalities are solved; it may raise.
     """
     axes = list(parts)
     reach = [rest]
     for axis in reversed(axes):
         reach.append(reach[-1] | union(mask for _, mask in parts[axis]))
     reach.reverse()
-    todo: list[tuple[int, dict[int, Stretch], int]] = [(0, dict(held), 0)]
+    todo: list[tuple[int, dict[int, AxisStretch], int]] = [(0, dict(extra), 0)]
     while todo:
         place, wanted, covered = todo.pop()
         if (covered | reach[place]) & goal != goal:
             continue
         if wanted:
-            tell()
-            if point_with(given, wanted) is None:
+            count()
+            if point_with(base, wanted) is None:
                 continue
         if place == len(axes):
             yield wanted, covered
@@ -396,8 +395,8 @@ def choices(
 
 
 def parts_of(
-    contest: Contest,
-    options: Options,
+    contest: Duel,
+    options: AxisOptions,
     axis: int,
     band: int,
     levels: tuple[Fraction, Fraction],
@@ -406,29 +405,24 @@ def parts_of(
 ) -> Iterator[Part]:
     """Yield the stretches of an axis, each with the rivals left below there.
 
-    Args:
-        contest: The question.
-        options: Those of the axis that count.
-        axis: The axis.
-        band: The band below the levels.
-        levels: The rule must reach the lower one, the rivals stay below the upper.
-        is_outer: Whether what may suffice at some level between counts.
+    `levels`: the rule must reach the lower one, the rivals stay below the upper;
+    `is_outer`: whether what may suffice at some level between counts.
     """
-    laid = contest.ground.laid[0][axis]
+    grid = contest.base.grids[axis]
     for number in ((options.top > band) & (options.where >= START)).nonzero()[0]:
         cell = int(options.where[number])
-        mine = weakest(laid, contest.ours, cell)
+        mine = weakest(grid, contest.ours, cell)
         floors = options.floor[number]
         theirs = {
-            n: weakest(laid, [contest.rivals[n]], cell)
+            n: weakest(grid, [contest.rivals[n]], cell)
             for n in range(len(floors))
             if floors[n] <= band
         }
-        yield from nested(laid, cell, levels, mine, theirs, is_outer=is_outer)
+        yield from nested(grid, cell, levels, mine, theirs, is_outer=is_outer)
 
 
 def nested(
-    laid: Laid,
+    grid: AxisGrid,
     cell: int,
     levels: tuple[Fraction, Fraction],
     mine: int,
@@ -439,22 +433,14 @@ def nested(
     """Yield stretches of a cell, each with the rivals left below there.
 
     What is left below is nested: everything up to some element of the order.
-
-    Args:
-        laid: The axis.
-        cell: The cell.
-        levels: As for `parts_of`.
-        mine: The element that is the rule's degree.
-        theirs: That of each rival that may be left below.
-        is_outer: As for `parts_of`.
     """
-    rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
+    rank = grid.cells.start_rank if cell == START else grid.cells.rank[cell]
     for limit in sorted({-1, *(int(rank[e]) for e in theirs.values())}):
         kept = {n: e for n, e in theirs.items() if int(rank[e]) <= limit}
         below = set(kept.values())
         if is_outer:
-            part = widest(laid, cell, levels, [mine], below)
+            part = widest(grid, cell, levels, [mine], below)
         else:
-            part = stretch(laid, cell, levels[0], [mine], below)
+            part = stretch(grid, cell, levels[0], [mine], below)
         if part is not None:
             yield part, union(1 << n for n in kept)

@@ -37,7 +37,7 @@ from fuzzytree.numerics.exact import CAP
 ZERO, ONE = Fraction(0), Fraction(1)
 
 
-class Piece(Value, frozen=True):
+class PolynomialPiece(Value, frozen=True):
     """A degree on `low < x <= high`: `min(max(p(x), 0), cap)`.
 
     All shapes are continuous from the left, so the pieces' upper ends belong to them.
@@ -60,7 +60,7 @@ class Piece(Value, frozen=True):
 
 
 @functools.lru_cache(maxsize=1 << 12)
-def pieces(shape: Shape) -> tuple[Piece, ...]:
+def pieces(shape: Shape) -> tuple[PolynomialPiece, ...]:
     """Return a shape's pieces, from minus to plus infinity without a gap.
 
     Example:
@@ -77,11 +77,13 @@ def pieces(shape: Shape) -> tuple[Piece, ...]:
     assert_never(shape)
 
 
-def _flat(low: Fraction | None, high: Fraction | None, degree: Fraction) -> Piece:
-    return Piece(low, high, (degree,), max(degree, CAP))
+def _flat(
+    low: Fraction | None, high: Fraction | None, degree: Fraction
+) -> PolynomialPiece:
+    return PolynomialPiece(low, high, (degree,), max(degree, CAP))
 
 
-def _band(band: Band) -> Iterator[Piece]:
+def _band(band: Band) -> Iterator[PolynomialPiece]:
     low = None if band.low is None else Fraction(band.low)
     high = None if band.high is None else Fraction(band.high)
     if low is not None:
@@ -93,7 +95,7 @@ def _band(band: Band) -> Iterator[Piece]:
 
 def _flank(
     flank: Flank | None, low: Fraction | None, high: Fraction | None
-) -> Iterator[Piece]:
+) -> Iterator[PolynomialPiece]:
     """Yield a flank's pieces on one side of a plateau."""
     if flank is None:
         yield _flat(low, high, ZERO)
@@ -111,7 +113,7 @@ def _flank(
     level = min(max(sum(curve, ZERO), ZERO), CAP)
     for a, b in itertools.pairwise(ends):
         if a is not None and first <= a and b is not None and b <= last:
-            yield Piece(a, b, inner, CAP)
+            yield PolynomialPiece(a, b, inner, CAP)
         elif (b is not None and b <= first) is (end < start):
             yield _flat(a, b, ZERO)
         else:
@@ -122,13 +124,13 @@ def _is_within(x: Fraction, low: Fraction | None, high: Fraction | None) -> bool
     return (low is None or low < x) and (high is None or x < high)
 
 
-def _lr(shape: LR) -> Iterator[Piece]:
+def _lr(shape: LR) -> Iterator[PolynomialPiece]:
     mean = Fraction(shape.mean)
     yield from _side(shape.left, mean, -1)
     yield from reversed([*_side(shape.right, mean, 1)])
 
 
-def _side(side: Side, mean: Fraction, sign: int) -> Iterator[Piece]:
+def _side(side: Side, mean: Fraction, sign: int) -> Iterator[PolynomialPiece]:
     """Yield a side's pieces, from the outside to the mean."""
     spread, reach = Fraction(side.spread), Fraction(side.reach)
     curve = tuple(map(Fraction, side.curve))
@@ -136,21 +138,23 @@ def _side(side: Side, mean: Fraction, sign: int) -> Iterator[Piece]:
     far, near = mean + sign * spread * reach, mean + sign * spread
     slope = sign / spread
 
-    def laid(a: Fraction | None, b: Fraction, polynomial: Polynomial) -> Piece:
+    def parts(
+        a: Fraction | None, b: Fraction, polynomial: Polynomial
+    ) -> PolynomialPiece:
         low, high = (a, b) if sign < 0 else (b, a)
-        return Piece(low, high, polynomial)
+        return PolynomialPiece(low, high, polynomial)
 
-    yield laid(None, far, (ZERO,))
+    yield parts(None, far, (ZERO,))
     # w = (reach - u) / (reach - 1) with u = slope (x - mean)
     base = (ZERO, ZERO, ZERO, ZERO, at_spread)
     tail = composed(base, (reach + slope * mean) / (reach - 1), -slope / (reach - 1))
-    yield laid(far, near, tail if at_spread else (ZERO,))
+    yield parts(far, near, tail if at_spread else (ZERO,))
     inner = composed(curve, -ONE, Fraction(2))  # c(2 t - 1) in t
     body = (ONE, *(-one for one in inner))  # 1 - t c(2 t - 1)
-    yield laid(near, mean, composed(body, -slope * mean, slope))
+    yield parts(near, mean, composed(body, -slope * mean, slope))
 
 
-def _points(points: Points) -> Iterator[Piece]:
+def _points(points: Points) -> Iterator[PolynomialPiece]:
     values = tuple(map(Fraction, points.values))
     degrees = tuple(map(Fraction, points.degrees))
     yield _flat(None, values[0], degrees[0])
@@ -161,34 +165,34 @@ def _points(points: Points) -> Iterator[Piece]:
             yield _flat(a, b, p)
             continue
         slope = (r - p) / (b - a)
-        yield Piece(a, b, (p - slope * a, slope))
+        yield PolynomialPiece(a, b, (p - slope * a, slope))
     yield _flat(values[-1], None, degrees[-1])
 
 
-def piece_at(laid: tuple[Piece, ...], x: Fraction) -> Piece:
+def piece_at(parts: tuple[PolynomialPiece, ...], x: Fraction) -> PolynomialPiece:
     """Return the piece that x belongs to."""
-    low, high = 0, len(laid) - 1
+    low, high = 0, len(parts) - 1
     while low < high:
         middle = (low + high) // 2
-        end = laid[middle].high
+        end = parts[middle].high
         if end is None or x <= end:
             high = middle
         else:
             low = middle + 1
-    return laid[low]
+    return parts[low]
 
 
-def degree_after(laid: tuple[Piece, ...], x: Fraction) -> Fraction:
+def degree_after(parts: tuple[PolynomialPiece, ...], x: Fraction) -> Fraction:
     """Return the limit of the degree from the right: it differs from it at a step."""
-    low, high = 0, len(laid) - 1
+    low, high = 0, len(parts) - 1
     while low < high:
         middle = (low + high) // 2
-        end = laid[middle].high
+        end = parts[middle].high
         if end is None or x < end:
             high = middle
         else:
             low = middle + 1
-    return laid[low].degree(x)
+    return parts[low].degree(x)
 
 
 # --- the curves of one axis
@@ -200,7 +204,7 @@ ALWAYS = Band()
 """The curve of a rule that asks nothing of a variable."""
 
 
-class Element(NamedTuple):
+class RuleCurve(NamedTuple):
     """A curve that rules use: a shape, or 1 minus it."""
 
     shape: Shape
@@ -209,15 +213,15 @@ class Element(NamedTuple):
     def degree(self, x: Fraction) -> Fraction:
         """Return the exact degree at a value."""
         checkpoint()
-        found = piece_at(pieces(self.shape), x).degree(x)
-        return 1 - found if self.is_complement else found
+        result = piece_at(pieces(self.shape), x).degree(x)
+        return 1 - result if self.is_complement else result
 
     def degree_after(self, x: Fraction) -> Fraction:
         """Return the exact limit of the degree from the right."""
-        found = degree_after(pieces(self.shape), x)
-        return 1 - found if self.is_complement else found
+        result = degree_after(pieces(self.shape), x)
+        return 1 - result if self.is_complement else result
 
-    def pieces(self) -> tuple[tuple[Piece, Polynomial], ...]:
+    def pieces(self) -> tuple[tuple[PolynomialPiece, Polynomial], ...]:
         """Return the pieces of the shape, each with its own polynomial on it."""
         return tuple(
             (
@@ -230,7 +234,7 @@ class Element(NamedTuple):
         )
 
 
-class Place(NamedTuple):
+class ChangePoint(NamedTuple):
     """Where something can change on an axis: between `low` and `high`.
 
     Attributes:
@@ -244,61 +248,61 @@ class Place(NamedTuple):
     of: tuple[Polynomial, Root] | None = None
 
 
-def places(elements: Sequence[Element]) -> tuple[Place, ...]:
+def places(elements: Sequence[RuleCurve]) -> tuple[ChangePoint, ...]:
     """Return all places where the order or direction of some curves can change."""
-    found: set[Fraction] = set()
-    irrational: list[Place] = []
-    laid = [element.pieces() for element in elements]
+    result: set[Fraction] = set()
+    irrational: list[ChangePoint] = []
+    parts = [element.pieces() for element in elements]
     levels = sorted(
         {ZERO, ONE}
         | {
             level
-            for of in laid
+            for of in parts
             for piece, polynomial in of
             if piece.cap == CAP and len(polynomial) > 1
             for level in (CAP, 1 - CAP)
         }
     )
-    for element, of in zip(elements, laid, strict=True):
+    for element, of in zip(elements, parts, strict=True):
         is_kept = isinstance(element.shape, Points)  # lines that stay in [0, 1]
         for piece, polynomial in of:
-            found.update(end for end in (piece.low, piece.high) if end is not None)
+            result.update(end for end in (piece.low, piece.high) if end is not None)
             if len(polynomial) > 1:
                 ends = piece.low, piece.high
                 turning = integers(derivative(polynomial))[0]
                 if len(turning) > 1:
-                    _solve(turning, *ends, found, irrational)
+                    _solve(turning, *ends, result, irrational)
                 for level in levels:
                     if not is_kept or ZERO < level < ONE:
                         met = _crossing(polynomial, (level,))
-                        _solve(met, *ends, found, irrational)
-    for one, other in itertools.combinations(laid, 2):
+                        _solve(met, *ends, result, irrational)
+    for one, other in itertools.combinations(parts, 2):
         checkpoint()
         for low, high, p, q in _overlaps(one, other):
             is_asked = p in _ENDS or q in _ENDS  # where one meets 0 or 1 is known
             if (len(p) > 1 or len(q) > 1) and not is_asked:
-                _solve(_crossing(p, q), low, high, found, irrational)
-    return tuple(_apart([*(Place(x, x) for x in found), *irrational]))
+                _solve(_crossing(p, q), low, high, result, irrational)
+    return tuple(_apart([*(ChangePoint(x, x) for x in result), *irrational]))
 
 
-def _apart(found: Iterable[Place]) -> list[Place]:
+def _apart(result: Iterable[ChangePoint]) -> list[ChangePoint]:
     """Return places apart from each other: one place that was met twice stands once.
 
     Two that cannot be told apart are left to touch.
     """
-    kept: list[Place] = []
-    todo = sorted(found, key=lambda one: (one.low, one.high), reverse=True)
+    kept: list[ChangePoint] = []
+    todo = sorted(result, key=lambda one: (one.low, one.high), reverse=True)
     while todo:
         after = todo.pop()
         if not kept or after.low > kept[-1].high:
             kept.append(after)
             continue
         before = kept.pop()
-        same = _same(before, after)
-        if same is not None:
-            todo.append(same)
+        same_contenders = _same(before, after)
+        if same_contenders is not None:
+            todo.append(same_contenders)
             continue
-        pair = sorted(_told_apart(before, after), key=lambda one: one.low)
+        pair = sorted(_separated(before, after), key=lambda one: one.low)
         if pair[1].low > pair[0].high:
             todo += reversed(pair)  # the lower one may meet those before
         else:
@@ -306,7 +310,7 @@ def _apart(found: Iterable[Place]) -> list[Place]:
     return kept
 
 
-def _same(one: Place, other: Place) -> Place | None:
+def _same(one: ChangePoint, other: ChangePoint) -> ChangePoint | None:
     """Return two places that touch as one, if they are the same for sure."""
     if one.of is None or other.of is None:
         exact, vague = (one, other) if one.of is None else (other, one)
@@ -320,11 +324,11 @@ def _same(one: Place, other: Place) -> Place | None:
     # only one in its place.
     shared = common_factor(one.of[0], other.of[0])
     if len(shared) > 1 and value_at(shared, low) * value_at(shared, high) < 0:
-        return Place(low, high, (shared, Root(low, high)))
+        return ChangePoint(low, high, (shared, Root(low, high)))
     return None
 
 
-def _is_only_root(of: Polynomial, at: Fraction, place: Place) -> bool:
+def _is_only_root(of: Polynomial, at: Fraction, place: ChangePoint) -> bool:
     """Return whether a polynomial is 0 at a value, and nowhere else in a place."""
     if place.low == place.high:
         return at == place.low
@@ -336,7 +340,7 @@ def _is_only_root(of: Polynomial, at: Fraction, place: Place) -> bool:
     return all(value_at(of, end) for end in ends) and not roots(of, *ends)
 
 
-def _told_apart(one: Place, other: Place) -> tuple[Place, Place]:
+def _separated(one: ChangePoint, other: ChangePoint) -> tuple[ChangePoint, ChangePoint]:
     """Return two places that touch as narrow as it takes for them to be apart."""
     for bits in (64, 128, 512):
         one, other = (_narrowed(place, bits) for place in (one, other))
@@ -345,12 +349,12 @@ def _told_apart(one: Place, other: Place) -> tuple[Place, Place]:
     return one, other
 
 
-def _narrowed(place: Place, bits: int) -> Place:
+def _narrowed(place: ChangePoint, bits: int) -> ChangePoint:
     if place.of is None:
         return place
     size = max(abs(place.low), abs(place.high)) or ONE
     root = refined(*place.of, bits - magnitude(size))
-    return Place(root.low, root.high, (place.of[0], root))
+    return ChangePoint(root.low, root.high, (place.of[0], root))
 
 
 def _crossing(one: Polynomial, other: Polynomial) -> list[int]:
@@ -366,8 +370,8 @@ def _solve(
     numbers: Sequence[int],
     low: Fraction | None,
     high: Fraction | None,
-    found: set[Fraction],
-    irrational: list[Place],
+    result: set[Fraction],
+    irrational: list[ChangePoint],
 ) -> None:
     if low is None or high is None:
         return
@@ -377,14 +381,15 @@ def _solve(
         met = integer_roots(numbers, low, high)
     for root in met:
         if root.low == root.high:
-            found.add(root.low)
+            result.add(root.low)
         else:
             of = tuple(map(Fraction, numbers))
-            irrational.append(Place(root.low, root.high, (of, root)))
+            irrational.append(ChangePoint(root.low, root.high, (of, root)))
 
 
 def _overlaps(
-    one: Sequence[tuple[Piece, Polynomial]], other: Sequence[tuple[Piece, Polynomial]]
+    one: Sequence[tuple[PolynomialPiece, Polynomial]],
+    other: Sequence[tuple[PolynomialPiece, Polynomial]],
 ) -> Iterator[tuple[Fraction | None, Fraction | None, Polynomial, Polynomial]]:
     """Yield where a piece of one curve and one of another both hold."""
     i = j = 0

@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Ground, Laid, strengths_at
+from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, strengths_at
 from fuzzytree.auditing.engine.domain import Point
 from fuzzytree.auditing.engine.linear import simple
-from fuzzytree.auditing.engine.measures import local
-from fuzzytree.auditing.engine.options import Contest, maximal, weakest
+from fuzzytree.auditing.engine.measures import local_polynomial
+from fuzzytree.auditing.engine.options import Duel, maximal, weakest
 from fuzzytree.auditing.engine.states import Bracket, Claim, Witness, coordinates
 from fuzzytree.auditing.engine.witnesses import (
     START,
-    Stretch,
+    AxisStretch,
     have_one_direction,
     is_within,
     part_of,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from fuzzytree.model.contracts import IntArray
 
 
-class Asked(NamedTuple):
+class TieQuestion(NamedTuple):
     """Is there a set with an interior on which rules are the strongest?
 
     Attributes:
@@ -64,133 +64,122 @@ class Asked(NamedTuple):
         return Bracket(f"whether {noun} {names} {verb} (1) or not (0)", 0.0, 1.0, why)
 
 
-def checked(given: Ground, asked: Asked, point: Point) -> Witness | None:
+def tie_witness(
+    base: Arrangement, question: TieQuestion, point: Point
+) -> Witness | None:
     """Return a point as a witness, if it is one in fractions."""
-    strengths = strengths_at(given, point)
-    mine = strengths[asked.ours[0] - 1]
+    strengths = strengths_at(base, point)
+    mine = strengths[question.ours[0] - 1]
     holds = (
-        all(strengths[n - 1] == mine for n in asked.ours)
-        and all(strengths[n - 1] < mine for n in asked.strict)
-        and all(strengths[n - 1] <= mine for n in asked.weak)
+        all(strengths[n - 1] == mine for n in question.ours)
+        and all(strengths[n - 1] < mine for n in question.strict)
+        and all(strengths[n - 1] <= mine for n in question.weak)
         and mine > 0
-        and is_within(given, point)
+        and is_within(base, point)
     )
     if not holds:
         return None
-    return Witness(coordinates(point), _claims(asked, strengths, mine))
+    return Witness(coordinates(point), _claims(question, strengths, mine))
 
 
 def _claims(
-    asked: Asked, strengths: Sequence[Fraction], mine: Fraction
+    question: TieQuestion, strengths: Sequence[Fraction], mine: Fraction
 ) -> tuple[Claim, ...]:
-    every = asked.ours + asked.rivals
+    every = question.ours + question.rivals
     level = tuple(sorted(n for n in every if strengths[n - 1] == mine))
     below = tuple(sorted(n for n in every if strengths[n - 1] < mine))
     return (
         Claim("ties", rules=level, rivals=below),
-        Claim("strength", rules=(asked.ours[0],), level=str(mine)),
+        Claim("strength", rules=(question.ours[0],), level=str(mine)),
     )
 
 
 # --- pairs of rules that may tie
 
 
-def may_tie(given: Ground) -> BoolArray:
+def may_tie(base: Arrangement) -> BoolArray:
     """Return which pairs of rules may be equally strong, and not 0, on an open set.
-
-    Args:
-        given: The rules and the box.
 
     Returns:
         Shape (rules, rules), symmetric. All are true under the product, where cells
         are too many to be kept, where an axis is a single value, and where two axes
         have one direction.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.auditing.engine.domain import Domain, Side
-        >>> from fuzzytree.auditing.engine.arrangement import ground
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(1))
-        >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
-        >>> may_tie(ground(rules, box)).shape
-        (7, 7)
     """
-    count = len(given.rules.rules)
+    count = len(base.rules.rules)
     every: BoolArray = np.ones((count, count), dtype=bool)
-    is_product = given.rules.semantics.conjunction == "product"
-    if is_product or given.is_empty or not given.is_kept or not given.axes:
+    is_product = base.rules.semantics.conjunction == "product"
+    if is_product or base.is_empty or not base.is_kept or not base.axes:
         return every
-    laid, bands = given.laid
-    if any(not len(one.cells.rank) for one in laid) or have_one_direction(given):
+    grids, bands = base.grids, base.bands
+    if any(not len(one.cells.rank) for one in grids) or have_one_direction(base):
         return every
-    flat = [_flat(one, bands.is_sharp) for one in laid]
-    found = _constants(laid, flat, bands.is_sharp)
-    for one, is_flat in zip(laid, flat, strict=True):
+    flat = [_flat(one, bands.is_sharp) for one in grids]
+    result = _constants(grids, flat, bands.is_sharp)
+    for one, is_flat in zip(grids, flat, strict=True):
         rank, _, _, is_zero = _degrees_in_cells(one)
         alive = ~is_zero & ~is_flat  # constants are seen to
         for rule in range(count):
             checkpoint()
             cells = np.flatnonzero(alive[rule])
-            same = rank[:, cells] == rank[rule, cells]
-            found[rule] |= same.any(axis=1)
-    return np.asarray(found | found.T)
+            same_contenders = rank[:, cells] == rank[rule, cells]
+            result[rule] |= same_contenders.any(axis=1)
+    return np.asarray(result | result.T)
 
 
-def _degrees_in_cells(laid: Laid) -> tuple[IntArray, IntArray, IntArray, BoolArray]:
+def _degrees_in_cells(grid: AxisGrid) -> tuple[IntArray, IntArray, IntArray, BoolArray]:
     """Return order, bands and zeros of the rules' degrees in cells: (rules, cells)."""
-    columns = np.arange(laid.of.shape[1])
+    columns = np.arange(grid.of.shape[1])
     return (
-        laid.cells.rank[columns, laid.of],
-        laid.least[laid.of, columns],
-        laid.most[laid.of, columns],
-        laid.is_zero[laid.of, columns],
+        grid.cells.rank[columns, grid.of],
+        grid.least[grid.of, columns],
+        grid.most[grid.of, columns],
+        grid.is_zero[grid.of, columns],
     )
 
 
-def is_constant(laid: Laid, element: int, cell: int) -> bool:
+def is_constant(grid: AxisGrid, element: int, cell: int) -> bool:
     """Return whether a curve is constant in a cell, or an axis a single value."""
     if cell == START:
         return True
-    low, high = laid.cells.between[cell]
-    return len(local(laid.axis.elements[element], (low + high) / 2)) == 1
+    low, high = grid.cells.between[cell]
+    return len(local_polynomial(grid.axis.elements[element], (low + high) / 2)) == 1
 
 
-def _flat(laid: Laid, is_sharp: BoolArray) -> BoolArray:
+def _flat(grid: AxisGrid, is_sharp: BoolArray) -> BoolArray:
     """Return which rules' degrees are constant in a cell, and not 0: (rules, cells)."""
-    flat = (laid.least == laid.most) & ~laid.is_zero
+    flat = (grid.least == grid.most) & ~grid.is_zero
     # Within a band that is not one level, the curve itself tells.
-    for row, cell in np.argwhere(flat & ~is_sharp[laid.least]).tolist():
-        flat[row, cell] = is_constant(laid, row, cell)
-    return np.asarray(flat[laid.of, np.arange(laid.of.shape[1])])
+    for row, cell in np.argwhere(flat & ~is_sharp[grid.least]).tolist():
+        flat[row, cell] = is_constant(grid, row, cell)
+    return np.asarray(flat[grid.of, np.arange(grid.of.shape[1])])
 
 
 def _constants(
-    laid: Sequence[Laid], flat: Sequence[BoolArray], is_sharp: BoolArray
+    grid: Sequence[AxisGrid], flat: Sequence[BoolArray], is_sharp: BoolArray
 ) -> BoolArray:
     """Return which pairs may have one constant level in a box: (rules, rules).
 
     On one axis each is constant at the level; on the others it is too, or goes above.
     Within a band that is not one level, what goes above is not known.
     """
-    seen = [_degrees_in_cells(one) for one in laid]
-    held = [
-        least[is_flat] for (_, least, _, _), is_flat in zip(seen, flat, strict=True)
+    degrees = [_degrees_in_cells(one) for one in grid]
+    levels = [
+        least[is_flat] for (_, least, _, _), is_flat in zip(degrees, flat, strict=True)
     ]
-    count = len(laid[0].of)
-    found: BoolArray = np.zeros((count, count), dtype=bool)
-    for band in np.unique(np.concatenate(held)).tolist():
+    count = len(grid[0].of)
+    result: BoolArray = np.zeros((count, count), dtype=bool)
+    for band in np.unique(np.concatenate(levels)).tolist():
         is_some: BoolArray = np.zeros(count, dtype=bool)
         both: BoolArray = np.ones((count, count), dtype=bool)
-        for (_, least, most, _), is_flat in zip(seen, flat, strict=True):
+        for (_, least, most, _), is_flat in zip(degrees, flat, strict=True):
             checkpoint()
             here = is_flat & (least == band)
             above = most > band if is_sharp[band] else most >= band
             is_some |= here.any(axis=1)
             reach = (here | above).astype(np.float32)
             both &= reach @ reach.T > 0.0
-        found |= both & is_some & is_some[:, np.newaxis]
-    return found
+        result |= both & is_some & is_some[:, np.newaxis]
+    return result
 
 
 # --- pivots
@@ -219,7 +208,7 @@ class Pivot(NamedTuple):
         return (self,) if self.beside is None else (self, self.beside)
 
 
-class _Seen(NamedTuple):
+class _CellDegrees(NamedTuple):
     """The rules' degrees in the cells of an axis; at its value where it has only one.
 
     Attributes:
@@ -235,47 +224,47 @@ class _Seen(NamedTuple):
     is_zero: BoolArray
 
 
-def _seen(laid: Laid) -> _Seen:
-    count = len(laid.cells.rank)
+def _cell_degrees(grid: AxisGrid) -> _CellDegrees:
+    count = len(grid.cells.rank)
     if not count:
-        of = laid.of_start[:, np.newaxis]
-        return _Seen(
-            [START], of, laid.cells.start_rank[of], laid.is_zero_at[of[:, 0], :1]
+        of = grid.of_start[:, np.newaxis]
+        return _CellDegrees(
+            [START], of, grid.cells.start_rank[of], grid.is_zero_at[of[:, 0], :1]
         )
     columns = np.arange(count)
-    height = laid.cells.rank[columns, laid.of]
-    is_zero = laid.is_zero[laid.of, columns]
-    return _Seen([*range(count)], laid.of, height, is_zero)
+    height = grid.cells.rank[columns, grid.of]
+    is_zero = grid.is_zero[grid.of, columns]
+    return _CellDegrees([*range(count)], grid.of, height, is_zero)
 
 
-def whole(laid: Laid, cell: int) -> Stretch:
+def whole(grid: AxisGrid, cell: int) -> AxisStretch:
     """Return all of a cell, or the one value of an axis."""
     if cell == START:
-        return Stretch(*laid.cells.zones[0], is_open=False)
-    return Stretch(*laid.cells.between[cell])
+        return AxisStretch(*grid.cells.zones[0], is_open=False)
+    return AxisStretch(*grid.cells.between[cell])
 
 
 def value_of(
-    laid: Laid, pivot: Pivot, levels: tuple[Fraction, Fraction]
+    grid: AxisGrid, pivot: Pivot, levels: tuple[Fraction, Fraction]
 ) -> Fraction | None:
     """Return a value of a pivot's axis at which its level is well between two."""
-    low, high, _ = whole(laid, pivot.cell)
+    low, high, _ = whole(grid, pivot.cell)
     ends, room = (low, high), (levels[1] - levels[0]) / 4
-    element = laid.axis.elements[pivot.element]
+    element = grid.axis.elements[pivot.element]
     for level, is_high in ((levels[0] + room, True), (levels[1] - room, False)):
         part = part_of(element, ends, level, is_high=is_high, bits=64)
         low, high = max(low, part.low), min(high, part.high)
     return simple(low, high) if low < high else None
 
 
-def ends_of(laid: Laid, element: int, cell: int) -> tuple[int, int]:
+def ends_of(grid: AxisGrid, element: int, cell: int) -> tuple[int, int]:
     """Return the bands of the least and the largest value of a curve in a cell."""
     if cell == START:
-        return int(laid.at[element, 0]), int(laid.at[element, 0])
-    return int(laid.least[element, cell]), int(laid.most[element, cell])
+        return int(grid.at[element, 0]), int(grid.at[element, 0])
+    return int(grid.least[element, cell]), int(grid.most[element, cell])
 
 
-def levels_of(contest: Contest, least: int, most: int, *, is_each: bool) -> list[int]:
+def levels_of(contest: Duel, least: int, most: int, *, is_each: bool) -> list[int]:
     """Return bands from which on, up to the next one, nothing changes.
 
     Where axes share inputs every level matters: at another one other values are free.
@@ -286,124 +275,130 @@ def levels_of(contest: Contest, least: int, most: int, *, is_each: bool) -> list
     return sorted({least, *inner})
 
 
-def pivots(contest: Contest, asked: Asked, axis: int, *, is_each: bool) -> list[Pivot]:
+def pivots(
+    contest: Duel, question: TieQuestion, axis: int, *, is_each: bool
+) -> list[Pivot]:
     """Return the cells of an axis in which all of ours are the same curve, not 0.
 
     Of cells between the same levels one will do, unless each is asked for.
     """
-    laid = contest.ground.laid[0][axis]
-    seen = _seen(laid)
-    ours = seen.height[np.array(contest.ours)]
-    rivals = seen.height[np.array(contest.rivals, dtype=np.int64)]
-    mine = seen.of[contest.ours[0]]
-    fits = (ours == ours[0]).all(axis=0) & ~seen.is_zero[contest.ours[0]]
-    is_below = rivals < ours[0] + _limits(asked)
-    found: dict[tuple[int, ...], Pivot] = {}
+    grid = contest.base.grids[axis]
+    degrees = _cell_degrees(grid)
+    ours = degrees.height[np.array(contest.ours)]
+    rivals = degrees.height[np.array(contest.rivals, dtype=np.int64)]
+    mine = degrees.of[contest.ours[0]]
+    fits = (ours == ours[0]).all(axis=0) & ~degrees.is_zero[contest.ours[0]]
+    is_below = rivals < ours[0] + _limits(question)
+    result: dict[tuple[int, ...], Pivot] = {}
     for column in np.flatnonzero(fits).tolist():
         mask = sum(1 << n for n in np.flatnonzero(is_below[:, column]).tolist())
-        element, cell = int(mine[column]), seen.cells[column]
-        key = element, mask, *ends_of(laid, element, cell), cell * is_each
-        found.setdefault(key, Pivot(axis, cell, element, mask))
-    return list(found.values())
+        element, cell = int(mine[column]), degrees.cells[column]
+        key = element, mask, *ends_of(grid, element, cell), cell * is_each
+        result.setdefault(key, Pivot(axis, cell, element, mask))
+    return list(result.values())
 
 
-def crossed(contest: Contest, asked: Asked, *, is_each: bool) -> list[Pivot]:
+def constant_pairs(
+    contest: Duel, question: TieQuestion, *, is_each: bool
+) -> list[Pivot]:
     """Return pairs of constants of one level, on two axes, that hold two rules."""
-    if len(asked.ours) < 2:
+    if len(question.ours) < 2:
         return []
-    one, other = ([*_held(contest, asked, rule)] for rule in contest.ours)
-    found: dict[tuple[int, ...], Pivot] = {}
+    one, other = ([*_constants_of(contest, question, rule)] for rule in contest.ours)
+    result: dict[tuple[int, ...], Pivot] = {}
     key: tuple[int, ...]
     for first, level in one:
-        for second, same in other:
-            if first.axis != second.axis and level == same:
+        for second, same_contenders in other:
+            if first.axis != second.axis and level == same_contenders:
                 key = level, first.axis, first.mask, second.axis, second.mask
                 if is_each:
                     key = *key, first.cell, second.cell
-                found.setdefault(key, first._replace(beside=second))
-    return list(found.values())
+                result.setdefault(key, first._replace(beside=second))
+    return list(result.values())
 
 
-def _held(contest: Contest, asked: Asked, rule: int) -> Iterator[tuple[Pivot, int]]:
+def _constants_of(
+    contest: Duel, question: TieQuestion, rule: int
+) -> Iterator[tuple[Pivot, int]]:
     """Yield where a rule, the least of ours, is constant and not 0, with the band."""
-    for axis, laid in enumerate(contest.ground.laid[0]):
-        seen = _seen(laid)
-        height, mine = seen.height[rule], seen.of[rule]
-        fits = (height <= seen.height[np.array(contest.ours)]).all(axis=0)
-        fits &= ~seen.is_zero[rule]
-        rivals = seen.height[np.array(contest.rivals, dtype=np.int64)]
-        is_behind = rivals < height + _limits(asked)
+    for axis, grid in enumerate(contest.base.grids):
+        degrees = _cell_degrees(grid)
+        height, mine = degrees.height[rule], degrees.of[rule]
+        fits = (height <= degrees.height[np.array(contest.ours)]).all(axis=0)
+        fits &= ~degrees.is_zero[rule]
+        rivals = degrees.height[np.array(contest.rivals, dtype=np.int64)]
+        is_behind = rivals < height + _limits(question)
         for column in np.flatnonzero(fits).tolist():
-            element, cell = int(mine[column]), seen.cells[column]
-            least, most = ends_of(laid, element, cell)
-            if least == most and is_constant(laid, element, cell):
+            element, cell = int(mine[column]), degrees.cells[column]
+            least, most = ends_of(grid, element, cell)
+            if least == most and is_constant(grid, element, cell):
                 mask = sum(
                     1 << n for n in np.flatnonzero(is_behind[:, column]).tolist()
                 )
                 yield Pivot(axis, cell, element, mask), least
 
 
-def _limits(asked: Asked) -> IntArray:
+def _limits(question: TieQuestion) -> IntArray:
     """Return, of each rival, by how many ranks it must stay below: 0, or 1 less."""
-    return np.array([0] * len(asked.strict) + [1] * len(asked.weak), dtype=np.int64)[
-        :, np.newaxis
-    ]
+    return np.array(
+        [0] * len(question.strict) + [1] * len(question.weak), dtype=np.int64
+    )[:, np.newaxis]
 
 
 def flat_family(
-    contest: Contest, asked: Asked, axis: int, band: int, *, is_within: bool = False
+    contest: Duel,
+    question: TieQuestion,
+    axis: int,
+    band: int,
+    *,
+    is_within: bool = False,
 ) -> tuple[int, ...]:
     """Return what does not exceed a level where ours reach it.
 
     Rivals are left strictly below it, or stay at it as curves that are constant.
 
-    Args:
-        contest: Our rules and their rivals.
-        asked: Which of these must be weaker.
-        axis: The axis.
-        band: The band of the level, which is sharp.
-        is_within: Of a band that is not: what may hold somewhere in it, never too
-            little.
+    `asked`: which of these must be weaker; `is_within`: of a band that is not: what may
+    hold somewhere in it, never too little.
     """
-    options, laid = contest.all_inner[axis], contest.ground.laid[0][axis]
+    options, grid = contest.all_inner[axis], contest.base.grids[axis]
     masks: list[int] = []
     limit = band + 1 if is_within else band  # below which rivals are left
     least = -np.iinfo(np.int64).max if is_within else START
     for number in np.flatnonzero(options.where >= least).tolist():
         cell, top = int(options.where[number]), int(options.top[number])
         if top > band or (
-            top == band and (is_within or _least(contest, laid, cell) == band)
+            top == band and (is_within or _least(contest, grid, cell) == band)
         ):
             behind = options.floor[number] < limit
-            for place in range(len(asked.strict), len(behind)):
+            for place in range(len(question.strict), len(behind)):
                 behind[place] |= cell >= START and stays(
-                    contest, laid, cell, place, band
+                    contest, grid, cell, place, band
                 )
             masks.append(sum(1 << n for n in np.flatnonzero(behind).tolist()))
     return maximal(masks)
 
 
-def _least(contest: Contest, laid: Laid, cell: int) -> int:
+def _least(contest: Duel, grid: AxisGrid, cell: int) -> int:
     """Return the band of the least value of our weakest rule in a cell."""
-    return ends_of(laid, weakest(laid, contest.ours, cell), cell)[0]
+    return ends_of(grid, weakest(grid, contest.ours, cell), cell)[0]
 
 
-def stays(contest: Contest, laid: Laid, cell: int, rival: int, band: int) -> bool:
+def stays(contest: Duel, grid: AxisGrid, cell: int, rival: int, band: int) -> bool:
     """Return whether a rival's curve is constant in a cell, in a band."""
     if cell == START:
-        return bool(laid.at[laid.of_start[contest.rivals[rival]], 0] == band)
-    element = laid.of[contest.rivals[rival], cell]
-    return bool(laid.least[element, cell] == band == laid.most[element, cell])
+        return bool(grid.at[grid.of_start[contest.rivals[rival]], 0] == band)
+    element = grid.of[contest.rivals[rival], cell]
+    return bool(grid.least[element, cell] == band == grid.most[element, cell])
 
 
 def part_at(
-    contest: Contest, axis: int, level: Fraction, mask: int, flat: int | None
-) -> Stretch | None:
+    contest: Duel, axis: int, level: Fraction, mask: int, flat: int | None
+) -> AxisStretch | None:
     """Return where on an axis ours reach a level and some rivals stay below it.
 
     Where the level is a band, `flat`, rivals may also stay in it.
     """
-    options, laid = contest.all_inner[axis], contest.ground.laid[0][axis]
+    options, grid = contest.all_inner[axis], contest.base.grids[axis]
     every = [n for n in range(len(contest.rivals)) if mask >> n & 1]
     order = np.argsort(-options.top, kind="stable")
     for number in order[options.where[order] >= START].tolist():
@@ -411,14 +406,14 @@ def part_at(
             n
             for n in every
             if flat is None
-            or not stays(contest, laid, int(options.where[number]), n, flat)
+            or not stays(contest, grid, int(options.where[number]), n, flat)
         ]
         if (options.floor[number, rivals] > options.top[number]).any():
             continue
         cell = int(options.where[number])
-        mine = weakest(laid, contest.ours, cell)
-        below = {weakest(laid, [contest.rivals[n]], cell) for n in rivals}
-        found = stretch(laid, cell, level, [mine], below)
-        if found is not None:
-            return found
+        mine = weakest(grid, contest.ours, cell)
+        below = {weakest(grid, [contest.rivals[n]], cell) for n in rivals}
+        result = stretch(grid, cell, level, [mine], below)
+        if result is not None:
+            return result
     return None

@@ -89,10 +89,10 @@ def difference(one: Polynomial, other: Polynomial) -> Polynomial:
     """Return one polynomial minus another, without zeros at its end."""
     size = max(len(one), len(other))
     padded = [(*each, *(Fraction(0),) * (size - len(each))) for each in (one, other)]
-    found = [a - b for a, b in zip(*padded, strict=True)]
-    while len(found) > 1 and not found[-1]:
-        found.pop()
-    return tuple(found)
+    result = [a - b for a, b in zip(*padded, strict=True)]
+    while len(result) > 1 and not result[-1]:
+        result.pop()
+    return tuple(result)
 
 
 def multiplied(one: Polynomial, other: Polynomial) -> Polynomial:
@@ -102,11 +102,11 @@ def multiplied(one: Polynomial, other: Polynomial) -> Polynomial:
         >>> multiplied((Fraction(1), Fraction(1)), (Fraction(0), Fraction(2)))
         (Fraction(0, 1), Fraction(2, 1), Fraction(2, 1))
     """
-    found = [Fraction(0)] * (len(one) + len(other) - 1)
+    result = [Fraction(0)] * (len(one) + len(other) - 1)
     for i, a in enumerate(one):
         for j, b in enumerate(other):
-            found[i + j] += a * b
-    return tuple(found)
+            result[i + j] += a * b
+    return tuple(result)
 
 
 def divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
@@ -117,12 +117,12 @@ def divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
         >>> [int(one) for one in divided(square, Fraction(1))]
         [1, 1]
     """
-    found: list[Fraction] = []
+    result: list[Fraction] = []
     carried = Fraction(0)
     for one in reversed(polynomial[1:]):
         carried = one + carried * at
-        found.append(carried)
-    return tuple(reversed(found))
+        result.append(carried)
+    return tuple(reversed(result))
 
 
 def monic(polynomial: Polynomial) -> Polynomial:
@@ -160,17 +160,17 @@ def _shifted(
     numbers: Sequence[int], offset: int, slope: int, bottom: int
 ) -> tuple[list[int], int]:
     """Return bottom**n p((offset + slope z) / bottom), and bottom**n."""
-    found = [numbers[-1]]
+    result = [numbers[-1]]
     power = 1
     for number in reversed(numbers[:-1]):
         power *= bottom
-        scaled = [offset * one for one in found]
+        scaled = [offset * one for one in result]
         scaled.append(0)
-        for place, one in enumerate(found):
+        for place, one in enumerate(result):
             scaled[place + 1] += slope * one
         scaled[0] += number * power
-        found = scaled
-    return found, power
+        result = scaled
+    return result, power
 
 
 def roots(polynomial: Polynomial, low: Fraction, high: Fraction) -> tuple[Root, ...]:
@@ -220,7 +220,7 @@ def integer_roots(
 def _unit_roots(numbers: list[int]) -> list[tuple[Fraction, Fraction, bool]]:
     """Return the places in (0, 1) where a polynomial with integer coefficients is 0."""
     degree = len(numbers) - 1
-    found: list[tuple[Fraction, Fraction, bool]] = []
+    result: list[tuple[Fraction, Fraction, bool]] = []
     todo = [(0, 0, _bernstein(numbers))]
     while todo:
         level, index, bends = todo.pop()
@@ -229,25 +229,25 @@ def _unit_roots(numbers: list[int]) -> list[tuple[Fraction, Fraction, bool]]:
             continue
         size = Fraction(1, 1 << level)
         if changes == 1:
-            found.append(_single(numbers, bends, level, index))
+            result.append(_single(numbers, bends, level, index))
             continue
         if level == _DEEPEST:
-            found.append((index * size, (index + 1) * size, False))
+            result.append((index * size, (index + 1) * size, False))
             continue
         left, right = _halves(bends, degree)
         if right[0] == 0:
             middle = (2 * index + 1) * size / 2
-            found.append((middle, middle, True))
+            result.append((middle, middle, True))
         todo += [(level + 1, 2 * index, left), (level + 1, 2 * index + 1, right)]
-    return _apart(sorted(found))
+    return _apart(sorted(result))
 
 
 def _apart(
-    found: list[tuple[Fraction, Fraction, bool]],
+    result: list[tuple[Fraction, Fraction, bool]],
 ) -> list[tuple[Fraction, Fraction, bool]]:
     """Join places that touch; two roots there are no longer told apart."""
     kept: list[tuple[Fraction, Fraction, bool]] = []
-    for low, high, is_sure in found:
+    for low, high, is_sure in result:
         if kept and low <= kept[-1][1]:
             kept[-1] = (kept[-1][0], max(high, kept[-1][1]), False)
         else:
@@ -271,11 +271,11 @@ def _choices(degree: int) -> tuple[int, ...]:
 def _bernstein(numbers: Sequence[int]) -> list[int]:
     """Return degree! times the Bernstein coefficients: sums of C(j, i) over C(n, i)."""
     degree = len(numbers) - 1
-    found = [a * b for a, b in zip(numbers, _weights(degree), strict=True)]
+    result = [a * b for a, b in zip(numbers, _weights(degree), strict=True)]
     for step in range(degree):  # Pascal's triangle, by additions
         for place in range(degree, step, -1):
-            found[place] += found[place - 1]
-    return found
+            result[place] += result[place - 1]
+    return result
 
 
 def _changes(bends: Sequence[int]) -> int:
@@ -367,15 +367,15 @@ def _guess(bends: Sequence[int]) -> float:
         middle = high - above * (high - low) / (above - below)
         if not low < middle < high:
             middle = (low + high) / 2
-        found = _weighted_value(row, middle)
-        if found == 0.0 or high - low < 2.0**-_FINE:
+        result = _weighted_value(row, middle)
+        if result == 0.0 or high - low < 2.0**-_FINE:
             return middle
-        if (found > 0.0) == (above > 0.0):
-            high, above = middle, found
+        if (result > 0.0) == (above > 0.0):
+            high, above = middle, result
             below = below / 2 if last > 0 else below
             last = 1
         else:
-            low, below = middle, found
+            low, below = middle, result
             above = above / 2 if last < 0 else above
             last = -1
     return (low + high) / 2
@@ -408,8 +408,8 @@ def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
 
     Example:
         >>> two = (Fraction(-2), Fraction(0), Fraction(1))
-        >>> found = refined(two, Root(Fraction(1), Fraction(2)), 100)
-        >>> found.high - found.low <= Fraction(1, 2**100)
+        >>> result = refined(two, Root(Fraction(1), Fraction(2)), 100)
+        >>> result.high - result.low <= Fraction(1, 2**100)
         True
     """
     low, high = root.low, root.high
@@ -430,13 +430,13 @@ def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
         for at in (first, first + part):  # where the chord crosses, if it is straight
             if not low < at < high:
                 continue
-            found = value_at(polynomial, at)
-            if found == 0:
+            result = value_at(polynomial, at)
+            if result == 0:
                 return Root(at, at)
-            if (found > 0) == rising:
-                high, above = at, found
+            if (result > 0) == rising:
+                high, above = at, result
                 break
-            low, below = at, found
+            low, below = at, result
         power = power * 2 if high - low <= part else power // 2
     return Root(low, high, root.is_sure)
 
@@ -473,8 +473,8 @@ def squarefree(polynomial: Polynomial) -> Polynomial:
         [-2, 0, 1]
     """
     repeated = common_factor(polynomial, derivative(polynomial))
-    found, _ = division(polynomial, repeated)
-    return tuple(map(Fraction, _primitive(integers(found)[0])))
+    result, _ = division(polynomial, repeated)
+    return tuple(map(Fraction, _primitive(integers(result)[0])))
 
 
 def division(polynomial: Polynomial, by: Polynomial) -> tuple[Polynomial, Polynomial]:
@@ -486,23 +486,23 @@ def division(polynomial: Polynomial, by: Polynomial) -> tuple[Polynomial, Polyno
         >>> [[int(one) for one in part] for part in parts]
         [[1, 1], [1, 2]]
     """
-    rest, found = list(polynomial), list[Fraction]()
+    rest, result = list(polynomial), list[Fraction]()
     while len(rest) >= len(by):
-        found.append(rest[-1] / by[-1])
+        result.append(rest[-1] / by[-1])
         for place in range(1, len(by) + 1):
-            rest[-place] -= found[-1] * by[-place]
+            rest[-place] -= result[-1] * by[-place]
         rest.pop()
     zero = (Fraction(0),)
-    return tuple(reversed(found)) or zero, difference(tuple(rest) or zero, zero)
+    return tuple(reversed(result)) or zero, difference(tuple(rest) or zero, zero)
 
 
 def _primitive(numbers: Sequence[int]) -> list[int]:
     """Return coefficients without zeros at the end and without a common divisor."""
-    found = list(numbers)
-    while found and not found[-1]:
-        found.pop()
-    common = math.gcd(*found) * (1 if not found or found[-1] > 0 else -1)
-    return [number // common for number in found]
+    result = list(numbers)
+    while result and not result[-1]:
+        result.pop()
+    common = math.gcd(*result) * (1 if not result or result[-1] > 0 else -1)
+    return [number // common for number in result]
 
 
 def integral(polynomial: Polynomial, low: Fraction, high: Fraction) -> Fraction:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import Arrangement, strengths_at
 from fuzzytree.auditing.engine.domain import Domain, Point, variable_value
 from fuzzytree.auditing.engine.linear import simple
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
@@ -36,9 +36,7 @@ _ROUNDS = 24
 def near_strengths(rules: RuleBase, values: FloatArray) -> FloatArray:
     """Return about how strong each rule is at some points.
 
-    Args:
-        rules: The rules.
-        values: Shape (inputs, points), finite.
+    `values`: shape (inputs, points), finite.
 
     Returns:
         Shape (rules, points): lower bounds, short by rounding only.
@@ -73,34 +71,29 @@ def ends_of(rules: RuleBase, domain: Domain) -> tuple[FloatArray, FloatArray]:
     return low, high
 
 
-def drawn_in(given: Ground, count: int, seed: int = 0) -> FloatArray | None:
+def drawn_in(base: Arrangement, count: int, seed: int = 0) -> FloatArray | None:
     """Return points of a box that are drawn; None if it has no point.
 
     Where combinations are limited, points are drawn on the ways from one point inside
     to points of the inputs' box, as far as the limits let them.
 
-    Args:
-        given: Where.
-        count: How many points.
-        seed: Of what is drawn.
-
     Returns:
         Shape (inputs, count); about within the sides of combinations.
     """
     chance = np.random.default_rng(seed)
-    low, high = ends_of(given.rules, given.domain)
+    low, high = ends_of(base.rules, base.domain)
     values = low + chance.random((len(low), count)) * (high - low)
     limited = [
         (variable, side)
-        for variable in given.rules.variables
-        if variable.parts and (side := given.domain.side(variable.name)) is not None
+        for variable in base.rules.variables
+        if variable.parts and (side := base.domain.side(variable.name)) is not None
     ]
     if not limited:
         return values
-    inside = point_with(given, {})
+    inside = point_with(base, {})
     if inside is None:
         return None
-    names = given.rules.inputs
+    names = base.rules.inputs
     start = np.array([[float(inside[name])] for name in names])
     corners = np.where(chance.random(values.shape) < 0.5, low, high)
     values[:, ::2] = corners[:, ::2]
@@ -112,44 +105,38 @@ def drawn_in(given: Ground, count: int, seed: int = 0) -> FloatArray | None:
             most = np.where(step > 0.0, side.high - here, side.low - here) / step
         room = np.where(step != 0.0, np.clip(most, 0.0, room), room)
     share = room * chance.random(count) ** (1.0 / len(names))
-    found: FloatArray = start + (values - start) * share
-    return found
+    result: FloatArray = start + (values - start) * share
+    return result
 
 
 def leader(
-    given: Ground, ours: Sequence[int], rivals: Sequence[int], seed: int = 0
+    base: Arrangement, ours: Sequence[int], rivals: Sequence[int], seed: int = 0
 ) -> Point:
     """Return a point of the inputs' box at which some rules lead others by much.
 
     It is the best of some thousand points that were drawn, and nothing is claimed.
-
-    Args:
-        given: Where.
-        ours: The numbers of the rules, from 1; without any, the others shall be weak.
-        rivals: The numbers of the others.
-        seed: Of what is drawn.
     """
     chance = np.random.default_rng([seed, *ours])
-    low, high = ends_of(given.rules, given.domain)
+    low, high = ends_of(base.rules, base.domain)
     mine, others = [n - 1 for n in ours], [n - 1 for n in rivals]
 
     def leads(points: FloatArray) -> FloatArray:
-        found = near_strengths(given.rules, points)
+        result = near_strengths(base.rules, points)
         lead: FloatArray = np.ones(points.shape[1])
         if mine:
-            lead = found[mine].min(axis=0)
+            lead = result[mine].min(axis=0)
         if others:
-            lead = lead - found[others].max(axis=0)
+            lead = lead - result[others].max(axis=0)
         return lead
 
     width = high - low
     points = low + width * chance.random((len(low), _FIRST))
     best, most, reach = points[:, :1], -np.inf, 1.0
     for _ in range(_ROUNDS):
-        found = leads(points)
-        top = int(found.argmax())
-        if found[top] > most:
-            best, most = points[:, top : top + 1], float(found[top])
+        result = leads(points)
+        top = int(result.argmax())
+        if result[top] > most:
+            best, most = points[:, top : top + 1], float(result[top])
         else:
             reach *= 0.6
         steps = chance.standard_normal((len(low), _NEXT)) * width * reach * 0.2
@@ -157,44 +144,37 @@ def leader(
         points = np.clip(best + steps, low, high)
     return {
         name: Fraction(float(value))
-        for name, value in zip(given.rules.inputs, best[:, 0], strict=True)
+        for name, value in zip(base.rules.inputs, best[:, 0], strict=True)
     }
 
 
 def plainer(
-    given: Ground, point: Point, ours: Sequence[int], rivals: Sequence[int]
+    base: Arrangement, point: Point, ours: Sequence[int], rivals: Sequence[int]
 ) -> Point:
-    """Return a point of fewer digits at which rules still lead by half as much.
-
-    Args:
-        given: Where.
-        point: A point of the domain at which they lead.
-        ours: The numbers of the rules, from 1.
-        rivals: The numbers of the others.
-    """
-    goal = _lead(given, point, ours, rivals) / 2
-    found = dict(point)
-    for name in given.rules.inputs:
-        side = given.domain.side(name)
+    """Return a point of fewer digits at which rules still lead by half as much."""
+    goal = _lead(base, point, ours, rivals) / 2
+    result = dict(point)
+    for name in base.rules.inputs:
+        side = base.domain.side(name)
         assert side is not None  # checked when the ground was made
         width = Fraction(side.high) - Fraction(side.low)
         for share in (Fraction(1, 50), Fraction(1, 1000), Fraction(1, 10**5)):
-            low = max(found[name] - width * share, Fraction(side.low))
-            high = min(found[name] + width * share, Fraction(side.high))
+            low = max(result[name] - width * share, Fraction(side.low))
+            high = min(result[name] + width * share, Fraction(side.high))
             if not low < high:
                 break
-            tried = {**found, name: simple(low, high)}
-            is_good = _lead(given, tried, ours, rivals) > max(goal, Fraction(0))
-            if is_good and is_within(given, tried):
-                found = tried
+            tried = {**result, name: simple(low, high)}
+            is_good = _lead(base, tried, ours, rivals) > max(goal, Fraction(0))
+            if is_good and is_within(base, tried):
+                result = tried
                 break
-    return found
+    return result
 
 
 def _lead(
-    given: Ground, point: Point, ours: Sequence[int], rivals: Sequence[int]
+    base: Arrangement, point: Point, ours: Sequence[int], rivals: Sequence[int]
 ) -> Fraction:
-    strengths = strengths_at(given, point)
+    strengths = strengths_at(base, point)
     mine = min((strengths[number - 1] for number in ours), default=Fraction(1))
     return mine - max((strengths[n - 1] for n in rivals), default=Fraction(0))
 
@@ -208,21 +188,21 @@ _STEPS: Final = 1024  # of each input, so that points have few digits
 _CLEAR: Final = 1e-9  # leads below are not worth a look in fractions
 
 
-class Glimpses(msgspec.Struct, frozen=True, eq=False, dict=True):
+class RandomProbes(msgspec.Struct, frozen=True, eq=False, dict=True):
     """What rules do at some points of a domain.
 
     Attributes:
-        given: The rules and the box.
+        base: The rules and the box.
         seed: Of what is drawn.
     """
 
-    given: Ground
+    base: Arrangement
     seed: int = 0
 
     @functools.cached_property
     def _points(self) -> FloatArray:
-        low, high = ends_of(self.given.rules, self.given.domain)
-        count = min(_MOST_POINTS, _MOST_STRENGTHS // len(self.given.rules.rules))
+        low, high = ends_of(self.base.rules, self.base.domain)
+        count = min(_MOST_POINTS, _MOST_STRENGTHS // len(self.base.rules.rules))
         steps = np.random.default_rng(self.seed).integers(
             0, _STEPS, size=(len(low), max(count, 1)), endpoint=True
         )
@@ -231,12 +211,12 @@ class Glimpses(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     @functools.cached_property
     def _strengths(self) -> FloatArray:
-        return near_strengths(self.given.rules, self._points)
+        return near_strengths(self.base.rules, self._points)
 
     @functools.cached_property
     def _of_classes(self) -> tuple[FloatArray, IntArray]:
         """How far each rule is ahead of other classes at best, and at which point."""
-        rules = self.given.rules
+        rules = self.base.rules
         number = {label: n for n, label in enumerate(rules.classes)}
         owner = np.array([number[rule.then] for rule in rules.rules])
         best = np.zeros((len(rules.classes), self._points.shape[1]))
@@ -268,12 +248,7 @@ class Glimpses(msgspec.Struct, frozen=True, eq=False, dict=True):
         return bool(self._of_classes[0][rule - 1] > _CLEAR)
 
     def wins(self, rule: int, rivals: Collection[int]) -> Witness | None:
-        """Return a point at which a rule is stronger than all of other classes.
-
-        Args:
-            rule: The number of the rule, from 1.
-            rivals: The numbers of the rules of other classes.
-        """
+        """Return a point at which a rule is stronger than all of other classes."""
         return self._witness(self._of_classes, rule, rivals)
 
     def wins_alone(self, rule: int, others: Collection[int]) -> Witness | None:
@@ -281,20 +256,20 @@ class Glimpses(msgspec.Struct, frozen=True, eq=False, dict=True):
         return self._witness(self._of_rules, rule, others)
 
     def _witness(
-        self, seen: tuple[FloatArray, IntArray], rule: int, rivals: Collection[int]
+        self, leads: tuple[FloatArray, IntArray], rule: int, rivals: Collection[int]
     ) -> Witness | None:
-        lead, place = seen
+        lead, place = leads
         if not lead[rule - 1] > _CLEAR:
             return None
         values = self._points[:, place[rule - 1]].tolist()
         point = {
             name: Fraction(value)
-            for name, value in zip(self.given.rules.inputs, values, strict=True)
+            for name, value in zip(self.base.rules.inputs, values, strict=True)
         }
-        if not is_within(self.given, point):
+        if not is_within(self.base, point):
             return None
         rivals = sorted(rivals)
-        strength = strength_above(self.given, point, rule, rivals)
+        strength = strength_above(self.base, point, rule, rivals)
         if strength is None:
             return None
         claims = (
@@ -305,19 +280,13 @@ class Glimpses(msgspec.Struct, frozen=True, eq=False, dict=True):
 
 
 def strength_above(
-    given: Ground, point: Point, rule: int, rivals: Sequence[int]
+    base: Arrangement, point: Point, rule: int, rivals: Sequence[int]
 ) -> Fraction | None:
     """Return a rule's exact strength if it is above that of each of some others.
 
     Of a rival only as many clauses are asked as it takes to see that it is weaker.
-
-    Args:
-        given: The rules.
-        point: A point of the inputs.
-        rule: The number of the rule, from 1.
-        rivals: The numbers of the others.
     """
-    rules = given.rules
+    rules = base.rules
     is_product = rules.semantics.conjunction == "product"
     shapes = shapes_of(rules.variables)
     variables = {variable.name: variable for variable in rules.variables}
@@ -335,14 +304,14 @@ def strength_above(
 
     def strength(of: Rule, enough: Fraction) -> Fraction:
         """Return a rule's strength, or some number below `enough` if it is."""
-        found = Fraction(1)
+        result = Fraction(1)
         for clause in of.when:
             one = max(degree(clause.variable, term) for term in clause.terms)
             one = 1 - one if clause.negated else one
-            found = found * one if is_product else min(found, one)
-            if found < enough:
+            result = result * one if is_product else min(result, one)
+            if result < enough:
                 break
-        return found
+        return result
 
     mine = strength(rules.rules[rule - 1], Fraction(0))
     if not mine:

@@ -19,18 +19,18 @@ from typing import Final, NamedTuple
 import msgspec
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import Ground, Laid
+from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.bounding import wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import (
     Domain,
+    DomainSide,
     Point,
-    Side,
     variable_value,
 )
 from fuzzytree.auditing.engine.factors import Factored
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
-from fuzzytree.auditing.engine.pivots import Asked, checked
+from fuzzytree.auditing.engine.pivots import TieQuestion, tie_witness
 from fuzzytree.auditing.engine.polynomials import Polynomial, difference, monic
 from fuzzytree.auditing.engine.states import (
     Declined,
@@ -42,7 +42,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import (
     START,
-    Stretch,
+    AxisStretch,
     coupled,
     direction_of,
     point_with,
@@ -67,41 +67,38 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
     """The rules of a ground, to be compared as functions on boxes of cells.
 
     Attributes:
-        ground: The rules, joined by the product, and the box, which is not empty.
+        base: The rules, joined by the product, and the box, which is not empty.
     """
 
-    ground: Ground
+    base: Arrangement
 
     @functools.cached_property
     def factored(self) -> Factored:
         """The rules as polynomials."""
-        return Factored(self.ground)
+        return Factored(self.base)
 
     @property
-    def laid(self) -> tuple[Laid, ...]:
+    def grids(self) -> tuple[AxisGrid, ...]:
         """The axes."""
-        return self.ground.laid[0]
+        return self.base.grids
 
     @functools.cached_property
     def whole(self) -> Box:
         """All of the domain."""
-        count = [len(laid.cells.between) for laid in self.laid]
+        count = [len(grid.cells.between) for grid in self.grids]
         return tuple(Run(0, n - 1) if n else Run(START, START) for n in count)
 
     def boxes(self, one: int, other: int, within: Box) -> Iterator[Box]:
         """Yield all boxes on which two rules are one function that is not 0.
 
-        Args:
-            one: The position of a rule.
-            other: The position of another one.
-            within: Where they are looked for.
+        `within`: where they are looked for.
         """
         runs: list[list[tuple[Run, Fraction]]] = []
         for axis, run in enumerate(within):
-            found = [*self._runs(axis, one, other, run)]
-            if not found:
+            result = [*self._runs(axis, one, other, run)]
+            if not result:
                 return
-            runs.append(found)
+            runs.append(result)
         reach = [{ONE}]  # what the ratios of the last axes can multiply to
         for of in reversed(runs):
             reach.append({a * b for a in {ratio for _, ratio in of} for b in reach[-1]})
@@ -147,8 +144,8 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def vague(self, axis: int, run: Run) -> Sequence[bool]:
         """Return of each place within a run, its ends too, if it may hide a cell."""
-        found: list[bool] = self.laid[axis].cells.is_vague.tolist()
-        return found[max(run.first, 0) : run.last + 2]
+        result: list[bool] = self.grids[axis].cells.is_vague.tolist()
+        return result[max(run.first, 0) : run.last + 2]
 
     @functools.cached_property
     def _shared(self) -> dict[tuple[int, int, int], bool]:
@@ -158,23 +155,23 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
         """Return whether two rules ask the same of an axis, in whatever order."""
         key = axis, one, other
         if key not in self._shared:
-            asked = self.factored.asked[axis]
-            self._shared[key] = sorted(asked[one]) == sorted(asked[other])
+            question = self.factored.clauses[axis]
+            self._shared[key] = sorted(question[one]) == sorted(question[other])
         return self._shared[key]
 
     def are_free(self, one: int, other: int) -> bool:
         """Return whether no two axes on which rules differ have one direction."""
-        found: list[tuple[tuple[int, Fraction], ...]] = []
-        for axis, laid in enumerate(self.laid):
+        result: list[tuple[tuple[int, Fraction], ...]] = []
+        for axis, grid in enumerate(self.grids):
             if self.is_shared(axis, one, other):
                 continue
-            direction = direction_of(self.ground, axis)
-            if direction and not laid.cells.between:
+            direction = direction_of(self.base, axis)
+            if direction and not grid.cells.between:
                 return False  # one value of a combination makes inputs depend
-            if direction in found:
+            if direction in result:
                 return False
             if direction:
-                found.append(direction)
+                result.append(direction)
         return True
 
     @functools.cached_property
@@ -208,7 +205,7 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
         if self.is_shared(axis, one, other):
             yield within, ONE
             return
-        is_vague = self.laid[axis].cells.is_vague
+        is_vague = self.grids[axis].cells.is_vague
         first, known = within.first, None
         for cell in _cells(within):
             ratio = self._ratio(axis, one, other, cell)
@@ -222,7 +219,7 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def ends(self, axis: int, run: Run) -> tuple[Fraction, Fraction]:
         """Return the ends of a run; those of the axis where it reaches them."""
-        cells = self.laid[axis].cells
+        cells = self.grids[axis].cells
         if run == self.whole[axis]:
             return cells.zones[0][0], cells.zones[-1][1]
         low = cells.between[run.first][0] if run.first else cells.zones[0][0]
@@ -244,13 +241,8 @@ _NEAR: Final = (3, 6, 12, 24, 48)  # halvings of the way from a point to the mid
 _TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
 
 
-def tie_of_products(given: Ground, asked: Asked, clock: Clock) -> State:
+def tie_of_products(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
     """Return whether rules are the strongest on a set with an interior.
-
-    Args:
-        given: The rules, joined by the product, and the box, which is not empty.
-        asked: Which of them.
-        clock: How much time there is.
 
     Returns:
         `Proved`: they nowhere are. `Witness`: here they are. `Bracket`: time, or a
@@ -261,21 +253,21 @@ def tie_of_products(given: Ground, asked: Asked, clock: Clock) -> State:
         OutOfTimeError: If the clock is over.
         TooManyCellsError: If the axes are too large.
     """
-    search = _Search(Proportions(given), asked, clock)
-    mine, *others = (rule - 1 for rule in (*asked.ours, *asked.weak))
+    search = _Search(Proportions(base), question, clock)
+    mine, *others = (rule - 1 for rule in (*question.ours, *question.weak))
     if not all(search.of.is_told(mine, other) for other in others):
-        search.of = Proportions(given.fine)
-    found = search.found()
-    if found is not None:
-        return found
+        search.of = Proportions(base.fine)
+    result = search.run()
+    if result is not None:
+        return result
     if search.why:
-        return asked.open(search.why)
+        return question.open(search.why)
     if not all(search.of.are_free(mine, other) for other in others):
         reason = "the inputs of its variables depend on each other"
         return Declined("FTD04", reason)
     if not all(search.of.is_told(mine, other) for other in others):
         return Declined("FTD04", "two places of an axis are too near to tell")
-    boxes = counted(len(search.seen), "box", "boxes")
+    boxes = counted(len(search.visited), "box", "boxes")
     return Proved(f"{boxes} of cells visited in which they are one function")
 
 
@@ -290,51 +282,51 @@ class _Search:
         why: What left a box open, if any was.
     """
 
-    def __init__(self, of: Proportions, asked: Asked, clock: Clock) -> None:
-        self.of, self.asked, self.clock = of, asked, clock
-        self.seen: set[Box] = set()
+    def __init__(self, of: Proportions, question: TieQuestion, clock: Clock) -> None:
+        self.of, self.question, self.clock = of, question, clock
+        self.visited: set[Box] = set()
         self.why = ""
-        given = of.ground
-        self.joined = {axis for group in coupled(given) for axis in group}
+        base = of.base
+        self.joined = {axis for group in coupled(base) for axis in group}
 
-    def found(self) -> Witness | None:
+    def run(self) -> Witness | None:
         """Return a point, or None if there is none, or none was found."""
-        mine, *others = (rule - 1 for rule in self.asked.ours)
+        mine, *others = (rule - 1 for rule in self.question.ours)
         todo: list[Iterable[Box]] = [
             self.of.boxes(mine, others[0], self.of.whole) if others else [self.of.whole]
         ]
         while todo:
             for box in todo.pop():
                 self.clock.check()
-                if box in self.seen:
+                if box in self.visited:
                     continue
-                if len(self.seen) == _MOST_BOXES:
+                if len(self.visited) == _MOST_BOXES:
                     raise OutOfTimeError
-                self.seen.add(box)
-                same = {
+                self.visited.add(box)
+                same_contenders = {
                     rule
-                    for rule in self.asked.rivals
+                    for rule in self.question.rivals
                     if self.of.are_one(mine, rule - 1, box)
                 }
-                if same & {*self.asked.strict}:
+                if same_contenders & {*self.question.strict}:
                     continue
-                found = self._leads(box, same)
-                if found is not None:
-                    return found
-                todo.append(self._parts(box, same))
+                result = self._leads(box, same_contenders)
+                if result is not None:
+                    return result
+                todo.append(self._parts(box, same_contenders))
         return None
 
-    def _parts(self, box: Box, same: set[int]) -> Iterator[Box]:
+    def _parts(self, box: Box, same_contenders: set[int]) -> Iterator[Box]:
         """Yield the parts of a box in which more rivals are the same function."""
-        mine = self.asked.ours[0] - 1
-        for rule in self.asked.weak:
-            if rule not in same:
+        mine = self.question.ours[0] - 1
+        for rule in self.question.weak:
+            if rule not in same_contenders:
                 yield from self.of.boxes(mine, rule - 1, box)
 
-    def _leads(self, box: Box, same: set[int]) -> Witness | None:
+    def _leads(self, box: Box, same_contenders: set[int]) -> Witness | None:
         """Return a point of a box at which all but some rivals are weaker."""
-        rivals = [rule for rule in self.asked.rivals if rule not in same]
-        rules, rule = self.of.ground.rules, self.asked.ours[0]
+        rivals = [rule for rule in self.question.rivals if rule not in same_contenders]
+        rules, rule = self.of.base.rules, self.question.ours[0]
         for is_outer in (True, False):
             domain = self._domain(box, is_outer=is_outer)
             if domain is None:
@@ -346,20 +338,20 @@ class _Search:
             if isinstance(state, Proved) and is_outer:
                 return None
             if isinstance(state, Witness):
-                found = self._near(box, point_of(state.point))
-                if found is not None:
-                    return found
-        found = self._near(box, None)  # there may be no double in it
-        if found is None:
+                result = self._near(box, point_of(state.point))
+                if result is not None:
+                    return result
+        result = self._near(box, None)  # there may be no double in it
+        if result is None:
             self.why = "no point is known where they lead, and none is excluded"
-        return found
+        return result
 
     def _near(self, box: Box, point: Point | None) -> Witness | None:
         """Return a point of a box at which they tie, if one near another does."""
-        given = self.of.ground
+        base = self.of.base
         ends = enumerate(self.of.ends(axis, run) for axis, run in enumerate(box))
-        wanted = {n: Stretch(*of, is_open=of[0] < of[1]) for n, of in ends}
-        middle = point_with(given, wanted)
+        wanted = {n: AxisStretch(*of, is_open=of[0] < of[1]) for n, of in ends}
+        middle = point_with(base, wanted)
         tried = [] if point is None else [point]
         if middle is not None:
             start = point or middle
@@ -369,17 +361,17 @@ class _Search:
             ]
         for one in tried:
             if self._is_inside(box, one):
-                found = checked(given, self.asked, one)
-                if found is not None:
-                    return found
+                result = tie_witness(base, self.question, one)
+                if result is not None:
+                    return result
         return None
 
     def _domain(self, box: Box, *, is_outer: bool) -> Domain | None:
         """Return a box with doubles for its ends, around it or within it."""
-        domain = self.of.ground.domain
+        domain = self.of.base.domain
         sides = {side.variable: side for side in domain.sides}
         for axis, run in enumerate(box):
-            variable = self.of.laid[axis].axis.variable
+            variable = self.of.grids[axis].axis.variable
             known = sides.get(variable.name)
             if run == self.of.whole[axis]:
                 if known is not None and known.low < known.high:
@@ -394,16 +386,18 @@ class _Search:
             is_open = first == low
             if first > last or (first == last and is_open):
                 return None
-            sides[variable.name] = Side(variable.name, first, last, is_open=is_open)
+            sides[variable.name] = DomainSide(
+                variable.name, first, last, is_open=is_open
+            )
         return Domain(tuple(sides.values()))
 
     def _is_inside(self, box: Box, point: Point) -> bool:
         """Return whether points with an interior about one, or below, are in a box."""
         for axis, run in enumerate(box):
-            laid = self.of.laid[axis]
-            value = variable_value(laid.axis.variable, point)
-            if axis in self.joined and laid.cells.between:
-                cells = laid.cells.between[run.first : run.last + 1]
+            grid = self.of.grids[axis]
+            value = variable_value(grid.axis.variable, point)
+            if axis in self.joined and grid.cells.between:
+                cells = grid.cells.between[run.first : run.last + 1]
                 if not any(low < value < high for low, high in cells):
                     return False
                 continue

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.pieces import Piece, pieces
+from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
 from fuzzytree.auditing.engine.polynomials import composed, derivative, roots
 from fuzzytree.model.rulebase import Clause, Shape
 from fuzzytree.numerics.enclosures import (
@@ -58,20 +58,20 @@ class Bends(NamedTuple):
 @functools.lru_cache(maxsize=1 << 12)
 def bends(shape: Shape) -> Bends:
     """Return where a shape turns or jumps."""
-    found: list[_Bend] = []
+    result: list[_Bend] = []
     jumps: list[tuple[float, float, float]] = []
-    laid = pieces(shape)
-    for piece, behind in zip(laid, (*laid[1:], None), strict=True):
-        found += _turns(piece)
+    parts = pieces(shape)
+    for piece, behind in zip(parts, (*parts[1:], None), strict=True):
+        result += _turns(piece)
         if behind is None or piece.high is None:
             continue
         at = outwards(piece.high)
         here, after = piece.degree(piece.high), behind.degree(piece.high)
-        found.append((*at, *_pair(here, here)))
+        result.append((*at, *_pair(here, here)))
         if here != after:
             jumps.append((at[0], *_pair(after, after)))
-            found.append((at[0], np.nextafter(at[1], np.inf), *_pair(after, after)))
-    low, high, least, most = np.array(sorted(found)).reshape(-1, 4).T
+            result.append((at[0], np.nextafter(at[1], np.inf), *_pair(after, after)))
+    low, high, least, most = np.array(sorted(result)).reshape(-1, 4).T
     steps, after_low, after_high = np.array(jumps).reshape(-1, 3).T
     return Bends(
         np.minimum.accumulate(low[::-1])[::-1],
@@ -83,7 +83,7 @@ def bends(shape: Shape) -> Bends:
     )
 
 
-def _turns(piece: Piece) -> Iterator[_Bend]:
+def _turns(piece: PolynomialPiece) -> Iterator[_Bend]:
     """Yield where a piece's derivative is 0."""
     if piece.low is None or piece.high is None or len(piece.polynomial) < 3:
         return
@@ -118,17 +118,15 @@ def _largest(windows: FloatArray, first: IntArray, last: IntArray) -> FloatArray
     level = np.frexp(np.maximum(count, 1))[1] - 1
     start = np.minimum(first, windows.shape[1] - 1)
     end = np.maximum(last - (1 << level), 0)
-    found = np.maximum(windows[level, start], windows[level, end])
-    return np.where(count > 0, found, -np.inf)
+    result = np.maximum(windows[level, start], windows[level, end])
+    return np.where(count > 0, result, -np.inf)
 
 
 def shape_ranges(shape: Shape, edges: FloatArray) -> tuple[Enclosure, Enclosure]:
     """Return which degrees a shape has at edges, and on the cells between them.
 
-    Args:
-        shape: The shape.
-        edges: Shape (..., cells + 1), finite, not falling along the last axis. A cell
-            is `a < x <= b`; the point itself if both ends are equal.
+    `edges`: shape (..., cells + 1), finite, not falling along the last axis. A cell is
+    `a < x <= b`; the point itself if both ends are equal.
 
     Returns:
         Enclosures at the edges, and on the cells.
@@ -162,6 +160,6 @@ def clause_ranges(
     clause: Clause, shapes: Mapping[tuple[str, str], Shape], edges: FloatArray
 ) -> tuple[Enclosure, Enclosure]:
     """Return which degrees a clause has at edges and on cells, as `shape_ranges`."""
-    found = [shape_ranges(shapes[clause.variable, t], edges) for t in clause.terms]
-    at, cells = zip(*found, strict=True)
+    result = [shape_ranges(shapes[clause.variable, t], edges) for t in clause.terms]
+    at, cells = zip(*result, strict=True)
     return clause_enclosure(clause, at), clause_enclosure(clause, cells)

@@ -15,7 +15,7 @@ from fractions import Fraction
 
 from fuzzytree.auditing.engine.domain import (
     Domain,
-    Side,
+    DomainSide,
     linear_form,
     span,
     variable_value,
@@ -50,21 +50,15 @@ class Region(Value, frozen=True):
 
 
 def regions(tree: FuzzyTree) -> tuple[Region, ...]:
-    """Return the region of each leaf, in the order of the leaves.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> [region.label for region in regions(random_tree(3, leaves=2))]
-        ['class 1', 'class 2']
-    """
+    """Return the region of each leaf, in the order of the leaves."""
     start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
     todo: list[tuple[Branch, dict[str, Union]]] = [(start, {})]
-    found: list[Region] = []
+    result: list[Region] = []
     while todo:
         branch, sides = todo.pop()
         if branch.leaf is not None:
             label = tree.leaves[branch.leaf - 1].label
-            found.append(Region(branch.leaf, label, tuple(sides.items())))
+            result.append(Region(branch.leaf, label, tuple(sides.items())))
         elif branch.node is not None:
             node = tree.nodes[branch.node - 1]
             before = sides.get(node.variable, EVERYWHERE)
@@ -78,7 +72,7 @@ def regions(tree: FuzzyTree) -> tuple[Region, ...]:
                 )
                 step = {**sides, node.variable: common(before, owned)}
                 todo.append((node.branches[index], step))
-    return tuple(found)
+    return tuple(result)
 
 
 def common(one: Union, other: Union) -> Union:
@@ -118,29 +112,29 @@ def boxes(region: Region, tree: FuzzyTree, domain: Domain) -> Iterator[Domain]:
     """
     variables = {variable.name: variable for variable in tree.variables}
     sides = {side.variable: side for side in domain.sides}
-    choices: list[list[Side]] = []
+    choices: list[list[DomainSide]] = []
     for name, union in region.sides:
         whole = sides.pop(name, None) or _whole(variables[name], domain)
         choices.append([met for met in (cut_side(whole, of) for of in union) if met])
     order = {name: place for place, name in enumerate(variables)}
     for chosen in itertools.product(*choices):
-        made = (*sides.values(), *chosen)
-        yield Domain(tuple(sorted(made, key=lambda side: order[side.variable])))
+        sides_of_box = (*sides.values(), *chosen)
+        yield Domain(tuple(sorted(sides_of_box, key=lambda side: order[side.variable])))
 
 
-def _whole(variable: Variable, domain: Domain) -> Side:
+def _whole(variable: Variable, domain: Domain) -> DomainSide:
     """Return all values of a combination on a domain, rounded outwards."""
     low, high = span(variable, domain)
-    return Side(variable.name, outwards(low)[0], outwards(high)[1])
+    return DomainSide(variable.name, outwards(low)[0], outwards(high)[1])
 
 
-def cut_side(side: Side, interval: Interval) -> Side | None:
+def cut_side(side: DomainSide, interval: Interval) -> DomainSide | None:
     """Return the part of a side within an interval, None if there is none.
 
     Example:
-        >>> cut_side(Side("x", 0.0, 2.0), (None, 0.0))
-        Side(variable='x', low=0.0, high=0.0, origin='limits', is_open=False)
-        >>> cut_side(Side("x", 0.0, 2.0), (2.0, None)) is None
+        >>> cut_side(DomainSide("x", 0.0, 2.0), (None, 0.0))
+        DomainSide(variable='x', low=0.0, high=0.0, origin='limits', is_open=False)
+        >>> cut_side(DomainSide("x", 0.0, 2.0), (2.0, None)) is None
         True
     """
     below, above = interval
@@ -150,17 +144,13 @@ def cut_side(side: Side, interval: Interval) -> Side | None:
     high = side.high if above is None else min(side.high, above)
     if low > high or (low == high and is_open):
         return None
-    return Side(side.variable, low, high, side.origin, is_open)
+    return DomainSide(side.variable, low, high, side.origin, is_open)
 
 
 def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
     """Return a point of the inputs in a box, deep inside it; None if there is none.
 
     Its coordinates have few digits.
-
-    Args:
-        box: A side for each input, and for any combinations.
-        tree: Whose inputs and combinations they are.
     """
     number = {name: place for place, name in enumerate(tree.inputs)}
     variables = {variable.name: variable for variable in tree.variables}
@@ -173,8 +163,8 @@ def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
         rows.append(Row(weights, low - constant, high - constant, side.is_open))
     wanted = [ranges[name] for name in tree.inputs]
     inner = [row if row.low == row.high else _strict(row) for row in rows]
-    found = feasible(wanted, inner) or feasible(wanted, rows)
-    return None if found is None else dict(zip(tree.inputs, found, strict=True))
+    result = feasible(wanted, inner) or feasible(wanted, rows)
+    return None if result is None else dict(zip(tree.inputs, result, strict=True))
 
 
 def _strict(row: Row) -> Row:
@@ -182,14 +172,7 @@ def _strict(row: Row) -> Row:
 
 
 def leaf_at(tree: FuzzyTree, point: Mapping[str, Fraction]) -> int:
-    """Return the number of the leaf that a point of the inputs reaches, exactly.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> tree = random_tree(3)
-        >>> leaf_at(tree, dict.fromkeys(tree.inputs, Fraction(0)))
-        4
-    """
+    """Return the number of the leaf that a point of the inputs reaches, exactly."""
     variables = {variable.name: variable for variable in tree.variables}
     number = 1 if tree.nodes else None
     leaf = 1

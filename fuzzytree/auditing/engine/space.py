@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Ground, Laid
-from fuzzytree.auditing.engine.domain import Domain, Side, linear_form
+from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, linear_form
 from fuzzytree.auditing.engine.linear import Row, feasible
 from fuzzytree.auditing.engine.ranges import bends, clause_ranges
 from fuzzytree.model.interrupts import checkpoint
@@ -39,14 +39,14 @@ _FINEST = 2.0**-52  # the share of a line that is not parted any more
 _WIDEST = 20.0  # a logarithm: what can be 0 is not infinitely worth parting
 
 
-class Pair(NamedTuple):
+class RulePair(NamedTuple):
     """Two rules that are compared, by position: is `one` above `other`?"""
 
     one: int
     other: int
 
 
-class Table(NamedTuple):
+class BoundTable(NamedTuple):
     """What is known on each of some intervals.
 
     Attributes:
@@ -70,7 +70,7 @@ class Table(NamedTuple):
     width: FloatArray
 
 
-class Spans(NamedTuple):
+class Intervals(NamedTuple):
     """Intervals `low < x <= high`, in order and apart from each other."""
 
     low: FloatArray
@@ -86,7 +86,7 @@ class Spans(NamedTuple):
         return starts & ends & (a < b)
 
 
-class Asked:
+class VariableUse:
     """What some rules ask of one variable.
 
     Attributes:
@@ -103,8 +103,8 @@ class Asked:
         rules: RuleBase,
         variable: Variable,
         chosen: Sequence[int],
-        pairs: Sequence[Pair],
-        ordered: Sequence[Spans] = (),
+        pairs: Sequence[RulePair],
+        ordered: Sequence[Intervals] = (),
     ) -> None:
         self.is_product = rules.semantics.conjunction == "product"
         self.shapes = shapes_of([variable])
@@ -112,7 +112,7 @@ class Asked:
         self.clauses: list[Clause] = []
         self.rules: list[tuple[int, ...]] = []
         for position in chosen:
-            asked: list[int] = []
+            positions: list[int] = []
             for clause in rules.rules[position].when:
                 if clause.variable == variable.name:
                     said = frozenset(
@@ -122,14 +122,14 @@ class Asked:
                     if key not in known:
                         known[key] = len(known)
                         self.clauses.append(clause)
-                    asked.append(known[key])
-            self.rules.append(tuple(sorted(asked)))
+                    positions.append(known[key])
+            self.rules.append(tuple(sorted(positions)))
         place = {position: n for n, position in enumerate(chosen)}
         self.pairs = [
             _apart(self.rules[place[one]], self.rules[place[other]])
             for one, other in pairs
         ]
-        self.ordered = ordered or [Spans(np.empty(0), np.empty(0))] * len(pairs)
+        self.ordered = ordered or [Intervals(np.empty(0), np.empty(0))] * len(pairs)
         self.ones = [place[pair.one] for pair in pairs]
         self.others = [place[pair.other] for pair in pairs]
         turns = [bends(shape) for shape in dict.fromkeys(self.shapes.values())]
@@ -137,12 +137,11 @@ class Asked:
         self.steps = np.unique(np.concatenate([nothing, *(t.steps for t in turns)]))
         self.marks = np.unique(np.concatenate([nothing, *(t.low for t in turns)]))
 
-    def table(self, edges: FloatArray, middle: FloatArray) -> Table:
+    def table(self, edges: FloatArray, middle: FloatArray) -> BoundTable:
         """Return what is known on intervals.
 
-        Args:
-            edges: Shape (intervals, cells + 1): the ends of each interval's cells.
-            middle: Shape (intervals,): a value in each.
+        `edges`: shape (intervals, cells + 1): the ends of each interval's cells;
+        `middle`: shape (intervals,): a value in each.
         """
         lows: list[FloatArray] = []
         highs: list[FloatArray] = []
@@ -154,9 +153,9 @@ class Asked:
             highs.append(cells.high)
             ats.append((here.low + here.high)[:, 0] / 2)
         size = edges.shape[0], edges.shape[1] - 1
-        low = [self._joined(lows, asked, size, -1) for asked in self.rules]
-        high = [self._joined(highs, asked, size, 1) for asked in self.rules]
-        at = [self._joined(ats, asked, size[:1], 0) for asked in self.rules]
+        low = [self._joined(lows, positions, size, -1) for positions in self.rules]
+        high = [self._joined(highs, positions, size, 1) for positions in self.rules]
+        at = [self._joined(ats, positions, size[:1], 0) for positions in self.rules]
         compare = _ratios if self.is_product else _losses
         apart: list[tuple[FloatArray, FloatArray]] = []
         for (mine, theirs), one, spans in zip(
@@ -164,10 +163,10 @@ class Asked:
         ):
             ours, others = (
                 Enclosure(
-                    self._joined(lows, asked, size, -1),
-                    self._joined(highs, asked, size, 1),
+                    self._joined(lows, positions, size, -1),
+                    self._joined(highs, positions, size, 1),
                 )
-                for asked in (mine, theirs)
+                for positions in (mine, theirs)
             )
             is_below = spans.hold(edges[:, :-1], edges[:, 1:])
             apart.append(compare(ours, others, high[one], is_below))
@@ -179,7 +178,7 @@ class Asked:
         spread = self._width(least, most) if self.is_product else width[:, self.ones]
         if not self.is_product:
             spread = np.maximum(spread, width[:, self.others])
-        return Table(
+        return BoundTable(
             least_low,
             most_high,
             _columns(at, size[0]),
@@ -199,13 +198,13 @@ class Asked:
     def _joined(
         self,
         degrees: Sequence[FloatArray],
-        asked: Sequence[int],
+        positions: Sequence[int],
         size: tuple[int, ...],
         side: int,
     ) -> FloatArray:
         """Return the degree of some clauses together, rounded down, up or not."""
         checkpoint()
-        chosen = [degrees[place] for place in asked]
+        chosen = [degrees[place] for place in positions]
         if not self.is_product:
             return functools.reduce(np.minimum, chosen, np.ones(size))
         return product_of(chosen, side) if chosen else np.ones(size)
@@ -218,21 +217,21 @@ def product_of(factors: Sequence[FloatArray], side: int) -> FloatArray:
     underflow becomes 0 or `LEAST`. A factor of 0 makes exactly 0, and factors of 1 do
     not round.
     """
-    found = factors[0]
+    result = factors[0]
     for factor in factors[1:]:
-        before = found
+        before = result
         with np.errstate(invalid="ignore", over="ignore", under="ignore"):
-            found = before * factor
-            off = found * (1.0 + side * 2 * U)
+            result = before * factor
+            off = result * (1.0 + side * 2 * U)
         if not side:
             continue
-        off = np.where((before == 1.0) | (factor == 1.0), found, off)
+        off = np.where((before == 1.0) | (factor == 1.0), result, off)
         if side < 0:
-            found = np.where(off >= LEAST, off, 0.0)  # infinity times 0 is not known
+            result = np.where(off >= LEAST, off, 0.0)  # infinity times 0 is not known
         else:
             off = np.maximum(off, LEAST)
-            found = np.where((before == 0.0) | (factor == 0.0), 0.0, off)
-    return found
+            result = np.where((before == 0.0) | (factor == 0.0), 0.0, off)
+    return result
 
 
 def _apart(
@@ -282,7 +281,7 @@ def _losses(
     return most, np.zeros(most.shape)
 
 
-class Line:
+class Segment:
     """An input's interval and its parts, each `start < x <= end`, or a point.
 
     Attributes:
@@ -296,18 +295,20 @@ class Line:
         roots: The parts that make up the whole.
     """
 
-    def __init__(self, asked: Asked, low: float, high: float, *, is_open: bool) -> None:
-        self.asked = asked
+    def __init__(
+        self, use: VariableUse, low: float, high: float, *, is_open: bool
+    ) -> None:
+        self.use = use
         self.finest = float(high - low) * _FINEST
         first = [(low, high)] if low < high else []
         # A curve may jump just behind the lower end, which is then a part of its own.
-        if not is_open and (low == high or low in asked.steps):
+        if not is_open and (low == high or low in use.steps):
             first.append((low, low))
         ends = np.array(first).reshape(-1, 2)
         self.start, self.end = ends[:, 0], ends[:, 1]
         self.middle = self._middles(self.start, self.end)
         self.child = np.full(len(first), -1)
-        self.table = asked.table(_edges(self.start, self.end), self.middle)
+        self.table = use.table(_edges(self.start, self.end), self.middle)
         self.roots = range(len(first))
 
     @property
@@ -326,22 +327,22 @@ class Line:
             start = np.stack([self.start[new], self.middle[new]], axis=1).ravel()
             end = np.stack([self.middle[new], self.end[new]], axis=1).ravel()
             middle = self._middles(start, end)
-            table = self.asked.table(_edges(start, end), middle)
+            table = self.use.table(_edges(start, end), middle)
             self.start = np.concatenate([self.start, start])
             self.end = np.concatenate([self.end, end])
             self.middle = np.concatenate([self.middle, middle])
             self.child = np.concatenate([self.child, np.full(len(start), -1)])
-            self.table = Table(*map(_stacked, self.table, table))
+            self.table = BoundTable(*map(_stacked, self.table, table))
         return self.child[parts]
 
     def _middles(self, start: FloatArray, end: FloatArray) -> FloatArray:
         middle = start * 0.5 + end * 0.5
         middle = np.where((start < middle) & (middle < end), middle, end)
         quarter = (end - start) * 0.25
-        for mark in _neighbours(self.asked.marks, middle):
+        for mark in _neighbours(self.use.marks, middle):
             is_central = (start + quarter < mark) & (mark < end - quarter)
             middle = np.where(is_central, mark, middle)
-        for step in _neighbours(self.asked.steps, middle):
+        for step in _neighbours(self.use.steps, middle):
             middle = np.where((start < step) & (step < end), step, middle)
         return middle
 
@@ -374,23 +375,23 @@ def _edges(start: FloatArray, end: FloatArray) -> FloatArray:
 _MIX_CELLS = 4  # of a combination's values on one box
 
 
-class Mix(NamedTuple):
+class Combination(NamedTuple):
     """A combination of inputs.
 
     Attributes:
-        asked: What the rules ask of it.
+        use: The clauses of rules on it.
         weights: The summands' weights, each with the position of its line.
         constant: Bounds of what is added to them.
         side: Its limits in the domain, if it has any.
     """
 
-    asked: Asked
+    use: VariableUse
     weights: tuple[tuple[int, float], ...]
     constant: tuple[float, float]
-    side: Side | None
+    side: DomainSide | None
 
 
-class Seen(NamedTuple):
+class BoxReach(NamedTuple):
     """What is known of each of some boxes.
 
     Attributes:
@@ -400,7 +401,7 @@ class Seen(NamedTuple):
         widths: For each line how far rules vary, shape (boxes, rules).
     """
 
-    table: Table
+    table: BoundTable
     is_empty: npt.NDArray[np.bool_]
     spreads: list[FloatArray]
     widths: list[FloatArray]
@@ -409,12 +410,8 @@ class Seen(NamedTuple):
 class Space:
     """The inputs that some rules need, on a domain.
 
-    Args:
-        given: The rules and their domain.
-        chosen: The positions of the rules that matter.
-        pairs: Which of them are compared.
-        is_ordered: Whether it is worked out exactly where one's curve is above the
-            other's: it takes longer, and proves what doubles leave open.
+    `is_ordered`: whether it is worked out exactly where one's curve is above the
+    other's: it takes longer, and proves what doubles leave open.
 
     Attributes:
         names: The inputs.
@@ -425,39 +422,41 @@ class Space:
 
     def __init__(
         self,
-        given: Ground,
+        base: Arrangement,
         chosen: Sequence[int],
-        pairs: Sequence[Pair] = (),
+        pairs: Sequence[RulePair] = (),
         *,
         is_ordered: bool = False,
     ) -> None:
-        rules, domain = given.rules, given.domain
+        rules, domain = base.rules, base.domain
         self.is_product = rules.semantics.conjunction == "product"
         self.domain = domain
-        asked = {c.variable for n in chosen for c in rules.rules[n].when}
+        used = {c.variable for n in chosen for c in rules.rules[n].when}
         mixed = [
             v
             for v in rules.variables
-            if v.parts and (v.name in asked or domain.side(v.name) is not None)
+            if v.parts and (v.name in used or domain.side(v.name) is not None)
         ]
-        needed = asked | {part.input for v in mixed for part in v.parts}
+        needed = used | {part.input for v in mixed for part in v.parts}
         inputs = [v for v in rules.variables if not v.parts and v.name in needed]
         # At least one, so that there is a box at all.
         inputs = inputs or [v for v in rules.variables if not v.parts][:1]
         self.names = tuple(v.name for v in inputs)
-        self.lines: list[Line] = []
-        ordered = _ordered(given, pairs) if is_ordered else {}
+        self.lines: list[Segment] = []
+        ordered = _ordered(base, pairs) if is_ordered else {}
         for variable in inputs:
             side = domain.side(variable.name)
             if side is None:
                 raise ValueError(f"the domain has no side for {variable.name!r}")
-            of = Asked(rules, variable, chosen, pairs, ordered.get(variable.name, ()))
-            self.lines.append(Line(of, side.low, side.high, is_open=side.is_open))
+            of = VariableUse(
+                rules, variable, chosen, pairs, ordered.get(variable.name, ())
+            )
+            self.lines.append(Segment(of, side.low, side.high, is_open=side.is_open))
         number = {name: n for n, name in enumerate(self.names)}
         self.mixes = [
             _mix(
                 v,
-                Asked(rules, v, chosen, pairs, ordered.get(v.name, ())),
+                VariableUse(rules, v, chosen, pairs, ordered.get(v.name, ())),
                 number,
                 domain,
             )
@@ -493,10 +492,10 @@ class Space:
 
     def can_part(self, boxes: IntArray) -> npt.NDArray[np.bool_]:
         """Return whether each line of each box can be parted, shape (boxes, inputs)."""
-        found = [
+        result = [
             line.can_part[boxes[:, number]] for number, line in enumerate(self.lines)
         ]
-        return np.stack(found, axis=1)
+        return np.stack(result, axis=1)
 
     def ends(self, boxes: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return where each box begins and ends, each of shape (boxes, inputs)."""
@@ -517,17 +516,17 @@ class Space:
 
         Where combinations are limited it is one within the limits, if there is one.
         """
-        found = [*map(Fraction, self.middles(box[np.newaxis])[0].tolist())]
+        result = [*map(Fraction, self.middles(box[np.newaxis])[0].tolist())]
         if self.limits:
             low, high = (ends[0].tolist() for ends in self.ends(box[np.newaxis]))
             ranges = [*zip(map(Fraction, low), map(Fraction, high), strict=True)]
-            found = feasible(ranges, self.limits) or found
-        return dict(zip(self.names, found, strict=True))
+            result = feasible(ranges, self.limits) or result
+        return dict(zip(self.names, result, strict=True))
 
-    def look(self, boxes: IntArray) -> Seen:
+    def look(self, boxes: IntArray) -> BoxReach:
         """Return what is known of boxes."""
         tables = [
-            Table(*(field[boxes[:, number]] for field in line.table))
+            BoundTable(*(field[boxes[:, number]] for field in line.table))
             for number, line in enumerate(self.lines)
         ]
         spreads = [table.spread for table in tables]
@@ -541,18 +540,18 @@ class Space:
                 is_empty |= (high < mix.side.low) | (low > mix.side.high)
                 if mix.side.is_open:
                     is_empty |= high <= mix.side.low
-            if not mix.asked.clauses:
+            if not mix.use.clauses:
                 continue
-            table = mix.asked.table(*_mix_cells(mix, low, high, middle))
+            table = mix.use.table(*_mix_cells(mix, low, high, middle))
             tables.append(table)
             _share(mix, end - start, table, spreads, widths)
-        return Seen(self._together(tables), is_empty, spreads, widths)
+        return BoxReach(self._together(tables), is_empty, spreads, widths)
 
-    def _together(self, tables: Sequence[Table]) -> Table:
+    def _together(self, tables: Sequence[BoundTable]) -> BoundTable:
         low, high, at, most, least, _, _ = zip(*tables, strict=True)
         nothing = np.empty((len(low[0]), 0))
         if self.is_product:
-            return Table(
+            return BoundTable(
                 product_of(low, -1),
                 product_of(high, 1),
                 product_of(at, 0),
@@ -561,7 +560,7 @@ class Space:
                 nothing,
                 nothing,
             )
-        return Table(
+        return BoundTable(
             np.minimum.reduce(low),
             np.minimum.reduce(high),
             np.minimum.reduce(at),
@@ -572,53 +571,55 @@ class Space:
         )
 
 
-def _ordered(given: Ground, pairs: Sequence[Pair]) -> dict[str, list[Spans]]:
+def _ordered(
+    base: Arrangement, pairs: Sequence[RulePair]
+) -> dict[str, list[Intervals]]:
     """Return, for each variable and pair, where `other` is at least as large.
 
     Only where each of both is one curve: a product of several has no order there.
     """
-    if not pairs or given.is_empty or not given.is_kept:
+    if not pairs or base.is_empty or not base.is_kept:
         return {}
-    is_product = given.rules.semantics.conjunction == "product"
-    found: dict[str, list[Spans]] = {}
-    for laid in given.laid[0]:
-        of: list[Spans] = []
+    is_product = base.rules.semantics.conjunction == "product"
+    result: dict[str, list[Intervals]] = {}
+    for grid in base.grids:
+        of: list[Intervals] = []
         for pair in pairs:
-            asked = (laid.axis.asked[pair.one], laid.axis.asked[pair.other])
-            if is_product and max(map(len, asked)) > 1:
-                of.append(Spans(np.empty(0), np.empty(0)))
+            clauses = (grid.axis.clauses[pair.one], grid.axis.clauses[pair.other])
+            if is_product and max(map(len, clauses)) > 1:
+                of.append(Intervals(np.empty(0), np.empty(0)))
             else:
-                of.append(_spans(laid, laid.of[pair.one], laid.of[pair.other]))
-        found[laid.axis.variable.name] = of
-    return found
+                of.append(_spans(grid, grid.of[pair.one], grid.of[pair.other]))
+        result[grid.axis.variable.name] = of
+    return result
 
 
-def _spans(laid: Laid, one: IntArray, other: IntArray) -> Spans:
+def _spans(grid: AxisGrid, one: IntArray, other: IntArray) -> Intervals:
     """Return where one element is at most another, given both for each cell.
 
     Cells are joined at a place that is known exactly, for curves are continuous from
     the left; and at any other where bounds of both tell the order.
     """
-    cells, rows = laid.cells, np.arange(len(one))
+    cells, rows = grid.cells, np.arange(len(one))
     holds = cells.rank[rows, one] <= cells.rank[rows, other]
     joins = [a == b for a, b in cells.zones]
     inner = np.arange(1, len(one))  # the places between cells
-    told = np.ones(len(inner), dtype=bool)
+    is_known = np.ones(len(inner), dtype=bool)
     for mine, theirs in ((one[:-1], other[:-1]), (one[1:], other[1:])):
         for values in (cells.left, cells.right):
             below = values[1, mine, inner] <= values[0, theirs, inner]
-            told &= below | (mine == theirs)
+            is_known &= below | (mine == theirs)
     ends: list[list[Fraction]] = []
     for cell in np.flatnonzero(holds).tolist():
         low, high = cells.zones[cell][1], cells.zones[cell + 1][0]
         is_next = bool(ends) and ends[-1][1] == cells.zones[cell][0]
-        if is_next and (joins[cell] or told[cell - 1]):
+        if is_next and (joins[cell] or is_known[cell - 1]):
             ends[-1][1] = high
         else:
             ends.append([low, high])
     lows = [outwards(low)[1] for low, _ in ends]
     highs = [outwards(high)[0] for _, high in ends]
-    return Spans(np.array(lows), np.array(highs))
+    return Intervals(np.array(lows), np.array(highs))
 
 
 def _limits(
@@ -633,17 +634,20 @@ def _limits(
 
 
 def _mix(
-    variable: Variable, asked: Asked, number: Mapping[str, int], domain: Domain
-) -> Mix:
+    variable: Variable,
+    use: VariableUse,
+    number: Mapping[str, int],
+    domain: Domain,
+) -> Combination:
     constant = -sum(
         (Fraction(p.weight) * Fraction(p.centre) for p in variable.parts), Fraction(0)
     )
     weights = tuple((number[part.input], part.weight) for part in variable.parts)
-    return Mix(asked, weights, outwards(constant), domain.side(variable.name))
+    return Combination(use, weights, outwards(constant), domain.side(variable.name))
 
 
 def mix_range(
-    mix: Mix, start: FloatArray, end: FloatArray
+    mix: Combination, start: FloatArray, end: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return what a combination's exact values lie between on boxes.
 
@@ -666,7 +670,7 @@ def mix_range(
 
 
 def _mix_cells(
-    mix: Mix, low: FloatArray, high: FloatArray, middle: FloatArray
+    mix: Combination, low: FloatArray, high: FloatArray, middle: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the cells of a combination's values, and its value in the middle."""
     low = np.nextafter(low, -np.finfo(np.float64).max)  # a cell is open below
@@ -680,9 +684,9 @@ def _mix_cells(
 
 
 def _share(
-    mix: Mix,
+    mix: Combination,
     sizes: FloatArray,
-    table: Table,
+    table: BoundTable,
     spreads: list[FloatArray],
     widths: list[FloatArray],
 ) -> None:

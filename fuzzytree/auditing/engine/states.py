@@ -172,14 +172,14 @@ def _coordinate(name: str, value: Fraction) -> Coordinate:
     return Coordinate(name, str(value), repr(near), near.hex() if is_double else None)
 
 
-def point_of(found: Iterable[Coordinate]) -> dict[str, Fraction]:
+def point_of(result: Iterable[Coordinate]) -> dict[str, Fraction]:
     """Return the exact values of a point, by input.
 
     Example:
         >>> point_of(coordinates({"x": Fraction(1, 3)}))
         {'x': Fraction(1, 3)}
     """
-    return {one.input: Fraction(one.exact) for one in found}
+    return {one.input: Fraction(one.exact) for one in result}
 
 
 # --- counts, numbers and names in sentences

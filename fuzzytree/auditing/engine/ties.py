@@ -15,12 +15,12 @@ from collections.abc import Collection, Iterator, Sequence
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.auditing.engine.arrangement import Ground, TooManyCellsError
+from fuzzytree.auditing.engine.arrangement import Arrangement, TooManyCellsError
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import variable_value
 from fuzzytree.auditing.engine.linear import simple
 from fuzzytree.auditing.engine.options import (
-    Contest,
+    Duel,
     Part,
     at_most,
     choices,
@@ -31,16 +31,16 @@ from fuzzytree.auditing.engine.options import (
     weakest,
 )
 from fuzzytree.auditing.engine.pivots import (
-    Asked,
     Pivot,
-    checked,
-    crossed,
+    TieQuestion,
+    constant_pairs,
     ends_of,
     flat_family,
     levels_of,
     part_at,
     pivots,
     stays,
+    tie_witness,
     value_of,
     whole,
 )
@@ -49,7 +49,7 @@ from fuzzytree.auditing.engine.product_ties import tie_of_products
 from fuzzytree.auditing.engine.states import Declined, Proved, State, Witness
 from fuzzytree.auditing.engine.witnesses import (
     START,
-    Stretch,
+    AxisStretch,
     coupled,
     have_one_direction,
     point_with,
@@ -62,43 +62,34 @@ _MOST_CHOICES: Final = 4_000  # of values for axes that share inputs, in one que
 _Levels = tuple[Fraction, Fraction]
 
 
-class Sharing:
-    """One question, on axes some of which share inputs.
+class SharedInputs:
+    """One question, on axes some of which share inputs."""
 
-    Args:
-        contest: The rules and their rivals.
-        asked: Which of them.
-        clock: How much time there is.
-    """
-
-    def __init__(self, contest: Contest, asked: Asked, clock: Clock) -> None:
-        self.contest, self.asked, self.clock = contest, asked, clock
-        given = contest.ground
-        self.joined = sorted({axis for group in coupled(given) for axis in group})
-        self.tell = at_most(_MOST_CHOICES, clock)
+    def __init__(self, contest: Duel, question: TieQuestion, clock: Clock) -> None:
+        self.contest, self.question, self.clock = contest, question, clock
+        base = contest.base
+        self.joined = sorted({axis for group in coupled(base) for axis in group})
+        self.count = at_most(_MOST_CHOICES, clock)
 
     def leader(self) -> Witness | None:
         """Return a point at which a single rule leads, if floats lead to one."""
-        given, asked = self.contest.ground, self.asked
-        if len(asked.ours) > 1:
+        base, question = self.contest.base, self.question
+        if len(question.ours) > 1:
             return None
-        point = leader(given, asked.ours, asked.rivals)
-        for laid in given.laid[0]:
-            value = variable_value(laid.axis.variable, point)
-            cells = laid.cells.between
+        point = leader(base, question.ours, question.rivals)
+        for grid in base.grids:
+            value = variable_value(grid.axis.variable, point)
+            cells = grid.cells.between
             if cells and not any(low < value < high for low, high in cells):
                 return None
-        return checked(given, asked, point)
+        return tie_witness(base, question, point)
 
     def search(
         self, pivot: Pivot, band: int, *, is_flat: bool
     ) -> tuple[Witness | None, bool]:
         """Return a point at which ours tie, and whether there may be one unfound.
 
-        Args:
-            pivot: What holds ours.
-            band: The band of its level; or the one below, where it is not constant.
-            is_flat: Whether it is.
+        `pivot`: what holds ours.
         """
         bands = self.contest.bands
         first, last = bands.high[band], bands.low_after(band)
@@ -111,11 +102,11 @@ class Sharing:
             if not any(self._fitting(pivot, band, levels, is_flat, is_outer=True)):
                 continue
             for wanted in self._fitting(pivot, band, levels, is_flat, is_outer=False):
-                point = point_with(self.contest.ground, wanted)
+                point = point_with(self.contest.base, wanted)
                 if point is not None:
-                    found = checked(self.contest.ground, self.asked, point)
-                    if found is not None:
-                        return found, False
+                    result = tie_witness(self.contest.base, self.question, point)
+                    if result is not None:
+                        return result, False
             if is_flat or depth == _DEEPEST:
                 is_open = True
                 continue
@@ -132,64 +123,64 @@ class Sharing:
         is_flat: bool,
         *,
         is_outer: bool,
-    ) -> Iterator[dict[int, Stretch]]:
+    ) -> Iterator[dict[int, AxisStretch]]:
         """Yield values of the axes at which ours tie, or may at some of the levels."""
-        held = self._held(pivot, levels, is_flat=is_flat, is_outer=is_outer)
-        if held is None:
+        fixed = self._pivot_stretches(pivot, levels, is_flat=is_flat, is_outer=is_outer)
+        if fixed is None:
             return
-        contest, laid = self.contest, self.contest.ground.laid[0][pivot.axis]
+        contest, grid = self.contest, self.contest.base.grids[pivot.axis]
         goal = contest.full & ~union(part.mask for part in pivot.all)
         if not is_outer and not is_flat:
-            level = laid.axis.elements[pivot.element].degree(held[pivot.axis].low)
+            level = grid.axis.elements[pivot.element].degree(fixed[pivot.axis].low)
             levels = level, level
         parts = {
             axis: [*self._parts(axis, band, levels, is_flat=is_flat, is_outer=is_outer)]
             for axis in self.joined
-            if axis not in held
+            if axis not in fixed
         }
         free = [
             axis
             for axis in range(len(contest.inner_options))
-            if axis not in held and axis not in parts
+            if axis not in fixed and axis not in parts
         ]
         families = [
-            flat_family(contest, self.asked, axis, band)
+            flat_family(contest, self.question, axis, band)
             if is_flat
             else contest.inner_options[axis].at_gap(band)
             for axis in free
         ]
         rest = union(mask for family in families for mask in family)
-        given = contest.ground
-        for wanted, covered in choices(given, parts, goal, rest, held, self.tell):
-            left = goal & ~covered
-            chosen = cover(families, left, self.clock)
+        base = contest.base
+        for wanted, covered in choices(base, parts, goal, rest, fixed, self.count):
+            missing = goal & ~covered
+            chosen = cover(families, missing, self.clock)
             if chosen is None:
                 continue
             if is_outer:
                 yield wanted
                 continue
             flat = band if is_flat else None
-            found = {
-                axis: part_at(contest, axis, levels[0], mask & left, flat)
+            result = {
+                axis: part_at(contest, axis, levels[0], mask & missing, flat)
                 for axis, mask in zip(free, chosen, strict=True)
             }
-            whole_of = {axis: part for axis, part in found.items() if part is not None}
-            if len(whole_of) == len(found):
+            whole_of = {axis: part for axis, part in result.items() if part is not None}
+            if len(whole_of) == len(result):
                 yield wanted | whole_of
 
-    def _held(
+    def _pivot_stretches(
         self, pivot: Pivot, levels: _Levels, *, is_flat: bool, is_outer: bool
-    ) -> dict[int, Stretch] | None:
+    ) -> dict[int, AxisStretch] | None:
         """Return where the pivot is at some of the levels: one value if not outer."""
-        every = self.contest.ground.laid[0]
+        every = self.contest.base.grids
         if is_flat:
             return {part.axis: whole(every[part.axis], part.cell) for part in pivot.all}
-        laid = every[pivot.axis]
+        grid = every[pivot.axis]
         if is_outer:
-            part = widest(laid, pivot.cell, levels, [pivot.element], [pivot.element])
+            part = widest(grid, pivot.cell, levels, [pivot.element], [pivot.element])
             return None if part is None else {pivot.axis: part}
-        at = value_of(laid, pivot, levels)
-        return None if at is None else {pivot.axis: Stretch(at, at, is_open=False)}
+        at = value_of(grid, pivot, levels)
+        return None if at is None else {pivot.axis: AxisStretch(at, at, is_open=False)}
 
     def _parts(
         self,
@@ -206,49 +197,43 @@ class Sharing:
         if not is_flat:
             yield from parts_of(contest, options, axis, band, levels, is_outer=is_outer)
             return
-        laid = contest.ground.laid[0][axis]
-        first_weak = len(self.asked.strict)
+        grid = contest.base.grids[axis]
+        first_weak = len(self.question.strict)
         for number in (options.where >= START).nonzero()[0].tolist():
             cell = int(options.where[number])
-            mine = weakest(laid, contest.ours, cell)
+            mine = weakest(grid, contest.ours, cell)
             equal = {
                 n
                 for n in range(first_weak, len(contest.rivals))
-                if stays(contest, laid, cell, n, band)
+                if stays(contest, grid, cell, n, band)
             }
             below = {
-                n: weakest(laid, [contest.rivals[n]], cell)
+                n: weakest(grid, [contest.rivals[n]], cell)
                 for n in range(len(contest.rivals))
                 if n not in equal and options.floor[number, n] < band
             }
-            held = union(1 << n for n in equal)
-            found = nested(laid, cell, levels, mine, below, is_outer=is_outer)
-            yield from ((part, mask | held) for part, mask in found)
+            fixed = union(1 << n for n in equal)
+            result = nested(grid, cell, levels, mine, below, is_outer=is_outer)
+            yield from ((part, mask | fixed) for part, mask in result)
 
 
 # --- the search
 
 
-def tie(given: Ground, one: int, other: int, clock: Clock | None = None) -> State:
+def tie(base: Arrangement, one: int, other: int, clock: Clock | None = None) -> State:
     """Return whether two rules tie as the strongest, on a set with an interior.
-
-    Args:
-        given: The rules and the box.
-        one: The number of a rule, from 1.
-        other: The number of another one.
-        clock: How much time there is; no limit unless given.
 
     Returns:
         `Proved`: they never do. `Witness`: here they do. `Bracket`: the budget leaves
         it open. `Declined`: inputs that depend on each other do.
     """
-    every = range(1, len(given.rules.rules) + 1)
+    every = range(1, len(base.rules.rules) + 1)
     rest = tuple(n for n in every if n not in (one, other))
-    return _asked(given, Asked((one, other), (), rest), clock or Clock())
+    return _result(base, TieQuestion((one, other), (), rest), clock or Clock())
 
 
 def decides_by_order(
-    given: Ground,
+    base: Arrangement,
     rule: int,
     before: Collection[int],
     behind: Collection[int],
@@ -256,68 +241,61 @@ def decides_by_order(
 ) -> State:
     """Return whether a rule is somewhere as strong as any, on a set with an interior.
 
-    Args:
-        given: The rules and the box.
-        rule: The number of the rule, from 1.
-        before: The numbers of the rivals that win ties against it.
-        behind: The numbers of the rivals that lose them.
-        clock: How much time there is; no limit unless given.
-
     Returns:
         As `tie`.
     """
-    asked = Asked((rule,), tuple(sorted(before)), tuple(sorted(behind)))
-    return _asked(given, asked, clock or Clock())
+    question = TieQuestion((rule,), tuple(sorted(before)), tuple(sorted(behind)))
+    return _result(base, question, clock or Clock())
 
 
-def _asked(given: Ground, asked: Asked, clock: Clock) -> State:
-    if given.is_empty:
+def _result(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
+    if base.is_empty:
         return Proved("the domain has no point")
-    if not given.axes:
-        point = point_with(given, {})
-        found = None if point is None else checked(given, asked, point)
-        return found or Proved("no rule asks anything")
+    if not base.axes:
+        point = point_with(base, {})
+        result = None if point is None else tie_witness(base, question, point)
+        return result or Proved("no rule asks anything")
     try:
-        if given.rules.semantics.conjunction == "product":
-            return tie_of_products(given, asked, clock)
-        return _searched(given, asked, clock)
+        if base.rules.semantics.conjunction == "product":
+            return tie_of_products(base, question, clock)
+        return _searched(base, question, clock)
     except OutOfTimeError:
-        return asked.open("the budget was spent")
+        return question.open("the budget was spent")
     except TooManyCellsError as error:
-        return asked.open(str(error))
+        return question.open(str(error))
 
 
-def _searched(given: Ground, asked: Asked, clock: Clock) -> State:
-    contest = Contest(
-        given,
-        tuple(n - 1 for n in asked.ours),
-        tuple(n - 1 for n in asked.rivals),
+def _searched(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
+    contest = Duel(
+        base,
+        tuple(n - 1 for n in question.ours),
+        tuple(n - 1 for n in question.rivals),
     )
-    sharing = Sharing(contest, asked, clock) if coupled(given) else None
+    sharing = SharedInputs(contest, question, clock) if coupled(base) else None
     led = None if sharing is None else sharing.leader()
     if led is not None:
         return led
     is_each = sharing is not None
-    held_by = [
+    candidates = [
         pivot
-        for axis in range(len(given.laid[0]))
-        for pivot in pivots(contest, asked, axis, is_each=is_each)
+        for axis in range(len(base.grids))
+        for pivot in pivots(contest, question, axis, is_each=is_each)
     ]
-    held_by += crossed(contest, asked, is_each=is_each)
+    candidates += constant_pairs(contest, question, is_each=is_each)
     bands, levels = contest.bands, 0
     is_vague = is_open = False
     floors = [options.at_gap for options in contest.inner_options]
-    for pivot in held_by:
-        held = {part.axis: part.mask for part in pivot.all}
-        masks = [(mask,) for mask in held.values()]
-        least, most = ends_of(given.laid[0][pivot.axis], pivot.element, pivot.cell)
+    for pivot in candidates:
+        fixed = {part.axis: part.mask for part in pivot.all}
+        masks = [(mask,) for mask in fixed.values()]
+        least, most = ends_of(base.grids[pivot.axis], pivot.element, pivot.cell)
         is_flat = least == most
         if is_flat and not bands.is_sharp[least]:
             clock.check()
             vague = [
-                flat_family(contest, asked, axis, least, is_within=True)
+                flat_family(contest, question, axis, least, is_within=True)
                 for axis in range(len(floors))
-                if axis not in held
+                if axis not in fixed
             ]
             if cover([*masks, *vague], contest.full, clock) is None:
                 continue
@@ -328,37 +306,37 @@ def _searched(given: Ground, asked: Asked, clock: Clock) -> State:
             clock.check()
             levels += 1
             families = [
-                flat_family(contest, asked, axis, band)
+                flat_family(contest, question, axis, band)
                 if is_flat
                 else floors[axis](band)
                 for axis in range(len(floors))
-                if axis not in held
+                if axis not in fixed
             ]
             chosen = cover([*masks, *families], contest.full, clock)
             if chosen is None:
                 continue
             if sharing is not None:
-                found, is_left = sharing.search(pivot, band, is_flat=is_flat)
+                result, is_left = sharing.search(pivot, band, is_flat=is_flat)
                 is_open |= is_left
             else:
-                rest = chosen[len(held) :]
-                found = _witness(contest, asked, pivot, band, rest, is_flat=is_flat)
-                is_vague |= found is None
-            if found is not None:
-                return found
-    if is_vague and not given.is_fine:
-        return _searched(given.fine, asked, clock)
+                rest = chosen[len(fixed) :]
+                result = _witness(contest, question, pivot, band, rest, is_flat=is_flat)
+                is_vague |= result is None
+            if result is not None:
+                return result
+    if is_vague and not base.is_fine:
+        return _searched(base.fine, question, clock)
     if is_vague:
-        return asked.open("two critical levels are too near to tell")
-    if is_open or have_one_direction(given):
+        return question.open("two critical levels are too near to tell")
+    if is_open or have_one_direction(base):
         reason = "the inputs of its variables depend on each other"
         return Declined("FTD04", reason)
-    return Proved(f"{len(held_by)} cells where they share a curve, {levels} levels")
+    return Proved(f"{len(candidates)} cells where they share a curve, {levels} levels")
 
 
 def _witness(
-    contest: Contest,
-    asked: Asked,
+    contest: Duel,
+    question: TieQuestion,
     pivot: Pivot,
     band: int,
     chosen: Sequence[int],
@@ -366,29 +344,29 @@ def _witness(
     is_flat: bool,
 ) -> Witness | None:
     """Return a point at which ours tie, if one is found."""
-    given = contest.ground
-    laid = given.laid[0][pivot.axis]
+    base = contest.base
+    grid = base.grids[pivot.axis]
     if is_flat:
-        at: Fraction | None = simple(*whole(laid, pivot.cell)[:2])
+        at: Fraction | None = simple(*whole(grid, pivot.cell)[:2])
     else:
         levels = contest.bands.high[band], contest.bands.low_after(band)
-        at = value_of(laid, pivot, levels)
+        at = value_of(grid, pivot, levels)
     if at is None:
         return None
-    level = laid.axis.elements[pivot.element].degree(at)
-    wanted = {pivot.axis: Stretch(at, at, is_open=False)}
-    left = contest.full
-    for held in pivot.all:
+    level = grid.axis.elements[pivot.element].degree(at)
+    wanted = {pivot.axis: AxisStretch(at, at, is_open=False)}
+    missing = contest.full
+    for fixed in pivot.all:
         if is_flat:
-            wanted[held.axis] = whole(given.laid[0][held.axis], held.cell)
-        left &= ~held.mask
-    others = [axis for axis in range(len(given.laid[0])) if axis not in wanted]
+            wanted[fixed.axis] = whole(base.grids[fixed.axis], fixed.cell)
+        missing &= ~fixed.mask
+    others = [axis for axis in range(len(base.grids)) if axis not in wanted]
     for axis, mask in zip(others, chosen, strict=True):
         flat = band if is_flat else None
-        found = part_at(contest, axis, level, mask & left, flat)
-        if found is None:
+        result = part_at(contest, axis, level, mask & missing, flat)
+        if result is None:
             return None
-        wanted[axis] = found
-        left &= ~mask
-    point = point_with(given, wanted)
-    return None if point is None else checked(given, asked, point)
+        wanted[axis] = result
+        missing &= ~mask
+    point = point_with(base, wanted)
+    return None if point is None else tie_witness(base, question, point)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
-from fuzzytree.auditing.engine.arrangement import Ground, Laid
+from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.domain import (
     Domain,
     Point,
@@ -21,7 +21,7 @@ from fuzzytree.auditing.engine.domain import (
     variable_value,
 )
 from fuzzytree.auditing.engine.linear import Row, feasible, simple
-from fuzzytree.auditing.engine.pieces import ONE, Element, piece_at, pieces
+from fuzzytree.auditing.engine.pieces import ONE, RuleCurve, piece_at, pieces
 from fuzzytree.auditing.engine.polynomials import (
     difference,
     magnitude,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 START = -1  # the number of the option at an axis's lower end itself
 
 
-class Stretch(NamedTuple):
+class AxisStretch(NamedTuple):
     """Values of an axis on which an option holds at a level: all between low and high.
 
     Attributes:
@@ -54,50 +54,45 @@ class Stretch(NamedTuple):
 
 
 def stretch(
-    laid: Laid,
+    grid: AxisGrid,
     cell: int,
     level: Fraction,
     high_ones: Iterable[int],
     low_ones: Iterable[int],
-) -> Stretch | None:
+) -> AxisStretch | None:
     """Return where in a cell some elements are at a level or above, others below it.
 
-    Args:
-        laid: The axis.
-        cell: The cell, or `START`.
-        level: A level that is in no band.
-        high_ones: The elements that must reach it.
-        low_ones: The elements that must stay below it.
+    `level`: A level that is in no band.
 
     Returns:
         A part of the cell, shorter than the true one by next to nothing; None if there
         is none.
     """
-    sides = [*((one, True) for one in high_ones), *((one, False) for one in low_ones)]
-    elements = laid.axis.elements
+    limits = [*((one, True) for one in high_ones), *((one, False) for one in low_ones)]
+    elements = grid.axis.elements
     if cell == START:
-        at = laid.cells.zones[0][0]
-        fits = all((elements[e].degree(at) >= level) is up for e, up in sides)
-        return Stretch(at, at, is_open=False) if fits else None
-    ends = laid.cells.between[cell]
+        at = grid.cells.zones[0][0]
+        fits = all((elements[e].degree(at) >= level) is up for e, up in limits)
+        return AxisStretch(at, at, is_open=False) if fits else None
+    ends = grid.cells.between[cell]
     for bits in (64, 256, 1024):
         low, high = ends
-        for one, is_high in sides:
-            found = part_of(elements[one], ends, level, is_high=is_high, bits=bits)
-            low, high = max(low, found.low), min(high, found.high)
+        for one, is_high in limits:
+            result = part_of(elements[one], ends, level, is_high=is_high, bits=bits)
+            low, high = max(low, result.low), min(high, result.high)
         if low < high:
-            return Stretch(low, high)
+            return AxisStretch(low, high)
     return None
 
 
 def part_of(
-    element: Element,
+    element: RuleCurve,
     ends: tuple[Fraction, Fraction],
     level: Fraction,
     *,
     is_high: bool,
     bits: int,
-) -> Stretch:
+) -> AxisStretch:
     """Return the part of a cell where a monotone element is on a side of a level.
 
     A cell is within one piece, which is clipped on all of it or nowhere.
@@ -106,40 +101,44 @@ def part_of(
     middle = (low + high) / 2
     piece = piece_at(pieces(element.shape), middle)
     goal = 1 - level if element.is_complement else level
-    crossed = difference(piece.polynomial, (goal,))
-    found = () if piece.degree(middle) in (0, piece.cap) else roots(crossed, low, high)
-    if not found:
+    constant_pairs = difference(piece.polynomial, (goal,))
+    result = (
+        ()
+        if piece.degree(middle) in (0, piece.cap)
+        else roots(constant_pairs, low, high)
+    )
+    if not result:
         is_met = (element.degree(middle) >= level) is is_high
-        return Stretch(low, high) if is_met else Stretch(high, low)
+        return AxisStretch(low, high) if is_met else AxisStretch(high, low)
     size = max(0, -magnitude(high - low))
-    place = refined(crossed, found[0], size + bits)
-    starts_above = value_at(crossed, low) > 0
+    place = refined(constant_pairs, result[0], size + bits)
+    starts_above = value_at(constant_pairs, low) > 0
     if starts_above is (is_high is not element.is_complement):
-        return Stretch(low, place.low)
-    return Stretch(place.high, high)
+        return AxisStretch(low, place.low)
+    return AxisStretch(place.high, high)
 
 
 def widest(
-    laid: Laid,
+    grid: AxisGrid,
     cell: int,
     levels: tuple[Fraction, Fraction],
     high_ones: Iterable[int],
     low_ones: Iterable[int],
-) -> Stretch | None:
+) -> AxisStretch | None:
     """Return closed bounds of where a cell's option holds at any level of some.
 
     Nothing is left out: the elements of `high_ones` must reach the lower level and
     those of `low_ones` be below the upper one, and the zones at the cell's ends count.
     """
-    elements = laid.axis.elements
-    zones = laid.cells.zones
+    elements = grid.axis.elements
+    zones = grid.cells.zones
     if cell == START:
         at = zones[0][0]
         fits = all(elements[one].degree(at) >= levels[0] for one in high_ones) and all(
             elements[one].degree(at) < levels[1] for one in low_ones
         )
-        return Stretch(at, at, is_open=False) if fits else None
-    low, high = laid.cells.between[cell]
+        return AxisStretch(at, at, is_open=False) if fits else None
+    low, high = grid.cells.between[cell]
     ends = low, high
     first, last = zones[cell][0], zones[cell + 1][1]
     for one in high_ones:
@@ -154,19 +153,19 @@ def widest(
         low, high = max(low, part.low), min(high, part.high)
     if low > high:
         return None
-    return Stretch(
+    return AxisStretch(
         first if low <= ends[0] else low,
         last if high >= ends[1] else high,
         is_open=False,
     )
 
 
-def _outer(part: Stretch, ends: tuple[Fraction, Fraction]) -> Stretch:
+def _outer(part: AxisStretch, ends: tuple[Fraction, Fraction]) -> AxisStretch:
     """Return bounds of a part that its own ends, inner ones, fall short of."""
     if part.low > part.high:
         return part
     margin = (ends[1] - ends[0]) / 2**60
-    return Stretch(part.low - margin, part.high + margin)
+    return AxisStretch(part.low - margin, part.high + margin)
 
 
 # --- points of the inputs
@@ -175,7 +174,7 @@ def _outer(part: Stretch, ends: tuple[Fraction, Fraction]) -> Stretch:
 _DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 
 
-def coupled(given: Ground) -> tuple[tuple[int, ...], ...]:
+def coupled(base: Arrangement) -> tuple[tuple[int, ...], ...]:
     """Return the groups of axes that share inputs, so that they are not free.
 
     An axis alone is free: an input takes every value of its side, and a combination
@@ -184,12 +183,12 @@ def coupled(given: Ground) -> tuple[tuple[int, ...], ...]:
     """
     inputs = [
         {part.input for part in axis.variable.parts} or {axis.variable.name}
-        for axis in given.axes
+        for axis in base.axes
     ]
     limited = [
         {part.input for part in variable.parts}
-        for variable in given.rules.variables
-        if variable.parts and given.domain.side(variable.name) is not None
+        for variable in base.rules.variables
+        if variable.parts and base.domain.side(variable.name) is not None
     ]
     groups: list[tuple[set[int], set[str]]] = []
     for axis, names in [*enumerate(inputs), *((-1, names) for names in limited)]:
@@ -205,54 +204,52 @@ def coupled(given: Ground) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(sorted(members)) for members, _ in groups if len(members) > 1)
 
 
-def direction_of(given: Ground, axis: int) -> tuple[tuple[int, Fraction], ...]:
+def direction_of(base: Arrangement, axis: int) -> tuple[tuple[int, Fraction], ...]:
     """Return the weights of an axis's inputs that vary, as multiples of the first."""
-    number = {name: place for place, name in enumerate(given.rules.inputs)}
-    weights, _ = linear_form(given.axes[axis].variable, number)
-    sides = [given.domain.side(name) for name in given.rules.inputs]
+    number = {name: place for place, name in enumerate(base.rules.inputs)}
+    weights, _ = linear_form(base.axes[axis].variable, number)
+    limits = [base.domain.side(name) for name in base.rules.inputs]
     kept = [
         (place, weight)
         for place, weight in sorted(weights.items())
-        if (side := sides[place]) is not None and side.low < side.high
+        if (side := limits[place]) is not None and side.low < side.high
     ]
     return tuple((place, weight / kept[0][1]) for place, weight in kept)
 
 
-def have_one_direction(given: Ground) -> bool:
+def have_one_direction(base: Arrangement) -> bool:
     """Return whether curves of two axes can be one function of the inputs."""
-    known = [direction_of(given, axis) for axis in range(len(given.axes))]
-    found = [one for one in known if one]
-    return len(set(found)) < len(found)
+    known = [direction_of(base, axis) for axis in range(len(base.axes))]
+    result = [one for one in known if one]
+    return len(set(result)) < len(result)
 
 
-def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
+def point_with(base: Arrangement, wanted: Mapping[int, AxisStretch]) -> Point | None:
     """Return a point of the box whose axes have wanted values; None if there is none.
 
     Inputs on which nothing is wanted get a plain value near the middle of their side.
 
-    Args:
-        given: Where.
-        wanted: For axes, by position, what they must be between.
+    `wanted`: for axes, by position, what they must be between.
     """
-    names = given.rules.inputs
+    names = base.rules.inputs
     number = {name: place for place, name in enumerate(names)}
     ranges: list[tuple[Fraction, Fraction]] = []
     rows: list[Row] = []
     for name in names:
-        side = given.domain.side(name)
+        side = base.domain.side(name)
         assert side is not None  # checked when the ground was made
         ranges.append((Fraction(side.low), Fraction(side.high)))
         if side.is_open:
             start = ranges[-1][0]
             rows.append(Row({number[name]: Fraction(1)}, start, is_open_low=True))
-    for variable in given.rules.variables:
-        side = given.domain.side(variable.name)
+    for variable in base.rules.variables:
+        side = base.domain.side(variable.name)
         if variable.parts and side is not None:
             weights, constant = linear_form(variable, number)
             low, high = Fraction(side.low) - constant, Fraction(side.high) - constant
             rows.append(Row(weights, low, high, is_open_low=side.is_open))
     for axis, part in wanted.items():
-        weights, constant = linear_form(given.axes[axis].variable, number)
+        weights, constant = linear_form(base.axes[axis].variable, number)
         low, high = part.low - constant, part.high - constant
         rows.append(Row(weights, low, high, part.is_open, part.is_open))
     if not all(_may_hold(row) for row in rows if not row.weights):
@@ -272,18 +269,18 @@ def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
             return None
         point.append(simple(low, high))
     if joined:
-        asked = sorted(joined)
-        inner = {place: at for at, place in enumerate(asked)}
+        order = sorted(joined)
+        inner = {place: at for at, place in enumerate(order)}
         kept = [
             row._replace(weights={inner[p]: w for p, w in row.weights.items()})
             for row in rows
             if joined.issuperset(row.weights)
         ]
-        found = feasible([ranges[place] for place in asked], kept)
-        if found is None:
+        result = feasible([ranges[place] for place in order], kept)
+        if result is None:
             return None
         for place, at in inner.items():
-            point[place] = found[at]
+            point[place] = result[at]
     return dict(zip(names, point, strict=True))
 
 
@@ -300,9 +297,9 @@ def _ends(row: Row, weight: Fraction) -> tuple[Fraction | None, Fraction | None]
     return (first, last) if weight > 0 else (last, first)
 
 
-def is_within(given: Ground, point: Mapping[str, Fraction]) -> bool:
+def is_within(base: Arrangement, point: Mapping[str, Fraction]) -> bool:
     """Return whether a point of the inputs lies in the domain."""
-    return contains(given.domain, given.rules.variables, point)
+    return contains(base.domain, base.rules.variables, point)
 
 
 def simplified(
@@ -312,14 +309,11 @@ def simplified(
 ) -> dict[str, Fraction]:
     """Return a point of fewer digits near another one.
 
-    Args:
-        point: The point; what has no side in the domain stays.
-        domain: Where the point stays.
-        holds: Whether a point will do.
+    `domain`: where the point stays; `holds`: whether a point will do.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import Domain, Side
-        >>> box = Domain((Side("x", 0.0, 1.0),))
+        >>> from fuzzytree.auditing.engine.domain import Domain, DomainSide
+        >>> box = Domain((DomainSide("x", 0.0, 1.0),))
         >>> simplified({"x": Fraction(1, 3)}, box, lambda at: 3 * at["x"] < 1)
         {'x': Fraction(5944751508129055, 18014398509481984)}
     """
@@ -340,7 +334,7 @@ def simplified(
 # --- the box around a point
 
 
-class Held(NamedTuple):
+class LevelSides(NamedTuple):
     """What must hold along an axis.
 
     Attributes:
@@ -358,7 +352,7 @@ class Held(NamedTuple):
 
 
 def region_around(
-    given: Ground,
+    base: Arrangement,
     point: Mapping[str, Fraction],
     above: Sequence[int],
     below: Sequence[int],
@@ -370,39 +364,31 @@ def region_around(
     On all of it each of `above` is at least as strong as some level, and each of
     `below` is weaker than it, under the minimum. Only variables that matter have a
     span; the ends of spans are doubles. It is empty where no doubles are around.
-
-    Args:
-        given: The rules and the box.
-        point: A point of it.
-        above: Numbers of rules, from 1.
-        below: Numbers of others.
-        between: The strengths at the point between which the level is chosen: the
-            largest of `below` and the least of `above`.
     """
     level = simple(*between)
-    left = {number - 1 for number in below}
-    at = [variable_value(axis.variable, point) for axis in given.axes]
+    missing = {number - 1 for number in below}
+    at = [variable_value(axis.variable, point) for axis in base.axes]
     low_at: list[set[int]] = []
-    for axis, value in zip(given.axes, at, strict=True):
+    for axis, value in zip(base.axes, at, strict=True):
         of = [element.degree(value) for element in axis.elements]
         degrees = [
             min((max(of[one] for one in group) for group in groups), default=ONE)
-            for groups in axis.asked
+            for groups in axis.clauses
         ]
-        low_at.append({rule for rule in left if degrees[rule] < level})
+        low_at.append({rule for rule in missing if degrees[rule] < level})
     wanted: dict[int, set[int]] = {}
-    while left:
-        best = _widest(low_at, left)
-        if not low_at[best] & left:
+    while missing:
+        best = _widest(low_at, missing)
+        if not low_at[best] & missing:
             return ()
-        wanted[best] = low_at[best] & left
-        left -= low_at[best]
+        wanted[best] = low_at[best] & missing
+        missing -= low_at[best]
     spans: list[Span] = []
     mine = [number - 1 for number in above]
-    bound = level if given.is_fine else outwards(level)[1]
-    for number, laid in enumerate(given.laid[0]):
-        held = Held(level, bound, mine, sorted(wanted.get(number, ())))
-        span = _span(laid, at[number], held)
+    bound = level if base.is_fine else outwards(level)[1]
+    for number, grid in enumerate(base.grids):
+        sides = LevelSides(level, bound, mine, sorted(wanted.get(number, ())))
+        span = _span(grid, at[number], sides)
         if span is None:
             continue
         if not (span.low or 0.0) <= at[number] <= (span.high or 0.0):
@@ -411,18 +397,18 @@ def region_around(
     return tuple(spans)
 
 
-def _widest(sets: Sequence[set[int]], left: set[int]) -> int:
+def _widest(sets: Sequence[set[int]], missing: set[int]) -> int:
     """Return the position of the set that holds most of what is left."""
-    return max(range(len(sets)), key=lambda place: len(sets[place] & left))
+    return max(range(len(sets)), key=lambda place: len(sets[place] & missing))
 
 
-def _span(laid: Laid, x: Fraction, held: Held) -> Span | None:
+def _span(grid: AxisGrid, x: Fraction, sides: LevelSides) -> Span | None:
     """Return from where to where it holds along an axis; None if all along it."""
-    zones = laid.cells.zones
-    low, high = _walked(laid, x, held, -1), _walked(laid, x, held, 1)
+    zones = grid.cells.zones
+    low, high = _walked(grid, x, sides, -1), _walked(grid, x, sides, 1)
     # It may not hold at the ends themselves, be they the axis's own.
-    is_from = low <= zones[0][0] and _holds_at(laid, 0, held)
-    is_to = high >= zones[-1][1] and _holds_at(laid, len(zones) - 1, held)
+    is_from = low <= zones[0][0] and _holds_at(grid, 0, sides)
+    is_to = high >= zones[-1][1] and _holds_at(grid, len(zones) - 1, sides)
     if is_from and is_to:
         return None
     first, last = outwards(low)[1], outwards(high)[0]
@@ -430,7 +416,7 @@ def _span(laid: Laid, x: Fraction, held: Held) -> Span | None:
         first = math.nextafter(first, math.inf)
     if last == high and high != x and not is_to:
         last = math.nextafter(last, -math.inf)
-    return Span(laid.axis.variable.name, first, last)
+    return Span(grid.axis.variable.name, first, last)
 
 
 def zone_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int | None:
@@ -444,90 +430,90 @@ def cell_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int:
     return bisect_left(zones, (x, x)) - 1
 
 
-def _walked(laid: Laid, x: Fraction, held: Held, step: int) -> Fraction:
+def _walked(grid: AxisGrid, x: Fraction, sides: LevelSides, step: int) -> Fraction:
     """Return how far it holds from a value, in one direction."""
-    zones, cells = laid.cells.zones, laid.cells.between
+    zones, cells = grid.cells.zones, grid.cells.between
     far = x
     place = zone_of(zones, x)
     if place is None:
         cell = cell_of(zones, x)
     else:
-        if step > 0 and not _holds_after(laid, place, held):
+        if step > 0 and not _holds_after(grid, place, sides):
             return far
         cell = place if step > 0 else place - 1
     while 0 <= cell < len(cells):
         low, high = cells[cell]
         start = max(low, x) if step > 0 else min(high, x)
-        end = _end(laid, cell, start, held, step)
+        end = _end(grid, cell, start, sides, step)
         if end is not None:
             return end
         place = cell + 1 if step > 0 else cell
         far = zones[place][0] if step > 0 else zones[place][1]
-        if not _holds_at(laid, place, held):
+        if not _holds_at(grid, place, sides):
             return far
         far = zones[place][1] if step > 0 else zones[place][0]
-        if step > 0 and not _holds_after(laid, place, held):
+        if step > 0 and not _holds_after(grid, place, sides):
             return far
         cell += step
     return far
 
 
 def _end(
-    laid: Laid, cell: int, start: Fraction, held: Held, step: int
+    grid: AxisGrid, cell: int, start: Fraction, sides: LevelSides, step: int
 ) -> Fraction | None:
     """Return where in a cell it ends to hold; None if it holds to the cell's end."""
-    elements = laid.axis.elements
-    sides = [(int(laid.of[rule, cell]), True) for rule in held.above]
-    sides += [(int(laid.of[rule, cell]), False) for rule in held.below]
-    ends = laid.cells.between[cell]
-    found: list[Fraction] = []
-    for one, is_high in dict.fromkeys(sides):
-        if _is_sure(laid, cell, one, held.bound, is_high=is_high):
+    elements = grid.axis.elements
+    limits = [(int(grid.of[rule, cell]), True) for rule in sides.above]
+    limits += [(int(grid.of[rule, cell]), False) for rule in sides.below]
+    ends = grid.cells.between[cell]
+    result: list[Fraction] = []
+    for one, is_high in dict.fromkeys(limits):
+        if _is_sure(grid, cell, one, sides.bound, is_high=is_high):
             continue
-        part = part_of(elements[one], ends, held.level, is_high=is_high, bits=64)
+        part = part_of(elements[one], ends, sides.level, is_high=is_high, bits=64)
         if step > 0:
             if part.low > start or part.high < start:
                 return start
             if part.high < ends[1]:
-                found.append(part.high)
+                result.append(part.high)
         else:
             if part.high < start or part.low > start:
                 return start
             if part.low > ends[0]:
-                found.append(part.low)
-    if not found:
+                result.append(part.low)
+    if not result:
         return None
-    return min(found) if step > 0 else max(found)
+    return min(result) if step > 0 else max(result)
 
 
 def _is_sure(
-    laid: Laid, cell: int, one: int, bound: Fraction | float, *, is_high: bool
+    grid: AxisGrid, cell: int, one: int, bound: Fraction | float, *, is_high: bool
 ) -> bool:
     """Return whether an element keeps to its side in all of a cell, by its bounds."""
-    first, last = laid.cells.right[:, one, cell], laid.cells.left[:, one, cell + 1]
+    first, last = grid.cells.right[:, one, cell], grid.cells.left[:, one, cell + 1]
     if is_high:
         return bool(min(first[0], last[0]) >= bound)
     return bool(max(first[1], last[1]) < bound)
 
 
-def _holds_at(laid: Laid, place: int, held: Held) -> bool:
-    return _holds(laid, place, held, laid.cells.left)
+def _holds_at(grid: AxisGrid, place: int, sides: LevelSides) -> bool:
+    return _holds(grid, place, sides, grid.cells.left)
 
 
-def _holds_after(laid: Laid, place: int, held: Held) -> bool:
-    return _holds(laid, place, held, laid.cells.right)
+def _holds_after(grid: AxisGrid, place: int, sides: LevelSides) -> bool:
+    return _holds(grid, place, sides, grid.cells.right)
 
 
-def _holds(laid: Laid, place: int, held: Held, values: Values) -> bool:
+def _holds(grid: AxisGrid, place: int, sides: LevelSides, values: Values) -> bool:
     """Return whether it holds at a zone for sure, by the bounds of values there."""
     low, high = values[0][:, place].tolist(), values[1][:, place].tolist()
 
     def degree(rule: int, of: Sequence[float]) -> float:
-        groups = laid.axis.asked[rule]
+        groups = grid.axis.clauses[rule]
         return min(
             (max(of[one] for one in group) for group in groups), default=math.inf
         )
 
-    return all(degree(rule, low) >= held.bound for rule in held.above) and all(
-        degree(rule, high) < held.bound for rule in held.below
+    return all(degree(rule, low) >= sides.bound for rule in sides.above) and all(
+        degree(rule, high) < sides.bound for rule in sides.below
     )

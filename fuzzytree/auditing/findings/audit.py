@@ -243,10 +243,10 @@ def _ask_all(
     why = f"the budget of {subject.settings.budget_s:g} s is spent"
     for position, task in enumerate(tasks):
         part = 1.0 if position == len(tasks) - 1 else task.part
-        own = clock.share(part, tell=_telling(clock, position, len(tasks)))
+        own = clock.share(part, report=_telling(clock, position, len(tasks)))
         try:
             clock.check()
-            own.tell(CODES[task.codes[0]].title, 0.0)
+            own.report(CODES[task.codes[0]].title, 0.0)
             with enforced(own):
                 for answer in task.ask(msgspec.structs.replace(subject, clock=own)):
                     asked.answers.append(answer)
@@ -268,7 +268,7 @@ def _is_late(answer: Answer) -> bool:
 
 def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
     """Return a function that tells a family's progress as part of all."""
-    return lambda text, share: clock.tell(text, (position + share) / count)
+    return lambda text, share: clock.report(text, (position + share) / count)
 
 
 def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:

@@ -11,13 +11,13 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import (
-    Ground,
-    answer_at,
-    ground,
+    Arrangement,
+    arrange,
+    prediction_at,
     rule_strengths,
 )
-from fuzzytree.auditing.engine.dominance import Compared
-from fuzzytree.auditing.engine.equivalence import alike
+from fuzzytree.auditing.engine.dominance import RulePairs
+from fuzzytree.auditing.engine.equivalence import equivalence
 from fuzzytree.auditing.engine.states import (
     Claim,
     Proved,
@@ -75,8 +75,8 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
         subject.rules,
         rules=(*subject.rules.rules, *(one.shorter for one in every)),
     )
-    given = ground(both, subject.domain)
-    compared = Compared(given)
+    given = arrange(both, subject.domain)
+    compared = RulePairs(given)
     seen = _Seen(subject, given, both)
     count = len(subject.rules.rules)
     silent = [
@@ -87,7 +87,7 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
         if one.rule in silent:
             continue
         subject.clock.check()
-        subject.clock.tell("irrelevant clause", (number - count) / len(every))
+        subject.clock.report("irrelevant clause", (number - count) / len(every))
         state = _state(subject, compared, seen, one, number, turns)
         if state is None:
             turns.left_out += 1
@@ -131,13 +131,13 @@ def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
 
 def _state(
     subject: Subject,
-    compared: Compared,
+    compared: RulePairs,
     seen: _Seen,
     one: _Dropped,
     number: int,
     turns: TimeSlices,
 ) -> State | None:
-    left = len(compared.ground.rules.rules) - number + 1
+    left = len(compared.base.rules.rules) - number + 1
     if compared.never_weaker(one.rule, number) == "always":
         return Proved("the rule is as strong without it everywhere")
     by = _backed(subject, compared, one, number)
@@ -147,7 +147,7 @@ def _state(
     if found is not None:
         return found
     shorter = one.of(subject.rules)
-    turn = partial(alike, subject.rules, shorter, subject.domain)
+    turn = partial(equivalence, subject.rules, shorter, subject.domain)
     state = turns.ask(left, turn)
     if isinstance(state, Witness):
         point = point_of(state.point)
@@ -156,7 +156,7 @@ def _state(
 
 
 def _backed(
-    subject: Subject, compared: Compared, one: _Dropped, number: int
+    subject: Subject, compared: RulePairs, one: _Dropped, number: int
 ) -> str | None:
     """Return why the shorter rule never decides what another one does not."""
     rules = subject.rules.rules
@@ -178,14 +178,14 @@ def _backed(
 
 def _witness(rules: RuleBase, point: dict[str, Fraction]) -> Witness:
     """Return a point as a witness, with what the rules decide there."""
-    label = answer_at(rules, point).label
+    label = prediction_at(rules, point).label
     return Witness(coordinates(point), (Claim("decides", label=label),))
 
 
 class _Seen:
     """Rows of the domain, with the strengths of all rules with and without clauses."""
 
-    def __init__(self, subject: Subject, given: Ground, both: RuleBase) -> None:
+    def __init__(self, subject: Subject, given: Arrangement, both: RuleBase) -> None:
         self.rules, self.given = subject.rules, given
         self.count = len(subject.rules.rules)
         most = min(MOST_ROWS, _MOST_STRENGTHS // len(both.rules))

@@ -6,7 +6,12 @@ import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.measures import Bounds, Line, apart, local
+from fuzzytree.auditing.engine.measures import (
+    Bounds,
+    CurveAxis,
+    local_polynomial,
+    separate_axis,
+)
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
@@ -137,7 +142,7 @@ def coverage(of: VariableRange) -> Bounds:
         '1'
     """
     terms = of.variable.terms
-    made = apart([term.shape for term in terms], of.low, of.high)
+    made = separate_axis([term.shape for term in terms], of.low, of.high)
     total, slack = ZERO, sum((b - a for a, b in made.cells.zones), ZERO)
     for low, high in made.cells.between:
         summed = _sum(made, (low + high) / 2)
@@ -159,10 +164,10 @@ def coverage(of: VariableRange) -> Bounds:
     return Bounds(total / width, min((total + slack) / width, ONE))
 
 
-def _sum(made: Line, at: Fraction) -> Polynomial:
+def _sum(made: CurveAxis, at: Fraction) -> Polynomial:
     found: Polynomial = (ZERO,)
     for element in made.elements:
-        negative = tuple(-c for c in local(element, at))
+        negative = tuple(-c for c in local_polynomial(element, at))
         found = difference(found, negative)
     return found
 

@@ -106,10 +106,10 @@ def questions(subject: Subject) -> Iterator[Convention]:
         >>> from fuzzytree.auditing.findings.records import AuditSettings
         >>> from fuzzytree.auditing.findings.views import view
         >>> from fuzzytree.auditing.engine.clock import Clock
-        >>> from fuzzytree.auditing.engine.domain import Domain, Side
+        >>> from fuzzytree.auditing.engine.domain import Domain, DomainSide
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
-        >>> box = Domain(tuple(Side(name, 0.0, 1.0) for name in tree.inputs))
+        >>> box = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in tree.inputs))
         >>> seen = view(tree, box)
         >>> subject = Subject(seen.rules, seen.policy, box, AuditSettings(), Clock())
         >>> [question.name for question in questions(subject)][:3]

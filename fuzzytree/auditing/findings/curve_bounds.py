@@ -32,7 +32,7 @@ from fractions import Fraction
 from types import MappingProxyType
 from typing import Final, Literal, NamedTuple
 
-from fuzzytree.auditing.engine.pieces import Element
+from fuzzytree.auditing.engine.pieces import RuleCurve
 from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import MOST_POINTS, Points, Shape
 from fuzzytree.model.system import (
@@ -176,7 +176,7 @@ def gap(found: CurveBounds, of: Interval) -> Fraction:
     """Return how far two lines are apart at most on a range."""
     low, high = of
     apart = Fraction(0)
-    lines = Element(found.lower), Element(found.upper)
+    lines = RuleCurve(found.lower), RuleCurve(found.upper)
     for shape in (found.lower, found.upper):
         if isinstance(shape, Points):
             inner = (Fraction(x) for x in shape.values)

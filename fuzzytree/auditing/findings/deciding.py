@@ -8,11 +8,11 @@ from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from fuzzytree.auditing.engine.arrangement import Ground
+from fuzzytree.auditing.engine.arrangement import Arrangement
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.duels import largest_lead, wins
 from fuzzytree.auditing.engine.pivots import may_tie
-from fuzzytree.auditing.engine.probes import Glimpses
+from fuzzytree.auditing.engine.probes import RandomProbes
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -48,7 +48,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if subject.policy.decision == "all":
         yield from _firing(subject, sides)
         return
-    seen = Glimpses(given, subject.settings.seed)
+    seen = RandomProbes(given, subject.settings.seed)
     won: dict[int, Witness] = {}
     yield from _winning(subject, seen, won)
     yield from _leading(subject, seen, won)
@@ -92,7 +92,7 @@ def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
 
 
 def _winning(
-    subject: Subject, seen: Glimpses, won: dict[int, Witness]
+    subject: Subject, seen: RandomProbes, won: dict[int, Witness]
 ) -> Iterator[Answer]:
     """Answer whether each rule wins strictly; those that were not seen to win first.
 
@@ -101,13 +101,13 @@ def _winning(
         seen: What points show of them.
         won: Is given where each rule wins.
     """
-    given = seen.given
+    given = seen.base
     count = len(subject.rules.rules)
     turns = TimeSlices(subject.clock, 0.5)
     order = sorted(range(1, count + 1), key=seen.is_ahead)
     for place, number in enumerate(order):
         name = subject.rule_name(number)
-        subject.clock.tell(f"does {name} win", place / count)
+        subject.clock.report(f"does {name} win", place / count)
         rivals = _rivals(subject, number)
         state = turns.ask(count - place, partial(wins, given, number, rivals))
         if not isinstance(state, Proved | Witness):
@@ -130,18 +130,18 @@ def _winning(
 
 
 def _leading(
-    subject: Subject, seen: Glimpses, won: dict[int, Witness]
+    subject: Subject, seen: RandomProbes, won: dict[int, Witness]
 ) -> Iterator[Answer]:
     """Answer whether each rule that wins leads by enough."""
     turns = TimeSlices(subject.clock, 0.5)
     for place, (number, state) in enumerate(sorted(won.items())):
         name = subject.rule_name(number)
-        subject.clock.tell(f"how far does {name} lead", place / len(won))
+        subject.clock.report(f"how far does {name} lead", place / len(won))
         rivals = _rivals(subject, number)
         start = seen.wins(number, rivals) or state
         found = turns.ask(
             len(won) - place,
-            partial(_led, subject, seen.given, number, rivals, (state, start)),
+            partial(_led, subject, seen.base, number, rivals, (state, start)),
         )
         if found is None:
             turns.left_out += 1
@@ -150,7 +150,7 @@ def _leading(
     yield from turns.rest("FT102", "rule", "how far they lead")
 
 
-def _won(subject: Subject, given: Ground, number: int, state: State) -> Answer:
+def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Answer:
     name = subject.rule_name(number)
     if isinstance(state, Witness):
         sentence = f"{name} wins somewhere"
@@ -191,7 +191,7 @@ def _won(subject: Subject, given: Ground, number: int, state: State) -> Answer:
 
 def _led(
     subject: Subject,
-    given: Ground,
+    given: Arrangement,
     number: int,
     rivals: tuple[int, ...],
     known: tuple[Witness, Witness],
@@ -234,7 +234,7 @@ def _led(
 class _Ties:
     """Which rules of different classes tie as the strongest; each pair asked once."""
 
-    def __init__(self, subject: Subject, given: Ground) -> None:
+    def __init__(self, subject: Subject, given: Arrangement) -> None:
         self.subject, self.given = subject, given
         self.turns = TimeSlices(subject.clock, 0.9)
         self.known: dict[tuple[int, int], State] = {}
@@ -272,7 +272,7 @@ class _Ties:
             if rules[one - 1].then != rules[other - 1].then
         ]
         for place, (one, other) in enumerate(pairs, 1):
-            self.subject.clock.tell("which rules tie", place / len(pairs))
+            self.subject.clock.report("which rules tie", place / len(pairs))
             state = self.of(one, other, len(pairs) - place + 1)
             unasked += state is None
             if isinstance(state, Declined | Bracket):
@@ -314,7 +314,7 @@ class _Ties:
         )  # fmt: skip
 
 
-def _needed(subject: Subject, seen: Glimpses, ties: _Ties) -> Iterator[Answer]:
+def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answer]:
     """Answer whether leaving out a rule changes a decision."""
     count = len(subject.rules.rules)
     if count == 1:
@@ -322,10 +322,10 @@ def _needed(subject: Subject, seen: Glimpses, ties: _Ties) -> Iterator[Answer]:
     turns = TimeSlices(subject.clock, 0.5)
     for number in range(1, count + 1):
         name = subject.rule_name(number)
-        subject.clock.tell(f"is {name} needed", number / count)
+        subject.clock.report(f"is {name} needed", number / count)
         others = tuple(n for n in range(1, count + 1) if n != number)
         state = seen.wins_alone(number, others) or turns.ask(
-            count - number + 1, partial(wins, seen.given, number, others)
+            count - number + 1, partial(wins, seen.base, number, others)
         )
         if state is None:
             turns.left_out += 1

@@ -8,10 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Ground, ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.arrangement import (
+    Arrangement,
+    arrange,
+    restricted,
+    strengths_at,
+)
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.decisions import (
-    Around,
+    StrengthBounds,
     columns,
     decision_at,
     other_decision,
@@ -75,9 +80,9 @@ class TreeAndRules:
         found: Sequence[Region],
     ) -> None:
         self.tree, self.domain, self.found = tree, domain, found
-        self.given = ground(raw, domain)
+        self.given = arrange(raw, domain)
         self.crisp = CrispDecider(tree, domain)
-        self.around = Around(raw, domain)
+        self.around = StrengthBounds(raw, domain)
 
     def claims(self, point: Mapping[str, Fraction]) -> tuple[Claim, Claim]:
         """Return what both decide at a point."""
@@ -111,7 +116,7 @@ class TreeAndRules:
 
 
 def other_in_boxes(
-    given: Ground, inside: Sequence[Domain], label: str, clock: Clock
+    given: Arrangement, inside: Sequence[Domain], label: str, clock: Clock
 ) -> State:
     """Return whether raw rules decide somewhere in some boxes otherwise than a class.
 
@@ -123,7 +128,7 @@ def other_in_boxes(
     """
     left_open: State | None = None
     for box in inside:
-        state = other_decision(narrowed(given, box), label, clock, of="raw rules")
+        state = other_decision(restricted(given, box), label, clock, of="raw rules")
         if isinstance(state, Witness):
             tree_too = Claim("decides", of="tree", label=label)
             return Witness(state.point, (tree_too, *state.claims), state.region)
@@ -240,7 +245,7 @@ class _Search:
         while left and not self.end.is_over:
             place, row = left[0], self.rows[left[0]]
             share = len(self.settled) / len(self.rows)
-            self.clock.tell(f"nearest disagreement to row {row.number}", share)
+            self.clock.report(f"nearest disagreement to row {row.number}", share)
             found = nearest(
                 self.both.domain,
                 row.point,
@@ -419,10 +424,10 @@ def leaf_differences(
         tree: The tree itself.
         found: Its regions.
     """
-    given = ground(raw, subject.domain)
+    given = arrange(raw, subject.domain)
     alike = asked = 0
     for region in found:
-        subject.clock.tell(
+        subject.clock.report(
             f"leaf {region.leaf} against the raw rules", region.leaf / len(found)
         )
         inside = [*boxes(region, tree, subject.domain)]
@@ -439,7 +444,7 @@ def leaf_differences(
     yield Answer("FT203", "leaves", text, Proved(how), False)
 
 
-def _difference(given: Ground, region: Region, state: State) -> Answer:
+def _difference(given: Arrangement, region: Region, state: State) -> Answer:
     name, rules = f"leaf {region.leaf}", (region.leaf,)
     if not isinstance(state, Witness):
         text = f"whether the raw rules decide otherwise in {name} is left open"

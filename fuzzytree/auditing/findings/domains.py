@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, assert_never
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import LR, Band, Points, Variable
@@ -79,7 +79,7 @@ def domain_of(
     if within == "data" and spreads is None and rows is None:
         raise ValueError("limits from data need rows (--data TABLE)")
     left_out = set(limited)
-    sides: list[Side] = []
+    sides: list[DomainSide] = []
     faults: list[str] = []
     for position, axis in enumerate(_axes(model)):
         values = None if rows is None else rows.values[position]
@@ -98,7 +98,7 @@ def domain_of(
             else:
                 value = (row or {}).get(axis.name, 0.0)
                 ends = (0.0, 1.0, value if math.isfinite(value) else 0.0)
-                sides.append(Side(axis.name, min(ends), max(ends), "unused"))
+                sides.append(DomainSide(axis.name, min(ends), max(ends), "unused"))
     if faults:
         more = [f"and {len(faults) - _MOST_FAULTS} more such inputs"]
         raise ValueError(
@@ -112,7 +112,7 @@ def inputs_of(model: Document) -> tuple[str, ...]:
     return model.columns if isinstance(model, FuzzySystem) else model.inputs
 
 
-def _declared(axis: _Axis, values: FloatArray | None) -> Side:
+def _declared(axis: _Axis, values: FloatArray | None) -> DomainSide:
     """Return the range of an input, or the span of its curves, or of its rows.
 
     Raises:
@@ -120,7 +120,7 @@ def _declared(axis: _Axis, values: FloatArray | None) -> Side:
     """
     name, low, high = axis.name, axis.low, axis.high
     if low is not None and high is not None:
-        return Side(name, low, high, "model")
+        return DomainSide(name, low, high, "model")
     ends = [*axis.ends, *(one for one in (low, high) if one is not None)]
     if not axis.ends and values is not None:
         return _seen(axis, values)
@@ -139,10 +139,10 @@ def _declared(axis: _Axis, values: FloatArray | None) -> Side:
             f"the curves of input {name!r} span more than doubles hold; "
             f"give {_limits_of(name)}"
         )
-    return Side(name, low, high, "curves")
+    return DomainSide(name, low, high, "curves")
 
 
-def _seen(axis: _Axis, values: FloatArray | None) -> Side:
+def _seen(axis: _Axis, values: FloatArray | None) -> DomainSide:
     """Return the smallest and the largest value of the rows.
 
     Raises:
@@ -154,10 +154,10 @@ def _seen(axis: _Axis, values: FloatArray | None) -> Side:
             f"the rows have no value of input {axis.name!r}; "
             f"give {_limits_of(axis.name)}"
         )
-    return Side(axis.name, float(finite.min()), float(finite.max()), "data")
+    return DomainSide(axis.name, float(finite.min()), float(finite.max()), "data")
 
 
-def _around(axis: _Axis, spreads: float, values: FloatArray | None) -> Side:
+def _around(axis: _Axis, spreads: float, values: FloatArray | None) -> DomainSide:
     """Return the span of some spreads around the sets of an input, or its rows' mean.
 
     Raises:
@@ -184,7 +184,7 @@ def _around(axis: _Axis, spreads: float, values: FloatArray | None) -> Side:
         raise ValueError(
             f"{spreads!r} spreads of input {axis.name!r} span more than doubles hold"
         )
-    return Side(axis.name, min(ends), max(ends), "spreads")
+    return DomainSide(axis.name, min(ends), max(ends), "spreads")
 
 
 def _limits_of(name: str) -> str:

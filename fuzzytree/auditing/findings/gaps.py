@@ -10,10 +10,10 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import Ground, narrowed
+from fuzzytree.auditing.engine.arrangement import Arrangement, restricted
 from fuzzytree.auditing.engine.clock import OutOfTimeError
 from fuzzytree.auditing.engine.cover import uncovered
-from fuzzytree.auditing.engine.domain import Domain, Side, span
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, span
 from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.rows import rank_by_distance
@@ -76,7 +76,7 @@ def _weak(subject: Subject, sides: StrengthBounds) -> Answer:
     return Answer("FT301", subject_of, sentence, state, False, measures=measures)
 
 
-def _gaps(subject: Subject, given: Ground, first: Witness) -> Iterator[Answer]:
+def _gaps(subject: Subject, given: Arrangement, first: Witness) -> Iterator[Answer]:
     """Answer with the gaps that were found, the nearest to a row first."""
     found, is_all = _separate(subject, given, first)
     told = [_gap(subject, state) for state in found]
@@ -124,7 +124,7 @@ def _stretch(side: Span) -> str:
 
 
 def _separate(
-    subject: Subject, given: Ground, first: Witness
+    subject: Subject, given: Arrangement, first: Witness
 ) -> tuple[list[Witness], bool]:
     """Return gaps in separate parts of the domain, and whether these are all."""
     found = [first]
@@ -137,7 +137,7 @@ def _separate(
         box = todo.popleft()
         tried += 1
         try:
-            state: State = uncovered(narrowed(given, box), clock)
+            state: State = uncovered(restricted(given, box), clock)
             clock.check()
         except OutOfTimeError:
             return found, False
@@ -160,7 +160,9 @@ def _held(state: Witness, box: Domain, domain: Domain) -> tuple[Span, ...]:
     return (*state.region, *parts) if known else ()
 
 
-def _around(given: Ground, box: Domain, region: tuple[Span, ...]) -> Iterator[Domain]:
+def _around(
+    given: Arrangement, box: Domain, region: tuple[Span, ...]
+) -> Iterator[Domain]:
     """Yield the parts of a box outside an inner one; together they are all of it."""
     sides = {side.variable: side for side in box.sides}
     variables = {axis.variable.name: axis.variable for axis in given.axes}
@@ -171,12 +173,14 @@ def _around(given: Ground, box: Domain, region: tuple[Span, ...]) -> Iterator[Do
         if side is None:
             ends = span(variables[inner.variable], box)
             low, high = outwards(ends[0])[0], outwards(ends[1])[1]
-            side = Side(inner.variable, low, high, "model")
+            side = DomainSide(inner.variable, low, high, "model")
         for low, high in (
             (side.low, math.nextafter(inner.low, -math.inf)),
             (math.nextafter(inner.high, math.inf), side.high),
         ):
             if low <= high:
-                part = Side(side.variable, low, high, side.origin)
+                part = DomainSide(side.variable, low, high, side.origin)
                 yield Domain(tuple({**sides, side.variable: part}.values()))
-        sides[side.variable] = Side(side.variable, inner.low, inner.high, side.origin)
+        sides[side.variable] = DomainSide(
+            side.variable, inner.low, inner.high, side.origin
+        )

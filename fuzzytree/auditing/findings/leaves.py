@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.regions import (
     Interval,
     Region,
@@ -132,7 +132,7 @@ def _region(
     )
 
 
-def _ends(side: Side, union: Union) -> Interval:
+def _ends(side: DomainSide, union: Union) -> Interval:
     """Return the ends of a box's side that the tree sets, and not the domain."""
     low, high = next(
         (low, high)

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
-from fuzzytree.auditing.engine.factors import Distance
-from fuzzytree.auditing.engine.joint_maximum import Meeting
+from fuzzytree.auditing.engine.factors import RuleDistance
+from fuzzytree.auditing.engine.joint_maximum import JointMaximum
 from fuzzytree.auditing.engine.states import (
     Declined,
     Proved,
@@ -148,7 +148,7 @@ def _masked(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
 
 
 def _how(compared: StrengthBounds) -> str:
-    cells = sum(len(laid.cells.rank) for laid in compared.lower.laid[0])
+    cells = sum(len(grid.cells.rank) for grid in compared.lower.grids)
     means = "ratios of degrees" if compared.is_product else "orders of degrees"
     axes = len(compared.lower.axes)
     return f"{means} in {cells} cells on {counted(axes, 'axis', 'axes')} were compared"
@@ -200,7 +200,7 @@ def _rest_of_strengths(
 
 def _copied(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
     count = len(subject.rules.rules)
-    copies: list[tuple[Pair, Distance]] = []
+    copies: list[tuple[Pair, RuleDistance]] = []
     pairs = near = 0
     for pair in itertools.combinations(range(1, count + 1), 2):
         subject.clock.check()
@@ -327,7 +327,7 @@ def _may_conflict(subject: Subject, one: int, other: int) -> bool:
     return any(name in shared for name, _ in told[0] ^ told[1])
 
 
-def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
+def _conflict(subject: Subject, pair: Pair, found: JointMaximum) -> Answer:
     first, second = (subject.rule_name(number) for number in pair)
     one, other = (_then(subject, number) for number in pair)
     low, high = found.level
@@ -364,7 +364,7 @@ def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
     )
 
 
-def level_reached(found: Meeting) -> str:
+def level_reached(found: JointMaximum) -> str:
     """Return the level that two rules both reach, as their sentence says it.
 
     A point in fractions may fall a little short of a level that is irrational.

@@ -9,10 +9,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.arrangement import arrange, restricted, strengths_at
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.decisions import (
-    Around,
+    StrengthBounds,
     columns,
     decision_at,
     other_decision,
@@ -156,8 +156,8 @@ class RuleDecider:
 
     def __init__(self, subject: Subject) -> None:
         self.subject = subject
-        self.given = ground(subject.rules, subject.domain)
-        self.around = Around(subject.rules, subject.domain)
+        self.given = arrange(subject.rules, subject.domain)
+        self.around = StrengthBounds(subject.rules, subject.domain)
         self.ahead: dict[tuple[Fraction, ...], tuple[Point, float]] = {}
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
@@ -205,7 +205,7 @@ class RuleDecider:
         return nearest(
             self.subject.domain,
             point,
-            lambda box: other_decision(narrowed(self.given, box), label, clock),
+            lambda box: other_decision(restricted(self.given, box), label, clock),
             is_one,
             clock,
             clear=self._clear(point, label, away),
@@ -405,7 +405,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     for number, point in chosen:
         if clock.is_over:
             break
-        subject.clock.tell(f"radius of row {number}", len(asked) / len(chosen))
+        subject.clock.report(f"radius of row {number}", len(asked) / len(chosen))
         found = decider.nearest_other(point, clock)
         is_worth_telling = found.is_narrow or (not asked and found.high is not None)
         if clock.is_over and not is_worth_telling:

@@ -9,7 +9,7 @@ from fractions import Fraction
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, Side, contains
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
 from fuzzytree.auditing.engine.domain import span as ends_on
 from fuzzytree.auditing.engine.nearest import Nearest, Polytope, Polytopes, polytope_of
 from fuzzytree.auditing.engine.states import (
@@ -123,9 +123,9 @@ def rank_by_distance(
             is met, the point of the witness counts.
 
     Example:
-        >>> from fuzzytree.auditing.engine.domain import Side
+        >>> from fuzzytree.auditing.engine.domain import DomainSide
         >>> from fuzzytree.auditing.engine.states import Proved
-        >>> box = Domain((Side("x", 0.0, 4.0),))
+        >>> box = Domain((DomainSide("x", 0.0, 4.0),))
         >>> where = (Span("x", 3.0, 4.0),)
         >>> gap = Answer("FT301", "gap", "", Proved(""), True, region=where)
         >>> rows = AuditRows("rows", np.array([[0.0, 1.0]]))
@@ -170,11 +170,11 @@ def _part(
         name = one.variable
         if name not in sides:
             low, high = ends_on(combined[name], domain)
-            sides[name] = Side(name, outwards(low)[0], outwards(high)[1])
+            sides[name] = DomainSide(name, outwards(low)[0], outwards(high)[1])
         whole = sides[name]
         low_end = whole.low if one.low is None else max(whole.low, one.low)
         high_end = whole.high if one.high is None else min(whole.high, one.high)
-        sides[name] = Side(name, low_end, high_end)
+        sides[name] = DomainSide(name, low_end, high_end)
     return polytope_of(Domain(tuple(sides.values())), inputs, combined)
 
 

@@ -21,14 +21,18 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import Ground, ground
+from fuzzytree.auditing.engine.arrangement import Arrangement, arrange
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
 from fuzzytree.auditing.engine.domain import Domain, span
-from fuzzytree.auditing.engine.dominance import Compared, Verdict
+from fuzzytree.auditing.engine.dominance import Dominance, RulePairs
 from fuzzytree.auditing.engine.duels import wins
-from fuzzytree.auditing.engine.factors import Distance, distance
-from fuzzytree.auditing.engine.joint_maximum import Meeting, highest, meet
+from fuzzytree.auditing.engine.factors import RuleDistance, rule_distance
+from fuzzytree.auditing.engine.joint_maximum import (
+    JointMaximum,
+    joint_bounds,
+    joint_maximum,
+)
 from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules
@@ -70,8 +74,8 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         bounds: The rule bases, None if nothing is.
     """
 
-    lower: Ground
-    upper: Ground
+    lower: Arrangement
+    upper: Arrangement
     bounds: BoundedRules | None = None
 
     def is_inexact(self, *numbers: int) -> bool:
@@ -79,14 +83,14 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         return self.bounds is not None and not self.bounds.rules.isdisjoint(numbers)
 
     @functools.cached_property
-    def from_below(self) -> Compared:
+    def from_below(self) -> RulePairs:
         """The lower rules, to be compared."""
-        return Compared(self.lower)
+        return RulePairs(self.lower)
 
     @functools.cached_property
-    def from_above(self) -> Compared:
+    def from_above(self) -> RulePairs:
         """The upper rules, to be compared."""
-        return self.from_below if self.upper is self.lower else Compared(self.upper)
+        return self.from_below if self.upper is self.lower else RulePairs(self.upper)
 
     @property
     def is_product(self) -> bool:
@@ -112,7 +116,7 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         high = self.bounds.gap if isinstance(found, Proved) else 1.0
         return Bracket(f"the strength of rule {number}", 0.0, high, self.bounds.why)
 
-    def never_weaker(self, strong: int, weak: int) -> Verdict:
+    def never_weaker(self, strong: int, weak: int) -> Dominance:
         """Return whether a rule is nowhere weaker than another one."""
         if not self.is_inexact(strong, weak):
             return self.from_below.never_weaker(strong, weak)
@@ -121,7 +125,7 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         found = self._pair(weak, strong, shares=False).never_weaker(2, 1)
         return "not" if found == "not" else "open"
 
-    def _pair(self, one: int, other: int, *, shares: bool = True) -> Compared:
+    def _pair(self, one: int, other: int, *, shares: bool = True) -> RulePairs:
         """Return two rules, the first from below and the second from above.
 
         Args:
@@ -145,7 +149,7 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
             variables=tuple(variables),
             rules=(replace(mine, when=tuple(when)), theirs),
         )
-        return Compared(ground(rules, self.lower.domain))
+        return RulePairs(arrange(rules, self.lower.domain))
 
     def _is_shared(self, clause: Clause, rule: Rule, others: Sequence[Clause]) -> bool:
         """Return whether other clauses ask what one of a rule does, perhaps for less.
@@ -159,14 +163,14 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         found = map(self.bounds.asked, others)
         return any(theirs == mine and most <= weight for theirs, _, most in found)
 
-    def distance(self, one: int, other: int, most: Fraction) -> Distance | None:
+    def distance(self, one: int, other: int, most: Fraction) -> RuleDistance | None:
         """Return how far two rules are apart, None if more; see `factors.distance`.
 
         Of rules that are held it is known only if they ask the same.
         """
         if self.is_inexact(one, other) and self._keys[one - 1] != self._keys[other - 1]:
             return None
-        return distance(self.from_below.factored, one - 1, other - 1, most)
+        return rule_distance(self.from_below.factored, one - 1, other - 1, most)
 
     def is_near(self, one: int, other: int, most: Fraction) -> bool:
         """Return whether it is open whether degrees of two rules differ by more.
@@ -234,26 +238,28 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def highest(self, one: int) -> FloatArray:
         """Return bounds of the levels that a rule reaches with each other one."""
-        return highest(self.from_above, one)
+        return joint_bounds(self.from_above, one)
 
-    def meet(self, one: int, other: int, level: Fraction, clock: Clock) -> Meeting:
+    def meet(self, one: int, other: int, level: Fraction, clock: Clock) -> JointMaximum:
         """Return the highest level that two rules reach at one point; see `meeting`."""
-        found = meet(self.from_below, one, other, level, clock)
+        found = joint_maximum(self.from_below, one, other, level, clock)
         if self.bounds is None or not self.is_inexact(one, other):
             return found
-        above = meet(self.from_above, one, other, level, clock)
+        above = joint_maximum(self.from_above, one, other, level, clock)
         most = above.level.high
         if isinstance(found.state, Witness):
             state = self.bounds.certified(found.state)
-            return Meeting(Bounds(found.level.low, max(most, found.level.low)), state)
+            return JointMaximum(
+                Bounds(found.level.low, max(most, found.level.low)), state
+            )
         if most < level or isinstance(above.state, Proved):
             state = above.state
             if isinstance(state, Bracket):  # its point is one of the upper rules
                 state = replace(state, low=0.0, point=(), claims=())
-            return Meeting(Bounds(Fraction(0), most), state, above.is_touch)
+            return JointMaximum(Bounds(Fraction(0), most), state, above.is_touch)
         # What is reached nearly is told, with its point.
         easier = max(level - 4 * Fraction(self.bounds.gap), Fraction(0))
-        near = meet(self.from_below, one, other, easier, clock)
+        near = joint_maximum(self.from_below, one, other, easier, clock)
         low = near.level.low if isinstance(near.state, Witness) else Fraction(0)
         name = f"the highest level that rules {one} and {other} both reach"
         ends = outwards(low)[0], outwards(most)[1]
@@ -261,17 +267,17 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         if isinstance(near.state, Witness):
             claim = Claim("reaches", rules=(one, other), level=str(Fraction(ends[0])))
             state = replace(state, point=near.state.point, claims=(claim,))
-        return Meeting(Bounds(low, most), state)
+        return JointMaximum(Bounds(low, most), state)
 
 
 def strength_bounds(subject: Subject) -> StrengthBounds:
     """Return a subject's rules from below and from above, on its domain."""
     if subject.bounds is None:
-        given = ground(subject.rules, subject.domain)
+        given = arrange(subject.rules, subject.domain)
         return StrengthBounds(given, given)
     lower, upper = subject.bounds.lower, subject.bounds.upper
     return StrengthBounds(
-        ground(lower, subject.domain), ground(upper, subject.domain), subject.bounds
+        arrange(lower, subject.domain), arrange(upper, subject.domain), subject.bounds
     )
 
 

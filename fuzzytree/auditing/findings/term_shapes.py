@@ -12,15 +12,15 @@ from fuzzytree.auditing.engine.measures import (
     Excess,
     Overlap,
     area,
+    curve_axis,
     dips,
-    line,
-    local,
+    excesses,
+    local_polynomial,
     most_shared,
-    outside,
     overlap,
     walk,
 )
-from fuzzytree.auditing.engine.pieces import Element, pieces
+from fuzzytree.auditing.engine.pieces import RuleCurve, pieces
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -71,7 +71,7 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
 
 def _defects(of: VariableRange, term: Term) -> Iterator[Answer | None]:
     """Yield the defects of a term's shape, None for each that is too small to tell."""
-    for excess in outside(term.shape, of.low, of.high):
+    for excess in excesses(term.shape, of.low, of.high):
         yield _excess(of, term, excess) if excess.depth >= SHALLOW else None
     yield from _dips(of, term)
     if isinstance(term.shape, Points) and max(term.shape.degrees) < 1.0:
@@ -181,7 +181,7 @@ def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
         return None
     if first.high == last.low:
         return None
-    curve, parts = Element(shape), list[Bounds]()
+    curve, parts = RuleCurve(shape), list[Bounds]()
     for low, high in (
         (max(first.high, of.low), min(last.low, of.high)),
         (first.high, last.low),
@@ -189,7 +189,12 @@ def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
         if low >= high:
             parts.append(Bounds(Fraction(0), Fraction(0)))
             continue
-        parts.append(area(line([shape], low, high), lambda _, at: local(curve, at)))
+        parts.append(
+            area(
+                curve_axis([shape], low, high),
+                lambda _, at: local_polynomial(curve, at),
+            )
+        )
     part, whole = parts
     if whole.low <= 0:
         return None

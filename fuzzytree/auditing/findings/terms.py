@@ -9,8 +9,8 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import span
-from fuzzytree.auditing.engine.measures import Bounds, Line, heights, line
-from fuzzytree.auditing.engine.pieces import Element, pieces
+from fuzzytree.auditing.engine.measures import Bounds, CurveAxis, curve_axis, heights
+from fuzzytree.auditing.engine.pieces import RuleCurve, pieces
 from fuzzytree.auditing.engine.states import Bracket, Proved, counted, short
 from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
@@ -34,10 +34,10 @@ class VariableRange(NamedTuple):
     high: Fraction
     is_open: bool
 
-    def line(self, *terms: Term) -> Line:
+    def line(self, *terms: Term) -> CurveAxis:
         """Return the curves of some terms on the range."""
         shapes = [term.shape for term in terms]
-        return line(shapes, self.low, self.high, is_open=self.is_open)
+        return curve_axis(shapes, self.low, self.high, is_open=self.is_open)
 
 
 def ranges(subject: Subject) -> tuple[VariableRange, ...]:
@@ -143,7 +143,7 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answe
 
 def _is_full(of: VariableRange, term: Term) -> bool:
     """Return whether a curve is 1 where one of its pieces ends, or the range does."""
-    curve = Element(term.shape)
+    curve = RuleCurve(term.shape)
     ends = {of.low, of.high}
     for piece in pieces(term.shape):
         ends.update(end for end in (piece.low, piece.high) if end is not None)

@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 
 import msgspec
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved
 from fuzzytree.auditing.findings.records import Answer, Policy
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules, bounded_rules
@@ -179,7 +179,7 @@ def _conjunction(system: FuzzySystem) -> Conjunction:
 def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[Answer]]:
     """Return the domain within the ranges that inputs are moved into."""
     clipped = {one.name: one for one in system.inputs if one.clips and not one.parts}
-    sides: list[Side] = []
+    sides: list[DomainSide] = []
     answers: list[Answer] = []
     for side in domain.sides:
         one = clipped.get(side.variable)

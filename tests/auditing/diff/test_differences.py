@@ -16,7 +16,7 @@ import fuzzytree as ft
 from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.measures import distance
+from fuzzytree.auditing.engine.measures import curve_distance
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -452,7 +452,7 @@ def test_a_distance_of_curves_holds_every_point() -> None:
     tree = random_tree(3)
     shapes = [term.shape for group in tree.sets for term in group.terms]
     for one, other in itertools.pairwise(shapes[:6]):
-        found = distance(one, other, Fraction(-3), Fraction(3))
+        found = curve_distance(one, other, Fraction(-3), Fraction(3))
         assert found.high - found.low < Fraction(1, 10**20)
         assert 0 <= found.low <= found.high <= 1
 

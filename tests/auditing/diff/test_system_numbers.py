@@ -272,7 +272,7 @@ def test_the_budget_ends_the_comparison_of_numbers() -> None:
         if text == "comparing numbers" and done > 0.0:  # behind the probes
             hour[0] = 999.0
 
-    found = told(tipper(), new, Clock(99.0, now=now, tell=tell))
+    found = told(tipper(), new, Clock(99.0, now=now, report=tell))
     (left,) = (a for a in found.answers if a.subject == "points")
     assert left.sentence == "36 points were not looked at: the budget was spent"
     assert left.state == Declined("FTD03", "the budget was spent")

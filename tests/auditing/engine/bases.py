@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -88,7 +88,7 @@ def random_base(
 
 def unit_domain(rules: RuleBase, low: float = 0.0, high: float = 1.0) -> Domain:
     """Return the box with the same ends for each input."""
-    return Domain(tuple(Side(name, low, high) for name in rules.inputs))
+    return Domain(tuple(DomainSide(name, low, high) for name in rules.inputs))
 
 
 def _clauses(

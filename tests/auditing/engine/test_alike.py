@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import answer_at
+from fuzzytree.auditing.engine.arrangement import prediction_at
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.contenders import Stretch, laid, spread
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.equivalence import alike, region
+from fuzzytree.auditing.engine.contenders import AxisPart, common_axes, spread
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.equivalence import difference_region, equivalence
 from fuzzytree.auditing.engine.states import Bracket, Proved, State, Witness, point_of
 from fuzzytree.model.rulebase import (
     Band,
@@ -36,7 +36,7 @@ from fuzzytree.testing import random_tree
 
 def box(*models: RuleBase, low: float = -3.0, high: float = 3.0) -> Domain:
     names = dict.fromkeys(name for model in models for name in model.inputs)
-    return Domain(tuple(Side(name, low, high) for name in names))
+    return Domain(tuple(DomainSide(name, low, high) for name in names))
 
 
 def pair(seed: int) -> tuple[RuleBase, RuleBase]:
@@ -108,14 +108,14 @@ def assert_true(old: RuleBase, new: RuleBase, found: State) -> None:
 @pytest.mark.parametrize("seed", range(16))
 def test_a_verdict_about_two_bases_is_what_a_grid_says(seed: int) -> None:
     old, new = pair(seed)
-    assert_true(old, new, alike(old, new, box(old), Clock(), most=200))
+    assert_true(old, new, equivalence(old, new, box(old), Clock(), most=200))
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("seed", range(100, 250))
 def test_more_verdicts_are_what_a_grid_says(seed: int) -> None:
     old, new = pair(seed)
-    assert_true(old, new, alike(old, new, box(old), Clock()))
+    assert_true(old, new, equivalence(old, new, box(old), Clock()))
 
 
 @pytest.mark.parametrize("combinations", [0, 2])
@@ -127,7 +127,7 @@ def test_relative_rules_decide_alike_in_any_order_and_with_any_and(
     reversed_rules = replace(rules, rules=rules.rules[::-1])
     times = replace(rules, semantics=Semantics("product"))
     for other in (reversed_rules, times):
-        assert isinstance(alike(rules, other, box(rules), Clock()), Proved)
+        assert isinstance(equivalence(rules, other, box(rules), Clock()), Proved)
 
 
 def crisp(cut: float, *, name: str = "x") -> RuleBase:
@@ -145,14 +145,14 @@ def crisp(cut: float, *, name: str = "x") -> RuleBase:
 
 def test_a_cut_that_moved_by_one_double_is_found_there_and_nowhere_else() -> None:
     moved = math.nextafter(0.3, 1.0)
-    found = alike(crisp(0.3), crisp(moved), box(crisp(0.3)), Clock())
+    found = equivalence(crisp(0.3), crisp(moved), box(crisp(0.3)), Clock())
     assert isinstance(found, Witness)
     assert point_of(found.point) == {"x": Fraction(moved)}
     assert [claim.label for claim in found.claims] == ["b", "a"]
 
 
 def test_a_curve_that_changed_outside_of_the_domain_changes_nothing() -> None:
-    found = alike(crisp(5.0), crisp(6.0), box(crisp(5.0)), Clock())
+    found = equivalence(crisp(5.0), crisp(6.0), box(crisp(5.0)), Clock())
     assert found == Proved("both answer alike in every box: 1 box settled")
 
 
@@ -165,7 +165,7 @@ def test_rules_in_another_order_differ_at_their_tie_alone() -> None:
     )
     old = RuleBase("tie", ("a", "b"), (Variable("x", (falls, rises)),), rules)
     new = replace(old, rules=rules[::-1])
-    found = alike(old, new, box(old), Clock())
+    found = equivalence(old, new, box(old), Clock())
     assert isinstance(found, Witness)
     assert point_of(found.point) == {"x": Fraction(1, 2)}
 
@@ -178,7 +178,7 @@ def test_a_tie_that_no_double_reaches_stays_a_bracket_of_nearly_nothing() -> Non
         Rule((Clause("x", ("rises",)),), "b"),
     )
     old = RuleBase("tie", ("a", "b"), (Variable("x", (falls, rises)),), rules)
-    found = alike(old, replace(old, rules=rules[::-1]), box(old), Clock())
+    found = equivalence(old, replace(old, rules=rules[::-1]), box(old), Clock())
     assert isinstance(found, Bracket)
     assert found.high < 1e-12
     assert found.of == "the smaller of both margins where the two answer otherwise"
@@ -188,15 +188,15 @@ def test_a_dead_rule_may_go() -> None:
     old = crisp(0.3)
     both = (Clause("x", ("low",)), Clause("x", ("high",)))
     new = replace(old, rules=(*old.rules, Rule(both, "a")))
-    assert isinstance(alike(old, new, box(old), Clock()), Proved)
+    assert isinstance(equivalence(old, new, box(old), Clock()), Proved)
 
 
 def test_an_answer_for_no_rule_counts_only_where_none_fires() -> None:
     old = crisp(0.3)
     new = replace(old, semantics=Semantics(uncovered="a"))
-    assert isinstance(alike(old, new, box(old), Clock()), Proved)
+    assert isinstance(equivalence(old, new, box(old), Clock()), Proved)
     few, less = (replace(model, rules=model.rules[:1]) for model in (old, new))
-    found = alike(few, less, box(old), Clock())
+    found = equivalence(few, less, box(old), Clock())
     assert isinstance(found, Witness)
     assert [claim.label for claim in found.claims] == [None, "a"]
 
@@ -209,11 +209,11 @@ def sums(cut: float) -> RuleBase:
 
 
 def test_a_witness_of_a_combination_is_a_point_of_the_inputs() -> None:
-    found = alike(sums(0.25), sums(0.5), box(sums(0.5)), Clock())
+    found = equivalence(sums(0.25), sums(0.5), box(sums(0.5)), Clock())
     assert isinstance(found, Witness)
     at = point_of(found.point)
     assert Fraction(1, 4) < at["x"] - at["y"] <= Fraction(1, 2)
-    assert answer_at(sums(0.25), at).label == "b"
+    assert prediction_at(sums(0.25), at).label == "b"
 
 
 def test_what_no_input_reaches_is_no_difference() -> None:
@@ -224,25 +224,25 @@ def test_what_no_input_reaches_is_no_difference() -> None:
     both = Rule((clause, Clause("sum", ("high",))), "a")
     old = replace(one, variables=(low, *one.variables[1:]))
     new = replace(old, rules=(both, *old.rules))
-    domain = Domain((Side("x", -1.0, 1.0), Side("y", 0.0, 1.0)))
-    assert isinstance(alike(old, new, domain, Clock()), Proved)
+    domain = Domain((DomainSide("x", -1.0, 1.0), DomainSide("y", 0.0, 1.0)))
+    assert isinstance(equivalence(old, new, domain, Clock()), Proved)
 
 
 def test_a_budget_that_is_spent_leaves_a_bracket() -> None:
     old = crisp(0.3)
-    found = alike(old, crisp(0.4), box(old), Clock(), most=0)
+    found = equivalence(old, crisp(0.4), box(old), Clock(), most=0)
     assert isinstance(found, Bracket)
     assert found.why.startswith("enough boxes were halved: ")
 
 
 def test_a_clause_has_one_form_where_its_curves_are_one() -> None:
     near, far = crisp(0.0), crisp(2.0)
-    (axis,), (one, other) = laid(
-        (near, far), [("x", Stretch(Fraction(-3), Fraction(3), True))]
+    (axis,), (one, other) = common_axes(
+        (near, far), [("x", AxisPart(Fraction(-3), Fraction(3), True))]
     )
-    whole = axis.seen(axis.whole)
+    whole = axis.bounds_on(axis.whole)
     assert whole[one[0][0][1]].form != whole[other[0][0][1]].form
-    below = axis.seen(Stretch(Fraction(-3), Fraction(-1)))
+    below = axis.bounds_on(AxisPart(Fraction(-3), Fraction(-1)))
     assert below[one[0][0][1]].form == below[other[0][0][1]].form
 
 
@@ -264,9 +264,9 @@ def test_a_region_is_a_box_on_which_both_answer_so() -> None:
         replace(m, variables=(*m.variables, second), rules=(*m.rules, idle))
         for m in (old, new)
     )
-    found = alike(old, new, box(old), Clock())
+    found = equivalence(old, new, box(old), Clock())
     assert isinstance(found, Witness)
-    (span,) = region(old, new, box(old), point_of(found.point))
+    (span,) = difference_region(old, new, box(old), point_of(found.point))
     assert span.variable == "x"
     assert span.low == math.nextafter(0.25, 1.0)
     assert span.high == 0.75

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import ground, strengths_at
-from fuzzytree.auditing.engine.decisions import Around, columns, decision_at
-from fuzzytree.auditing.engine.domain import Domain, Side, contains
+from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
+from fuzzytree.auditing.engine.decisions import StrengthBounds, columns, decision_at
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
 from fuzzytree.auditing.engine.nearest import distance
 from fuzzytree.auditing.engine.probes import drawn_in
 from fuzzytree.model.rulebase import Conjunction, RuleBase
@@ -30,7 +30,7 @@ def _rules(seed: int, conjunction: Conjunction = "min") -> RuleBase:
 
 
 def _box(rules: RuleBase) -> Domain:
-    return Domain(tuple(Side(name, -3.0, 3.0) for name in rules.inputs))
+    return Domain(tuple(DomainSide(name, -3.0, 3.0) for name in rules.inputs))
 
 
 def _within(draw: random.Random, low: FloatArray, high: FloatArray) -> list[Fraction]:
@@ -47,8 +47,8 @@ def test_no_point_of_a_box_is_outside_the_bounds(
     seed: int, conjunction: Conjunction
 ) -> None:
     rules = _rules(seed, conjunction)
-    given = ground(rules, _box(rules))
-    around = Around(rules, given.domain)
+    given = arrange(rules, _box(rules))
+    around = StrengthBounds(rules, given.domain)
     draw = random.Random(seed)
     centres = np.array([[draw.uniform(-3, 3) for _ in range(6)] for _ in rules.inputs])
     for radius in (0.0, 0.01, 0.3):
@@ -65,7 +65,7 @@ def test_no_point_of_a_box_is_outside_the_bounds(
 
 def test_a_ball_holds_all_points_within_its_radius() -> None:
     rules = _rules(0)
-    around = Around(rules, _box(rules))
+    around = StrengthBounds(rules, _box(rules))
     centre = Fraction(0.1)
     low, high = around.ball(np.full((len(rules.inputs), 1), 0.1), 1 / 3)
     reach = Fraction(1 / 3) * 6
@@ -76,8 +76,8 @@ def test_a_ball_holds_all_points_within_its_radius() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_clear_box_has_no_other_decision(seed: int) -> None:
     rules = _rules(seed)
-    given = ground(rules, _box(rules))
-    around = Around(rules, given.domain)
+    given = arrange(rules, _box(rules))
+    around = StrengthBounds(rules, given.domain)
     draw = random.Random(seed)
     points = [
         dict(zip(rules.inputs, map(Fraction, row), strict=True))
@@ -98,8 +98,8 @@ def test_a_clear_box_has_no_other_decision(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_steps_towards_another_class_end_where_it_is_ahead(seed: int) -> None:
     rules = random_base(seed, 6, 3, kind="mixed", shared=0.5)
-    given = ground(rules, Domain(tuple(Side(n, 0.0, 1.0) for n in rules.inputs)))
-    around = Around(rules, given.domain)
+    given = arrange(rules, Domain(tuple(DomainSide(n, 0.0, 1.0) for n in rules.inputs)))
+    around = StrengthBounds(rules, given.domain)
     draw = random.Random(seed)
     points = [
         {name: Fraction(draw.random()) for name in rules.inputs} for _ in range(20)
@@ -121,13 +121,13 @@ def test_steps_towards_another_class_end_where_it_is_ahead(seed: int) -> None:
 def test_points_are_drawn_within_the_sides_of_combinations(seed: int) -> None:
     rules = _rules(seed)
     variable = next(one for one in rules.variables if one.parts)
-    sides = (*_box(rules).sides, Side(variable.name, 0.0, 0.5))
-    given = ground(rules, Domain(sides))
+    sides = (*_box(rules).sides, DomainSide(variable.name, 0.0, 0.5))
+    given = arrange(rules, Domain(sides))
     drawn = drawn_in(given, 64)
     assert drawn is not None
     for values in drawn.T.tolist():
         point = dict(zip(rules.inputs, map(Fraction, values), strict=True))
-        wide = Domain((*sides[:-1], Side(variable.name, -1e-9, 0.5 + 1e-9)))
+        wide = Domain((*sides[:-1], DomainSide(variable.name, -1e-9, 0.5 + 1e-9)))
         assert contains(wide, [variable], point)
-    never = Domain((*sides[:-1], Side(variable.name, 1e6, 2e6)))
-    assert drawn_in(ground(rules, never), 64) is None
+    never = Domain((*sides[:-1], DomainSide(variable.name, 1e6, 2e6)))
+    assert drawn_in(arrange(rules, never), 64) is None

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import ground
+from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.bounding import (
     below_by_boxes,
     highest_by_boxes,
@@ -17,7 +17,7 @@ from fuzzytree.auditing.engine.bounding import (
     wins_by_boxes,
 )
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -103,7 +103,7 @@ def test_every_witness_holds_and_no_sampled_row_contradicts_a_proof(
 
 def _check_against_cells(rules: RuleBase) -> None:
     box = unit_domain(rules)
-    given = ground(rules, box)
+    given = arrange(rules, box)
     for rule in range(1, 6):
         rivals = _rivals(rules, rule)
         one = wins_by_boxes(rules, box, rule, rivals, Clock(5.0))
@@ -188,7 +188,7 @@ def test_rules_of_a_tree_that_share_clauses_are_decided(
     # Rules from one subtree tie wherever a shared clause is the smallest.
     for seed in range(2):
         rules = rules_from_tree(random_tree(seed, leaves=6), conjunction=conjunction)
-        box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
+        box = Domain(tuple(DomainSide(name, -9.0, 9.0) for name in rules.inputs))
         for rule in range(1, 7):
             state = wins_by_boxes(rules, box, rule, _rivals(rules, rule), Clock(5.0))
             assert isinstance(state, Witness | Proved)
@@ -232,7 +232,7 @@ def test_an_input_that_no_rule_covers_is_found() -> None:
     assert isinstance(state, Witness)
     assert max(_strengths(rules, state.point)) == 0
     assert state.claims[0].level == "0"
-    inner = Domain((Side("x", 0.1, 0.9), Side("y", 0.2, 0.8)))
+    inner = Domain((DomainSide("x", 0.1, 0.9), DomainSide("y", 0.2, 0.8)))
     assert isinstance(below_by_boxes(rules, inner, 0), Proved)
 
 
@@ -275,7 +275,7 @@ def test_a_step_at_the_lower_end_of_the_domain_is_not_missed() -> None:
     state = wins_by_boxes(rules, unit_domain(rules), 1, (2,))
     assert isinstance(state, Witness)
     assert state.point[0].exact == "0"
-    behind = Domain((Side("x", 0.0, 1.0, is_open=True),))
+    behind = Domain((DomainSide("x", 0.0, 1.0, is_open=True),))
     assert isinstance(wins_by_boxes(rules, behind, 1, (2,)), Proved)
 
 
@@ -286,11 +286,11 @@ def test_limits_of_a_combination_limit_its_inputs_together() -> None:
     variables = (Variable("x", (up, down)), Variable("y"), Variable("sum", parts=parts))
     made = (Rule((Clause("x", ("up",)),), "a"), Rule((Clause("x", ("down",)),), "b"))
     rules = RuleBase("sum", ("a", "b"), variables, made, Semantics("product"))
-    sides = (Side("x", 0.0, 1.0), Side("y", 0.0, 1.0))
+    sides = (DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0))
     assert isinstance(wins_by_boxes(rules, Domain(sides), 1, (2,)), Witness)
-    small = Domain((*sides, Side("sum", 0.0, 0.37)))
+    small = Domain((*sides, DomainSide("sum", 0.0, 0.37)))
     assert isinstance(wins_by_boxes(rules, small, 1, (2,)), Proved)
-    larger = Domain((*sides, Side("sum", 0.375, 0.38)))
+    larger = Domain((*sides, DomainSide("sum", 0.375, 0.38)))
     state = wins_by_boxes(rules, larger, 1, (2,))
     assert isinstance(state, Witness)
     assert Fraction(3, 8) <= sum(point_of(state.point).values()) <= Fraction(0.38)
@@ -299,7 +299,7 @@ def test_limits_of_a_combination_limit_its_inputs_together() -> None:
 def test_a_rule_without_rivals_wins_where_it_fires() -> None:
     rules = _covered_by_two(0.9, "product")
     assert isinstance(wins_by_boxes(rules, unit_domain(rules), 1, ()), Witness)
-    away = Domain((Side("x", 0.8, 0.9), Side("y", 0.0, 1.0)))
+    away = Domain((DomainSide("x", 0.8, 0.9), DomainSide("y", 0.0, 1.0)))
     assert isinstance(wins_by_boxes(rules, away, 1, ()), Proved)
 
 
@@ -363,4 +363,4 @@ def test_a_step_at_the_lower_end_of_many_inputs_is_a_bracket() -> None:
     found = wins_by_boxes(rules, unit_domain(rules), 1, set())
     assert isinstance(found, Bracket)
     assert (found.low, found.high) == (0.0, 1.0)
-    assert isinstance(wins(ground(rules, unit_domain(rules)), 1, set()), Witness)
+    assert isinstance(wins(arrange(rules, unit_domain(rules)), 1, set()), Witness)

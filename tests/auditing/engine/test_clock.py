@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.auditing.diff import decisions
 from fuzzytree.auditing.engine.clock import GRACE_S, Clock, OutOfTimeError, enforced
-from fuzzytree.auditing.engine.pieces import Element
+from fuzzytree.auditing.engine.pieces import RuleCurve
 from fuzzytree.auditing.engine.states import Bracket
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.model.interrupts import checkpoint
@@ -28,7 +28,7 @@ def over(by_s: float) -> Clock:
 
 def forever() -> None:
     """Work with no clock at hand, step by step."""
-    curve = Element(Points((0.0, 1.0), (0.0, 1.0)))
+    curve = RuleCurve(Points((0.0, 1.0), (0.0, 1.0)))
     while True:
         curve.degree(Fraction(1, 3))
 
@@ -78,7 +78,7 @@ def test_a_comparison_ends_within_a_box_that_holds_no_clock(
     def endless(*_: object) -> None:
         forever()
 
-    monkeypatch.setattr(decisions, "alike", endless)
+    monkeypatch.setattr(decisions, "equivalence", endless)
     old = random_base(1, 3, 2)
     first, *_, last = old.rules
     narrower = msgspec.structs.replace(last, when=(*last.when, first.when[0]))

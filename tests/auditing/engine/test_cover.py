@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
 from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
     LR,
@@ -38,11 +38,11 @@ def _partition(*peaks: float, width: float = 1.0) -> RuleBase:
 
 
 def _box(low: float, high: float) -> Domain:
-    return Domain((Side("x", low, high),))
+    return Domain((DomainSide("x", low, high),))
 
 
 def test_a_partition_covers_all_and_least_at_its_crossings() -> None:
-    given = ground(_partition(0.0, 1.0, 2.0), _box(0.0, 2.0))
+    given = arrange(_partition(0.0, 1.0, 2.0), _box(0.0, 2.0))
     assert isinstance(uncovered(given), Proved)
     assert isinstance(below(given, Fraction(1, 2)), Proved)
     found = least_cover(given)
@@ -50,7 +50,7 @@ def test_a_partition_covers_all_and_least_at_its_crossings() -> None:
 
 
 def test_one_point_between_two_triangles_is_uncovered() -> None:
-    given = ground(_partition(0.0, 2.0), _box(-0.5, 2.5))
+    given = arrange(_partition(0.0, 2.0), _box(-0.5, 2.5))
     found = uncovered(given)
     assert isinstance(found, Witness)
     assert point_of(found.point) == {"x": 1}
@@ -58,13 +58,13 @@ def test_one_point_between_two_triangles_is_uncovered() -> None:
 
 
 def test_a_gap_is_told_from_end_to_end() -> None:
-    found = uncovered(ground(_partition(0.0, 4.0), _box(0.0, 4.0)))
+    found = uncovered(arrange(_partition(0.0, 4.0), _box(0.0, 4.0)))
     assert isinstance(found, Witness)
     assert (found.region[0].low, found.region[0].high) == (1.0, 3.0)
 
 
 def test_below_a_level_is_found_just_above_the_least_cover() -> None:
-    given = ground(_partition(0.0, 1.0), _box(0.0, 1.0))
+    given = arrange(_partition(0.0, 1.0), _box(0.0, 1.0))
     found = below(given, Fraction(1, 2) + Fraction(1, 2**40))
     assert isinstance(found, Witness)
     assert max(strengths_at(given, point_of(found.point))) < Fraction(1, 2) + Fraction(
@@ -74,9 +74,9 @@ def test_below_a_level_is_found_just_above_the_least_cover() -> None:
 
 def test_an_open_end_is_no_point_of_the_domain() -> None:
     rules = _partition(0.0, 2.0)
-    inner = Domain((Side("x", 1.0, 2.5, is_open=True),))
-    assert isinstance(uncovered(ground(rules, inner)), Proved)
-    assert isinstance(uncovered(ground(rules, _box(1.0, 2.5))), Witness)
+    inner = Domain((DomainSide("x", 1.0, 2.5, is_open=True),))
+    assert isinstance(uncovered(arrange(rules, inner)), Proved)
+    assert isinstance(uncovered(arrange(rules, _box(1.0, 2.5))), Witness)
 
 
 @pytest.mark.one_in(4)
@@ -84,7 +84,7 @@ def test_an_open_end_is_no_point_of_the_domain() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_what_is_proved_covered_has_no_uncovered_row(seed: int, kind: str) -> None:
     rules = random_base(seed, 6, 2, kind=kind, odd=0.4, shared=0.3)  # type: ignore[arg-type]
-    given = ground(rules, unit_domain(rules))
+    given = arrange(rules, unit_domain(rules))
     found, least = uncovered(given), least_cover(given)
     values = np.random.default_rng(seed).random((2, 4000))
     answers = decide(rules, values)
@@ -110,8 +110,8 @@ def test_a_side_that_falls_as_a_line_covers_the_inputs_before_its_zero() -> None
     rule = Rule((Clause("x", ("steep",)),), "a")
     rules = RuleBase("p", ("a",), (Variable("x", (Term("steep", steep),)),), (rule,))
     zero = 0.75 - 0.25 / 40.0
-    assert isinstance(uncovered(ground(rules, _box(zero + 1e-9, 0.75))), Proved)
-    found = uncovered(ground(rules, _box(0.0, 0.75)))
+    assert isinstance(uncovered(arrange(rules, _box(zero + 1e-9, 0.75))), Proved)
+    found = uncovered(arrange(rules, _box(0.0, 0.75)))
     assert isinstance(found, Witness)
     assert found.region[0].high == pytest.approx(zero)
 
@@ -121,7 +121,7 @@ def test_a_gap_behind_a_step_begins_after_it() -> None:
     rule = Rule((Clause("x", ("step",)),), "a")
     rules = RuleBase("p", ("a",), (Variable("x", (step,)),), (rule,))
     for start in (5.5, 9.0):  # 9 itself is covered
-        found = uncovered(ground(rules, _box(start, 10.0)))
+        found = uncovered(arrange(rules, _box(start, 10.0)))
         assert isinstance(found, Witness)
         (span,) = found.region
         assert (span.low, span.high) == (math.nextafter(9.0, 10.0), 10.0)
@@ -130,7 +130,7 @@ def test_a_gap_behind_a_step_begins_after_it() -> None:
 def test_what_is_0_between_two_places_is_told_of_a_point_between_them() -> None:
     # In this base a cell lies between two doubles; a curve is 0 at the nearer of them.
     rules = random_base(1, 5, 3, kind="mixed", shared=0.5, odd=0.3)
-    given = ground(rules, unit_domain(rules))
+    given = arrange(rules, unit_domain(rules))
     found = uncovered(given)
     assert isinstance(found, Witness)
     assert not any(strengths_at(given, point_of(found.point)))
@@ -139,7 +139,7 @@ def test_what_is_0_between_two_places_is_told_of_a_point_between_them() -> None:
 @pytest.mark.parametrize("seed", [34])
 def test_gaps_on_axes_that_share_inputs_are_decided(seed: int) -> None:
     rules = random_base(seed, 4, 2, kind="mixed", shared=0.5, odd=0.2, combinations=1)
-    given = ground(rules, unit_domain(rules))
+    given = arrange(rules, unit_domain(rules))
     found = uncovered(given)
     if isinstance(found, Witness):
         assert not any(strengths_at(given, point_of(found.point)))

@@ -9,11 +9,11 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine import arrangement as module
-from fuzzytree.auditing.engine.arrangement import TooManyCellsError, ground
+from fuzzytree.auditing.engine.arrangement import TooManyCellsError, arrange
 from fuzzytree.auditing.engine.axes import crossings
 from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
 from fuzzytree.auditing.engine.duels import wins
-from fuzzytree.auditing.engine.pieces import Element, places
+from fuzzytree.auditing.engine.pieces import RuleCurve, places
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness
 from fuzzytree.auditing.engine.ties import tie
 from tests.auditing.engine.bases import random_base, random_shape, unit_domain
@@ -21,7 +21,7 @@ from tests.auditing.engine.bases import random_base, random_shape, unit_domain
 
 def test_no_more_crossings_are_counted_than_there_are() -> None:
     chance = random.Random(3)
-    curves = [Element(random_shape(chance, "points"), n % 3 == 0) for n in range(70)]
+    curves = [RuleCurve(random_shape(chance, "points"), n % 3 == 0) for n in range(70)]
     pairs = len(curves) * (len(curves) - 1) // 2
     assert pairs // 2 < crossings(curves) < len(places(curves))
     assert crossings(curves[:50]) == 0  # so few are not counted
@@ -32,13 +32,13 @@ def test_rules_in_too_many_cells_are_asked_by_boxes(
 ) -> None:
     base = random_base(5, 6, 2, kind="points")
     rivals = [n for n in range(1, 7) if base.rules[n - 1].then != base.rules[0].then]
-    given = ground(base, unit_domain(base))
+    given = arrange(base, unit_domain(base))
     known = [wins(given, n, {*range(1, 7)} - {n}) for n in range(1, 7)]
     monkeypatch.setattr(module, "MOST_NUMBERS", 100)
-    crowded = ground(replace(base, name="crowded"), unit_domain(base))
+    crowded = arrange(replace(base, name="crowded"), unit_domain(base))
     assert not crowded.is_kept
     with pytest.raises(TooManyCellsError):
-        _ = crowded.laid
+        _ = crowded.grids
     for number, state in enumerate(known, 1):
         found = wins(crowded, number, {*range(1, 7)} - {number})
         assert isinstance(found, Witness) == isinstance(state, Witness)
@@ -53,5 +53,5 @@ def test_rules_in_too_many_cells_are_asked_by_boxes(
 
 def test_curves_that_are_many_and_apart_are_kept() -> None:
     base = random_base(1, 80, 1, kind="points", shared=0.95)
-    assert ground(base, unit_domain(base)).is_kept
-    assert isinstance(wins(ground(base, unit_domain(base)), 1, ()), Witness | Proved)
+    assert arrange(base, unit_domain(base)).is_kept
+    assert isinstance(wins(arrange(base, unit_domain(base)), 1, ()), Witness | Proved)

@@ -9,10 +9,15 @@ from typing import get_args
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import Ground, ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.arrangement import (
+    Arrangement,
+    arrange,
+    restricted,
+    strengths_at,
+)
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.decisions import decision_at, other_decision
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -40,7 +45,9 @@ UNIT = (0.0, 1.0)
 
 
 def _box(rules: RuleBase, **ends: tuple[float, float]) -> Domain:
-    return Domain(tuple(Side(name, *ends.get(name, UNIT)) for name in rules.inputs))
+    return Domain(
+        tuple(DomainSide(name, *ends.get(name, UNIT)) for name in rules.inputs)
+    )
 
 
 def _shared(after: Points, *, is_swapped: bool = False) -> RuleBase:
@@ -66,7 +73,7 @@ HIGHER = Points((0.0, 1.0), (1.0, 0.875))
 
 def test_a_class_that_decides_by_its_place_alone_is_found() -> None:
     rules = _shared(HIGHER)
-    given = ground(rules, _box(rules, x=(0.25, 1.0)))  # without what none covers
+    given = arrange(rules, _box(rules, x=(0.25, 1.0)))  # without what none covers
     assert isinstance(wins(given, 1, [2]), Proved)  # it is never stronger
     state = other_decision(given, "b")
     assert isinstance(state, Witness)
@@ -78,7 +85,7 @@ def test_a_class_that_decides_by_its_place_alone_is_found() -> None:
 def test_the_same_rules_in_the_other_order_decide_for_the_other_class() -> None:
     rules = _shared(HIGHER, is_swapped=True)
     inner = _box(rules, x=(0.25, 1.0))  # where x is 0 none fires, and that is `a`
-    assert isinstance(other_decision(ground(rules, inner), "b"), Proved)
+    assert isinstance(other_decision(arrange(rules, inner), "b"), Proved)
 
 
 def test_a_tie_on_a_plateau_is_found() -> None:
@@ -89,7 +96,7 @@ def test_a_tie_on_a_plateau_is_found() -> None:
         (Variable("x", (full,)), Variable("y", (full,))),
         (Rule((Clause("x", ("full",)),), "a"), Rule((Clause("y", ("full",)),), "b")),
     )
-    inside = ground(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))
+    inside = arrange(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))
     assert isinstance(wins(inside, 1, [2]), Proved)
     state = other_decision(inside, "b")
     assert isinstance(state, Witness)
@@ -104,7 +111,7 @@ def test_a_tie_at_a_constant_degree_is_found() -> None:
         (Variable("x", (level,)), Variable("y", (level,))),
         (Rule((Clause("x", ("level",)),), "a"), Rule((Clause("y", ("level",)),), "b")),
     )
-    given = ground(rules, _box(rules))
+    given = arrange(rules, _box(rules))
     assert isinstance(decides_by_order(given, 1, [], [2]), Witness)
     assert isinstance(other_decision(given, "a"), Proved)
 
@@ -120,7 +127,7 @@ def test_an_input_that_no_rule_covers_is_another_decision_only_if_it_is() -> Non
     for answer, kind in ((None, Witness), ("b", Witness), ("a", Proved)):
         semantics = Semantics(uncovered=answer)
         changed = RuleBase("n", rules.classes, rules.variables, rules.rules, semantics)
-        state = other_decision(ground(changed, _box(changed)), "a")
+        state = other_decision(arrange(changed, _box(changed)), "a")
         assert isinstance(state, kind)
         if isinstance(state, Witness):
             assert state.claims == (Claim("decides", label=answer),)
@@ -134,8 +141,8 @@ def test_where_no_rule_fires_the_first_that_does_is_another_decision() -> None:
         (Variable("x", (narrow,)),),
         (Rule((Clause("x", ("narrow",)),), "a"),),
     )
-    assert isinstance(other_decision(ground(rules, _box(rules)), None), Witness)
-    outside = ground(rules, _box(rules, x=(0.8, 1.0)))
+    assert isinstance(other_decision(arrange(rules, _box(rules)), None), Witness)
+    outside = arrange(rules, _box(rules, x=(0.8, 1.0)))
     assert isinstance(other_decision(outside, None), Proved)
 
 
@@ -156,7 +163,7 @@ def test_rules_tie_under_the_product_where_they_are_one_function(
     other: Points, ties: bool
 ) -> None:
     rules = _as_product(_shared(other))
-    found = tie(ground(rules, _box(rules)), 1, 2)
+    found = tie(arrange(rules, _box(rules)), 1, 2)
     assert isinstance(found, Witness if ties else Proved)
 
 
@@ -169,7 +176,7 @@ def test_a_tie_on_a_plateau_under_the_product_is_not_taken_for_none() -> None:
         (Rule((Clause("x", ("full",)),), "a"), Rule((Clause("y", ("full",)),), "b")),
         Semantics("product"),
     )
-    inside = ground(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))
+    inside = arrange(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))
     assert isinstance(other_decision(inside, "b"), Witness)
     assert isinstance(tie(inside, 1, 2), Witness)
     assert isinstance(other_decision(inside, "a"), Proved)  # the first one decides
@@ -179,12 +186,14 @@ def test_a_spent_budget_leaves_it_open() -> None:
     times = iter([0.0] + [9.0] * 10_000)
     clock = Clock(1.0, now=lambda: next(times))
     rules = _shared(HIGHER)
-    state = decides_by_order(ground(rules, _box(rules)), 1, [], [2], clock)
+    state = decides_by_order(arrange(rules, _box(rules)), 1, [], [2], clock)
     assert isinstance(state, Bracket)
     assert state.why == "the budget was spent"
 
 
-def _sampled(given: Ground, label: str | None, draw: random.Random, count: int) -> int:
+def _sampled(
+    given: Arrangement, label: str | None, draw: random.Random, count: int
+) -> int:
     """Return how many of some points are decided otherwise."""
     found = 0
     for _ in range(count):
@@ -196,7 +205,7 @@ def _sampled(given: Ground, label: str | None, draw: random.Random, count: int) 
     return found
 
 
-def _checked(given: Ground, label: str | None, state: State) -> None:
+def _checked(given: Arrangement, label: str | None, state: State) -> None:
     """Check that a witness is one, by the reference in fractions too."""
     if isinstance(state, Witness):
         point = point_of(state.point)
@@ -208,17 +217,17 @@ def _checked(given: Ground, label: str | None, state: State) -> None:
 
 def _compare(kind: Kind, seed: int, points: int) -> None:
     rules = random_base(seed, 7, 3, kind=kind, shared=0.6)
-    whole = ground(rules, _box(rules))
+    whole = arrange(rules, _box(rules))
     draw = random.Random(seed)
     for reach in (0.02, 0.1, 0.3):
         at = {name: draw.random() for name in rules.inputs}
         box = Domain(
             tuple(
-                Side(name, max(0.0, x - reach), min(1.0, x + reach))
+                DomainSide(name, max(0.0, x - reach), min(1.0, x + reach))
                 for name, x in at.items()
             )
         )
-        given = narrowed(whole, box)
+        given = restricted(whole, box)
         label = decision_at(given, {name: Fraction(x) for name, x in at.items()})
         state = other_decision(given, label)
         _checked(given, label, state)

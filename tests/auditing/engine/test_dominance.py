@@ -8,12 +8,12 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import ground, strengths_at
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.dominance import Compared
+from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.dominance import RulePairs
 from fuzzytree.auditing.engine.duels import wins
-from fuzzytree.auditing.engine.factors import distance, largest_ratio, quotient
-from fuzzytree.auditing.engine.joint_maximum import highest, meet
+from fuzzytree.auditing.engine.factors import largest_ratio, quotient, rule_distance
+from fuzzytree.auditing.engine.joint_maximum import joint_bounds, joint_maximum
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
@@ -39,8 +39,8 @@ SEEDS = [0, *(pytest.param(n, marks=pytest.mark.heavy) for n in range(1, 8))]
 """The first is tried always, the others where there is time."""
 
 
-def compared(rules: RuleBase) -> Compared:
-    return Compared(ground(rules, unit_domain(rules)))
+def compared(rules: RuleBase) -> RulePairs:
+    return RulePairs(arrange(rules, unit_domain(rules)))
 
 
 def strengths(rules: RuleBase) -> list[tuple[Fraction, ...]]:
@@ -59,7 +59,7 @@ def test_a_rule_is_nowhere_weaker_iff_the_other_never_wins(
     rules = random_base(seed, 5, 2, kind=kind, shared=0.5, odd=0.2)
     both = compared(rules)
     for strong, weak in itertools.permutations(range(1, 6), 2):
-        state = wins(both.ground, weak, {strong})
+        state = wins(both.base, weak, {strong})
         verdict = both.never_weaker(strong, weak)
         if not isinstance(state, Bracket):
             assert (verdict == "always") is isinstance(state, Proved)
@@ -110,7 +110,7 @@ def test_the_strengths_of_a_ground_are_those_of_the_definition(
     rules = random_base(3, 6, 2, kind="mixed", odd=0.7, combinations=1)
     meant = Semantics("product" if conjunction == "product" else "min")
     rules = replace(rules, semantics=meant)
-    given = ground(rules, unit_domain(rules))
+    given = arrange(rules, unit_domain(rules))
     for a, b in itertools.product(GRID[1::2], repeat=2):
         found = strengths_at(given, {"x1": Fraction(a), "x2": Fraction(b)})
         assert tuple(found) == exact_answer(rules, {"x1": a, "x2": b}).strengths
@@ -119,7 +119,7 @@ def test_the_strengths_of_a_ground_are_those_of_the_definition(
 def test_rules_that_ask_nothing_are_equal() -> None:
     rules = RuleBase("all", ("a", "b"), (), (Rule((), "a"), Rule((), "b")))
     for meant in (Semantics("min"), Semantics("product")):
-        both = Compared(ground(replace(rules, semantics=meant), Domain(())))
+        both = RulePairs(arrange(replace(rules, semantics=meant), Domain(())))
         assert both.never_weaker(1, 2) == "always"
         assert both.above(1, 2) != "always"
         assert both.fires.all()
@@ -140,8 +140,8 @@ def test_an_open_lower_end_does_not_count(conjunction: str) -> None:
         Semantics("product" if conjunction == "product" else "min"),
     )
     verdicts = [
-        Compared(
-            ground(rules, Domain((Side("x", 0.0, 1.0, is_open=is_open),)))
+        RulePairs(
+            arrange(rules, Domain((DomainSide("x", 0.0, 1.0, is_open=is_open),)))
         ).never_weaker(1, 2)
         for is_open in (False, True)
     ]
@@ -169,7 +169,7 @@ def test_no_point_of_a_grid_is_farther_than_a_distance(seed: int) -> None:
     rules = random_base(seed, 4, 2, kind="lr", shared=0.7)
     both, rows = compared(rules), strengths(rules)
     for one, other in itertools.combinations(range(4), 2):
-        found = distance(both.factored, one, other, ONE)
+        found = rule_distance(both.factored, one, other, ONE)
         assert found is not None
         assert all(abs(row[one] - row[other]) <= found.whole for row in rows)
 
@@ -184,10 +184,10 @@ def test_no_point_of_a_grid_reaches_more_than_where_rules_meet(
     rules = replace(rules, semantics=meant)
     both, rows, level = compared(rules), strengths(rules), Fraction(1, 10)
     for one, other in itertools.combinations(range(1, 5), 2):
-        found = meet(both, one, other, level)
+        found = joint_maximum(both, one, other, level)
         most = max(min(row[one - 1], row[other - 1]) for row in rows)
         assert most <= found.level.high + Fraction(1, 10**12)
-        assert most <= highest(both, one)[other - 1]
+        assert most <= joint_bounds(both, one)[other - 1]
         if isinstance(found.state, Witness):
             assert Fraction(found.state.claims[0].level or 0) >= level
         if conjunction == "min":
@@ -232,11 +232,11 @@ def test_a_rule_that_is_0_on_both_sides_of_an_irrational_place_never_fires() -> 
 @pytest.mark.parametrize("seed", [5, 18])
 def test_where_rules_on_shared_inputs_meet_is_decided(seed: int) -> None:
     rules = random_base(seed, 4, 2, kind="mixed", shared=0.5, odd=0.2, combinations=1)
-    both = Compared(ground(rules, unit_domain(rules)))
+    both = RulePairs(arrange(rules, unit_domain(rules)))
     level = Fraction(1, 2)
-    found = meet(both, 1, 3, level)
+    found = joint_maximum(both, 1, 3, level)
     if isinstance(found.state, Witness):
-        strengths = strengths_at(both.ground, point_of(found.state.point))
+        strengths = strengths_at(both.base, point_of(found.state.point))
         assert min(strengths[0], strengths[2]) >= level
         return
     assert found.level.high < level or isinstance(found.state, Proved)
@@ -244,7 +244,7 @@ def test_where_rules_on_shared_inputs_meet_is_decided(seed: int) -> None:
     for x in steps:
         for y in steps:
             point = dict(zip(rules.inputs, (x, y), strict=True))
-            strengths = strengths_at(both.ground, point)
+            strengths = strengths_at(both.base, point)
             assert min(strengths[0], strengths[2]) < level
 
 
@@ -260,7 +260,7 @@ def test_rules_that_come_as_near_to_a_level_as_one_likes_do_not_reach_it() -> No
             Rule((Clause("mixed", ("falls",)),), "b"),
         ),
     )
-    box = Domain((Side("x", 0.0, 2.0), Side("y", 0.0, 4.0, is_open=True)))
-    found = meet(Compared(ground(rules, box)), 1, 2, Fraction(1, 2))
+    box = Domain((DomainSide("x", 0.0, 2.0), DomainSide("y", 0.0, 4.0, is_open=True)))
+    found = joint_maximum(RulePairs(arrange(rules, box)), 1, 2, Fraction(1, 2))
     assert isinstance(found.state, Proved)
     assert found.level.high == Fraction(1, 2)  # nothing below it bounds them

@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
 from fuzzytree.auditing.engine.duels import wins
-from fuzzytree.auditing.engine.probes import Glimpses, strength_above
+from fuzzytree.auditing.engine.probes import RandomProbes, strength_above
 from fuzzytree.auditing.engine.states import Witness, point_of
 from fuzzytree.model.rulebase import Conjunction
 from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
@@ -21,8 +21,8 @@ def test_a_rule_that_is_seen_to_win_does_so_in_fractions(
     seen = told = 0
     for seed in range(6):
         base = random_base(seed, 9, 3, conjunction, "mixed", odd=0.3, combinations=1)
-        given = ground(base, unit_domain(base))
-        glimpses = Glimpses(given)
+        given = arrange(base, unit_domain(base))
+        glimpses = RandomProbes(given)
         for rule in range(1, 10):
             label = base.rules[rule - 1].then
             rivals = [n for n in range(1, 10) if base.rules[n - 1].then != label]
@@ -51,7 +51,7 @@ def test_a_rule_that_never_wins_is_not_seen_to() -> None:
     number = len(base.rules)
     label = base.rules[-1].then
     rivals = [n for n, rule in enumerate(base.rules, 1) if rule.then != label]
-    glimpses = Glimpses(ground(base, unit_domain(base)))
+    glimpses = RandomProbes(arrange(base, unit_domain(base)))
     assert not glimpses.is_ahead(number)
     assert glimpses.wins(number, rivals) is None
 
@@ -61,14 +61,14 @@ def test_a_rule_that_is_not_seen_may_win_in_a_sliver() -> None:
     number = len(base.rules)
     label = base.rules[-1].then
     rivals = [n for n, rule in enumerate(base.rules, 1) if rule.then != label]
-    given = ground(base, unit_domain(base))
-    assert Glimpses(given).wins(number, rivals) is None
+    given = arrange(base, unit_domain(base))
+    assert RandomProbes(given).wins(number, rivals) is None
     assert isinstance(wins(given, number, rivals), Witness)
 
 
 def test_as_few_clauses_are_asked_as_it_takes_to_see_who_is_stronger() -> None:
     base = random_base(4, 8, 3)
-    given = ground(base, unit_domain(base))
+    given = arrange(base, unit_domain(base))
     point = {name: Fraction(3, 8) for name in base.inputs}
     strengths = strengths_at(given, point)
     first = strengths.index(max(strengths)) + 1

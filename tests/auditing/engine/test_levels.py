@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import ground
+from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.dominance import Compared
-from fuzzytree.auditing.engine.duels import Question, searched
-from fuzzytree.auditing.engine.levels import Level, parted, relation
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.dominance import RulePairs
+from fuzzytree.auditing.engine.duels import LevelQuestion, search_level
+from fuzzytree.auditing.engine.levels import AlgebraicLevel, parted, relation
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.polynomials import roots, value_at
 from fuzzytree.auditing.engine.states import Proved, Witness
@@ -26,7 +26,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 
-SQUARE = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
+SQUARE = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
 GOLDEN = (-ONE, ONE, ONE)  # x**2 + x = 1
 
 
@@ -55,7 +55,9 @@ def _rules(*, is_mirrored: bool, drop: float = 1.0) -> RuleBase:
 
 
 def _found(rules: RuleBase) -> object:
-    return searched(ground(rules, SQUARE), Question((1,), (2,), None, ""), Clock())
+    return search_level(
+        arrange(rules, SQUARE), LevelQuestion((1,), (2,), None, ""), Clock()
+    )
 
 
 @pytest.mark.parametrize("is_mirrored", [False, True])
@@ -64,23 +66,23 @@ def test_a_rule_no_higher_than_the_lowest_of_another_never_wins(
 ) -> None:
     rules = _rules(is_mirrored=is_mirrored)
     assert isinstance(_found(rules), Proved)
-    assert Compared(ground(rules, SQUARE)).never_weaker(2, 1) == "always"
+    assert RulePairs(arrange(rules, SQUARE)).never_weaker(2, 1) == "always"
 
 
 @pytest.mark.parametrize("is_mirrored", [False, True])
 def test_it_wins_where_the_other_sinks_by_one_digit(is_mirrored: bool) -> None:
     rules = _rules(is_mirrored=is_mirrored, drop=1.0 - 2.0**-53)
     assert isinstance(_found(rules), Witness)
-    assert Compared(ground(rules, SQUARE)).never_weaker(2, 1) == "not"
+    assert RulePairs(arrange(rules, SQUARE)).never_weaker(2, 1) == "not"
 
 
 def test_values_of_two_polynomials_at_two_places_are_one_number() -> None:
     place = roots(GOLDEN, ZERO, ONE)[0]
     mirrored = (ONE, Fraction(-3), ONE)  # that of 1 - x
     beside = roots(mirrored, ZERO, ONE)[0]
-    square = Level((ZERO, ZERO, ONE), GOLDEN, place)
-    line = Level((ZERO, ONE), mirrored, beside)
-    near = Level((Fraction(1, 2**90), ONE), mirrored, beside)
+    square = AlgebraicLevel((ZERO, ZERO, ONE), GOLDEN, place)
+    line = AlgebraicLevel((ZERO, ONE), mirrored, beside)
+    near = AlgebraicLevel((Fraction(1, 2**90), ONE), mirrored, beside)
     found = parted([square, near, line])
     assert found is not None
     assert found[0] == found[2]
@@ -91,7 +93,7 @@ def test_a_value_that_is_rational_at_an_irrational_place_is_that_number() -> Non
     two = (Fraction(-2), ZERO, ONE)
     place = roots(two, ONE, Fraction(2))[0]
     half = Fraction(1, 2)
-    sides = Level((ZERO, ZERO, Fraction(1, 4)), two, place), half
+    sides = AlgebraicLevel((ZERO, ZERO, Fraction(1, 4)), two, place), half
     assert parted(sides) == [(half, half), (half, half)]
     fourth = relation((ZERO, ONE, ZERO, ONE), two)  # x**3 + x is 3 x there
     assert [int(one) for one in fourth] == [-18, 0, 1]

@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.nearest import (
     NARROW,
     ball,
@@ -23,7 +23,7 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
 )
 
-SQUARE = Domain((Side("x", 0.0, 4.0), Side("y", -1.0, 1.0)))
+SQUARE = Domain((DomainSide("x", 0.0, 4.0), DomainSide("y", -1.0, 1.0)))
 CENTRE = {"x": Fraction(1), "y": Fraction(0)}
 LIMIT = Fraction(29, 10)
 
@@ -104,15 +104,17 @@ def test_a_ball_is_rounded_outwards_and_stays_in_the_domain() -> None:
 
 
 def test_a_fixed_input_does_not_count_in_a_distance() -> None:
-    domain = Domain((Side("x", 0.0, 2.0), Side("y", 5.0, 5.0)))
+    domain = Domain((DomainSide("x", 0.0, 2.0), DomainSide("y", 5.0, 5.0)))
     one = {"x": Fraction(0), "y": Fraction(5)}
     assert distance(domain, one, {"x": Fraction(1), "y": Fraction(5)}) == Fraction(1, 2)
 
 
 @pytest.mark.parametrize("is_open", [True, False])
 def test_the_nearest_box_is_told_exactly(is_open: bool) -> None:
-    far = Domain((Side("x", 3.0, 4.0), Side("y", -1.0, 1.0)))
-    near = Domain((Side("x", 2.0, 4.0, is_open=is_open), Side("y", -1.0, -0.25)))
+    far = Domain((DomainSide("x", 3.0, 4.0), DomainSide("y", -1.0, 1.0)))
+    near = Domain(
+        (DomainSide("x", 2.0, 4.0, is_open=is_open), DomainSide("y", -1.0, -0.25))
+    )
     found = nearest_box(SQUARE, CENTRE, [far, near])
     assert found.low == Fraction(1, 4)
     assert found.point is not None
@@ -123,7 +125,9 @@ def test_the_nearest_box_is_told_exactly(is_open: bool) -> None:
 
 
 def test_a_centre_at_an_open_end_has_distance_zero_and_a_point_beside_it() -> None:
-    beside = Domain((Side("x", 1.0, 4.0, is_open=True), Side("y", -1.0, 1.0)))
+    beside = Domain(
+        (DomainSide("x", 1.0, 4.0, is_open=True), DomainSide("y", -1.0, 1.0))
+    )
     found = nearest_box(SQUARE, CENTRE, [beside])
     assert found.low == 0
     assert found.point is not None

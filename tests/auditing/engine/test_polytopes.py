@@ -8,20 +8,20 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side, variable_value
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, variable_value
 from fuzzytree.auditing.engine.linear import Row, holds, solved
 from fuzzytree.auditing.engine.nearest import Nearest, Polytopes, distance, polytope_of
 from fuzzytree.model.rulebase import Part, Variable
 
 NONE, ONE = Fraction(0), Fraction(1)
 NAMES = ("x", "y", "z")
-UNIT = Domain(tuple(Side(name, 0.0, 1.0) for name in NAMES))
+UNIT = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in NAMES))
 SUM = Variable("sum", parts=(Part("x", 1.0), Part("y", 1.0)))
 LEAN = Variable("lean", parts=(Part("x", 2.0), Part("y", -1.0), Part("z", 0.5)))
 VARIABLES = {one.name: one for one in (*map(Variable, NAMES), SUM, LEAN)}
 
 
-def _nearest(centre: dict[str, float], *boxes: tuple[Side, ...]) -> Nearest:
+def _nearest(centre: dict[str, float], *boxes: tuple[DomainSide, ...]) -> Nearest:
     whole = {side.variable: side for side in UNIT.sides}
     parts = [
         polytope_of(
@@ -37,7 +37,7 @@ def _nearest(centre: dict[str, float], *boxes: tuple[Side, ...]) -> Nearest:
 
 
 def test_a_half_space_is_as_far_as_its_inputs_must_move_together() -> None:
-    found = _nearest({"x": 0.25, "y": 0.25, "z": 0.5}, (Side("sum", 1.0, 2.0),))
+    found = _nearest({"x": 0.25, "y": 0.25, "z": 0.5}, (DomainSide("sum", 1.0, 2.0),))
     assert found.low == Fraction(1, 4)
     assert found.is_narrow
     assert found.point is not None
@@ -46,14 +46,14 @@ def test_a_half_space_is_as_far_as_its_inputs_must_move_together() -> None:
 
 def test_an_input_that_is_at_its_end_leaves_the_way_to_the_others() -> None:
     # y is at its end: x alone must bring the sum from 1.25 to 1.75.
-    found = _nearest({"x": 0.25, "y": 1.0, "z": 0.5}, (Side("sum", 1.75, 2.0),))
+    found = _nearest({"x": 0.25, "y": 1.0, "z": 0.5}, (DomainSide("sum", 1.75, 2.0),))
     assert found.low == Fraction(1, 2)
 
 
 def test_two_half_spaces_are_farther_together_than_either() -> None:
     # The sum may be 1 at 1/4, and lean at most -1/2 at 1/14, but not both at once.
     start = {"x": 0.25, "y": 0.25, "z": 0.0}
-    one, two = Side("sum", 1.0, 2.0), Side("lean", -2.0, -0.5)
+    one, two = DomainSide("sum", 1.0, 2.0), DomainSide("lean", -2.0, -0.5)
     alone = max(_nearest(start, (one,)).low, _nearest(start, (two,)).low)
     both = _nearest(start, (one, two))
     assert both.low > alone
@@ -64,7 +64,7 @@ def test_two_half_spaces_are_farther_together_than_either() -> None:
 
 def test_an_open_end_is_met_just_behind() -> None:
     found = _nearest(
-        {"x": 0.5, "y": 0.5, "z": 0.5}, (Side("sum", 1.0, 2.0, "model", True),)
+        {"x": 0.5, "y": 0.5, "z": 0.5}, (DomainSide("sum", 1.0, 2.0, "model", True),)
     )
     assert found.low == 0
     assert found.point is not None
@@ -73,9 +73,9 @@ def test_an_open_end_is_met_just_behind() -> None:
 
 def test_the_nearest_of_several_is_told_and_an_empty_one_is_none() -> None:
     start = {"x": 0.0, "y": 0.0, "z": 0.0}
-    empty = (Side("sum", 2.0, 3.0, "model", True),)
-    never = (Side("x", 0.5, 1.0), Side("sum", 0.0, 0.25))
-    far, near = (Side("sum", 1.0, 2.0),), (Side("x", 0.25, 1.0),)
+    empty = (DomainSide("sum", 2.0, 3.0, "model", True),)
+    never = (DomainSide("x", 0.5, 1.0), DomainSide("sum", 0.0, 0.25))
+    far, near = (DomainSide("sum", 1.0, 2.0),), (DomainSide("x", 0.25, 1.0),)
     assert _nearest(start, empty, never).is_none
     assert _nearest(start, far, empty, near, never).low == Fraction(1, 4)
 
@@ -92,13 +92,13 @@ def test_a_spent_budget_is_told() -> None:
 def test_no_point_that_is_drawn_is_nearer(seed: int) -> None:
     draw = random.Random(seed)
     variables = dict(VARIABLES)
-    sides: list[Side] = []
+    sides: list[DomainSide] = []
     for number in range(3):
         parts = tuple(Part(name, draw.uniform(-1.0, 1.0)) for name in NAMES)
         variables[f"v{number}"] = one = Variable(f"v{number}", parts=parts)
         at = {name: Fraction(draw.random()) for name in NAMES}
         value = float(variable_value(one, at))
-        sides.append(Side(one.name, value, value + draw.random(), "model", True))
+        sides.append(DomainSide(one.name, value, value + draw.random(), "model", True))
     box = Domain((*UNIT.sides, *sides))
     asked = Polytopes(UNIT, NAMES, [polytope_of(box, NAMES, variables)])
     centre = {name: Fraction(draw.random()) for name in NAMES}

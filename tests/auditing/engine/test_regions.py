@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.domain import Domain, Side, contains
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
 from fuzzytree.auditing.engine.regions import (
     boxes,
     common,
@@ -19,7 +19,7 @@ from fuzzytree.testing import random_tree
 
 
 def _wide(tree: FuzzyTree, reach: float) -> Domain:
-    return Domain(tuple(Side(name, -reach, reach) for name in tree.inputs))
+    return Domain(tuple(DomainSide(name, -reach, reach) for name in tree.inputs))
 
 
 def _points(tree: FuzzyTree, domain: Domain, seed: int) -> list[dict[str, Fraction]]:
@@ -75,7 +75,7 @@ def test_a_point_of_a_box_reaches_its_leaf(seed: int) -> None:
 def test_a_box_that_its_combination_cannot_meet_has_no_point() -> None:
     tree = random_tree(0, combinations=1.0)
     inputs = _wide(tree, 1e-9)  # so near to 0 the combination hardly varies
-    far = Side(tree.nodes[0].variable, 1e6, 2e6)
+    far = DomainSide(tree.nodes[0].variable, 1e6, 2e6)
     assert point_in(inputs, tree) is not None
     assert point_in(Domain((*inputs.sides, far)), tree) is None
 
@@ -96,11 +96,11 @@ def _owns_twice(node: Node) -> bool:
 
 
 def test_intervals_are_open_below_and_closed_above() -> None:
-    side = Side("x", 0.0, 2.0)
-    assert cut_side(side, (None, 0.0)) == Side("x", 0.0, 0.0)
-    assert cut_side(side, (0.0, 1.0)) == Side("x", 0.0, 1.0, is_open=True)
+    side = DomainSide("x", 0.0, 2.0)
+    assert cut_side(side, (None, 0.0)) == DomainSide("x", 0.0, 0.0)
+    assert cut_side(side, (0.0, 1.0)) == DomainSide("x", 0.0, 1.0, is_open=True)
     assert cut_side(side, (2.0, None)) is None
-    assert cut_side(Side("x", 0.0, 2.0, is_open=True), (None, 0.0)) is None
+    assert cut_side(DomainSide("x", 0.0, 2.0, is_open=True), (None, 0.0)) is None
 
 
 def test_what_two_unions_have_in_common_has_no_empty_interval() -> None:

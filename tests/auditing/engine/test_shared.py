@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import ground
+from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.pivots import may_tie
 from fuzzytree.auditing.engine.states import Witness
 from fuzzytree.auditing.engine.ties import tie
@@ -19,7 +19,7 @@ def test_no_pair_that_ties_is_left_out(kind: Kind) -> None:
     ties = apart = 0
     for seed in range(4):
         base = random_base(seed, 7, 2, kind=kind, shared=0.5, odd=0.2)
-        given = ground(base, unit_domain(base))
+        given = arrange(base, unit_domain(base))
         found = may_tie(given)
         assert (found == found.T).all()
         for one, other in itertools.combinations(range(7), 2):
@@ -34,13 +34,13 @@ def test_no_pair_that_ties_is_left_out(kind: Kind) -> None:
 
 def test_rules_with_curves_of_their_own_are_apart() -> None:
     base = random_base(1, 12, 3, kind="lr")
-    found = may_tie(ground(base, unit_domain(base)))
+    found = may_tie(arrange(base, unit_domain(base)))
     assert found.sum() == found.diagonal().sum() == 12
 
 
 def test_curves_that_pass_one_level_on_two_axes_do_not_tie() -> None:
     # Both are far below 1e-13 there, in a band of levels that is not parted.
     base = random_base(25, 7, 2, kind="mixed", shared=0.5, odd=0.2)
-    given = ground(base, unit_domain(base))
+    given = arrange(base, unit_domain(base))
     assert not may_tie(given)[1, 2]
     assert not isinstance(tie(given, 2, 3), Witness)

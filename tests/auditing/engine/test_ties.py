@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import ground, strengths_at
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.pivots import may_tie
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness, point_of
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
@@ -43,11 +43,11 @@ def _rules(*rules: tuple[str, str, str], conjunction: str = "min") -> RuleBase:
     return RuleBase("ties", classes, variables, made, semantics)
 
 
-SQUARE = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
+SQUARE = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
 
 
 def test_rules_that_share_their_weakest_clause_tie() -> None:
-    given = ground(_rules(("up", "up", "a"), ("up", "down", "b")), SQUARE)
+    given = arrange(_rules(("up", "up", "a"), ("up", "down", "b")), SQUARE)
     found = tie(given, 1, 2)
     assert isinstance(found, Witness)
     one, two = strengths_at(given, point_of(found.point))
@@ -55,27 +55,27 @@ def test_rules_that_share_their_weakest_clause_tie() -> None:
 
 
 def test_rules_that_share_nothing_tie_on_a_line_only() -> None:
-    given = ground(_rules(("up", "up", "a"), ("down", "down", "b")), SQUARE)
+    given = arrange(_rules(("up", "up", "a"), ("down", "down", "b")), SQUARE)
     assert isinstance(tie(given, 1, 2), Proved)
 
 
 def test_a_third_rule_that_is_stronger_ends_the_tie() -> None:
     rules = (("up", "up", "a"), ("up", "down", "b"))
     above = ("half", "half", "c")
-    given = ground(_rules(*rules, above), SQUARE)
+    given = arrange(_rules(*rules, above), SQUARE)
     found = tie(given, 1, 2)
     assert isinstance(found, Proved)  # where they tie, x is below 1/2
 
 
 def test_constant_curves_tie_at_their_level() -> None:
-    given = ground(_rules(("half", "up", "a"), ("half", "down", "b")), SQUARE)
+    given = arrange(_rules(("half", "up", "a"), ("half", "down", "b")), SQUARE)
     assert isinstance(tie(given, 1, 2), Proved)  # up and down are both 1/2 on a line
     wide = _rules(("half", "half", "a"), ("half", "half", "b"))
-    assert isinstance(tie(ground(wide, SQUARE), 1, 2), Witness)
+    assert isinstance(tie(arrange(wide, SQUARE), 1, 2), Witness)
 
 
 def test_the_first_of_two_equal_rules_decides_and_the_second_does_not() -> None:
-    given = ground(_rules(("up", "up", "a"), ("up", "up", "b")), SQUARE)
+    given = arrange(_rules(("up", "up", "a"), ("up", "up", "b")), SQUARE)
     assert isinstance(decides_by_order(given, 1, (), (2,)), Witness)
     assert isinstance(decides_by_order(given, 2, (1,), ()), Proved)
 
@@ -85,14 +85,14 @@ def _products(*rules: tuple[str, str, str]) -> RuleBase:
 
 
 def test_products_of_the_same_curves_tie_and_those_of_others_do_not() -> None:
-    given = ground(_products(("up", "down", "a"), ("up", "down", "b")), SQUARE)
+    given = arrange(_products(("up", "down", "a"), ("up", "down", "b")), SQUARE)
     found = tie(given, 1, 2)
     assert isinstance(found, Witness)
     one, two = strengths_at(given, point_of(found.point))
     assert one == two > 0
     assert isinstance(decides_by_order(given, 1, (), (2,)), Witness)
     assert isinstance(decides_by_order(given, 2, (1,), ()), Proved)
-    shared = ground(_products(("up", "up", "a"), ("up", "down", "b")), SQUARE)
+    shared = arrange(_products(("up", "up", "a"), ("up", "down", "b")), SQUARE)
     assert isinstance(tie(shared, 1, 2), Proved)  # where y is 1/2, a line
 
 
@@ -114,7 +114,7 @@ def test_products_tie_where_what_they_do_not_share_multiplies_to_the_same() -> N
             ),
             Semantics("product"),
         )
-        return tie(ground(rules, SQUARE), 1, 2)
+        return tie(arrange(rules, SQUARE), 1, 2)
 
     assert isinstance(found(high), Witness)  # x / 4 is x / 2 * 1 / 2
     assert isinstance(found(low), Proved)
@@ -123,14 +123,14 @@ def test_products_tie_where_what_they_do_not_share_multiplies_to_the_same() -> N
 def test_products_tie_on_the_part_that_no_other_rule_exceeds() -> None:
     rules = (("up", "down", "a"), ("up", "down", "b"))
     above = _products(*rules, ("half", "down", "c"))
-    given = ground(above, SQUARE)
+    given = arrange(above, SQUARE)
     found = tie(given, 1, 2)
     assert isinstance(found, Witness)
     assert point_of(found.point)["x"] > Fraction(1, 2)
-    left = Domain((Side("x", 0.0, 0.5), Side("y", 0.0, 1.0)))
-    assert isinstance(tie(ground(above, left), 1, 2), Proved)
+    left = Domain((DomainSide("x", 0.0, 0.5), DomainSide("y", 0.0, 1.0)))
+    assert isinstance(tie(arrange(above, left), 1, 2), Proved)
     # A third that is the same function ends no tie.
-    assert isinstance(tie(ground(_products(*rules, rules[0]), SQUARE), 1, 2), Witness)
+    assert isinstance(tie(arrange(_products(*rules, rules[0]), SQUARE), 1, 2), Witness)
 
 
 def test_products_of_combinations_of_one_direction_are_declined() -> None:
@@ -145,7 +145,7 @@ def test_products_of_combinations_of_one_direction_are_declined() -> None:
         ),
         Semantics("product"),
     )
-    found = tie(ground(rules, Domain((Side("x", 0.0, 0.5),))), 1, 2)
+    found = tie(arrange(rules, Domain((DomainSide("x", 0.0, 0.5),))), 1, 2)
     assert isinstance(found, Declined)  # both are x
     assert found.code == "FTD04"
 
@@ -157,7 +157,7 @@ def test_no_row_ties_where_a_tie_is_excluded(
     seed: int, conjunction: Conjunction
 ) -> None:
     rules = random_base(seed, 5, 2, conjunction, kind="mixed", shared=0.6)
-    given = ground(rules, unit_domain(rules))
+    given = arrange(rules, unit_domain(rules))
     values = np.random.default_rng(seed).random((2, 3000))
     answers = decide(rules, values)
     assert answers.strengths is not None
@@ -194,11 +194,11 @@ def test_constants_of_one_level_on_different_axes_tie() -> None:
             ),
         )
 
-    given = ground(rules(0.5), SQUARE)
+    given = arrange(rules(0.5), SQUARE)
     found = tie(given, 1, 2)
     assert isinstance(found, Witness)
     assert point_of(found.point)["x"] > Fraction(1, 2)  # above, the third is weaker
-    assert isinstance(tie(ground(rules(0.4), SQUARE), 1, 2), Proved)
+    assert isinstance(tie(arrange(rules(0.4), SQUARE), 1, 2), Proved)
 
 
 def test_rules_that_meet_at_an_end_of_the_domain_alone_do_not_tie() -> None:
@@ -212,20 +212,20 @@ def test_rules_that_meet_at_an_end_of_the_domain_alone_do_not_tie() -> None:
             Rule((Clause("x", ("first",)), Clause("y", ("up",))), "b"),
         ),
     )
-    given = ground(rules, SQUARE)
+    given = arrange(rules, SQUARE)
     assert isinstance(tie(given, 1, 2), Proved)
     apart = replace(rules, rules=(rules.rules[0], Rule((Clause("y", ("up",)),), "b")))
-    assert isinstance(tie(ground(apart, SQUARE), 1, 2), Proved)
+    assert isinstance(tie(arrange(apart, SQUARE), 1, 2), Proved)
 
 
 def test_on_a_domain_of_one_value_rules_tie_along_the_other_inputs() -> None:
     rules = _rules(("half", "up", "a"), ("half", "up", "b"))
-    line = Domain((Side("x", 0.25, 0.25), Side("y", 0.0, 1.0)))
-    assert isinstance(tie(ground(rules, line), 1, 2), Witness)
-    point = Domain((Side("x", 0.25, 0.25), Side("y", 0.75, 0.75)))
-    assert isinstance(tie(ground(rules, point), 1, 2), Witness)
-    assert isinstance(decides_by_order(ground(rules, point), 1, (), (2,)), Witness)
-    assert isinstance(decides_by_order(ground(rules, point), 2, (1,), ()), Proved)
+    line = Domain((DomainSide("x", 0.25, 0.25), DomainSide("y", 0.0, 1.0)))
+    assert isinstance(tie(arrange(rules, line), 1, 2), Witness)
+    point = Domain((DomainSide("x", 0.25, 0.25), DomainSide("y", 0.75, 0.75)))
+    assert isinstance(tie(arrange(rules, point), 1, 2), Witness)
+    assert isinstance(decides_by_order(arrange(rules, point), 1, (), (2,)), Witness)
+    assert isinstance(decides_by_order(arrange(rules, point), 2, (1,), ()), Proved)
 
 
 def test_ties_on_axes_that_share_inputs_are_decided_where_inputs_have_the_values() -> (
@@ -243,10 +243,12 @@ def test_ties_on_axes_that_share_inputs_are_decided_where_inputs_have_the_values
             Rule((Clause("x", ("up",)), Clause("mix", ("down",))), "b"),
         ),
     )
-    found = tie(ground(rules, SQUARE), 1, 2)
+    found = tie(arrange(rules, SQUARE), 1, 2)
     assert isinstance(found, Witness)
-    low = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 0.25)))  # mix is below x
-    assert isinstance(tie(ground(rules, low), 1, 2), Proved)
+    low = Domain(
+        (DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 0.25))
+    )  # mix is below x
+    assert isinstance(tie(arrange(rules, low), 1, 2), Proved)
 
 
 def test_rivals_that_stay_at_a_level_are_seen_where_levels_are_near() -> None:
@@ -267,8 +269,8 @@ def test_rivals_that_stay_at_a_level_are_seen_where_levels_are_near() -> None:
             Rule((Clause("x", ("level",), negated=True),), "a"),
         ),
     )
-    box = Domain((Side("x", 0.0, 2.0), Side("y", 0.25, 3.75)))
-    found = decides_by_order(ground(rules, box), 1, (), (2, 3, 4))
+    box = Domain((DomainSide("x", 0.0, 2.0), DomainSide("y", 0.25, 3.75)))
+    found = decides_by_order(arrange(rules, box), 1, (), (2, 3, 4))
     assert isinstance(found, Witness)  # all but the dip are 1/2 where y is up to 2
 
 
@@ -291,7 +293,7 @@ def test_a_tie_between_any_two_levels_is_seen_where_axes_share_inputs() -> None:
             Rule((Clause("x", ("bump",)),), "c"),
         ),
     )
-    found = tie(ground(rules, Domain((Side("x", 0.0, 2.0),))), 1, 2)
+    found = tie(arrange(rules, Domain((DomainSide("x", 0.0, 2.0),))), 1, 2)
     assert isinstance(found, Witness)
     assert Fraction(1, 2) < point_of(found.point)["x"] < 1
 
@@ -311,7 +313,7 @@ def test_curves_on_axes_of_one_direction_may_be_one_function_of_the_inputs() -> 
             Rule((Clause("twice", ("late",)),), "b"),
         ),
     )
-    given = ground(rules, Domain((Side("x", 0.0, 1.0),)))
+    given = arrange(rules, Domain((DomainSide("x", 0.0, 1.0),)))
     found = tie(given, 1, 2)
     assert isinstance(found, Declined)  # both are x
     assert found.code == "FTD04"

@@ -8,10 +8,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import Ground, ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.arrangement import (
+    Arrangement,
+    arrange,
+    restricted,
+    strengths_at,
+)
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import least_cover, uncovered
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.auditing.engine.ties import tie
@@ -36,7 +41,9 @@ def _rivals(rules: RuleBase, rule: int) -> tuple[int, ...]:
     return tuple(n for n, one in enumerate(rules.rules, 1) if one.then != label)
 
 
-def _holds(given: Ground, found: Witness, rule: int, rivals: tuple[int, ...]) -> bool:
+def _holds(
+    given: Arrangement, found: Witness, rule: int, rivals: tuple[int, ...]
+) -> bool:
     strengths = strengths_at(given, point_of(found.point))
     return all(strengths[rule - 1] > strengths[n - 1] for n in rivals)
 
@@ -52,7 +59,7 @@ def test_no_sampled_row_contradicts_a_proof_and_witnesses_hold(
     seed: int, shared: float, kind: str
 ) -> None:
     rules = random_base(seed, 6, 3, kind=kind, shared=shared, odd=0.3)  # type: ignore[arg-type]
-    given = ground(rules, unit_domain(rules))
+    given = arrange(rules, unit_domain(rules))
     values = np.random.default_rng(seed).random((3, 3000))
     answers = decide(rules, values, with_strengths=False)
     for rule in range(1, 7):
@@ -72,7 +79,7 @@ def test_no_sampled_row_contradicts_a_proof_and_witnesses_hold(
 def test_it_holds_on_all_of_the_region(kind: str) -> None:
     chance = random.Random(7)
     rules = random_base(3, 6, 3, kind=kind)  # type: ignore[arg-type]
-    given = ground(rules, unit_domain(rules))
+    given = arrange(rules, unit_domain(rules))
     for rule in range(1, 7):
         rivals = _rivals(rules, rule)
         found = wins(given, rule, rivals)
@@ -104,7 +111,7 @@ def _union_base(sliver: float) -> RuleBase:
 
 def test_a_rule_that_only_two_others_together_hide_never_wins() -> None:
     rules = _union_base(0.1)
-    given = ground(rules, Domain((Side("x", 0.0, 1.0),)))
+    given = arrange(rules, Domain((DomainSide("x", 0.0, 1.0),)))
     found = wins(given, 3, (1, 2))
     assert isinstance(found, Proved)
     assert isinstance(wins(given, 3, (1,)), Witness)
@@ -123,7 +130,7 @@ def test_a_sliver_that_samples_miss_is_found() -> None:
         (variable,),
         (Rule((Clause("x", ("wide",)),), "a"), Rule((Clause("x", ("thin",)),), "b")),
     )
-    given = ground(rules, Domain((Side("x", 0.0, 1.0),)))
+    given = arrange(rules, Domain((DomainSide("x", 0.0, 1.0),)))
     found = wins(given, 2, (1,))
     assert isinstance(found, Witness)
     values = np.random.default_rng(0).random((1, 100_000))
@@ -148,25 +155,25 @@ def _mixed(rule_of_sum: str) -> RuleBase:
 
 
 def test_a_sum_that_its_inputs_cannot_reach_makes_a_rule_dead() -> None:
-    box = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
-    found = wins(ground(_mixed("far"), box), 1, (2,))
+    box = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
+    found = wins(arrange(_mixed("far"), box), 1, (2,))
     assert isinstance(found, Proved)
 
 
 def test_inputs_that_depend_on_each_other_are_solved_for() -> None:
-    square = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
-    given = ground(_mixed("high"), square)
+    square = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
+    given = arrange(_mixed("high"), square)
     found = wins(given, 1, (2,))
     assert isinstance(found, Witness)
     assert _holds(given, found, 1, (2,))
     # With x below 1/2 the sum reaches 5/4 only where y is above 3/4.
-    narrow = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 0.7)))
-    assert isinstance(wins(narrowed(given, narrow), 1, (2,)), Proved)
+    narrow = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 0.7)))
+    assert isinstance(wins(restricted(given, narrow), 1, (2,)), Proved)
 
 
 def test_a_point_is_a_domain_too() -> None:
     rules = _union_base(0.1)
-    given = ground(rules, Domain((Side("x", 0.3, 0.3),)))
+    given = arrange(rules, Domain((DomainSide("x", 0.3, 0.3),)))
     assert isinstance(wins(given, 1, (2, 3)), Witness)
     assert isinstance(wins(given, 3, (1, 2)), Proved)
 
@@ -175,14 +182,14 @@ def test_a_spent_budget_leaves_a_bracket() -> None:
     rules = random_base(0, 7, 4)
     ticks = iter(range(10**6))
     clock = Clock(2.0, now=lambda: float(next(ticks)))
-    found = wins(ground(rules, unit_domain(rules)), 1, _rivals(rules, 1), clock)
+    found = wins(arrange(rules, unit_domain(rules)), 1, _rivals(rules, 1), clock)
     assert isinstance(found, Bracket)
     assert "the budget was spent" in found.why
 
 
 def test_rules_that_ask_nothing_are_all_equal() -> None:
     both = (Rule((), "a"), Rule((), "b"))
-    given = ground(RuleBase("always", ("a", "b"), (), both), Domain(()))
+    given = arrange(RuleBase("always", ("a", "b"), (), both), Domain(()))
     assert isinstance(wins(given, 1, (2,)), Proved)
     assert isinstance(wins(given, 1, ()), Witness)
     assert isinstance(tie(given, 1, 2), Witness)
@@ -201,7 +208,7 @@ def test_an_end_of_the_domain_at_which_a_rule_does_not_fire_is_no_part() -> None
             for term, then in zip(terms, "ab", strict=True)
         ),
     )
-    given = ground(rules, Domain((Side("x", 0.0, 10.0),)))
+    given = arrange(rules, Domain((DomainSide("x", 0.0, 10.0),)))
     found = wins(given, 1, (2,))
     assert isinstance(found, Witness)
     assert 0.0 < found.region[0].low < 1e-300  # type: ignore[operator]

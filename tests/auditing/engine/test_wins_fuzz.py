@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
 from fuzzytree.auditing.engine.bounding import wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.duels import wins
@@ -42,7 +42,7 @@ def test_cells_boxes_and_rows_never_contradict_each_other(
             combinations=combinations,
         )
         box = unit_domain(base)
-        given = ground(base, box)
+        given = arrange(base, box)
         values = np.random.default_rng(seed).random((features, 20_000))
         answers = decide(base, values, with_strengths=False)
         for rule in range(1, rules + 1):

@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.arrangement import ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
 from fuzzytree.auditing.engine.cover import least_cover, uncovered
-from fuzzytree.auditing.engine.domain import Domain, Side, linear_form, span
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, linear_form, span
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
@@ -21,7 +21,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 
-BOX = Domain((Side("x", 0.0, 1.0),))
+BOX = Domain((DomainSide("x", 0.0, 1.0),))
 RAMP = Term("much", Points((0.0, 1.0), (0.0, 1.0)))
 
 
@@ -50,15 +50,15 @@ def test_an_input_that_is_taken_twice_counts_with_its_whole_weight(
 
 def test_a_rule_fires_where_a_multiple_of_an_input_is_limited() -> None:
     rules = _rules(Part("x", 2.0, 0.5))
-    box = Domain((*BOX.sides, Side("mix", 0.25, 0.625)))
-    found = wins(ground(rules, box), 1, ())
+    box = Domain((*BOX.sides, DomainSide("mix", 0.25, 0.625)))
+    found = wins(arrange(rules, box), 1, ())
     assert isinstance(found, Witness)
     assert 0.25 <= 2 * point_of(found.point)["x"] - 1 <= 0.625
 
 
 def test_what_is_asked_of_a_negative_multiple_is_turned_round() -> None:
     rules = _rules(Part("x", -4.0, 1.0))  # 4 - 4 x
-    given = ground(rules, Domain((*BOX.sides, Side("mix", 1.0, 3.0))))
+    given = arrange(rules, Domain((*BOX.sides, DomainSide("mix", 1.0, 3.0))))
     found = wins(given, 1, ())
     assert isinstance(found, Witness)
     assert strengths_at(given, point_of(found.point)) == [1]
@@ -66,8 +66,8 @@ def test_what_is_asked_of_a_negative_multiple_is_turned_round() -> None:
 
 
 def test_summands_that_cancel_leave_a_constant() -> None:
-    given = ground(_rules(Part("x", 2.0), Part("x", -2.0, 0.125)), BOX)  # 1/4
+    given = arrange(_rules(Part("x", 2.0), Part("x", -2.0, 0.125)), BOX)  # 1/4
     assert isinstance(uncovered(given), Proved)
     assert least_cover(given).high == 0.25
-    beyond = Domain((*BOX.sides, Side("mix", 0.5, 1.0)))
-    assert ground(given.rules, beyond).is_empty
+    beyond = Domain((*BOX.sides, DomainSide("mix", 0.5, 1.0)))
+    assert arrange(given.rules, beyond).is_empty

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.records import AuditSettings, Policy
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model.rulebase import (
@@ -121,7 +121,7 @@ def subject_of(
     return Subject(
         rules=rules,
         policy=Policy(semantics.conjunction, "strongest", semantics.uncovered),
-        domain=Domain(tuple(Side(name, *of) for name, of in ends.items())),
+        domain=Domain(tuple(DomainSide(name, *of) for name, of in ends.items())),
         settings=AuditSettings(),
         clock=clock or Clock(),
         tree=model if isinstance(model, FuzzyTree) else None,

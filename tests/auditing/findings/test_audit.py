@@ -15,7 +15,7 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree.api.verbs import audited_rows
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
@@ -26,7 +26,7 @@ from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variabl
 from fuzzytree.testing import random_system, random_tree
 from tests.cli.conftest import GRASPS, grip
 
-FAR = Domain((Side("force", 3.0, 5.0), Side("slip", 0.0, 1.0)))
+FAR = Domain((DomainSide("force", 3.0, 5.0), DomainSide("slip", 0.0, 1.0)))
 """Where the grip tree never reaches its first leaf."""
 
 
@@ -111,7 +111,7 @@ def test_the_same_audit_has_the_same_bytes() -> None:
 def test_an_unreachable_leaf_is_found_and_gone_where_it_is_reached() -> None:
     found = audit(grip(), domain=FAR, select=["FT101"])
     assert [one.rules for one in found.findings] == [(1,)]
-    wide = Domain((Side("force", 0.0, 5.0), Side("slip", 0.0, 1.0)))
+    wide = Domain((DomainSide("force", 0.0, 5.0), DomainSide("slip", 0.0, 1.0)))
     assert not audit(grip(), domain=wide, select=["FT101"]).findings
 
 
@@ -125,7 +125,7 @@ def test_answers_stand_in_the_order_of_their_codes_and_have_their_own_ids() -> N
 
 
 def test_an_id_says_what_a_rule_says_and_not_where_it_stands() -> None:
-    box = Domain((Side("x", 0.0, 2.0),))
+    box = Domain((DomainSide("x", 0.0, 2.0),))
     one = audit(steep(0, 1, 2), domain=box, select=["FT101"])
     other = audit(steep(2, 1, 0), domain=box, select=["FT101"])
     assert [a.rules for a in one.findings] == [(3,)]
@@ -236,7 +236,7 @@ def test_a_wrong_row_is_one_sentence(row: dict[str, float], message: str) -> Non
 @pytest.mark.parametrize("seed", [3, 5])
 def test_a_system_is_audited_as_a_view(seed: int) -> None:
     system = random_system(seed)
-    box = Domain(tuple(Side(name, 0.0, 1.0) for name in system.columns))
+    box = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in system.columns))
     found = audit(system, domain=box, select=["FT4", "FT5"])
     assert found.form == "system"
     assert digest_of(found) == found.digest

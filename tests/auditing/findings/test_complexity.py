@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.complexity import depth
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
@@ -77,7 +77,7 @@ def test_the_coverage_equals_a_dense_sum() -> None:
 
 
 def test_a_domain_of_one_point_has_no_index() -> None:
-    domain = Domain((Side("force", 1.0, 1.0),))
+    domain = Domain((DomainSide("force", 1.0, 1.0),))
     assert "index of Nauck" not in measures(RULES, domain)
 
 

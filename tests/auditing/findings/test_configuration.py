@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.baselines import (
     baseline_of,
@@ -120,7 +120,7 @@ def test_a_baseline_lies_beside_the_file_that_names_it(tmp_path: Path) -> None:
 
 def far() -> Audit:
     """Return an audit with one finding."""
-    box = Domain((Side("force", 3.0, 5.0), Side("slip", 0.0, 1.0)))
+    box = Domain((DomainSide("force", 3.0, 5.0), DomainSide("slip", 0.0, 1.0)))
     return audit(grip(), domain=box, select=["FT101"])
 
 

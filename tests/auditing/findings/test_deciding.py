@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 
-from fuzzytree.auditing.engine.arrangement import ground
+from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import _won as won
 from fuzzytree.auditing.findings.deciding import answers
@@ -48,7 +48,7 @@ def _asked(
     *rules: tuple[str, str], conjunction: str = "min", decision: str = "strongest"
 ) -> list[Answer]:
     base = _base(*rules, conjunction=conjunction)
-    box = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
+    box = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
     policy = Policy(conjunction, decision)  # type: ignore[arg-type]
     return [*answers(Subject(base, policy, box, AuditSettings(), Clock(30.0)))]
 
@@ -166,7 +166,7 @@ def test_where_a_place_in_the_list_may_decide_a_rule_is_no_error() -> None:
         (Clock(9.0), "rule 1 decides by its place in the list alone: "),
         (Clock(1.0, now=itertools.count().__next__), "rule 1 never wins: "),
     ):
-        given = ground(base, unit_domain(base))
+        given = arrange(base, unit_domain(base))
         found = won(_subject(base, clock), given, 1, Proved("never above rule 2"))
         assert found.sentence.startswith(says)
         assert (found.is_finding, found.severity) == (True, "warning")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.domain import Side, limited
+from fuzzytree.auditing.engine.domain import DomainSide, limited
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.contracts import Document
@@ -75,14 +75,14 @@ def asking(
     return RuleBase("asking", ("a",), (Variable("x", terms, "", low, high),), (rule,))
 
 
-def side(model: Document, **options: object) -> Side:
+def side(model: Document, **options: object) -> DomainSide:
     """Return the only side of a model's domain."""
     (found,) = domain_of(model, **options).sides  # type: ignore[arg-type]  # by name
     return found
 
 
 def test_the_declared_range_is_the_domain() -> None:
-    assert side(asking(SET, low=1.0, high=2.0)) == Side("x", 1.0, 2.0, "model")
+    assert side(asking(SET, low=1.0, high=2.0)) == DomainSide("x", 1.0, 2.0, "model")
 
 
 @pytest.mark.parametrize(
@@ -100,23 +100,25 @@ def test_the_declared_range_is_the_domain() -> None:
 def test_without_a_range_it_is_the_span_of_the_curves(
     shapes: list[Shape], low: float, high: float
 ) -> None:
-    assert side(asking(*shapes)) == Side("x", low, high, "curves")
+    assert side(asking(*shapes)) == DomainSide("x", low, high, "curves")
 
 
 def test_half_a_range_is_completed_by_the_curves() -> None:
-    assert side(asking(SET, low=-7.0)) == Side("x", -7.0, 13.0, "curves")
+    assert side(asking(SET, low=-7.0)) == DomainSide("x", -7.0, 13.0, "curves")
 
 
 def test_rows_give_their_smallest_and_largest_finite_value() -> None:
-    assert side(asking(SET), within="data", rows=ROWS) == Side("x", 1.0, 3.0, "data")
+    assert side(asking(SET), within="data", rows=ROWS) == DomainSide(
+        "x", 1.0, 3.0, "data"
+    )
 
 
 def test_spreads_are_counted_from_the_fitted_sets() -> None:
-    assert side(asking(SET), spreads=2.0) == Side("x", 3.0, 9.0, "spreads")
+    assert side(asking(SET), spreads=2.0) == DomainSide("x", 3.0, 9.0, "spreads")
 
 
 def test_spreads_are_counted_from_the_rows_where_there_are_no_sets() -> None:
-    assert side(asking(Band(high=1.0)), spreads=2.0, rows=ROWS) == Side(
+    assert side(asking(Band(high=1.0)), spreads=2.0, rows=ROWS) == DomainSide(
         "x", 0.0, 4.0, "spreads"
     )
 
@@ -129,8 +131,8 @@ def test_a_system_is_asked_on_its_ranges_and_curves() -> None:
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     assert domain_of(system).sides == (
-        Side("dirt", 2.0, 8.0, "curves"),
-        Side("load", 0.0, 3.0, "model"),
+        DomainSide("dirt", 2.0, 8.0, "curves"),
+        DomainSide("load", 0.0, 3.0, "model"),
     )
 
 
@@ -203,10 +205,10 @@ def test_all_inputs_without_limits_are_named_at_once() -> None:
 def test_an_input_on_which_nothing_depends_may_be_any_number(
     options: dict[str, object],
 ) -> None:
-    assert side(asking(), **options) == Side("x", 0.0, 1.0, "unused")
-    assert side(asking(Band()), **options) == Side("x", 0.0, 1.0, "unused")
+    assert side(asking(), **options) == DomainSide("x", 0.0, 1.0, "unused")
+    assert side(asking(Band()), **options) == DomainSide("x", 0.0, 1.0, "unused")
     far = side(asking(), row={"x": -7.0}, **options)
-    assert far == Side("x", -7.0, 1.0, "unused")
+    assert far == DomainSide("x", -7.0, 1.0, "unused")
     assert side(asking(), rows=ROWS, **options).origin != "unused"
 
 
@@ -250,11 +252,11 @@ def test_an_input_that_a_formula_may_name_needs_limits() -> None:
 
 def test_an_input_whose_limits_are_given_needs_no_others() -> None:
     box = domain_of(SUM, limited=["x"])
-    assert limited(box, {"x": (0.0, 1.0)}, SUM).sides == (Side("x", 0.0, 1.0),)
+    assert limited(box, {"x": (0.0, 1.0)}, SUM).sides == (DomainSide("x", 0.0, 1.0),)
 
 
 def test_rows_stand_in_where_nothing_is_declared() -> None:
-    assert side(SUM, rows=ROWS) == Side("x", 1.0, 3.0, "data")
+    assert side(SUM, rows=ROWS) == DomainSide("x", 1.0, 3.0, "data")
 
 
 @pytest.mark.parametrize(

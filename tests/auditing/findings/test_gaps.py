@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings.gaps import answers
 from fuzzytree.auditing.findings.records import Answer, AuditSettings, Policy
@@ -37,7 +37,7 @@ def _asked(
     )
     semantics = Semantics(uncovered=uncovered)
     base = RuleBase("b", ("a", "b"), (Variable("x", terms),), rules, semantics)
-    box = Domain((Side("x", 0.0, 4.0),))
+    box = Domain((DomainSide("x", 0.0, 4.0),))
     policy = Policy("min", "strongest", uncovered)
     subject = Subject(
         base, policy, box, AuditSettings(), Clock(30.0), rows=rows, is_whole=is_whole

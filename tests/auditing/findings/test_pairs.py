@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import answer_at
-from fuzzytree.auditing.engine.joint_maximum import Meeting
+from fuzzytree.auditing.engine.arrangement import prediction_at
+from fuzzytree.auditing.engine.joint_maximum import JointMaximum
 from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -344,7 +344,7 @@ def test_a_point_that_falls_short_of_the_highest_level_nearly_reaches_it(
 ) -> None:
     claims = (Claim("reaches", rules=(1, 2), level=claimed),)
     half = Bounds(Fraction(1, 2), Fraction(1, 2))
-    assert level_reached(Meeting(half, Witness((), claims))) == text
+    assert level_reached(JointMaximum(half, Witness((), claims))) == text
 
 
 @pytest.mark.parametrize(
@@ -515,9 +515,9 @@ def test_an_input_is_told_where_a_clause_matters(conjunction: Conjunction) -> No
     assert isinstance(one.state, Witness)
     point = point_of(one.state.point)
     shorter = replace(rules.rules[1], when=rules.rules[1].when[:1])
-    assert answer_at(rules, point).label == one.state.claims[0].label
+    assert prediction_at(rules, point).label == one.state.claims[0].label
     without = replace(rules, rules=(rules.rules[0], shorter))
-    assert answer_at(without, point).label == "hard"
+    assert prediction_at(without, point).label == "hard"
 
 
 def test_clauses_of_a_rule_that_never_fires_are_not_asked() -> None:

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Claim, Proved, Span, Witness, coordinates
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.rows import (
@@ -20,7 +20,7 @@ from fuzzytree.model.rulebase import Part, Variable
 from fuzzytree.numerics.oracle import decide
 from tests.auditing.findings.small_trees import subject_of, two_cuts
 
-BOX = Domain((Side("x", 0.0, 4.0), Side("y", 0.0, 1.0)))
+BOX = Domain((DomainSide("x", 0.0, 4.0), DomainSide("y", 0.0, 1.0)))
 ROWS = AuditRows("rows", np.array([[0.0, 1.0, np.nan], [0.0, 0.5, 0.0]]))
 
 
@@ -82,7 +82,7 @@ def test_without_a_complete_row_nothing_is_ranked() -> None:
 
 
 def test_a_fixed_input_does_not_count() -> None:
-    fixed = Domain((Side("x", 2.0, 2.0), Side("y", 0.0, 1.0)))
+    fixed = Domain((DomainSide("x", 2.0, 2.0), DomainSide("y", 0.0, 1.0)))
     spans = (Span("x", 3.0, 4.0), Span("y", 0.5, 1.0))
     point = {"x": Fraction(0), "y": Fraction(0)}
     assert box_distance(spans, point, fixed) == Fraction(1, 2)

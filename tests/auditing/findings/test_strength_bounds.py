@@ -11,7 +11,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.arrangement import ground
+from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
@@ -405,7 +405,7 @@ def test_where_rules_do_not_meet_nothing_is_claimed_of_the_upper_ones(
     seen = view(system, domain_of(system))
     assert seen.bounds is not None
     lower, upper = (
-        ground(one, seen.domain) for one in (seen.bounds.lower, seen.bounds.upper)
+        arrange(one, seen.domain) for one in (seen.bounds.lower, seen.bounds.upper)
     )
     found = StrengthBounds(lower, upper, seen.bounds).meet(
         1, 2, Fraction(1, 2), Clock()

@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings import support
 from fuzzytree.auditing.findings.domains import domain_of
@@ -240,7 +240,13 @@ def test_rows_exactly_at_an_end_a_level_and_a_margin_are_counted_exactly() -> No
 def test_points_are_drawn_within_the_domain_and_alike_for_a_seed() -> None:
     mix = Variable("mix", parts=(Part("force", 1.0), Part("slip", 1.0)))
     rules = replace(RULES, variables=(*RULES.variables, Variable("slip"), mix))
-    box = Domain((Side("force", 0.0, 1.0), Side("slip", 2.0, 2.0), Side("mix", 2.5, 9)))
+    box = Domain(
+        (
+            DomainSide("force", 0.0, 1.0),
+            DomainSide("slip", 2.0, 2.0),
+            DomainSide("mix", 2.5, 9),
+        )
+    )
     points = sample_points(rules, box, 400, 7)
     assert 150 < points.shape[1] < 250
     assert points[0].min() >= 0.5
@@ -268,7 +274,7 @@ def test_a_domain_that_no_point_meets_is_declined() -> None:
     mix = Variable("mix", parts=(Part("force", 1.0),))
     rules = replace(RULES, variables=(*RULES.variables, mix))
     subject = subject_of(rules)
-    box = Domain((*subject.domain.sides, Side("mix", 50.0, 60.0)))
+    box = Domain((*subject.domain.sides, DomainSide("mix", 50.0, 60.0)))
     found = asked(replace(subject, domain=box))["domain"]
     assert found.state == Declined(
         "FTD04", "no drawn point lies within the sides of the combinations"

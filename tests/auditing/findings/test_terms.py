@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, short
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
@@ -84,10 +84,10 @@ def test_a_term_that_is_hardly_reached_is_told_with_its_height() -> None:
 
 def test_a_step_at_an_open_lower_end_counts_from_above_only() -> None:
     spike = Term("spike", Points((0.0, 0.0), (1.0, 0.0)))
-    domain = Domain((Side("force", 0.0, 4.0),))
+    domain = Domain((DomainSide("force", 0.0, 4.0),))
     rules = base(LOW, HIGH, spike)
     assert not audit(rules, select=["FT401"], domain=domain).findings
-    opened = Domain((Side("force", 0.0, 4.0, is_open=True),))
+    opened = Domain((DomainSide("force", 0.0, 4.0, is_open=True),))
     (answer,) = audit(rules, select=["FT401"], domain=opened).findings
     assert "'spike' of 'force' is empty" in answer.sentence
 
@@ -218,7 +218,9 @@ def test_curves_of_very_many_pieces_are_declined() -> None:
 
 
 def test_a_domain_of_one_point_has_no_areas() -> None:
-    made = audit(CLEAN, select=["FT403"], domain=Domain((Side("force", 1.0, 1.0),)))
+    made = audit(
+        CLEAN, select=["FT403"], domain=Domain((DomainSide("force", 1.0, 1.0),))
+    )
     (answer,) = made.answers
     assert answer.sentence == (
         "0 pairs of terms share less than 0.75 of their area; "

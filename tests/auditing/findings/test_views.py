@@ -9,7 +9,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.system_conditions import MOST_QUESTIONS, MOST_WAYS
 from fuzzytree.auditing.findings.views import AuditView, view
 from fuzzytree.model.rulebase import sentence
@@ -43,7 +43,7 @@ from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
 
 BOX_INPUTS: Sequence[str] = ("a", "b")
-BOX = Domain((Side("a", 0.0, 4.0), Side("b", 0.0, 4.0)))
+BOX = Domain((DomainSide("a", 0.0, 4.0), DomainSide("b", 0.0, 4.0)))
 LOW: Curve = Trapezoid(None, 0.0, 1.0, 3.0)
 HIGH: Curve = Trapezoid(1.0, 3.0, 4.0, None)
 ROUNDING = Fraction(1, 2**48)  # of a few products and sums of degrees
@@ -263,7 +263,7 @@ def test_a_rule_that_cannot_fire_is_a_finding_and_leaves_nothing_open() -> None:
 
 
 def test_beyond_the_range_of_a_clipped_input_nothing_is_asked() -> None:
-    wide = Domain((Side("a", -9.0, 4.0), Side("b", 0.0, 9.0)))
+    wide = Domain((DomainSide("a", -9.0, 4.0), DomainSide("b", 0.0, 9.0)))
     found = view(system_of(block_of(A_LOW), clips=True), wide)
     assert [(side.low, side.high) for side in found.domain.sides] == [(0.0, 4.0)] * 2
     assert reasons(found)[0] == (

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.head import LIMITS, digest_of
@@ -194,7 +194,7 @@ def test_the_audit_of_a_tree_whose_leaves_are_not_all_reached_holds() -> None:
 
 def unit(tree: FuzzyTree) -> Domain:
     """Return -1 to 1 for each input of a tree."""
-    return Domain(tuple(Side(name, -1.0, 1.0) for name in tree.inputs))
+    return Domain(tuple(DomainSide(name, -1.0, 1.0) for name in tree.inputs))
 
 
 @pytest.mark.heavy

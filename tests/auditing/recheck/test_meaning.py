@@ -84,13 +84,15 @@ def test_a_rule_that_wins_at_a_random_point_is_never_called_dead() -> None:
 
 @pytest.mark.heavy
 def test_its_proofs_agree_with_the_engine() -> None:
-    from fuzzytree.auditing.engine.arrangement import ground
-    from fuzzytree.auditing.engine.domain import Side
+    from fuzzytree.auditing.engine.arrangement import arrange
+    from fuzzytree.auditing.engine.domain import DomainSide
     from fuzzytree.auditing.engine.duels import wins
 
     for seed in range(16):
         base = random_base(seed, 5, 2, kind="mixed", odd=0.3, shared=0.5)
-        given = ground(base, Domain(tuple(Side(n, 0.0, 1.0) for n in base.inputs)))
+        given = arrange(
+            base, Domain(tuple(DomainSide(n, 0.0, 1.0) for n in base.inputs))
+        )
         for number, mine in enumerate(wins_of(base)[1]):
             rule = base.rules[number]
             rivals = [k for k, r in enumerate(base.rules, 1) if r.then != rule.then]

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.records import SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
@@ -53,7 +53,7 @@ def audit_of(planted: Planted) -> tuple[Facts, bytes]:
     assert not isinstance(model, FuzzySystem)  # these have tests of their own
     options: Facts = {"select": [planted.code]}
     if isinstance(model, FuzzyTree):
-        sides = tuple(Side(name, 0.0, 1.0) for name in model.inputs)
+        sides = tuple(DomainSide(name, 0.0, 1.0) for name in model.inputs)
         options["domain"] = Domain(sides)
     if planted.code == "FT701":
         options["rows"] = AuditRows("rows.csv", ROWS.T)

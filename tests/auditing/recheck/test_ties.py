@@ -71,15 +71,17 @@ def test_rules_that_a_third_one_hides_do_not_tie() -> None:
 
 @pytest.mark.heavy
 def test_ties_agree_with_the_engine() -> None:
-    from fuzzytree.auditing.engine.arrangement import ground
-    from fuzzytree.auditing.engine.domain import Domain, Side
+    from fuzzytree.auditing.engine.arrangement import arrange
+    from fuzzytree.auditing.engine.domain import Domain, DomainSide
     from fuzzytree.auditing.engine.states import Proved, Witness
     from fuzzytree.auditing.engine.ties import tie
 
     seen = {True: 0, False: 0}
     for seed in range(12):
         base = random_base(seed, 5, 2, kind="points", odd=0.3, shared=0.7)
-        given = ground(base, Domain(tuple(Side(n, 0.0, 1.0) for n in base.inputs)))
+        given = arrange(
+            base, Domain(tuple(DomainSide(n, 0.0, 1.0) for n in base.inputs))
+        )
         for (one, other), is_tie in pairs_of(base).items():
             ours = tie(given, one + 1, other + 1)
             if isinstance(ours, Proved | Witness):
