@@ -16,13 +16,13 @@ from fuzzytree.model.rulebase import Part, Value, Variable, name_choice
 from fuzzytree.model.system import FuzzySystem
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
-"""Where a side comes from: the range in the model, the rows' smallest and largest
-value, k spreads around the fitted sets, the span of the curves, nowhere (no answer
+"""The origin of a side: the range in the model, the smallest and largest value of the
+rows, k spreads around the fitted sets, the span of the curves, none (no prediction
 depends on the variable), the user."""
 
 
 class DomainSide(Value, frozen=True):
-    """The values of one variable that are asked about: `low <= x <= high`.
+    """The values of one variable in the domain: `low <= x <= high`.
 
     Attributes:
         variable: An input; or a combination, which limits its inputs together.

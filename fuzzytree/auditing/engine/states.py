@@ -10,8 +10,8 @@ from typing import Literal
 from fuzzytree.model.rulebase import Value
 
 Representation = Literal["rules", "tree", "raw rules", "old", "new"]
-"""Which model a claim is about: the audited rules, the tree they come from, its raw
-rules, or one of two that are compared."""
+"""Which model a claim is about: the audited rules, their tree, its raw rules, or one of
+two models in a comparison."""
 
 ClaimKind = Literal[
     "strength", "beats", "ties", "below", "reaches", "decides", "degree", "covered"
@@ -36,7 +36,7 @@ class Coordinate(Value, frozen=True):
 
 
 class Claim(Value, frozen=True):
-    """What is said of a point, so that anyone can evaluate it again.
+    """A statement about a point, which anyone can evaluate again.
 
     Attributes:
         kind: `strength`: that of `rules[0]` is `level`. `beats`: each of `rules` is
@@ -44,9 +44,9 @@ class Claim(Value, frozen=True):
             strong, and strictly stronger than each of `rivals`. `below`: every one of
             `rules` has a strength below `level`, or of 0 where `level` is `0`.
             `reaches`: every one of `rules` has a strength of at least `level`.
-            `decides`: the model's answer is `label`; None is no class. `degree`: that
+            `decides`: the model predicts `label`; None is no class. `degree`: that
             of the term `term` of `variable` is `level`. `covered`: some rule fires.
-        of: The model that it is said of.
+        of: The model of the statement.
         rules: The numbers of rules, from 1.
         rivals: The numbers of others.
         level: A number as `p/q`.
@@ -74,23 +74,23 @@ class Span(Value, frozen=True):
 
 
 class Proved(Value, frozen=True, tag="PROVED", tag_field="state"):
-    """It holds on all of the domain.
+    """The claim is true on all of the domain.
 
     Attributes:
-        how: What was visited, with counts, in a sentence.
+        how: The work of the proof with its counts, in a sentence.
     """
 
     how: str
 
 
 class Witness(Value, frozen=True, tag="WITNESS", tag_field="state"):
-    """It happens: here.
+    """A point that shows a finding.
 
     Attributes:
         point: A value for every input.
-        claims: What holds there; each was evaluated in fractions.
-        region: A box around the point on which it holds too, with only the variables
-            that matter; empty if it was not looked for.
+        claims: What is true there; each was evaluated in fractions.
+        region: A box around the point on which the claims are true as well, with only
+            the variables that matter; empty if it was not computed.
     """
 
     point: tuple[Coordinate, ...]
@@ -99,16 +99,16 @@ class Witness(Value, frozen=True, tag="WITNESS", tag_field="state"):
 
 
 class Bracket(Value, frozen=True, tag="BRACKET", tag_field="state"):
-    """A number lies between two: the budget was spent before it was known better.
+    """Bounds of a number, which the time or the method did not make narrower.
 
     Attributes:
         of: What the number is, such as `the largest lead of rule 3`.
-        low: It is at least this.
-        high: It is at most this.
-        why: What stopped it, in a sentence.
-        point: Where one of the two ends is reached, if such a point is known: `low` of
-            what is largest somewhere, `high` of a distance.
-        claims: What holds at the point.
+        low: The lower bound.
+        high: The upper bound.
+        why: Why the bounds are not narrower, in a sentence.
+        point: Where one of the bounds is reached, if such a point is known: `low` of
+            a maximum, `high` of a distance.
+        claims: What is true at the point.
     """
 
     of: str
@@ -124,8 +124,8 @@ class Sampled(Value, frozen=True, tag="SAMPLED", tag_field="state"):
 
     Attributes:
         of: What was counted.
-        hits: In how many of the rows it holds.
-        rows: How many rows were looked at.
+        hits: The number of rows for which it is true.
+        rows: The number of rows in the sample.
         low: The lower end of the confidence interval of the share.
         high: The upper end.
         confidence: Of the interval, such as 0.95.
@@ -142,11 +142,11 @@ class Sampled(Value, frozen=True, tag="SAMPLED", tag_field="state"):
 
 
 class Declined(Value, frozen=True, tag="DECLINED", tag_field="state"):
-    """It was not decided.
+    """A question that was not decided.
 
     Attributes:
-        code: Why, as a code that `fuzzytree explain` tells about.
-        reason: Why, in a sentence.
+        code: The reason, as a code that `fuzzytree explain` explains.
+        reason: The reason, in a sentence.
     """
 
     code: str
@@ -211,7 +211,7 @@ def number_text(number: float) -> str:
 
 
 def percent(share: Fraction) -> str:
-    """Return a share as people read it.
+    """Return a share in percent, as sentences show it.
 
     Example:
         >>> percent(Fraction(1, 300))
@@ -221,7 +221,7 @@ def percent(share: Fraction) -> str:
 
 
 def answer_text(label: str | None) -> str:
-    """Return an answer as people read it.
+    """Return a predicted class as sentences show it.
 
     Example:
         >>> answer_text("a"), answer_text(None)
@@ -231,7 +231,7 @@ def answer_text(label: str | None) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as people read them.
+    """Return names as sentences show them.
 
     Example:
         >>> listed(["a", "b"]), listed([])
