@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from fuzzytree.checking.abilities import MEANINGS, Ability
+from fuzzytree.checking.abilities import MEANINGS, Ability, Outcome
 from fuzzytree.model.contracts import Format, Runtime
 from fuzzytree.model.options import OptionFacts
 from fuzzytree.report.text import aligned, counted
@@ -178,7 +178,7 @@ def detail_lines(
         yield found
         return
     if not is_verbose:
-        outcomes = [one.outcome for one in found]
+        outcomes: list[Outcome] = [one.outcome for one in found]
         yield f"{counted(len(found), 'kind')} of models; --verbose lists them"
         yield from aligned(
             (f"  {outcomes.count(name)}", name, MEANINGS[name])

@@ -37,7 +37,7 @@ def facts(call: Call, *words: str) -> Any:
     return json.loads(out)
 
 
-def test_a_finding_is_told_at_its_place_and_fails(call: Call) -> None:
+def test_a_finding_is_reported_at_its_place_and_fails(call: Call) -> None:
     code, out, err = call("audit", "grip.yaml", *FAR, "--verbose")
     assert code == 1
     lines = out.splitlines()
@@ -93,7 +93,7 @@ def test_nothing_found_is_exit_0(call: Call) -> None:
     assert out.startswith("nothing found; ")
 
 
-def test_what_is_no_finding_is_counted_and_told_one_by_one_by_all(call: Call) -> None:
+def test_what_is_no_finding_is_counted_and_listed_one_by_one_by_all(call: Call) -> None:
     _, out, _ = call("audit", "grip.yaml", "--select", "FT101", "--verbose")
     assert "; --all lists each\n" in out
     assert "answers that are no findings" not in out
@@ -105,10 +105,10 @@ def test_what_is_no_finding_is_counted_and_told_one_by_one_by_all(call: Call) ->
 def test_the_row_that_was_given_is_answered_without_being_a_finding(call: Call) -> None:
     words = ("--row", "force=1,slip=0.1", "--select", "FT204", "--quiet")
     _, out, _ = call("audit", "grip.yaml", *words)
-    _, mark, told = out.partition("the row of --row\n  FT204 WITNESS  ")
+    _, mark, said = out.partition("the row of --row\n  FT204 WITNESS  ")
     assert mark
-    assert told.startswith("the row is decided as '")
-    assert "\n  FT204 " in told.partition("\n\n")[0]
+    assert said.startswith("the row is decided as '")
+    assert "\n  FT204 " in said.partition("\n\n")[0]
 
 
 def test_quiet_says_nothing_unless_something_fails(call: Call) -> None:
@@ -165,7 +165,7 @@ def test_a_page_is_written_beside(call: Call) -> None:
     assert "FT101" in text
 
 
-def test_a_baseline_accepts_what_it_holds_and_tells_what_is_gone(call: Call) -> None:
+def test_a_baseline_accepts_its_findings_and_reports_what_is_gone(call: Call) -> None:
     assert call("audit", "grip.yaml", "--write-baseline", "known.json", *FAR)[0] == 0
     words = ("--baseline", "known.json", "--verbose")
     code, out, _ = call("audit", "grip.yaml", *words, *FAR)
@@ -324,12 +324,12 @@ def test_a_file_of_another_format_has_no_lines(call: Call) -> None:
     assert all(not one["places"] for one in json.loads(out)["answers"])
 
 
-def test_a_ctrl_c_keeps_what_is_answered_and_tells_the_rest() -> None:
-    told: list[str] = []
+def test_a_ctrl_c_keeps_what_is_answered_and_reports_the_rest() -> None:
+    said: list[str] = []
 
     def interrupt(text: str, _: float) -> None:
-        told.append(text)
-        if len(told) == 3:
+        said.append(text)
+        if len(said) == 3:
             signal.raise_signal(signal.SIGINT)
 
     found = ft.audit("grip.yaml", limits={"force": (3.0, 5.0)}, progress=interrupt)

@@ -19,7 +19,7 @@ from fuzzytree.model.rulebase import fingerprint
 from tests.cli.conftest import Call, grip
 
 ROOT = Path(__file__).resolve().parents[2]
-ASKED = ("audit", "grip.yaml", "--select", "FT501")
+SELECTED = ("audit", "grip.yaml", "--select", "FT501")
 
 
 @pytest.fixture(autouse=True)
@@ -37,9 +37,9 @@ def _results(folder: Path) -> None:
     (folder / "stability.json").write_text(stability.to_json(), "utf-8")
 
 
-def test_results_are_told_in_the_text_the_json_and_on_the_page(call: Call) -> None:
+def test_results_are_reported_in_the_text_the_json_and_on_the_page(call: Call) -> None:
     words = ("--results", "check.json", "--results", "stability.json")
-    code, out, _ = call(*ASKED, *words, "--page", "audit.html")
+    code, out, _ = call(*SELECTED, *words, "--page", "audit.html")
     assert code == 0
     assert (
         "\nresults  check.json: 1 of 2 comparisons and bounds disagrees\n"
@@ -54,17 +54,17 @@ def test_results_are_told_in_the_text_the_json_and_on_the_page(call: Call) -> No
         "the check&#x27;s file",
     ):
         assert part in page, part
-    found = json.loads(call(*ASKED, *words, "--json", "--quiet")[1])
+    found = json.loads(call(*SELECTED, *words, "--json", "--quiet")[1])
     schema = json.loads((ROOT / "schemas" / "audit.schema.json").read_text("utf-8"))
     jsonschema.Draft202012Validator(schema).validate(found)
-    told = [(r["verb"], r["parts"], r["wrong"]) for r in found["results"]]
-    assert told == [("check", 2, 1), ("stability", 2, 0)]
+    said = [(r["verb"], r["parts"], r["wrong"]) for r in found["results"]]
+    assert said == [("check", 2, 1), ("stability", 2, 0)]
     audit = ft.audit("grip.yaml", select=["FT501"], results=["check.json"])
     assert digest_of(audit) == audit.digest
 
 
 def test_a_page_without_results_has_no_place_for_them(call: Call) -> None:
-    call(*ASKED, "--page", "audit.html")
+    call(*SELECTED, "--page", "audit.html")
     page = Path("audit.html").read_text("utf-8")
     assert 'id="agreement"' not in page
     assert 'id="stability"' not in page
@@ -131,7 +131,7 @@ def test_a_result_of_something_else_is_one_sentence(
     call: Call, edit: dict[str, object], message: str
 ) -> None:
     changed(lambda facts: facts.update(edit))
-    assert call(*ASKED, "--results", "check.json") == (2, "", f"{message}\n")
+    assert call(*SELECTED, "--results", "check.json") == (2, "", f"{message}\n")
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_a_result_of_something_else_is_one_sentence(
 )
 def test_a_damaged_result_is_one_sentence(call: Call, content: bytes, why: str) -> None:
     Path("check.json").write_bytes(content)
-    code, out, err = call(*ASKED, "--results", "check.json")
+    code, out, err = call(*SELECTED, "--results", "check.json")
     assert (code, out) == (2, "")
     assert err.startswith(f"{LEAD}{why}")
     assert err.count("\n") == 1
@@ -154,7 +154,7 @@ def test_a_damaged_result_is_one_sentence(call: Call, content: bytes, why: str) 
 
 def test_two_results_of_one_verb_are_one_too_many(call: Call) -> None:
     words = ("--results", "check.json", "--results", "./check.json")
-    assert call(*ASKED, *words) == (
+    assert call(*SELECTED, *words) == (
         2,
         "",
         "./check.json: is a result of check, and so is check.json; give one of them\n",
@@ -164,4 +164,4 @@ def test_two_results_of_one_verb_are_one_too_many(call: Call) -> None:
 def test_a_page_does_not_overwrite_a_result(call: Call) -> None:
     words = ("--results", "check.json", "--page", "check.json")
     message = "check.json: cannot be written: it is read as well\n"
-    assert call(*ASKED, *words) == (2, "", message)
+    assert call(*SELECTED, *words) == (2, "", message)

@@ -19,7 +19,7 @@ from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Varia
 from fuzzytree.report.audit_page import page
 from tests.cli.conftest import Call
 
-ASKED = ("--select", "FT1,FT301,FT404")
+SELECTED = ("--select", "FT1,FT301,FT404")
 NAMES = {
     "markup": '"/><script>alert(1)</script>&',
     "commands": "b ::error::x%0A ::next",
@@ -54,12 +54,12 @@ def test_no_name_breaks_out_of_any_output(call: Call, name: str) -> None:
     for form in ("text", "github", "sarif", "json"):
         words = ["--output-format", form, "--output", "out"]
         words += ["--page", "page.html"] if form == "text" else []
-        code, _, err = call("audit", "odd.yaml", *ASKED, *words)
+        code, _, err = call("audit", "odd.yaml", *SELECTED, *words)
         assert code == 1
         out = Path("out").read_text("utf-8")
         if form in ("sarif", "json"):
-            told = json.dumps(json.loads(out), ensure_ascii=False)
-            assert "never wins" in told
+            said = json.dumps(json.loads(out), ensure_ascii=False)
+            assert "never wins" in said
             continue
         lines = [*out.split("\n"), *err.split("\n")]
         assert all(line.isprintable() for line in lines), lines
@@ -102,7 +102,7 @@ def test_a_model_and_a_table_may_be_pipes_for_each_is_read_once(call: Call) -> N
     assert "pipe.yaml" in Path("page.html").read_text("utf-8")
 
 
-def test_a_model_that_changes_meanwhile_is_told_as_it_was_read() -> None:
+def test_a_model_that_changes_meanwhile_is_reported_as_it_was_read() -> None:
     material = verbs.material("grip.yaml", data="grasps.csv")
     before = page(verbs.audit(material, select=["FT5"]), material.model)
     ft.save(hostile("new"), "grip.yaml")
@@ -161,24 +161,24 @@ def test_a_place_that_is_none_is_one_sentence(
     call: Call, words: tuple[str, ...], message: str
 ) -> None:
     before = {path: path.read_bytes() for path in Path().iterdir()}
-    assert call("audit", "grip.yaml", *ASKED, *words) == (2, "", f"{message}\n")
+    assert call("audit", "grip.yaml", *SELECTED, *words) == (2, "", f"{message}\n")
     assert {path: path.read_bytes() for path in Path().iterdir()} == before
 
 
 def test_a_dash_is_standard_output_for_the_findings_alone(call: Call) -> None:
-    plain = call("audit", "grip.yaml", *ASKED)
-    assert call("audit", "grip.yaml", *ASKED, "--output", "-") == plain
+    plain = call("audit", "grip.yaml", *SELECTED)
+    assert call("audit", "grip.yaml", *SELECTED, "--output", "-") == plain
     message = (
         "`-` is stdout, where the findings go; name a file\n"
         "  fuzzytree audit --help lists the options\n"
     )
     for option in ("--page", "--write-baseline"):
-        assert call("audit", "grip.yaml", *ASKED, option, "-") == (2, "", message)
+        assert call("audit", "grip.yaml", *SELECTED, option, "-") == (2, "", message)
     assert not Path("-").exists()
 
 
 @pytest.mark.parametrize("option", ["--output", "--page", "--write-baseline"])
-def test_a_full_disk_is_one_sentence_and_the_text_is_told(
+def test_a_full_disk_is_one_sentence_and_the_text_is_reported(
     call: Call, option: str
 ) -> None:
     words = ("--limits", "force=3:5", "--select", "FT101", "--quiet")

@@ -1,4 +1,4 @@
-"""`fuzzytree bench` measures, tells, writes, and survives what users do."""
+"""`fuzzytree bench` measures, reports, writes, and survives what users do."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_report_says_all_that_was_found() -> None:
     assert "\n".join(study_lines(made(), is_verbose=True)) + "\n" == expected
 
 
-def test_all_variants_are_told_when_asked_for() -> None:
+def test_all_variants_are_listed_on_request() -> None:
     lines = [*study_lines(made(), is_full=True)]
     assert any(line.startswith("  native, points 1e-01") for line in lines)
     assert not any("something beats" in line for line in lines)
@@ -117,7 +117,7 @@ def test_a_wanted_error_is_in_the_advice(call: Call) -> None:
     assert first.startswith("for an error of at most 0.0001, use native")
 
 
-def test_an_interrupted_study_is_told_and_exits_with_130(
+def test_an_interrupted_study_is_reported_and_exits_with_130(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = replace(made(), is_interrupted=True, is_complete=False)
@@ -236,7 +236,7 @@ def test_a_study_of_nothing_leaves_files_as_they_were(
     assert not Path("a.svg").exists()
 
 
-def test_a_place_that_cannot_be_written_is_told_before_any_work(
+def test_a_place_that_cannot_be_written_is_reported_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(verbs, "bench", None)

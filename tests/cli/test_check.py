@@ -63,7 +63,7 @@ def test_a_swapped_class_in_an_onnx_file_is_found(call: Call) -> None:
     assert "DISAGREES" in out
 
 
-def test_json_tells_the_same_facts(call: Call) -> None:
+def test_json_reports_the_same_facts(call: Call) -> None:
     code, out, _ = call("check", "grip.yaml", "--json", "--quiet", *NATIVE)
     facts = json.loads(out)
     assert code == 0
@@ -99,7 +99,7 @@ def test_comparisons_that_agree_are_counted_unless_all_are_wanted(call: Call) ->
     assert full.count(" calls ") == 2
 
 
-def test_a_disagreement_is_told_with_its_worst_row() -> None:
+def test_a_disagreement_is_reported_with_its_worst_row() -> None:
     wrong = Comparison(
         "x.onnx", "tree", "rows", 9, "DISAGREES", 2, 0.25, 0.0, "equal bits", 2, 0.5,
         ("probe 1: force 2.0: tree answers soft, x.onnx firm",),
@@ -130,7 +130,7 @@ def test_certificates_stand_behind_all_the_rest() -> None:
     )  # fmt: skip
     found = Agreement("grip", "0" * 64, (), probes=9, certificates=(mixed, tree))
     assert not found.ok
-    head, one, other, *told = list(agreement_lines(found, is_verbose=True))[2:]
+    head, one, other, *said = list(agreement_lines(found, is_verbose=True))[2:]
     flips = "1 (margin up to 3.1e-07), cover lost in 1, gained in 0"
     start = "compared with exact arithmetic  largest error  inside the band  "
     assert head == f"{start}{'flips':{len(flips)}}  verdict    certified"
@@ -138,7 +138,7 @@ def test_certificates_stand_behind_all_the_rest() -> None:
     assert one == f"{start}{flips}  agrees     {sentence}"
     start = "tree in mixed                   -              0 of 9 probes    "
     assert other == f"{start}{'1':{len(flips)}}  DISAGREES  no path can differ"
-    assert told == [
+    assert said == [
         "tree in mixed compared with exact arithmetic:",
         "  probe 1: force 2.0: exactly soft",
     ]
@@ -202,8 +202,8 @@ def test_a_program_is_run_only_if_it_is_the_one_that_is_written_now(
     code, out, _ = call(*words)
     assert code == 1
     assert "grip.py compared with a freshly written file:\n  line " in out
-    told = "grip.py: its answers: only --run-code runs a file with another text\n"
-    assert f"not examined: {told}" in out
+    said = "grip.py: its answers: only --run-code runs a file with another text\n"
+    assert f"not examined: {said}" in out
     code, out, _ = call(*words, "--run-code")
     assert code == 1
     assert "in 1 file only the rows agree, which --rows-only accepts (" in out

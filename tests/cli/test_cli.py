@@ -58,7 +58,7 @@ def test_every_verb_has_help(call: Call) -> None:
         assert out.startswith(f"Usage: fuzzytree {verb}")
 
 
-def test_the_version_is_told(call: Call) -> None:
+def test_the_version_is_reported(call: Call) -> None:
     code, out, _ = call("--version")
     assert code == 0
     assert out.startswith("fuzzytree ")
@@ -146,8 +146,8 @@ def test_a_bar_appears_only_on_a_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fuzzytree.cli.console._PATIENCE_S", 0.0)
-    with progress_bar() as tell:
-        tell("learning", 0.5)
+    with progress_bar() as show:
+        show("learning", 0.5)
     assert capsys.readouterr().err == ""
 
 
@@ -155,13 +155,13 @@ def test_a_bar_waits_half_a_second(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with progress_bar() as tell:
-        tell("learning", 0.5)
+    with progress_bar() as show:
+        show("learning", 0.5)
     assert capsys.readouterr().err == ""
     monkeypatch.setattr("fuzzytree.cli.console._PATIENCE_S", 0.0)
     monkeypatch.setenv("TERM", "xterm")
-    with progress_bar() as tell:
-        tell("learning [/b]\x1b[2J", 0.5)
+    with progress_bar() as show:
+        show("learning [/b]\x1b[2J", 0.5)
     assert r"learning [/b]\x1b[2J" in capsys.readouterr().err
 
 

@@ -1,4 +1,4 @@
-"""`fuzzytree convert` tells what it read, lost, wrote and proved."""
+"""`fuzzytree convert` reports what it read, lost, wrote and proved."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _here(folder: Path) -> None:
     (folder / "tipper.fll").write_bytes(TIPPER.read_bytes())
 
 
-def test_what_was_read_written_and_proved_is_told(call: Call) -> None:
+def test_what_was_read_written_and_proved_is_reported(call: Call) -> None:
     code, out, err = call("convert", "tipper.fll", "tipper.yaml")
     content = Path("tipper.yaml").read_bytes()
     digest = hashlib.sha256(content).hexdigest()
@@ -56,7 +56,7 @@ def test_the_next_command_works(call: Call) -> None:
     assert err == ""
 
 
-def test_json_tells_the_same_facts(call: Call) -> None:
+def test_json_reports_the_same_facts(call: Call) -> None:
     code, out, err = call("convert", "tipper.fll", "t.yaml", "--json", "--quiet")
     content = Path("t.yaml").read_bytes()
     assert (code, err) == (0, "")
@@ -104,9 +104,9 @@ def test_json_has_every_changed_name_and_the_text_every_changed_input(
     mixes = [one.name for one in tree.variables if one.parts]
     assert len(mixes) > 3
     assert {name: name.replace(" ", "_") for name in mixes}.items() <= names.items()
-    (told,) = (line for line in err.splitlines() if "names were changed" in line)
-    assert all(f"{name!r} is {names[name]}" in told for name in mixes)
-    assert told.endswith(f", and {len(names) - max(12, len(mixes))} more")
+    (said,) = (line for line in err.splitlines() if "names were changed" in line)
+    assert all(f"{name!r} is {names[name]}" in said for name in mixes)
+    assert said.endswith(f", and {len(names) - max(12, len(mixes))} more")
 
 
 def test_a_tree_goes_through_a_format_of_others_and_back(call: Call) -> None:
@@ -375,7 +375,7 @@ def test_a_loss_of_reading_is_refused_with_all_losses(
     assert (code, facts["file"], len(facts["read"]["losses"])) == (1, None, 2)
 
 
-def test_losses_that_are_allowed_are_told(
+def test_losses_that_are_allowed_are_reported(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _lossy(monkeypatch, on_read=False, on_write=True)
@@ -409,7 +409,7 @@ def test_a_file_with_losses_is_run_shown_and_checked_only_if_allowed(
 # --- in Python
 
 
-def test_a_conversion_in_python_tells_the_same() -> None:
+def test_a_conversion_in_python_reports_the_same() -> None:
     found = ft.convert("tipper.fll", ".yaml")
     assert isinstance(found.model, FuzzySystem)
     assert (found.source, found.read_as, found.to) == ("tipper.fll", "fll", "yaml")
@@ -485,7 +485,7 @@ def test_a_system_answers_the_same_in_python_and_on_the_command_line(
     assert str(found).startswith("3 rows: ")
 
 
-def test_why_tells_the_rules_of_a_system_with_their_degrees(call: Call) -> None:
+def test_why_reports_the_rules_of_a_system_with_their_degrees(call: Call) -> None:
     Path("meals.csv").write_text("service,food\n5,0\n", "utf-8")
     code, out, _ = call("run", "tipper.fll", "meals.csv", "--why", "--quiet")
     assert code == 0

@@ -33,7 +33,7 @@ def test_a_table_without_rows_is_refused(call: Call, words: tuple[str, ...]) -> 
 
 
 @verbs
-def test_the_delimiter_can_be_told_where_a_message_asks_for_it(
+def test_the_delimiter_can_be_reported_where_a_message_names_it(
     call: Call, words: tuple[str, ...]
 ) -> None:
     Path("odd.csv").write_text('slip;force;"a";b,c\n0;1.5;x;y\n', "utf-8")

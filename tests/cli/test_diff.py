@@ -1,4 +1,4 @@
-"""`fuzzytree diff` tells what changed, and exits with 1 if someone would notice."""
+"""`fuzzytree diff` reports changes, and exits with 1 if a decision changes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_a_tree_and_its_rules_are_proved_equal(call: Call) -> None:
     assert err == ""
 
 
-def test_rules_in_another_order_are_told_and_break_nothing(call: Call) -> None:
+def test_rules_in_another_order_are_reported_and_break_nothing(call: Call) -> None:
     code, out, _ = call("diff", "rules.yaml", "turned.yaml", "--verbose")
     assert code == 0, out
     assert "  PROVED   both models decide alike everywhere on the domain" in out

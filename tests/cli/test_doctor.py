@@ -1,4 +1,4 @@
-"""`fuzzytree formats` and `fuzzytree doctor` tell what is there."""
+"""`fuzzytree formats` and `fuzzytree doctor` list what is installed."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_every_format_and_runtime_is_listed(call: Call) -> None:
             assert f"  {name}: {limit}" in out.splitlines()
 
 
-def test_formats_are_told_to_programs(call: Call) -> None:
+def test_formats_have_the_facts_as_json(call: Call) -> None:
     facts = json.loads(call("formats", "--json")[1])
     assert [one["name"] for one in facts["formats"]] == [*TABLE]
     assert all(one["is_installed"] for one in facts["runtimes"])
@@ -80,7 +80,7 @@ def test_a_missing_extra_is_marked(call: Call, monkeypatch: pytest.MonkeyPatch) 
     assert "onnx (not installed)" in call("formats")[1]
 
 
-def test_the_doctor_tells_versions_and_tries_everything(call: Call) -> None:
+def test_the_doctor_reports_versions_and_tries_everything(call: Call) -> None:
     code, out, err = call("doctor")
     assert (code, err) == (0, "")
     said = "self-test passed: learning, writing, reading and running agree"
@@ -90,7 +90,7 @@ def test_the_doctor_tells_versions_and_tries_everything(call: Call) -> None:
     assert "selenium" in call("doctor", "--verbose")[1]
 
 
-def test_the_doctor_tells_how_to_install_what_is_missing(
+def test_the_doctor_reports_how_to_install_what_is_missing(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _without(monkeypatch, "onnxruntime")

@@ -1,4 +1,4 @@
-"""`fuzzytree explain` tells what a code means, and which codes there are."""
+"""`fuzzytree explain` explains codes and lists them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_an_unknown_code_is_one_sentence(call: Call) -> None:
     assert "(did you mean 'FT101'?)" in err
 
 
-def test_a_long_word_is_not_told_whole(call: Call) -> None:
+def test_a_long_word_is_not_printed_whole(call: Call) -> None:
     code, out, err = call("explain", "x" * 5000)
     assert (code, out) == (2, "")
     assert len(err) < 300

@@ -24,7 +24,7 @@ def _here(folder: Path) -> None:
     pass
 
 
-def test_size_and_hash_of_the_file_are_told(call: Call) -> None:
+def test_size_and_hash_of_the_file_are_reported(call: Call) -> None:
     code, out, err = call("export", "grip.yaml", "-o", "new.onnx")
     content = Path("new.onnx").read_bytes()
     digest = hashlib.sha256(content).hexdigest()
@@ -37,7 +37,7 @@ def test_size_and_hash_of_the_file_are_told(call: Call) -> None:
     )
 
 
-def test_json_tells_the_same_facts(call: Call) -> None:
+def test_json_reports_the_same_facts(call: Call) -> None:
     code, out, err = call("export", "grip.yaml", "-o", "new.onnx", "--json", "--quiet")
     content = Path("new.onnx").read_bytes()
     assert (code, err) == (0, "")
@@ -139,7 +139,7 @@ def test_rules_are_made_of_a_tree(
     assert (rules.kind, rules.semantics.conjunction) == (kind, conjunction)
 
 
-def test_a_tree_stays_a_tree_unless_told_otherwise(call: Call) -> None:
+def test_a_tree_stays_a_tree_unless_an_option_says_otherwise(call: Call) -> None:
     assert call("export", "grip.yaml", "-o", "new.yaml", "--as", "tree")[0] == 0
     assert ft.load("new.yaml") == grip()
 
@@ -228,7 +228,7 @@ def test_a_loss_is_refused_and_the_option_is_named(call: Call) -> None:
     assert not Path("x.onnx").exists()
 
 
-def test_a_loss_that_is_allowed_is_told(call: Call) -> None:
+def test_a_loss_that_is_allowed_is_reported(call: Call) -> None:
     ft.save(_narrow(), "narrow.yaml")
     words = ("export", "narrow.yaml", "-o", "x.onnx", "--dtype", "float32")
     code, out, err = call(*words, "--allow-loss", "--json")

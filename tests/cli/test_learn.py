@@ -41,7 +41,7 @@ def _refused(call: Call, text: str, *words: str) -> str:
     return err
 
 
-def test_five_lines_tell_what_happened(call: Call) -> None:
+def test_five_lines_report_what_happened(call: Call) -> None:
     code, out, err = call("learn", "few.csv", "--target", "grip", "-o", "few.yaml")
     assert (code, out) == (0, "")
     assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
@@ -57,7 +57,7 @@ def test_five_lines_tell_what_happened(call: Call) -> None:
     assert tree.name == "few"
 
 
-def test_what_was_left_out_is_told(call: Call) -> None:
+def test_what_was_left_out_is_reported(call: Call) -> None:
     lines = [f"{k},7,{'soft' if k < 6 else 'firm'}" for k in range(12)]
     text = "\n".join(["a,same,grip", *lines, "NA,7,soft", "3,7,", ""])
     Path("t.csv").write_text(text, "utf-8")
@@ -74,7 +74,7 @@ def test_what_was_left_out_is_told(call: Call) -> None:
     )
 
 
-def test_a_sample_is_told_where_not_all_rows_are_kept(call: Call) -> None:
+def test_a_sample_is_reported_where_not_all_rows_are_kept(call: Call) -> None:
     words = ("learn", "few.csv", "--target", "grip", "-o", "few.yaml", "--no-test")
     err = call(*words, "--rows-per-class", "4")[2]
     # Rows that are powers of two apart are kept together or not at all.
@@ -126,7 +126,7 @@ def test_a_continuous_target_is_refused(call: Call) -> None:
     )
 
 
-def test_json_tells_the_same_facts(call: Call) -> None:
+def test_json_reports_the_same_facts(call: Call) -> None:
     code, out, err = call(
         "learn", WINE, "--target", "cultivar", "-o", "wine.yaml", "--json", "--quiet"
     )

@@ -17,14 +17,14 @@ import json, os, sys
 import fuzzytree.cli, numpy
 assert not [name for name in {names!r} if name in sys.modules]
 for words in {lines!r}:
-    kept, told = os.pipe()
+    kept, pipe = os.pipe()
     if not os.fork():
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         code = fuzzytree.cli.main(words)
         found = [name for name in {names!r} if name in sys.modules]
-        os.write(told, json.dumps([code, *found]).encode())
+        os.write(pipe, json.dumps([code, *found]).encode())
         os._exit(0)
-    os.close(told)
+    os.close(pipe)
     os.wait()
     print(os.read(kept, 4096).decode())
     os.close(kept)

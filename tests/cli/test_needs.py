@@ -1,4 +1,4 @@
-"""`fuzzytree needs` tells what a model needs, and writes what is left."""
+"""`fuzzytree needs` reports what a model needs, and writes the simplified model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _here(folder: Path) -> None:
     pass
 
 
-def test_a_tree_tells_its_inputs_its_proof_and_its_sizes(call: Call) -> None:
+def test_a_tree_reports_its_inputs_its_proof_and_its_sizes(call: Call) -> None:
     words = ("needs", "grip.yaml", "--data", "grasps.csv")
     code, out, err = call(*words, "--verbose")
     assert (code, err) == (0, "")
@@ -84,7 +84,7 @@ def test_what_is_dropped_on_request_is_said(call: Call) -> None:
     assert err == "wrote    less.yaml predicts some rows differently from wide.yaml\n"
 
 
-def test_json_tells_the_same_facts(call: Call) -> None:
+def test_json_reports_the_same_facts(call: Call) -> None:
     code, out, err = call("needs", "grip.yaml", "--json", "--time", "0.2")
     facts = json.loads(out)
     assert (code, err) == (0, "")
@@ -163,7 +163,7 @@ def test_what_cannot_be_done_is_one_sentence(
     assert call(*words) == (2, "", message)
 
 
-def test_without_onnx_the_rest_is_told(
+def test_without_onnx_the_rest_is_reported(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from fuzzytree.errors import MissingExtraError

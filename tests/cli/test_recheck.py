@@ -24,7 +24,7 @@ def audit(call: Call) -> dict[str, object]:
     return facts
 
 
-def test_an_audit_that_holds_is_told_with_what_was_checked(
+def test_an_audit_that_is_right_is_reported_with_what_was_checked(
     call: Call, audit: dict[str, object]
 ) -> None:
     code, out, err = call("recheck", "audit.json", "grip.yaml")

@@ -36,7 +36,7 @@ def test_rows_are_answered_on_stdout_and_counted_on_stderr(
     assert call("run", model, "grasps.csv") == (0, ANSWERS, TALLY)
 
 
-def test_an_onnx_file_answers_like_the_tree_but_tells_no_ties(call: Call) -> None:
+def test_an_onnx_file_answers_like_the_tree_but_reports_no_ties(call: Call) -> None:
     tally = TALLY.replace(
         "0 rows decided by the order of the rules", "ties: not reported by this file"
     )
@@ -83,7 +83,7 @@ def test_no_rows_give_a_head_line(call: Call) -> None:
     assert call("run", "grip.yaml", "none.csv")[:2] == (0, "class,rule,status\n")
 
 
-def test_strengths_are_told_for_each_class(call: Call) -> None:
+def test_strengths_are_reported_for_each_class(call: Call) -> None:
     out = call("run", "grip.yaml", "grasps.csv", "--strengths", "class")[1]
     assert out.splitlines() == [
         "class,rule,status,strength of class firm,strength of class loose,"
@@ -95,7 +95,7 @@ def test_strengths_are_told_for_each_class(call: Call) -> None:
     ]
 
 
-def test_strengths_are_told_for_each_rule(call: Call) -> None:
+def test_strengths_are_reported_for_each_rule(call: Call) -> None:
     out = call("run", "rules.yaml", "grasps.csv", "--strengths", "rule")[1]
     assert out.splitlines()[:2] == [
         "class,rule,status,strength of rule 1,strength of rule 2,strength of rule 3",
@@ -103,7 +103,7 @@ def test_strengths_are_told_for_each_rule(call: Call) -> None:
     ]
 
 
-def test_a_file_without_strengths_cannot_tell_them(call: Call) -> None:
+def test_a_file_without_strengths_cannot_report_them(call: Call) -> None:
     code, _, err = call("run", "grip.onnx", "grasps.csv", "--strengths", "class")
     assert code == 2
     assert err == (
@@ -113,7 +113,7 @@ def test_a_file_without_strengths_cannot_tell_them(call: Call) -> None:
     )
 
 
-def test_why_tells_the_rule_and_its_degrees(call: Call) -> None:
+def test_why_reports_the_rule_and_its_degrees(call: Call) -> None:
     out = call("run", "grip.yaml", "grasps.csv", "--why")[1]
     assert out.splitlines() == [
         "class,rule,status,why",

@@ -1,4 +1,4 @@
-"""`fuzzytree show` draws a tree and tells its rules."""
+"""`fuzzytree show` draws a tree and prints its rules."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_rules_are_numbered_sentences(call: Call) -> None:
     assert call("show", "rules.yaml") == (0, head + RULES, "")
 
 
-def test_json_tells_the_same_facts(call: Call) -> None:
+def test_json_reports_the_same_facts(call: Call) -> None:
     facts = json.loads(call("show", "grip.yaml", "--json")[1])
     assert facts["representation"] == "tree"
     assert facts["fingerprint"] == fingerprint(grip())
@@ -74,7 +74,7 @@ def test_json_tells_the_same_facts(call: Call) -> None:
     assert facts["model"]["nodes"][0]["cuts"] == [2.0]
 
 
-def test_an_onnx_file_tells_what_it_says_about_itself(call: Call) -> None:
+def test_an_onnx_file_reports_what_it_says_about_itself(call: Call) -> None:
     code, out, _ = call("show", "grip.onnx")
     assert code == 0
     assert out.splitlines()[:5] == [
@@ -132,7 +132,7 @@ def test_every_leaf_and_rule_of_a_tree_is_shown(seed: int) -> None:
         ),
     ],
 )
-def test_a_curve_is_told_in_words(shape: Shape, text: str) -> None:
+def test_a_curve_is_described_in_words(shape: Shape, text: str) -> None:
     assert shape_text(shape) == text
 
 

@@ -1,4 +1,4 @@
-"""`fuzzytree stability` tells what holds, and exits with 1 if something does not."""
+"""`fuzzytree stability` reports each check, and exits with 1 if one fails."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_bulging_curve_fails(call: Call) -> None:
     assert err == ""
 
 
-def test_json_tells_the_same_facts(call: Call) -> None:
+def test_json_reports_the_same_facts(call: Call) -> None:
     words = ("stability", "rules.yaml", "--json", "--quiet", "--only", "N3", *NATIVE)
     code, out, err = call(*words)
     facts = json.loads(out)

@@ -70,11 +70,11 @@ def shown() -> str:
     return "\n".join(audit_lines(every_state(), LINES))
 
 
-def test_an_audit_is_told_as_it_is() -> None:
+def test_an_audit_is_printed_as_it_is() -> None:
     assert shown().partition("this audit does not establish")[0] == WHOLE
 
 
-def test_what_is_open_is_told_and_the_rest_counted_unless_all_are_wanted() -> None:
+def test_what_is_open_is_reported_and_the_rest_counted_unless_all_are_wanted() -> None:
     audit = every_state()
     open_one = replace(audit.answers[2], is_finding=False)
     answers = (*audit.answers[:2], open_one, audit.answers[4], audit.answers[4])
@@ -116,7 +116,7 @@ def test_the_gravest_finding_comes_first() -> None:
     assert places == sorted(places)
 
 
-def test_the_panel_is_told_whole() -> None:
+def test_the_panel_is_printed_whole() -> None:
     panel = shown().partition("this audit does not establish\n")[2]
     assert panel.replace("\n  ", " ").splitlines() == [f"- {text}" for text in LIMITS]
 

@@ -111,7 +111,7 @@ def test_an_audit_that_found_nothing_so_far_does_not_look_calm() -> None:
     assert 'class="said calm"' not in content
 
 
-def test_an_audit_that_was_cut_short_says_so_and_what_was_not_asked() -> None:
+def test_an_audit_that_was_cut_short_says_so_and_what_was_not_examined() -> None:
     unasked = ("FT501 complexity: not asked: the budget of 1 s is spent",)
     text = shown(is_complete=False, unasked=unasked).text
     assert "The audit was cut short by its budget: 10 questions examined" in text
@@ -176,7 +176,7 @@ def test_every_question_and_every_limit_is_on_the_page() -> None:
         assert limit in text
 
 
-def test_the_page_tells_how_to_repeat_the_audit() -> None:
+def test_the_page_reports_how_to_repeat_the_audit() -> None:
     audit = audit_of(rule_base())
     text = Outline(page(audit, rule_base())).text
     for said in (
@@ -199,7 +199,7 @@ def test_the_rules_say_how_often_they_fired_and_link_to_their_findings() -> None
     assert "rule-4" in found.ids
 
 
-def test_what_else_is_known_is_told_with_its_numbers() -> None:
+def test_what_else_is_known_is_reported_with_its_numbers() -> None:
     size = Answer(
         "FT501",
         "the rule base",
@@ -256,7 +256,7 @@ def test_sentences_places_and_ids_of_a_hostile_audit_do_not_become_markup() -> N
     assert len(set(found.ids)) == len(found.ids)
 
 
-def test_a_long_name_is_cut_and_its_length_told() -> None:
+def test_a_long_name_is_cut_and_its_length_is_written() -> None:
     rules = rule_base("p" * 5000)
     content = page(audit_of(rules), rules, rows=rows_of(rules))
     assert "p" * 401 not in content
@@ -297,7 +297,7 @@ def test_a_tree_is_drawn_with_the_rows_that_pass() -> None:
     assert "rows by class: 29" in text
 
 
-def test_a_tree_of_many_leaves_is_told_as_an_outline() -> None:
+def test_a_tree_of_many_leaves_is_printed_as_an_outline() -> None:
     tree = random_tree(3, leaves=130)
     text = Outline(page(audit_of(rule_base(), ()), tree)).text
     assert "A picture shows at most 120 leaves, and this tree has 130" in text
@@ -375,7 +375,7 @@ def test_a_code_of_two_severities_has_two_groups_and_no_id_twice() -> None:
     assert len(set(found.ids)) == len(found.ids)
 
 
-def test_what_was_not_asked_is_gathered_by_its_reason() -> None:
+def test_what_was_not_examined_is_gathered_by_its_reason() -> None:
     unasked = ("FT102 marginal rule: left out", "FT103 redundant rule: left out")
     assert "Not examined FT102, FT103: left out" in shown(unasked=unasked).text
 
@@ -403,17 +403,17 @@ def test_a_page_of_many_findings_is_bounded() -> None:
     assert large < small + 500_000 < 3_000_000
 
 
-def test_the_weights_of_a_systems_rules_are_told() -> None:
+def test_the_weights_of_a_systems_rules_are_reported() -> None:
     system = random_system(3)
     blocks = [
         replace(one, rules=tuple(replace(rule, weight=0.25) for rule in one.rules))
         for one in system.blocks
     ]
     audit = audit_of(rule_base(), (), form="system")
-    told = "The strengths of these are multiplied by their weights: rule 1 by 0.25"
+    said = "The strengths of these are multiplied by their weights: rule 1 by 0.25"
     plain, weighted = (
         Outline(page(audit, one)).text
         for one in (system, replace(system, blocks=tuple(blocks)))
     )
-    assert told in weighted
-    assert told not in plain
+    assert said in weighted
+    assert said not in plain

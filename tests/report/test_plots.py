@@ -55,14 +55,14 @@ def picture() -> Figure:
 
 def large(count: int) -> Study:
     chance = random.Random(1)
-    asked: tuple[Question, ...] = ("tree", "relative rules", "raw rules")
+    forms: tuple[Question, ...] = ("tree", "relative rules", "raw rules")
     kinds: tuple[Kind, ...] = ("runtime", "variant", "peer")
     points = [
         point(
             f"candidate {number}",
             10.0 ** chance.uniform(4, 8),
             error(10.0 ** chance.uniform(-15, -1), flips=chance.choice((0, 0, 1, 9))),
-            question=asked[number % 3],
+            question=forms[number % 3],
             kind=kinds[number // 3 % 3],
         )
         for number in range(count)

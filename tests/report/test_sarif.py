@@ -53,7 +53,7 @@ def test_without_a_place_it_is_the_file() -> None:
     ]
 
 
-def test_a_baseline_tells_new_from_known_from_gone() -> None:
+def test_a_baseline_distinguishes_new_known_and_gone() -> None:
     known = {"FT301-00000003": "a gap", "FT401-00000009": "an empty term"}
     results = run_of(sarif(every_state(), known))["results"]
     states = [(one["ruleId"], one["baselineState"]) for one in results]
@@ -67,7 +67,7 @@ def test_a_baseline_tells_new_from_known_from_gone() -> None:
     assert "baselineState" not in run_of(sarif(every_state()))["results"][0]
 
 
-def test_what_was_not_asked_is_told_and_the_run_did_not_succeed() -> None:
+def test_what_was_not_examined_is_reported_and_the_run_did_not_succeed() -> None:
     (invocation,) = run_of(sarif(every_state()))["invocations"]
     assert invocation["executionSuccessful"] is False
     notes = [n["message"]["text"] for n in invocation["toolExecutionNotifications"]]
