@@ -6,6 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import msgspec
+
 from fuzzytree.auditing.engine.states import (  # for other reports too
     counted as counted,
 )
@@ -97,8 +99,9 @@ def rule_facts(model: FuzzyTree | RuleBase) -> list[dict[str, object]]:
 
 
 def onnx_facts(model: OnnxModel) -> dict[str, object]:
-    """Return what an ONNX file says about itself."""
-    return {field: getattr(model, field) for field in Facts.__struct_fields__}
+    """Return what an ONNX file says about itself, by the names of the JSON."""
+    fields = msgspec.structs.fields(Facts)
+    return {one.encode_name: getattr(model, one.name) for one in fields}
 
 
 def fact_lines(facts: Mapping[str, object]) -> list[str]:
@@ -113,7 +116,8 @@ def fact_lines(facts: Mapping[str, object]) -> list[str]:
         elif isinstance(value, tuple):
             rows.append((name, ", ".join(map(str, value))))
         else:
-            rows.append((name, str(value)))
+            shown = "representation" if name == "carrier" else name
+            rows.append((shown, str(value)))
     return aligned(rows)
 
 

@@ -78,13 +78,14 @@ def test_an_onnx_file_reports_what_it_says_about_itself(call: Call) -> None:
     code, out, _ = call("show", "grip.onnx")
     assert code == 0
     assert out.splitlines()[:5] == [
-        "name         grip",
-        "representation      tree",
-        "kind         descent",
-        "dtype        float64",
-        f"fingerprint  {fingerprint(grip())}",
+        "name            grip",
+        "representation  tree",
+        "kind            descent",
+        "dtype           float64",
+        f"fingerprint     {fingerprint(grip())}",
     ]
     facts = json.loads(call("show", "grip.onnx", "--json")[1])
+    assert facts["carrier"] == "tree"
     assert facts["classes"] == ["firm", "loose", "soft"]
 
 
