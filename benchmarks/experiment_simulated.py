@@ -8,10 +8,10 @@ from types import MappingProxyType
 import msgspec
 import numpy as np
 from experiment_splits import Split
+from experiment_tables import EFFECTS
 from experiment_tasks import Task
 
 from fuzzytree.learning import Settings
-from fuzzytree.tactile.recognition.paper_tables import EFFECTS
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER, press
 from fuzzytree.tactile.simulation.physics import Settings as Physics

@@ -20,7 +20,6 @@ from fuzzytree.tactile.features import costs
 from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.names import FEATURES, PAPER
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
-from fuzzytree.tactile.runtimes.images import features_of_images
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 if TYPE_CHECKING:
@@ -89,7 +88,6 @@ def raw_then_binomial(frames: Cells) -> FloatArray:
 
 WAYS: dict[str, Callable[[Cells], FloatArray]] = {
     "raw then binomial": raw_then_binomial,
-    "images": lambda frames: features_of_images(frames / 255.0, PAPER).values,
     "frames": lambda frames: features_of(SENSOR, frames, PAPER).values,
 }
 

@@ -40,9 +40,6 @@ _BLOCK = 2**15  # points that are computed at once: they stay in the cache
 Real = npt.NDArray[np.integer | np.floating]
 """What frames may hold."""
 
-Floating = npt.NDArray[np.float64] | npt.NDArray[np.float32]
-"""What interpolated frames hold."""
-
 
 class Weights(NamedTuple):
     """How much the four cells around a point weigh, for each phase.
@@ -84,7 +81,6 @@ def interpolated(
     times: int,
     *,
     dtype: npt.DTypeLike = np.float64,
-    out: Floating | None = None,
 ) -> npt.NDArray[Any]:
     """Return frames of `times` as many points as cells on each side.
 
@@ -100,15 +96,14 @@ def interpolated(
     Args:
         cells: Whole or finite numbers of shape (..., rows, columns).
         times: Points for a cell on each side, at least 1.
-        dtype: float64 or float32, of what comes back; that of `out` if it is given.
-        out: Where to write, of shape (..., times rows, times columns).
+        dtype: float64 or float32, of the result.
 
     Returns:
-        Shape (..., times rows, times columns); `out` if it is given.
+        Shape (..., times rows, times columns).
 
     Raises:
         TypeError: If `times` is no whole number.
-        ValueError: If `times`, `dtype` or `out` cannot be.
+        ValueError: If `times` or `dtype` is out of range.
         TableError: If there is no cell, a number is not finite, or a frame would have
             more than `MOST_POINTS` points.
 
@@ -117,17 +112,12 @@ def interpolated(
         >>> found[1:5, 1:3].round(1).tolist()
         [[100.0, 83.3], [73.3, 56.0], [46.7, 40.0], [20.0, 16.7]]
     """
-    kind = np.dtype(dtype if out is None else out.dtype)
+    kind = np.dtype(dtype)
     if kind.name not in ("float64", "float32"):
         raise ValueError(f"interpolated values are float64 or float32, not {kind}")
     found = _checked(cells, times, kind)
     *many, rows, columns = found.shape
-    shape = (*many, times * rows, times * columns)
-    if out is not None and out.shape != shape:
-        raise ValueError(f"out has the shape {out.shape}; it must be {shape}")
-    whole: npt.NDArray[Any] = np.empty(shape, kind) if out is None else out
-    if not whole.flags.c_contiguous:
-        whole = np.empty(shape, kind)
+    whole = np.empty((*many, times * rows, times * columns), kind)
     frames = found.reshape(-1, rows, columns)
     if frames.size:
         is_whole = _is_exact(frames, 4 * times, kind)
@@ -137,10 +127,7 @@ def interpolated(
         for first in range(0, len(frames), block):
             part = slice(first, first + block)
             _interpolate(frames[part].astype(kind), plan, points[part])
-    if out is None or whole is out:
-        return whole
-    out[...] = whole
-    return out
+    return whole
 
 
 def _interpolate(cells: Any, plan: _Plan, points: Any) -> None:

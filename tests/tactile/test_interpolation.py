@@ -227,17 +227,6 @@ def test_many_frames_give_what_each_gives_alone(dtype: type, kind: type) -> None
     assert np.array_equal(found[1, 39], interpolated(frames[1, 39], 5, dtype=dtype))
 
 
-def test_values_go_where_they_shall_go() -> None:
-    whole = np.zeros((3, 4, 8))
-    for out in (whole[:, :, :4], np.empty((3, 4, 4), np.float32)):
-        found = interpolated(np.stack([PAPER] * 3), 2, out=out)
-        assert found is out
-        assert np.array_equal(
-            out, interpolated(np.stack([PAPER] * 3), 2, dtype=out.dtype)
-        )
-    assert (whole[:, :, 4:] == 0.0).all()
-
-
 def test_whole_cells_too_large_for_exact_sums_stay_between_their_neighbours() -> None:
     cells = np.array([[2**62, 2**62], [2**62, 2**62 + 2**20]])
     found = interpolated(cells, 7)
@@ -275,12 +264,6 @@ def test_nothing_given_is_changed() -> None:
             {"times": 2, "dtype": np.int64},
             ValueError,
             "interpolated values are float64 or float32, not int64",
-        ),
-        (
-            PAPER,
-            {"times": 2, "out": np.empty((4, 5))},
-            ValueError,
-            "out has the shape (4, 5); it must be (4, 4)",
         ),
         (PAPER == 10, {"times": 2}, TableError, "frames hold numbers, not bool"),
         (

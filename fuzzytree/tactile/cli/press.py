@@ -5,26 +5,23 @@ from __future__ import annotations
 import difflib
 import hashlib
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 import msgspec
 
 from fuzzytree.cli.console import (
-    answer,
     answer_bytes,
     answer_json,
     json_option,
     quiet_option,
-    say,
     say_rows,
     setting,
     wrong_options,
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.recognition.paper_tables import Comparison
     from fuzzytree.tactile.simulation.physics import Settings, Simulated
 
 
@@ -32,7 +29,9 @@ if TYPE_CHECKING:
 @click.argument("name", metavar="OBJECT")
 @click.option("--count", metavar="NUMBER", type=int, default=50, show_default=True)
 @click.option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
-@click.option("-o", "--output", metavar="FILE", help="`.npz`; `-` is stdout.")
+@click.option(
+    "-o", "--output", metavar="FILE", required=True, help="`.npz`; `-` is stdout."
+)
 @click.option(
     "--set",
     "changes",
@@ -40,25 +39,14 @@ if TYPE_CHECKING:
     multiple=True,
     help="Number of the simulator (repeat); see docs/explanation/simulator.md.",
 )
-@click.option(
-    "--means", is_flag=True, help="Print mean invariants beside the paper's Table 2."
-)
-@click.option(
-    "--effects",
-    "is_each",
-    is_flag=True,
-    help="Print what is recognised without each effect of the sensor.",
-)
 @json_option
 @quiet_option
 def command(
     name: str,
     count: int,
     seed: int,
-    output: str | None,
+    output: str,
     changes: Sequence[str],
-    means: bool,
-    is_each: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -67,21 +55,15 @@ def command(
     OBJECT is rectangle-0, rectangle-27, rectangle-45, circle, square, hand-0 or
     hand-45. FILE holds the frames, their labels and what a full cell reads.
     """
-    if output is None and not (means or is_each):
-        raise click.UsageError("name a file with -o, or ask for --means or --effects")
-    if output == "-" and (means or is_each or as_json):
-        raise click.UsageError(
-            "`-o -` leaves no room for --means, --effects or --json on stdout"
-        )
-    if is_each and (name != "all" or count < 2):
-        raise click.UsageError("--effects needs all objects, and 2 presses of each")
+    if output == "-" and as_json:
+        raise click.UsageError("`-o -` leaves no room for --json on stdout")
     from fuzzytree.files import check_place, write_atomically
     from fuzzytree.tactile.simulation.objects import OBJECTS
     from fuzzytree.tactile.simulation.physics import press
 
-    if output not in (None, "-"):
+    if output != "-":
         check_place(output)
-    settings = _settings(changes)
+    settings = physics_settings(changes)
     names = tuple(OBJECTS) if name == "all" else (name,)
     with wrong_options():
         found = {one: press(one, count, seed, settings) for one in names}
@@ -92,32 +74,21 @@ def command(
         "settings": msgspec.structs.asdict(settings),
         "objects": [_facts(one, made) for one, made in found.items()],
     }
-    if output is not None:
-        content = _content(found)
-        if output == "-":
-            answer_bytes(content)
-            return
-        write_atomically(output, content)
-        digest = hashlib.sha256(content).hexdigest()
-        size = f"{len(content)} bytes, sha256 {digest}"
-        words = ["fuzzytree", "tactile", "features", output, "--features", "S1, S9"]
-        after = shlex.join(words)
-        say_rows(("wrote", output, size), ("next", after, ""), quiet=quiet)
-        facts |= {"file": output, "bytes": len(content), "sha256": digest}
-    if means:
-        from fuzzytree.tactile.recognition.paper_tables import compare
-
-        comparison = compare(settings, seed, count=count, objects=names)
-        facts["means"] = _means_facts(comparison)
-        if not as_json:
-            _tell_means(comparison, quiet=quiet)
-    if is_each:
-        facts["effects"] = _tell_effects(settings, seed, count, is_silent=as_json)
+    content = _content(found)
+    if output == "-":
+        answer_bytes(content)
+        return
+    write_atomically(output, content)
+    digest = hashlib.sha256(content).hexdigest()
+    size = f"{len(content)} bytes, sha256 {digest}"
+    words = ["fuzzytree", "tactile", "features", output, "--features", "S1, S9"]
+    say_rows(("wrote", output, size), ("next", shlex.join(words), ""), quiet=quiet)
+    facts |= {"file": output, "bytes": len(content), "sha256": digest}
     if as_json:
         answer_json(facts)
 
 
-def _settings(changes: Sequence[str]) -> Settings:
+def physics_settings(changes: Sequence[str]) -> Settings:
     """Return the simulator's settings with those that were given."""
     from fuzzytree.tactile.simulation.physics import PAPER
 
@@ -185,67 +156,3 @@ def _content(found: dict[str, Simulated]) -> bytes:
         frames, sensor.full, label, tuple(found), nobody, sensor.threshold
     )
     return presses_content(presses)
-
-
-def _means_facts(found: Comparison) -> dict[str, object]:
-    from fuzzytree.tactile.recognition.paper_tables import FEATURES
-
-    return {
-        "features": FEATURES,
-        "objects": found.objects,
-        "means": found.means.tolist(),
-        "paper": found.paper.tolist(),
-        "within_2": found.within(2.0)[0],
-        "within_1.25": found.within(1.25)[0],
-        "of": found.within(2.0)[1],
-    }
-
-
-def _tell_means(found: Comparison, *, quiet: bool) -> None:
-    """Print a line for each feature: each object's mean and its ratio to Table 2."""
-    from fuzzytree.tactile.recognition.paper_tables import FEATURES, NO_ORACLE
-
-    rows = zip(FEATURES, found.means, found.ratios, strict=True)
-    answer(_line("feature", found.objects))
-    for feature, means, ratios in rows:
-        pairs = zip(means, ratios, strict=True)
-        answer(_line(feature, [f"{mean:.3g} x{ratio:.2f}" for mean, ratio in pairs]))
-    near, near_all = found.within(1.25)[0], found.within(2.0)
-    say(
-        f"x: times Table 2's mean; {near_all[0]} of {near_all[1]} lie within a factor "
-        f"of 2, {near} within 1.25; {NO_ORACLE} is not counted",
-        quiet=quiet,
-    )
-
-
-def _tell_effects(
-    settings: Settings, seed: int, count: int, *, is_silent: bool
-) -> list[dict[str, object]]:
-    """Print a line for each effect that is switched off, and return the facts."""
-    from fuzzytree.tactile.recognition.paper_tables import effects
-    from fuzzytree.tactile.simulation.objects import OBJECTS
-
-    facts: list[dict[str, object]] = []
-    if not is_silent:
-        heads = ["all", *OBJECTS, "within 2"]
-        answer(" ".join([f"{'without':18}", *(f"{head:>12}" for head in heads)]))
-    with wrong_options():
-        for one in effects(settings, seed, count=count):
-            shares = [one.all, *one.objects.values()]
-            cells = [*(f"{100 * share:.0f} %" for share in shares), str(one.near)]
-            if not is_silent:
-                row = (f"{cell:>12}" for cell in cells)
-                answer(" ".join([f"{one.name:18}", *row]))
-            facts.append(
-                {
-                    "name": one.name,
-                    "all": one.all,
-                    "objects": one.objects,
-                    "within_2": one.near,
-                }
-            )
-    return facts
-
-
-def _line(title: str, cells: Iterable[str]) -> str:
-    return " ".join([f"{title:7}", *(f"{cell:>17}" for cell in cells)])

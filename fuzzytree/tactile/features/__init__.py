@@ -11,14 +11,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from fuzzytree.errors import InvalidModelError, TableError
+from fuzzytree.errors import InvalidModelError
 from fuzzytree.model.rulebase import Value
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
 from fuzzytree.tactile.features.moments import (
     ORDER,
     Centred,
-    Measured,
-    Moments,
     Noisy,
     angle,
     complex_moment,
@@ -123,29 +121,6 @@ def costs(sensor: Sensor, names: Sequence[str]) -> Mapping[str, float]:
     return {name: float(frame_program(sensor, [name]).cost) for name in names}
 
 
-def image_program(names: Sequence[str]) -> Program:
-    """Return what computes features from moments that were measured.
-
-    For images whose cells are no whole numbers; see
-    `fuzzytree.tactile.runtimes.images`.
-
-    Args:
-        names: Of the features; of cells and blocks there are none.
-
-    Raises:
-        TableError: If a name is no feature of an image.
-    """
-    features = features_of_names(names)
-    for feature in features:
-        if feature.kind != "moment":
-            raise TableError(f"{feature.name!r} is a feature of frames, not of images")
-    inputs = [sum_name(0, 0), "area", "peak", "x", "y"]
-    for order in range(2, ORDER + 1):
-        for q in range(order + 1):
-            inputs += [f"{what} {order - q}{q}" for what in ("moment", "error")]
-    return _program(_Maker(Sensor(1, 1, full=1), Measured(Maker())), features, inputs)
-
-
 def _program(
     make: _Maker, features: Sequence[Feature], inputs: Sequence[str]
 ) -> Program:
@@ -165,7 +140,7 @@ def _program(
 class _Maker:
     """Makes the steps of features, each part once."""
 
-    def __init__(self, sensor: Sensor, moments: Moments) -> None:
+    def __init__(self, sensor: Sensor, moments: Centred) -> None:
         self.sensor, self.moments = sensor, moments
         self.steps, self.noise = moments.make, moments.noise
         self.zero, self.one = self.steps.constant(0.0), self.steps.constant(1.0)

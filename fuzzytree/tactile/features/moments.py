@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from fuzzytree.semantics.programs.steps import Maker
 
@@ -157,30 +156,6 @@ ORDER = 4
 _PASCAL = ((1,), (1, 1), (1, 2, 1), (1, 3, 3, 1), (1, 4, 6, 4, 1))
 
 
-class Moments(Protocol):
-    """Moments about the centre of pressure, wherever they come from.
-
-    Attributes:
-        make: Where the steps go.
-        noise: Arithmetic that ends there.
-        total: The sum of the cells, 1 where nothing presses.
-        is_pressed: Whether anything presses: a truth.
-    """
-
-    make: Maker
-    noise: Noise
-    total: int
-    is_pressed: int
-
-    def centre(self) -> tuple[int, int]:
-        """Return x and y of the centre."""
-        ...
-
-    def moment(self, p: int, q: int) -> Noisy:
-        """Return the moment about the centre; that of order 1 is 0."""
-        ...
-
-
 @dataclass
 class Centred:
     """Moments about the centre of pressure, from exact sums, made when asked for.
@@ -281,7 +256,7 @@ class Centred:
         return Noisy(value, make.chain("add", [*errors, own]))
 
 
-def complex_moment(moments: Moments, p: int, q: int) -> tuple[Noisy, Noisy]:
+def complex_moment(moments: Centred, p: int, q: int) -> tuple[Noisy, Noisy]:
     """Return the real and the imaginary part of C_pq (paper, 2.1)."""
     noise = moments.noise
     parts: tuple[list[Noisy], list[Noisy]] = ([], [])
@@ -294,30 +269,6 @@ def complex_moment(moments: Moments, p: int, q: int) -> tuple[Noisy, Noisy]:
     nothing = Noisy(moments.make.constant(0.0))
     real, imaginary = (noise.sum(*found) if found else nothing for found in parts)
     return real, imaginary
-
-
-class Measured:
-    """Moments that were taken about the centre of pressure, with their bounds.
-
-    The inputs are `moment pq` and `error pq`, `sum 00`, `x` and `y`.
-    """
-
-    def __init__(self, make: Maker) -> None:
-        self.make, self.noise = make, Noise(make)
-        zero, force = make.constant(0.0), make.input(sum_name(0, 0))
-        self.is_pressed = make("less", zero, force)
-        self.total = make("where", self.is_pressed, force, make.constant(1.0))
-
-    def centre(self) -> tuple[int, int]:
-        """Return x and y of the centre."""
-        return self.make.input("x"), self.make.input("y")
-
-    def moment(self, p: int, q: int) -> Noisy:
-        """Return a moment and its bound; that of order 1 is 0."""
-        if p + q == 1:
-            return Noisy(self.make.constant(0.0))
-        make = self.make
-        return Noisy(make.input(f"moment {p}{q}"), make.input(f"error {p}{q}"))
 
 
 _FIRST: tuple[Power, Power] = ((1, 0), (0, 1))

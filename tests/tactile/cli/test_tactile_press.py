@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from fuzzytree.tactile.presses import read_presses
-from fuzzytree.tactile.recognition.paper_tables import EFFECTS, FEATURES
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER, Settings, press
 
@@ -65,82 +64,48 @@ def test_a_setting_is_changed_by_name(call: Call, folder: Path) -> None:
     assert facts["objects"][0]["clipped"] == wanted.clipped.tolist()
 
 
-def test_means_stand_beside_the_papers(call: Call, folder: Path) -> None:
-    code, out, err = call("tactile", "press", "circle", "--count", "5", "--means")
-    assert code == 0
-    lines = out.splitlines()
-    assert [line.split()[0] for line in lines] == ["feature", *FEATURES]
-    mean, ratio = lines[1].split()[1:]
-    assert float(mean) / 6.72 == pytest.approx(float(ratio[1:]), rel=0.02)
-    assert err.splitlines()[-1].startswith("x: times Table 2's mean; ")
-    assert not list(folder.glob("*.npz"))
-
-
-@pytest.mark.heavy
-def test_effects_are_switched_off_one_by_one(call: Call, folder: Path) -> None:
-    words = ("tactile", "press", "all", "--count", "20", "--effects")
-    code, out, _ = call(*words)
-    assert code == 0
-    lines = out.splitlines()
-    assert [line[:18].rstrip() for line in lines] == ["without", *EFFECTS]
-    code, out, _ = call(*words, "--json")
-    facts = json.loads(out)["effects"]
-    assert [one["name"] for one in facts] == [*EFFECTS]
-    for one, line in zip(facts, lines[1:], strict=True):
-        assert line.endswith(f" {one['within_2']}")
-        assert f" {100 * one['all']:.0f} % " in line
-
-
 def test_frames_on_standard_output_leave_no_room_for_more(
     call: Call, folder: Path
 ) -> None:
-    code, out, err = call("tactile", "press", "circle", "-o", "-", "--means")
+    code, out, err = call("tactile", "press", "circle", "-o", "-", "--json")
     assert (code, out) == (2, "")
-    text = "`-o -` leaves no room for --means, --effects or --json on stdout"
+    text = "`-o -` leaves no room for --json on stdout"
     assert err.splitlines()[0] == text
 
 
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (("circle",), "name a file with -o, or ask for --means or --effects"),
+        (("circle",), "missing option '-o' / '--output'"),
+        (("circle", "--set", "tilt", "-o", "p.npz"), "--set tilt: must be NAME=VALUE"),
         (
-            ("circle", "--effects"),
-            "--effects needs all objects, and 2 presses of each",
-        ),
-        (
-            ("all", "--effects", "--count", "1"),
-            "--effects needs all objects, and 2 presses of each",
-        ),
-        (("circle", "--set", "tilt", "--means"), "--set tilt: must be NAME=VALUE"),
-        (
-            ("circle", "--set", "tild=1", "--means"),
+            ("circle", "--set", "tild=1", "-o", "p.npz"),
             "the simulator has no setting 'tild'; "
             f"it has {', '.join(Settings.__struct_fields__)} (did you mean 'tilt'?)",
         ),
         (
-            ("circle", "--set", "tilt=1", "--set", "tilt=2", "--means"),
+            ("circle", "--set", "tilt=1", "--set", "tilt=2", "-o", "p.npz"),
             "the setting 'tilt' is given twice",
         ),
         (
-            ("circle", "--set", "tilt=steep", "--means"),
+            ("circle", "--set", "tilt=steep", "-o", "p.npz"),
             "tilt: must be a number, not 'steep'",
         ),
         (
-            ("circle", "--set", "board=1.5", "--means"),
+            ("circle", "--set", "board=1.5", "-o", "p.npz"),
             "board: must be a whole number, not '1.5'",
         ),
         (
-            ("circle", "--set", "tilt=-1", "--means"),
+            ("circle", "--set", "tilt=-1", "-o", "p.npz"),
             "tilt lies in 0 to 10, not -1",
         ),
         (
-            ("foot", "--means"),
+            ("foot", "-o", "p.npz"),
             "no object 'foot'; the objects are rectangle-0, rectangle-27, "
             "rectangle-45, circle, square, hand-0, hand-45",
         ),
         (
-            ("circle", "--count", "0", "--means"),
+            ("circle", "--count", "0", "-o", "p.npz"),
             "1 to 100000 presses can be made at a time, not 0",
         ),
     ],

@@ -7,13 +7,13 @@ import math
 import msgspec
 import numpy as np
 import pytest
-
-from fuzzytree.tactile.recognition.paper_tables import (
+from experiment_tables import (
     FEATURES,
     TABLE_2,
-    Comparison,
+    TableMeans,
     compare,
 )
+
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.simulation.objects import OBJECTS, FloatArray, Object, rectangle
 from fuzzytree.tactile.simulation.physics import PAPER, Settings, press, press_object
@@ -43,7 +43,7 @@ def test_nearness_counts_both_sides_and_leaves_out_s5() -> None:
     means = np.ones((11, 1))
     paper = np.full((11, 1), 2.0)
     paper[:4, 0] = 0.5, 0.4, -1.0, 1.0
-    found = Comparison(("circle",), means, paper)
+    found = TableMeans(("circle",), means, paper)
     assert found.within(2.0) == (8, 10)  # neither 2.5 times nor the other sign
     assert found.within(1.25) == (1, 10)
     assert found.ratios[2, 0] == -1.0

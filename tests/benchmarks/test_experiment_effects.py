@@ -5,13 +5,13 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-
-from fuzzytree.tactile.recognition.paper_tables import (
+from experiment_tables import (
     EFFECTS,
     Effect,
     discriminate,
     effects,
 )
+
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER
 

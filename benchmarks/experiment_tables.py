@@ -1,16 +1,32 @@
-"""The simulator compared with the paper's Table 2, and the effects of the sensor."""
+"""The simulator compared with the paper's Table 2, and the effects of its sensor.
+
+python benchmarks/experiment_tables.py all --means
+python benchmarks/experiment_tables.py all --effects
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import click
 import msgspec
 import numpy as np
+from commands import run
 
+from fuzzytree.cli.console import (
+    answer,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    wrong_options,
+)
+from fuzzytree.tactile.cli.press import physics_settings
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
@@ -46,7 +62,7 @@ NO_ORACLE = "S5"
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class TableMeans:
     """Means of simulated presses beside the paper's.
 
     Attributes:
@@ -81,7 +97,7 @@ def compare(
     *,
     count: int = 50,
     objects: tuple[str, ...] = tuple(OBJECTS),
-) -> Comparison:
+) -> TableMeans:
     """Press objects and compare the means of their invariants with Table 2.
 
     Args:
@@ -93,6 +109,9 @@ def compare(
     Raises:
         ValueError: If there is no such object, or the count is out of its range.
     """
+    for name in objects:
+        if name not in OBJECTS:
+            raise ValueError(f"no object {name!r}; there is {', '.join(OBJECTS)}")
     columns = [list(OBJECTS).index(name) for name in objects]
     means: list[FloatArray] = []
     for name in objects:
@@ -100,7 +119,7 @@ def compare(
         values = features_of(found.sensor, found.frames, FEATURES).values
         means.append(values.mean(axis=1))
     paper = np.array(TABLE_2)[:, columns]
-    return Comparison(objects, np.stack(means, axis=1), paper)
+    return TableMeans(objects, np.stack(means, axis=1), paper)
 
 
 _EVEN_LINES: Mapping[str, object] = MappingProxyType(
@@ -193,7 +212,7 @@ def effects(
         known = np.repeat(np.arange(len(OBJECTS)), count)
         right = (answers == known).reshape(len(OBJECTS), count).mean(axis=1)
         means = np.stack([one.values[: len(FEATURES)].mean(axis=1) for one in learnt])
-        table = Comparison(tuple(OBJECTS), means.T, np.array(TABLE_2))
+        table = TableMeans(tuple(OBJECTS), means.T, np.array(TABLE_2))
         share = dict(zip(OBJECTS, right.tolist(), strict=True))
         yield Effect(name, share, table.within(2.0)[0])
 
@@ -225,3 +244,114 @@ def discriminate(
     apart = (rows @ axes)[:, np.newaxis] - means @ axes
     nearest: np.ndarray[tuple[int], np.dtype[np.int64]] = (apart**2).sum(2).argmin(1)
     return nearest
+
+
+@click.command("experiment_tables.py")
+@click.argument("name", metavar="OBJECT")
+@click.option("--count", metavar="NUMBER", type=int, default=50, show_default=True)
+@click.option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
+@click.option(
+    "--set",
+    "changes",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A number of the simulator (repeat); docs/explanation/simulator.md.",
+)
+@click.option("--means", is_flag=True, help="Print mean invariants beside Table 2.")
+@click.option(
+    "--effects",
+    "is_each",
+    is_flag=True,
+    help="Print the recognition rates without each effect of the sensor.",
+)
+@json_option
+@quiet_option
+def command(
+    name: str,
+    count: int,
+    seed: int,
+    changes: Sequence[str],
+    means: bool,
+    is_each: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Compare simulated presses of OBJECT, or of `all`, with the paper's."""
+    if not (means or is_each):
+        raise click.UsageError("choose --means or --effects")
+    if is_each and (name != "all" or count < 2):
+        raise click.UsageError("--effects needs all objects, and 2 presses of each")
+    settings = physics_settings(changes)
+    names = tuple(OBJECTS) if name == "all" else (name,)
+    facts: dict[str, object] = {}
+    with wrong_options():
+        if means:
+            table = compare(settings, seed, count=count, objects=names)
+            facts["means"] = _means_facts(table)
+            if not as_json:
+                _print_means(table, quiet=quiet)
+        if is_each:
+            facts["effects"] = _print_effects(settings, seed, count, is_silent=as_json)
+    if as_json:
+        answer_json(facts)
+
+
+def _means_facts(found: TableMeans) -> dict[str, object]:
+    return {
+        "features": FEATURES,
+        "objects": found.objects,
+        "means": found.means.tolist(),
+        "paper": found.paper.tolist(),
+        "within_2": found.within(2.0)[0],
+        "within_1.25": found.within(1.25)[0],
+        "of": found.within(2.0)[1],
+    }
+
+
+def _print_means(found: TableMeans, *, quiet: bool) -> None:
+    """Print a line for each feature: each object's mean and its ratio to Table 2."""
+    rows = zip(FEATURES, found.means, found.ratios, strict=True)
+    answer(_line("feature", found.objects))
+    for feature, means, ratios in rows:
+        pairs = zip(means, ratios, strict=True)
+        answer(_line(feature, [f"{mean:.3g} x{ratio:.2f}" for mean, ratio in pairs]))
+    near, near_all = found.within(1.25)[0], found.within(2.0)
+    say(
+        f"x: times Table 2's mean; {near_all[0]} of {near_all[1]} lie within a factor "
+        f"of 2, {near} within 1.25; {NO_ORACLE} is not counted",
+        quiet=quiet,
+    )
+
+
+def _print_effects(
+    settings: Settings, seed: int, count: int, *, is_silent: bool
+) -> list[dict[str, object]]:
+    """Print a line for each effect that is switched off, and return the facts."""
+    facts: list[dict[str, object]] = []
+    if not is_silent:
+        heads = ["all", *OBJECTS, "within 2"]
+        answer(" ".join([f"{'without':18}", *(f"{head:>12}" for head in heads)]))
+    with wrong_options():
+        for one in effects(settings, seed, count=count):
+            shares = [one.all, *one.objects.values()]
+            cells = [*(f"{100 * share:.0f} %" for share in shares), str(one.near)]
+            if not is_silent:
+                row = (f"{cell:>12}" for cell in cells)
+                answer(" ".join([f"{one.name:18}", *row]))
+            facts.append(
+                {
+                    "name": one.name,
+                    "all": one.all,
+                    "objects": one.objects,
+                    "within_2": one.near,
+                }
+            )
+    return facts
+
+
+def _line(title: str, cells: Iterable[str]) -> str:
+    return " ".join([f"{title:7}", *(f"{cell:>17}" for cell in cells)])
+
+
+if __name__ == "__main__":
+    sys.exit(run(command))
