@@ -209,7 +209,7 @@ def carry(
             "remarks": found.remarks,
         },
         "format": form.name,
-        "representation": kind_of(model),
+        "carrier": kind_of(model),
     }
     with progress_bar(quiet=quiet) as show:
         show(f"writing {form.name}", 0.0)

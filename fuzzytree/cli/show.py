@@ -118,7 +118,7 @@ def _facts(found: Reading) -> dict[str, object]:
 
     model = found.model
     facts: dict[str, object] = {
-        "representation": kind_of(model),
+        "carrier": kind_of(model),
         "fingerprint": fingerprint(model),
     }
     if isinstance(model, FuzzySystem):

@@ -67,7 +67,7 @@ def document_facts(model: Document) -> dict[str, object]:
     """Return the same for programs: kind, name, inputs, answers, counts."""
     if isinstance(model, FuzzySystem):
         return {
-            "representation": "system",
+            "carrier": "system",
             "name": model.name,
             "inputs": model.columns,
             "outputs": tuple(one.name for one in model.outputs),
@@ -77,7 +77,7 @@ def document_facts(model: Document) -> dict[str, object]:
     is_tree = isinstance(model, FuzzyTree)
     rules = model.leaves if isinstance(model, FuzzyTree) else model.rules
     return {
-        "representation": "tree" if is_tree else "rules",
+        "carrier": "tree" if is_tree else "rules",
         "name": model.name,
         "inputs": model.inputs,
         "classes": model.classes,

@@ -64,7 +64,7 @@ def test_json_reports_the_same_facts(call: Call) -> None:
         "read": {
             "file": "tipper.fll",
             "format": "fll",
-            "representation": "system",
+            "carrier": "system",
             "name": "tipper",
             "inputs": ["service", "food"],
             "outputs": ["tip"],
@@ -74,7 +74,7 @@ def test_json_reports_the_same_facts(call: Call) -> None:
             "remarks": [],
         },
         "format": "yaml",
-        "representation": "system",
+        "carrier": "system",
         "file": "t.yaml",
         "bytes": len(content),
         "sha256": hashlib.sha256(content).hexdigest(),
@@ -509,7 +509,7 @@ def test_a_system_is_shown_with_its_rules_and_terms(call: Call) -> None:
     assert (code, err) == (0, "")
     assert out == SHOWN
     facts = json.loads(call("show", "tipper.fll", "--json")[1])
-    assert facts["representation"] == "system"
+    assert facts["carrier"] == "system"
     assert facts["rules"][1]["text"] == "IF service is good THEN tip is average"
 
 

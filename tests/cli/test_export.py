@@ -46,7 +46,7 @@ def test_json_reports_the_same_facts(call: Call) -> None:
     assert facts == {
         "file": "new.onnx",
         "format": "onnx",
-        "representation": "tree",
+        "carrier": "tree",
         "bytes": len(content),
         "sha256": hashlib.sha256(content).hexdigest(),
         "losses": [],
@@ -61,7 +61,7 @@ def test_json_reports_the_same_facts(call: Call) -> None:
         "certificate": {
             "sentence": "no path can differ: no value is rounded before it meets a cut",
             "dtype": "float64",
-            "representation": "tree",
+            "carrier": "tree",
             "delta": None,
             "origin": "largest derived error of a value in float64, "
             "for values in the declared ranges",

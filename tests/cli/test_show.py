@@ -63,7 +63,7 @@ def test_rules_are_numbered_sentences(call: Call) -> None:
 
 def test_json_reports_the_same_facts(call: Call) -> None:
     facts = json.loads(call("show", "grip.yaml", "--json")[1])
-    assert facts["representation"] == "tree"
+    assert facts["carrier"] == "tree"
     assert facts["fingerprint"] == fingerprint(grip())
     assert facts["rules"][0] == {
         "number": 1,
