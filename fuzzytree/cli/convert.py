@@ -316,7 +316,7 @@ def _proof_row(proof: Proof) -> tuple[str, str, str]:
 def _certificate_facts(found: Certificate | None) -> dict[str, object] | None:
     if found is None:
         return None
-    return {"sentence": found.sentence, **msgspec.structs.asdict(found)}
+    return {"sentence": found.sentence, **msgspec.to_builtins(found)}
 
 
 def next_check(*files: tuple[str, str], more: Sequence[str] = ()) -> str:

@@ -202,7 +202,7 @@ class Certificate(msgspec.Struct, frozen=True):
     """
 
     dtype: Dtype | None
-    representation: ModelKind
+    representation: ModelKind = msgspec.field(name="carrier")
     delta: float | None
     origin: str
     terms: tuple[TermBound, ...] = ()

@@ -99,7 +99,7 @@ def test_a_file_that_holds_the_model_changes_nothing(
     assert json.loads(out)["certificate"] == {
         "sentence": sentence,
         "dtype": None,
-        "representation": representation,
+        "carrier": representation,
         "delta": 0.0,
         "origin": proof,
         "terms": [],
