@@ -75,12 +75,7 @@ _TOKEN = re.compile(
 
 
 class FormulaError(ReadError):
-    """A text that is no formula.
-
-    Attributes:
-        column: Where, from 1.
-        sentence: What was found, and what would be right.
-    """
+    """A text that is no formula."""
 
     def __init__(self, column: int, sentence: str) -> None:
         self.column = column
@@ -315,13 +310,7 @@ def _too_deep(token: _Token) -> FormulaError:
 def _written(
     expression: Expression, sign: str, number: Callable[[float], str]
 ) -> tuple[str, int]:
-    """Return a formula, and how closely its outermost operator binds.
-
-    Args:
-        expression: The formula.
-        sign: The sign of a negated operand, `-` or `~`.
-        number: Writes a number that is not negative.
-    """
+    """Return a formula, and how closely its outermost operator binds."""
 
     def inner(part: Expression, closeness: int) -> str:
         text, binds = _written(part, sign, number)

@@ -78,11 +78,6 @@ def decoded(
 ) -> tuple[str, tuple[str, ...]]:
     """Return the text of a file, and a remark if it is not UTF-8.
 
-    Args:
-        content: The file.
-        name: What messages call it.
-        most: How many bytes are read.
-
     Raises:
         ReadError: If it is too large, is UTF-16, or has control characters.
     """
@@ -124,12 +119,6 @@ def split_lines(text: str) -> list[str]:
 
 def words(text: str, line: int, column: int, signs: str = "") -> Iterator[Word]:
     """Yield the words of a text; each of `signs` is a word of its own.
-
-    Args:
-        text: The text.
-        line: Its line.
-        column: The column of its first character.
-        signs: Characters that need no blank beside them.
 
     Returns:
         The words; one that is longer than any name ends in dots.

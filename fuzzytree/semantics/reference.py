@@ -61,10 +61,6 @@ class Answer(msgspec.Struct, frozen=True):
 def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
     """Fire every rule on one row and let the first of the strongest decide.
 
-    Args:
-        rules: The rule base.
-        row: A value for each input, by name.
-
     Returns:
         The answer, with the strength of every rule.
 

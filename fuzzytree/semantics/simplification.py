@@ -50,13 +50,7 @@ _SMALL_CENTRE = 2.0**100  # below half a unit in the last place of float32's lar
 
 
 class Removed(Value, frozen=True):
-    """One thing that was left out, or could be.
-
-    Attributes:
-        where: The part of the model, as people name it.
-        why: Why it is not needed.
-        changes: What is different without it; empty if nothing is.
-    """
+    """One thing that was left out, or could be."""
 
     where: str
     why: str

@@ -69,10 +69,6 @@ def read(content: bytes, name: str) -> Reading:
 
     Only the first FUNCTION_BLOCK is read.
 
-    Args:
-        content: The file: UTF-8, or UTF-16 with its mark, or else Latin-1.
-        name: What messages call it.
-
     Raises:
         ReadError: With all mistakes of the file.
 

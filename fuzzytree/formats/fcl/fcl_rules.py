@@ -57,15 +57,7 @@ _HEDGES: Mapping[str, Hedge] = {
 
 
 class Scope(msgspec.Struct, frozen=True):
-    """What rules can speak of.
-
-    Attributes:
-        terms: The names of the terms of each variable.
-        outputs: The names of the outputs.
-        curved: The names of those that look at curves.
-        dialect: The dialect of the file.
-        notes: What is found on the way.
-    """
+    """What rules can speak of."""
 
     terms: Mapping[str, Collection[str]]
     outputs: Collection[str]
@@ -75,13 +67,7 @@ class Scope(msgspec.Struct, frozen=True):
 
 
 def _read(text: RuleText, number: int, scope: Scope) -> SystemRule:
-    """Return a rule; its mistakes are noted.
-
-    Args:
-        text: The statement.
-        number: Its place in the block, from 1.
-        scope: What it can speak of.
-    """
+    """Return a rule; its mistakes are noted."""
     when = _condition(text.condition, scope)
     if scope.dialect == "jfuzzylogic" and _is_ambiguous(text.condition):
         line = text.keyword.line

@@ -288,10 +288,6 @@ class FclText(msgspec.Struct, frozen=True):
 def parsed(content: bytes, name: str) -> FclText:
     """Return the statements of an FCL file.
 
-    Args:
-        content: The file.
-        name: What messages call it.
-
     Raises:
         ReadError: If it is too large, or no text.
     """

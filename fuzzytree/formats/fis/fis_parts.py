@@ -46,14 +46,7 @@ _WRONG = Formula(Number(0.0))
 def labels_of(
     entries: Sequence[Entry], count: Entry | None, about: About, notes: Notes
 ) -> tuple[Label, ...]:
-    """Return the terms of a variable in the order of their numbers.
-
-    Args:
-        entries: `MF1 = 'low':'trimf',[0 1 2]` and so on, in any order.
-        count: `NumMFs`, if it is there.
-        about: The variable.
-        notes: Mistakes and remarks are added to it.
-    """
+    """Return the terms of a variable in the order of their numbers."""
     numbered = {int(entry.key[2:]): entry for entry in reversed(entries)}
     if len(numbered) < len(entries):
         twice = next(e for e in entries if numbered[int(e.key[2:])] is not e)

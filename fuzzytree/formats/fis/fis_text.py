@@ -37,14 +37,7 @@ class Entry(msgspec.Struct, frozen=True):
 
 
 class Section(msgspec.Struct, frozen=True):
-    """A section: `system`, `rules`, or a numbered `input` or `output`.
-
-    Attributes:
-        kind: Which.
-        number: From 1; 0 where there is only one.
-        line: Where it starts.
-        entries: Its keys and values; a rule has the key ''.
-    """
+    """A section: `system`, `rules`, or a numbered `input` or `output`."""
 
     kind: str
     number: int
@@ -70,11 +63,6 @@ class Page(msgspec.Struct, frozen=True):
 
 def read_page(content: bytes, name: str, found: list[Found]) -> Page:
     """Return the sections of a file.
-
-    Args:
-        content: The file.
-        name: What messages call it.
-        found: Mistakes are added to it.
 
     Raises:
         ReadError: If it is too large.
@@ -238,13 +226,7 @@ def term_of(entry: Entry, found: list[Found]) -> Written | None:
 def spots_of(
     inputs: Sequence[Section], outputs: Sequence[Section], rules: Sequence[Entry]
 ) -> Spots:
-    """Return where the parts of a system stand.
-
-    Args:
-        inputs: What its inputs were made of.
-        outputs: What its outputs were made of.
-        rules: The line of each rule.
-    """
+    """Return where the parts of a system stand."""
     lines = [(one.line, one.value) for one in rules]
     begins = tuple((n, len(line) - len(line.lstrip()) + 1) for n, line in lines)
     block = Group(begins[0] if begins else (1, 1), begins)

@@ -236,10 +236,6 @@ def _is_truth(expression: Expression) -> bool:
 def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
     """Yield where fuzzylite 6 finds other numbers for an output of its own dialects.
 
-    Args:
-        output: As it is read; `docs/reference/interop.md` describes how the two were
-            compared.
-
     Example:
         >>> from fuzzytree.model.system import Defuzzifier, Label
         >>> how = Defuzzifier("weighted average")
@@ -266,9 +262,6 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
 
 def constant_degrees(output: SystemOutput) -> Iterator[str]:
     """Yield a remark on each number that is a degree because a curve is sampled.
-
-    Args:
-        output: As it is read from FLL, or from FCL in fuzzylite's dialect.
 
     Example:
         >>> from fuzzytree.model.system import Defuzzifier, Label

@@ -53,10 +53,6 @@ from fuzzytree.semantics.conversion import as_written
 def read(content: bytes, name: str) -> Reading:
     r"""Return what an FLL file says.
 
-    Args:
-        content: The file.
-        name: What messages call it.
-
     Raises:
         ReadError: With every mistake of the file.
 
@@ -179,18 +175,7 @@ _DROPPED = re.compile(r"[^\w.]")
 
 
 class Known(msgspec.Struct, frozen=True):
-    """A variable as it was read.
-
-    Attributes:
-        section: Where it stands.
-        name: Its name.
-        terms: Its terms.
-        lines: Where they stand.
-        said: The words that stand for each term.
-        variable: What it is, with its terms.
-        kind: The type of a weighted defuzzifier.
-        is_enabled: Whether it takes part.
-    """
+    """A variable as it was read."""
 
     section: Section
     name: str

@@ -35,13 +35,7 @@ RULE_WORDS: Final = ("if", "is", "then", "and", "or", "with", *HEDGES)
 
 
 class Variable(msgspec.Struct, frozen=True):
-    """What a rule can say of a variable.
-
-    Attributes:
-        name: Its name.
-        terms: The names of its terms, by the words that stand for them.
-        is_output: Whether rules may conclude it.
-    """
+    """What a rule can say of a variable."""
 
     name: str
     terms: Mapping[str, str]
@@ -53,11 +47,7 @@ Vocabulary = Mapping[str, Variable]
 
 
 class RuleError(ReadError):
-    """A rule that cannot be read.
-
-    Attributes:
-        found: Its mistakes.
-    """
+    """A rule that cannot be read."""
 
     def __init__(self, *found: Found) -> None:
         self.found = found
@@ -100,11 +90,6 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
     """Return the rule that words say.
 
     A condition that is nothing but `v is any` holds always.
-
-    Args:
-        words: The words of the rule, parentheses apart.
-        end: An empty word where the line ends.
-        vocabulary: The variables.
 
     Raises:
         RuleError: If they say none, with all mistakes that can be told apart.

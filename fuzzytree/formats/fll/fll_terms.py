@@ -63,12 +63,7 @@ class Place(msgspec.Struct, frozen=True):
 
 
 class Term(msgspec.Struct, frozen=True):
-    """A term as it was read.
-
-    Attributes:
-        label: Its name, curve and height.
-        kind: Its class in the file.
-    """
+    """A term as it was read."""
 
     label: Label
     kind: str
@@ -91,13 +86,6 @@ def read_term(
     name: str, kind: Word, rest: Sequence[Word], place: Place, formula: str = ""
 ) -> Term:
     """Return a term of a class and its parameters.
-
-    Args:
-        name: Its name.
-        kind: Its class.
-        rest: The words behind the class.
-        place: Where it stands.
-        formula: The same words as one text, for a class that takes a formula.
 
     Raises:
         TermError: If it is none.
@@ -140,11 +128,7 @@ def read_term(
 
 
 class TermError(ReadError):
-    """A term that cannot be read.
-
-    Attributes:
-        found: Its mistakes.
-    """
+    """A term that cannot be read."""
 
     def __init__(self, *found: Found) -> None:
         self.found = found

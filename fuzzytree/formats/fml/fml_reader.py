@@ -44,10 +44,6 @@ _OUTSIDE: Final = ("anYaDataCloud", "anYaRuleBase", "aggregatedFuzzyVariable")
 def reading(content: bytes, name: str) -> Reading:
     """Return what an FML file says.
 
-    Args:
-        content: The file.
-        name: What messages call it.
-
     Raises:
         ReadError: With every mistake of the file.
 
@@ -70,15 +66,7 @@ def places(content: bytes, name: str) -> Locate:
 
 
 class _Parts(NamedTuple):
-    """The parts of a system, each with what it was made of.
-
-    Attributes:
-        inputs: The inputs.
-        outputs: The outputs.
-        blocks: The blocks.
-        rules: What each rule of them was made of, and its rule base.
-        variables: What the variables call their terms.
-    """
+    """The parts of a system, each with what it was made of."""
 
     inputs: Sequence[tuple[Element, SystemInput]]
     outputs: Sequence[tuple[Element, SystemOutput]]

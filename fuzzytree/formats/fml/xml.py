@@ -21,17 +21,7 @@ LONGEST_TEXT: Final = 100_000
 
 
 class Element(msgspec.Struct):
-    """An element; line and column from 1.
-
-    Attributes:
-        name: Without its namespace.
-        namespace: Empty if it has none.
-        attributes: Those without a namespace, by name.
-        line: Where it starts.
-        column: Where it starts.
-        children: The elements in it.
-        text: The text in it, without blanks at its ends.
-    """
+    """An element; line and column from 1."""
 
     name: str
     namespace: str
@@ -55,10 +45,6 @@ class Document(msgspec.Struct, frozen=True):
 
 def parse(content: bytes, name: str) -> Document:
     """Return what a file holds.
-
-    Args:
-        content: The file.
-        name: What messages call it.
 
     Raises:
         ReadError: If it is no XML, has a document type, or is too large or too deep.

@@ -55,10 +55,6 @@ def vocabulary_of(variables: Iterable[Variable]) -> Vocabulary:
 def readings(text: str, vocabulary: Vocabulary) -> tuple[Clause, ...]:
     """Return the clauses that a sentence can mean: none, one, or two of several.
 
-    Args:
-        text: `VARIABLE is TERM or TERM`, or `VARIABLE is not TERM or TERM`.
-        vocabulary: The words of each variable.
-
     Example:
         >>> readings("grip is not firm", {"grip": words(["soft", "firm"])})
         (Clause(variable='grip', terms=('firm',), negated=True),)
@@ -293,12 +289,7 @@ def joined(join: type[And] | type[Or], left: Condition, right: Condition) -> Con
 def blocks_of(
     rules: Iterable[tuple[SystemRule, TNorm, SNorm]], implication: TNorm | None
 ) -> tuple[RuleBlock, ...]:
-    """Return blocks of rules in their order, a new one where the operators change.
-
-    Args:
-        rules: Each rule with its AND and its OR.
-        implication: That of all blocks.
-    """
+    """Return blocks of rules in their order, a new one where the operators change."""
     groups = itertools.groupby(rules, key=operator.itemgetter(1, 2))
     return tuple(
         RuleBlock(

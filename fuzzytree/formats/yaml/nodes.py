@@ -105,10 +105,6 @@ def meaning(scalar: Scalar) -> Meaning:
 def compose(content: bytes, name: str) -> tuple[Node, list[Found]]:
     """Return the only document of a YAML file, and the tags and anchors refused.
 
-    Args:
-        content: The file.
-        name: What messages call it.
-
     Raises:
         ReadError: If it is no UTF-8, no YAML, empty, too large or too deep.
     """

@@ -69,10 +69,6 @@ from fuzzytree.model.system import (
 def read_system(root: MappingNode, found: list[Found]) -> FuzzySystem | None:
     """Return the system of a file of `kind: system`.
 
-    Args:
-        root: The file's mapping.
-        found: Where mistakes are added.
-
     Returns:
         The system, or None after adding why there is none. With mistakes added it may
         be one with placeholders.

@@ -54,10 +54,6 @@ R = TypeVar("R")
 def read(content: bytes, name: str) -> Document:
     """Return the rule base, tree or system of a YAML file.
 
-    Args:
-        content: The file.
-        name: What messages call it.
-
     Raises:
         ReadError: If the file is no model; it lists all mistakes with their places.
 

@@ -88,11 +88,6 @@ def facts_of(
     It is ASCII, and holds no `*`, `/`, `<`, `>`, `#`, `%` and no two `-` in a row: so
     it can stand in a comment of any format.
 
-    Args:
-        rules: The rule base.
-        scores: As given to `as_system`.
-        always: As given to `as_system`.
-
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> from fuzzytree.semantics.lowering import rules_from_tree
@@ -190,10 +185,6 @@ def as_written(
 ) -> tuple[RuleBase | FuzzySystem, str | None]:
     """Return the rule base that a file was made of, and its facts, or the system.
 
-    Args:
-        system: The system of the file.
-        comments: Its comments; the first that begins with `FACTS` counts.
-
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> from fuzzytree.semantics.lowering import rules_from_tree
@@ -211,9 +202,6 @@ def as_written(
 
 def numbers_of(facts: str) -> tuple[int, ...]:
     """Return for each rule of a rule base the place of the system's rule that holds it.
-
-    Args:
-        facts: A line that `as_rules` took.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -235,9 +223,6 @@ def numbers_of(facts: str) -> tuple[int, ...]:
 
 def places_of(facts: str) -> tuple[int | None, ...]:
     """Return for each variable of a rule base the place of the file's input, if any.
-
-    Args:
-        facts: A line that `as_rules` took.
 
     Example:
         >>> from fuzzytree.testing import random_tree

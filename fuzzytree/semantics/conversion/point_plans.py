@@ -46,13 +46,7 @@ Error = Callable[[float, float], float]
 
 
 class Piece(NamedTuple):
-    """A stretch of a curve.
-
-    Attributes:
-        start: Where it starts.
-        end: Where it ends; above `start`.
-        error: How far the chord between two of its values can be from the curve.
-    """
+    """A stretch of a curve."""
 
     start: float
     end: float
@@ -80,10 +74,6 @@ class Plan(NamedTuple):
 
 def bent(value: Function, slope: Function) -> Error:
     """Return the error of chords of a curve that bends to one side only.
-
-    Args:
-        value: The curve.
-        slope: Its slope within the piece; an infinity at an upright end.
 
     Example:
         >>> bent(lambda x: x * x, lambda x: 2.0 * x)(0.0, 1.0)
@@ -177,11 +167,6 @@ def _slack(scale: float, knots: Iterable[float], power: float = 1.0) -> float:
     Degrees and slopes are good to a few units, amplified by `power`. A smooth
     inflection that is rounded by h leaves a stretch of that width, and a bend of its
     order, on the wrong side: it moves a chord by the order of its square.
-
-    Args:
-        scale: A length on which the degree changes much.
-        knots: The places.
-        power: How much a relative error of the value is amplified.
     """
     coarse = quotient(16.0 * math.ulp(max(map(abs, knots))), scale)
     return (2.0**-44 + coarse * coarse) * (1.0 + power)
@@ -217,14 +202,7 @@ def _two_gaussians(curve: Curve, two: TwoGaussians, tail: float) -> Plan:
 def _halves(
     curve: Curve, center: float, places: Sequence[float], steepness: Function
 ) -> list[Piece]:
-    """Return the pieces of a curve that falls alike on both sides of its center.
-
-    Args:
-        curve: The curve.
-        center: Its center.
-        places: Distances from it, the largest first.
-        steepness: How fast it falls at a distance.
-    """
+    """Return the pieces of a curve that falls alike on both sides of its center."""
     left = [*(center - d for d in places), center]
     right = [center, *(center + d for d in places)]
     return [

@@ -174,13 +174,7 @@ class _Change:
 
 
 class Found(NamedTuple):
-    """Points in the place of a curve.
-
-    Attributes:
-        points: The points.
-        bound: The largest difference of a degree.
-        tail: What becomes of a tail without end, if it has one.
-    """
+    """Points in the place of a curve."""
 
     points: Points
     bound: float
@@ -189,10 +183,6 @@ class Found(NamedTuple):
 
 def points_for(curve: Curve, tolerance: float) -> Found:
     """Return points in the place of a curve, and how far they can be off.
-
-    Args:
-        curve: The curve.
-        tolerance: The largest difference of a degree; above 0 and below 1.
 
     Raises:
         ValueError: If the tolerance is not above 0 and below 1.

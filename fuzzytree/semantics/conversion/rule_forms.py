@@ -126,11 +126,6 @@ def split(
 ) -> tuple[SystemRule, ...]:
     """Return rules whose conditions are all and, that say together what one says.
 
-    Args:
-        rule: The rule.
-        block: The block it stands in.
-        system: The system it stands in.
-
     Returns:
         The rules; only the rule itself if it is one, if they would be more than 64, or
         if they would not say the same to the last bit.

@@ -84,11 +84,6 @@ def as_system(
     becomes `is not`, which under min is asked of each of its terms; under product it is
     a NOT of the OR.
 
-    Args:
-        rules: The rule base.
-        scores: What the outputs say.
-        always: What a rule without clauses asks.
-
     Raises:
         LossError: If a rule without clauses must ask an input and there is none.
 

@@ -89,10 +89,6 @@ class Inference(msgspec.Struct, frozen=True):
 def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
     """Run every block on one row, then defuzzify every output.
 
-    Args:
-        system: The system.
-        row: A value for each column, by name.
-
     Raises:
         KeyError: If a column has no value.
 

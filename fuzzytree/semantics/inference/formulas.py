@@ -19,10 +19,6 @@ from fuzzytree.model.system import Call, Expression, Name, Number
 def value_of(expression: Expression, names: Mapping[str, float]) -> float:
     """Return the value of a formula.
 
-    Args:
-        expression: The formula.
-        names: The value of each name in it.
-
     Raises:
         KeyError: If a name has no value, or no function takes so many arguments.
 

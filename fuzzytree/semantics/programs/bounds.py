@@ -91,10 +91,6 @@ def error_bounds(
 ) -> npt.NDArray[np.float64]:
     """Return how far two runners of a program may be apart in each number.
 
-    Args:
-        program: The program.
-        values: Of shape (inputs, rows).
-
     Returns:
         Bounds of shape (results, rows): 0 demands equal bits, infinity nothing.
 
@@ -373,13 +369,6 @@ def marks_of(
     step: Step, place: int, found: Pair, given: Sequence[Pair], marks: Sequence[Array]
 ) -> Array:
     """Return a mark for each number of a step; copies of a number share its mark.
-
-    Args:
-        step: The step.
-        place: Its place in the program.
-        found: Its values and the largest errors of them.
-        given: Those of its arguments; of truths, whether they are unsure.
-        marks: The marks of its arguments.
 
     Returns:
         Marks of the shape of the values; of no meaning for truths.

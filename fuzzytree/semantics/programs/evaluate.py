@@ -21,12 +21,7 @@ Found = float | bool | list[float] | list[bool]
 
 
 class Numbers(msgspec.Struct, frozen=True):
-    """The results of a program for one row.
-
-    Attributes:
-        program: The program.
-        values: The number of each of its results, in order.
-    """
+    """The results of a program for one row."""
 
     program: Program
     values: tuple[float, ...]
@@ -39,10 +34,6 @@ class Numbers(msgspec.Struct, frozen=True):
 
 def evaluate(program: Program, row: Mapping[str, float]) -> Numbers:
     """Run a program on one row.
-
-    Args:
-        program: The program.
-        row: A value for each input, by name.
 
     Raises:
         KeyError: If an input has no value.

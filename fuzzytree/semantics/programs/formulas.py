@@ -46,11 +46,6 @@ _SAME: Mapping[str, str] = {
 def value_of(make: Maker, expression: Expression, names: Mapping[str, int]) -> int:
     """Return the value of a formula.
 
-    Args:
-        make: Where the steps go.
-        expression: The formula.
-        names: The place of each name's value.
-
     Raises:
         KeyError: If a name has no value.
     """

@@ -64,14 +64,7 @@ def is_unit(curve: Curve) -> bool:
 
 
 def curve_degree(make: Maker, curve: Curve, x: int, names: Mapping[str, int]) -> int:
-    """Return the degree at a value, without the label's height.
-
-    Args:
-        make: Where the steps go.
-        curve: The curve.
-        x: The place of the value.
-        names: The places of the variables' values, for formulas.
-    """
+    """Return the degree at a value, without the label's height."""
     match curve:
         case Band() | LR() | Points():
             return shape_degree(make, curve, x)
@@ -351,11 +344,6 @@ def smaller_slope(make: Maker, slopes: Sequence[int], *, is_peak: bool) -> int:
     """Return the smaller of some slopes, held in [0, 1].
 
     Rounding keeps order, so a slope is at least 1 wherever the other one counts.
-
-    Args:
-        make: Where the steps go.
-        slopes: One or two.
-        is_peak: Whether they meet at 1, so that one of them is at most 1 anywhere.
     """
     found = make.chain("minimum", slopes)
     if not is_peak:

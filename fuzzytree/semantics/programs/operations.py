@@ -21,13 +21,7 @@ Kind = Literal["number", "truth"]
 
 
 class Operation(msgspec.Struct, frozen=True):
-    """What an operation takes and gives.
-
-    Attributes:
-        takes: The kind of each argument.
-        gives: The kind of its result.
-        says: The result in words, of arguments a, b, c.
-    """
+    """What an operation takes and gives."""
 
     takes: tuple[Kind, ...]
     gives: Kind

@@ -67,10 +67,6 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
     runner whose `exp`, `pow` and the like are those of the C library. Rows with a value
     that is missing or not finite give NaN and status 3.
 
-    Args:
-        system: The system.
-        activations: Whether the degree of activation of each rule is wanted.
-
     Returns:
         A program with the result `output` for each output, `status`, and `activation`
         for each rule of all blocks if wanted.
@@ -169,13 +165,7 @@ def _status(make: Maker, known: int, numbers: Sequence[int]) -> int:
 
 
 class _Concluded(msgspec.Struct):
-    """A conclusion with its degree, 0 where its rule is not activated.
-
-    Attributes:
-        label: The label's name.
-        degree: Its place.
-        implication: The block's.
-    """
+    """A conclusion with its degree, 0 where its rule is not activated."""
 
     label: str
     degree: int
