@@ -158,30 +158,6 @@ def _stepped() -> RuleBase:
     return replace(rules, variables=(first, rules.variables[1]))
 
 
-def _of_points() -> RuleBase:
-    return _rules()
-
-
-def _product() -> RuleBase:
-    return _rules(semantics=Semantics("product"))
-
-
-def _several_terms() -> RuleBase:
-    return _rules(Rule((Clause("force", ("low", "high")),), "soft"), _PLAIN[1])
-
-
-def _negated() -> RuleBase:
-    return _rules(Rule((Clause("force", ("low",), negated=True),), "soft"), _PLAIN[0])
-
-
-def _always() -> RuleBase:
-    return _rules(_PLAIN[0], Rule((), "firm"))
-
-
-def _defaults() -> RuleBase:
-    return _rules(semantics=Semantics(uncovered="firm", missing="soft"))
-
-
 # --- systems
 
 
@@ -245,73 +221,12 @@ def _mamdani(method: Defuzzifier | None = None) -> FuzzySystem:
     return replace(system, outputs=(output,), blocks=(block,))
 
 
-def _mean_of_maximum() -> FuzzySystem:
-    return _mamdani(Defuzzifier("mean of maximum"))
-
-
 def _singletons() -> FuzzySystem:
     """Return a classifier as JFML writes them: terms without width, and a maximum."""
     system = _mamdani(Defuzzifier("smallest of maximum", 1000))
     labels = (Label("slow", Singleton(1.0)), Label("fast", Singleton(3.5)))
     output = replace(system.outputs[0], labels=labels)
     return replace(system, outputs=(output,))
-
-
-def _fine() -> FuzzySystem:
-    return _mamdani(Defuzzifier("centroid", samples=777))
-
-
-def _linear() -> FuzzySystem:
-    return _sugeno(slow=Linear((0.5, -0.25), 1.0), fast=Linear((0.0, 1.0), 2.0))
-
-
-def _formula() -> FuzzySystem:
-    square = Call("^", (Name("heat"), Number(2.0)))
-    return _sugeno(slow=Formula(Call("/", (square, Number(20.0)))))
-
-
-def _weighted_sum() -> FuzzySystem:
-    return _sugeno(method=Defuzzifier("weighted sum"))
-
-
-def _monotone() -> FuzzySystem:
-    ramp = Points((0.0, 5.0), (0.0, 1.0))
-    return _sugeno(slow=Points((0.0, 5.0), (1.0, 0.0)), fast=ramp)
-
-
-def _weights() -> FuzzySystem:
-    return _sugeno(*_two(0.75))
-
-
-def _hedges() -> FuzzySystem:
-    condition = Is("heat", "high", ("very",))
-    return _sugeno(_two()[0], SystemRule(condition, (Conclusion("fan", "fast"),)))
-
-
-def _or() -> FuzzySystem:
-    condition = Or((And((_LOW, _DRY)), _HIGH))
-    return _sugeno(SystemRule(condition, (Conclusion("fan", "fast"),)))
-
-
-def _not() -> FuzzySystem:
-    condition = And((_LOW, Not(_DRY)))
-    return _sugeno(SystemRule(condition, (Conclusion("fan", "slow"),)), _two()[1])
-
-
-def _unconditional() -> FuzzySystem:
-    return _sugeno(*_two(), SystemRule(None, (Conclusion("fan", "slow"),)))
-
-
-def _gaussian() -> FuzzySystem:
-    return _curved(Gaussian(5.0, 1.5))
-
-
-def _sigmoid() -> FuzzySystem:
-    return _curved(Sigmoid(5.0, 2.0))
-
-
-def _spline() -> FuzzySystem:
-    return _curved(SCurve(2.0, 8.0))
 
 
 def _curved(curve: Curve) -> FuzzySystem:
@@ -336,21 +251,6 @@ def _several_blocks() -> FuzzySystem:
     return replace(_sugeno(), blocks=blocks)
 
 
-def _probabilistic() -> FuzzySystem:
-    block = RuleBlock(_two(), "product", "algebraic sum")
-    return replace(_sugeno(), blocks=(block,))
-
-
-def _hamacher() -> FuzzySystem:
-    block = RuleBlock(_two(), "hamacher product", "hamacher sum")
-    return replace(_sugeno(), blocks=(block,))
-
-
-def _highest() -> FuzzySystem:
-    block = RuleBlock(_two(), activation=Activation("highest", 1))
-    return replace(_sugeno(), blocks=(block,))
-
-
 def _default() -> FuzzySystem:
     system = _sugeno()
     return replace(system, outputs=(replace(system.outputs[0], default=2.5),))
@@ -362,53 +262,68 @@ def _clipped() -> FuzzySystem:
     return replace(system, inputs=inputs)
 
 
-def _relative() -> RuleBase:
-    return rules_from_tree(_tree())
-
-
-def _raw() -> RuleBase:
-    return rules_from_tree(_tree(), "raw")
-
-
-def _mixed_rules() -> RuleBase:
-    return rules_from_tree(_mixed_tree())
-
-
 SAMPLES: Mapping[str, Callable[[], Document]] = {
     "tree": _tree,
     "tree with combined features": _mixed_tree,
-    "relative rules": _relative,
-    "raw rules (LR curves)": _raw,
-    "rules with combined features": _mixed_rules,
-    "point lists": _of_points,
+    "relative rules": lambda: rules_from_tree(_tree()),
+    "raw rules (LR curves)": lambda: rules_from_tree(_tree(), "raw"),
+    "rules with combined features": lambda: rules_from_tree(_mixed_tree()),
+    "point lists": lambda: _rules(),
     "vertical edges": _stepped,
-    "AND as product": _product,
-    "several terms in a clause": _several_terms,
-    "negated clauses": _negated,
-    "a rule that always holds": _always,
-    "answers where no rule fires": _defaults,
+    "AND as product": lambda: _rules(semantics=Semantics("product")),
+    "several terms in a clause": lambda: _rules(
+        Rule((Clause("force", ("low", "high")),), "soft"), _PLAIN[1]
+    ),
+    "negated clauses": lambda: _rules(
+        Rule((Clause("force", ("low",), negated=True),), "soft"), _PLAIN[0]
+    ),
+    "a rule that always holds": lambda: _rules(_PLAIN[0], Rule((), "firm")),
+    "answers where no rule fires": lambda: _rules(
+        semantics=Semantics(uncovered="firm", missing="soft")
+    ),
     "Sugeno, numbers": _sugeno,
-    "Sugeno, linear": _linear,
-    "Sugeno, formulas": _formula,
-    "weighted sum": _weighted_sum,
-    "Tsukamoto": _monotone,
+    "Sugeno, linear": lambda: _sugeno(
+        slow=Linear((0.5, -0.25), 1.0), fast=Linear((0.0, 1.0), 2.0)
+    ),
+    "Sugeno, formulas": lambda: _sugeno(
+        slow=Formula(Call("/", (Call("^", (Name("heat"), Number(2.0))), Number(20.0))))
+    ),
+    "weighted sum": lambda: _sugeno(method=Defuzzifier("weighted sum")),
+    "Tsukamoto": lambda: _sugeno(
+        slow=Points((0.0, 5.0), (1.0, 0.0)), fast=Points((0.0, 5.0), (0.0, 1.0))
+    ),
     "Mamdani, centroid": _mamdani,
-    "Mamdani, mean of maximum": _mean_of_maximum,
+    "Mamdani, mean of maximum": lambda: _mamdani(Defuzzifier("mean of maximum")),
     "Mamdani, singletons": _singletons,
-    "number of samples": _fine,
-    "weights of rules": _weights,
-    "hedges": _hedges,
-    "OR": _or,
-    "NOT": _not,
-    "a conclusion without a condition": _unconditional,
-    "gaussian curves": _gaussian,
-    "sigmoid curves": _sigmoid,
-    "S curves": _spline,
+    "number of samples": lambda: _mamdani(Defuzzifier("centroid", samples=777)),
+    "weights of rules": lambda: _sugeno(*_two(0.75)),
+    "hedges": lambda: _sugeno(
+        _two()[0],
+        SystemRule(Is("heat", "high", ("very",)), (Conclusion("fan", "fast"),)),
+    ),
+    "OR": lambda: _sugeno(
+        SystemRule(Or((And((_LOW, _DRY)), _HIGH)), (Conclusion("fan", "fast"),))
+    ),
+    "NOT": lambda: _sugeno(
+        SystemRule(And((_LOW, Not(_DRY))), (Conclusion("fan", "slow"),)), _two()[1]
+    ),
+    "a conclusion without a condition": lambda: _sugeno(
+        *_two(), SystemRule(None, (Conclusion("fan", "slow"),))
+    ),
+    "gaussian curves": lambda: _curved(Gaussian(5.0, 1.5)),
+    "sigmoid curves": lambda: _curved(Sigmoid(5.0, 2.0)),
+    "S curves": lambda: _curved(SCurve(2.0, 8.0)),
     "several outputs": _several_outputs,
     "several rule blocks": _several_blocks,
-    "product and algebraic sum": _probabilistic,
-    "Hamacher norms": _hamacher,
-    "the highest rule alone": _highest,
+    "product and algebraic sum": lambda: replace(
+        _sugeno(), blocks=(RuleBlock(_two(), "product", "algebraic sum"),)
+    ),
+    "Hamacher norms": lambda: replace(
+        _sugeno(), blocks=(RuleBlock(_two(), "hamacher product", "hamacher sum"),)
+    ),
+    "the highest rule alone": lambda: replace(
+        _sugeno(), blocks=(RuleBlock(_two(), activation=Activation("highest", 1)),)
+    ),
     "a default answer": _default,
     "inputs held in their range": _clipped,
 }

@@ -80,41 +80,9 @@ def _is_same(make: Maker, a: int, b: int) -> int:
     return make("or", make("equal", a, b), both)
 
 
-def _and(make: Maker, a: int, b: int) -> int:
-    return as_number(make, make("and", _is_true(make, a), _is_true(make, b)))
-
-
-def _or(make: Maker, a: int, b: int) -> int:
-    return as_number(make, make("or", _is_true(make, a), _is_true(make, b)))
-
-
-def _not(make: Maker, a: int) -> int:
-    return as_number(make, make("equal", a, make.constant(0.0)))
-
-
-def _lt(make: Maker, a: int, b: int) -> int:
-    return as_number(make, make("less", a, b))
-
-
 def _le(make: Maker, a: int, b: int) -> int:
     holds = make("or", make("at_most", a, b), _is_same(make, a, b))
     return as_number(make, holds)
-
-
-def _gt(make: Maker, a: int, b: int) -> int:
-    return _lt(make, b, a)
-
-
-def _ge(make: Maker, a: int, b: int) -> int:
-    return _le(make, b, a)
-
-
-def _eq(make: Maker, a: int, b: int) -> int:
-    return as_number(make, _is_same(make, a, b))
-
-
-def _neq(make: Maker, a: int, b: int) -> int:
-    return as_number(make, make("not", _is_same(make, a, b)))
 
 
 def _modulo(make: Maker, a: int, b: int) -> int:
@@ -130,14 +98,18 @@ def _modulo(make: Maker, a: int, b: int) -> int:
 
 _OTHERS: Mapping[str, Callable[..., int]] = {
     "%": _modulo,
-    "and": _and,
-    "or": _or,
-    "not": _not,
-    "lt": _lt,
+    "and": lambda make, a, b: as_number(
+        make, make("and", _is_true(make, a), _is_true(make, b))
+    ),
+    "or": lambda make, a, b: as_number(
+        make, make("or", _is_true(make, a), _is_true(make, b))
+    ),
+    "not": lambda make, a: as_number(make, make("equal", a, make.constant(0.0))),
+    "lt": lambda make, a, b: as_number(make, make("less", a, b)),
     "le": _le,
-    "gt": _gt,
-    "ge": _ge,
-    "eq": _eq,
-    "neq": _neq,
+    "gt": lambda make, a, b: as_number(make, make("less", b, a)),
+    "ge": lambda make, a, b: _le(make, b, a),
+    "eq": lambda make, a, b: as_number(make, _is_same(make, a, b)),
+    "neq": lambda make, a, b: as_number(make, make("not", _is_same(make, a, b))),
 }
 """Functions of formulas that are several operations."""

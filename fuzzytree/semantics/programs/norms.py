@@ -53,14 +53,6 @@ def _in_halves(make: Maker, d: int, low: int, high: int) -> int:
     return make("where", make("at_most", d, make.constant(0.5)), low, high)
 
 
-def _any(make: Maker, d: int) -> int:
-    return make.constant(1.0)
-
-
-def _somewhat(make: Maker, d: int) -> int:
-    return make("square_root", d)
-
-
 def _extremely(make: Maker, d: int) -> int:
     low = _twice(make, _square(make, d))
     high = _one_minus(make, _twice(make, _square(make, _one_minus(make, d))))
@@ -73,41 +65,19 @@ def _seldom(make: Maker, d: int) -> int:
     return _in_halves(make, d, low, _one_minus(make, root))
 
 
-def _cubed(make: Maker, d: int) -> int:
-    return make("multiply", _square(make, d), d)
-
-
-def _very_very(make: Maker, d: int) -> int:
-    return _square(make, _square(make, d))
-
-
-def _power(exponent: float) -> Callable[[Maker, int], int]:
-    def power(make: Maker, d: int) -> int:
-        return make("power", d, make.constant(exponent))
-
-    return power
-
-
 _HEDGES: Mapping[Hedge, Callable[[Maker, int], int]] = {
-    "any": _any,
+    "any": lambda make, d: make.constant(1.0),
     "not": _one_minus,
     "very": _square,
-    "somewhat": _somewhat,
+    "somewhat": lambda make, d: make("square_root", d),
     "extremely": _extremely,
     "seldom": _seldom,
-    "cubed": _cubed,
-    "very very": _very_very,
-    "plus": _power(1.25),
-    "minus": _power(0.75),
-    "cube root": _power(1.0 / 3.0),
+    "cubed": lambda make, d: make("multiply", _square(make, d), d),
+    "very very": lambda make, d: _square(make, _square(make, d)),
+    "plus": lambda make, d: make("power", d, make.constant(1.25)),
+    "minus": lambda make, d: make("power", d, make.constant(0.75)),
+    "cube root": lambda make, d: make("power", d, make.constant(1.0 / 3.0)),
 }
-
-
-def _plain(operation: str) -> Norm:
-    def norm(make: Maker, a: int, b: int) -> int:
-        return make(operation, a, b)
-
-    return norm
 
 
 def _sum_less_product(make: Maker, a: int, b: int) -> int:
@@ -140,10 +110,6 @@ def _nilpotent_minimum(make: Maker, a: int, b: int) -> int:
     return make("where", is_above, make("minimum", a, b), make.constant(0.0))
 
 
-def _bounded_sum(make: Maker, a: int, b: int) -> int:
-    return make("minimum", make.constant(1.0), make("add", a, b))
-
-
 def _drastic_sum(make: Maker, a: int, b: int) -> int:
     is_zero = make("equal", make("minimum", a, b), make.constant(0.0))
     return make("where", is_zero, make("maximum", a, b), make.constant(1.0))
@@ -173,8 +139,8 @@ def _normalized_sum(make: Maker, a: int, b: int) -> int:
 
 
 T_NORMS: Mapping[TNorm, Norm] = {
-    "minimum": _plain("minimum"),
-    "product": _plain("multiply"),
+    "minimum": lambda make, a, b: make("minimum", a, b),
+    "product": lambda make, a, b: make("multiply", a, b),
     "bounded difference": _bounded_difference,
     "drastic product": _drastic_product,
     "einstein product": _einstein_product,
@@ -183,15 +149,17 @@ T_NORMS: Mapping[TNorm, Norm] = {
 }
 
 S_NORMS: Mapping[SNorm, Norm] = {
-    "maximum": _plain("maximum"),
+    "maximum": lambda make, a, b: make("maximum", a, b),
     "algebraic sum": _sum_less_product,
-    "bounded sum": _bounded_sum,
+    "bounded sum": lambda make, a, b: make(
+        "minimum", make.constant(1.0), make("add", a, b)
+    ),
     "drastic sum": _drastic_sum,
     "einstein sum": _einstein_sum,
     "hamacher sum": _hamacher_sum,
     "nilpotent maximum": _nilpotent_maximum,
     "normalized sum": _normalized_sum,
-    "sum": _plain("add"),
+    "sum": lambda make, a, b: make("add", a, b),
 }
 
 
