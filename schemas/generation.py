@@ -19,7 +19,7 @@ from typing import Final
 import msgspec
 from msgspec import inspect
 
-from fuzzytree.formats.yaml.layout import Record
+from fuzzytree.formats.yaml.layout import FileRecord
 
 FILES: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -53,7 +53,7 @@ def generate(name: str) -> bytes:
         'A fuzzy decision tree of fuzzytree.'
     """
     kind = _record(FILES[name])
-    return _text(_of_file(kind)) if issubclass(kind, Record) else of_result(kind)
+    return _text(_of_file(kind)) if issubclass(kind, FileRecord) else of_result(kind)
 
 
 def write_all(folder: Path) -> None:
@@ -68,7 +68,7 @@ def _record(name: str) -> type[msgspec.Struct]:
     return found
 
 
-def _of_file(kind: type[Record]) -> Definitions:
+def _of_file(kind: type[FileRecord]) -> Definitions:
     definitions: Definitions = {}
     _define(kind, definitions)
     whole = definitions.pop(kind.__name__)
@@ -123,7 +123,7 @@ def _added(kind: type[msgspec.Struct]) -> Definitions:
     return found
 
 
-def _define(kind: type[Record], definitions: Definitions) -> None:
+def _define(kind: type[FileRecord], definitions: Definitions) -> None:
     """Add the definition of a record, and of the records in it."""
     if kind.__name__ in definitions:
         return
@@ -148,7 +148,7 @@ def _define(kind: type[Record], definitions: Definitions) -> None:
     definitions[kind.__name__] = definition
 
 
-def _forms(kind: type[Record], keys: list[str]) -> list[Json]:
+def _forms(kind: type[FileRecord], keys: list[str]) -> list[Json]:
     """Return what each form needs and forbids."""
     choosable = {key for form in kind.forms for key in (*form.needs, *form.may)}
     free = [key for key in keys if key not in choosable]
@@ -173,7 +173,7 @@ def _schema(kind: inspect.Type, definitions: Definitions) -> Definitions:
                 _schema(kinds[0], definitions) if len(kinds) == 1 else {"anyOf": found}
             )
         case inspect.StructType():
-            if issubclass(kind.cls, Record):
+            if issubclass(kind.cls, FileRecord):
                 _define(kind.cls, definitions)
             return {"$ref": f"#/$defs/{kind.cls.__name__}"}
         case inspect.VarTupleType():

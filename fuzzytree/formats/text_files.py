@@ -1,6 +1,6 @@
-"""Text files as lines and words that know their line and column.
+"""What readers share: text with positions, numbers, and notes on what a file says.
 
-For formats that are read line by line. Lines end with LF, CR or both.
+Lines end with LF, CR or both. Lines and columns count from 1.
 """
 
 from __future__ import annotations
@@ -13,28 +13,66 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
+from fuzzytree.model.contracts import Document, Loss, Reading
+from fuzzytree.model.rulebase import name_choice
 
 MOST_BYTES: Final = 4 * 2**20
 MOST_SHOWN: Final = 100
 LONGEST_MISTAKE: Final = 1_500
 LONGEST_NAME: Final = 1000
 
-Found = tuple[int, int, str]
-"""A mistake: line and column, both from 1, and a sentence."""
+Position = tuple[int, int]
+"""A line and a column."""
 
+FileMistake = tuple[int, int, str]
+"""A line, a column, and a sentence."""
+
+CONTROL: Final = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_CONTROL = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
 _NUMBER = re.compile(
     r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?", re.ASCII
 )
-_UNLIMITED = {
-    f"{sign}{word}": float(f"{sign}{word}")
-    for sign in ("", "+", "-")
-    for word in ("inf", "infinity", "nan")
-}
+_UNLIMITED = re.compile("[-+]?(?:inf|infinity|nan)", re.IGNORECASE | re.ASCII)
 
 
-def report(name: str, found: Sequence[Found]) -> ReadError:
+class PartError(ReadError):
+    """A part of a file, such as a rule or a term, that cannot be read."""
+
+    def __init__(self, *mistakes: FileMistake) -> None:
+        self.mistakes = mistakes
+        super().__init__("; ".join(sentence for _, _, sentence in mistakes))
+
+
+class ReaderNotes(msgspec.Struct, frozen=True):
+    """The mistakes, losses and remarks that a reader collects."""
+
+    mistakes: list[FileMistake] = msgspec.field(default_factory=list)
+    losses: list[Loss] = msgspec.field(default_factory=list)
+    remarks: list[str] = msgspec.field(default_factory=list)
+
+    def mistake(self, position: Position, sentence: str) -> None:
+        """Add a mistake."""
+        self.mistakes.append((*position, sentence))
+
+    def loss(self, where: str, what: str) -> None:
+        """Add a loss."""
+        self.losses.append(Loss(where, what))
+
+    def remark(self, sentence: str) -> None:
+        """Add a remark."""
+        self.remarks.append(sentence)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there are so many mistakes that the reader looks for no more."""
+        return len(self.mistakes) >= MOST_SHOWN
+
+    def reading(self, model: Document) -> Reading:
+        """Return a model with the losses and remarks."""
+        return Reading(model, tuple(self.losses), tuple(self.remarks))
+
+
+def report(name: str, mistakes: Sequence[FileMistake]) -> ReadError:
     """Return the error that lists mistakes by line, a hundred at most.
 
     A sentence that quotes more than it should loses its middle.
@@ -43,7 +81,7 @@ def report(name: str, found: Sequence[Found]) -> ReadError:
         >>> len(str(report("x.yaml", [(1, 1, "no term " + "n" * 1_000_000)])))
         1517
     """
-    found = sorted(set(found))
+    found = sorted(set(mistakes))
     lines = [
         f"{name}:{line}:{column}: {_shortened(text)}" for line, column, text in found
     ]
@@ -62,48 +100,75 @@ def _shortened(sentence: str) -> str:
 
 
 class Word(msgspec.Struct, frozen=True, gc=False):
-    """A text without blanks, and where it stands; both from 1."""
+    """A text without blanks, and its position."""
 
     text: str
     line: int
     column: int
 
-    def mistake(self, sentence: str) -> Found:
+    @property
+    def position(self) -> Position:
+        """Its line and column."""
+        return self.line, self.column
+
+    def mistake(self, sentence: str) -> FileMistake:
         """Return a mistake at this word."""
         return self.line, self.column, sentence
 
 
+def check_size(content: bytes, name: str, most: int) -> None:
+    """Refuse a file of more than `most` bytes.
+
+    Raises:
+        ReadError: If it is larger.
+    """
+    if len(content) > most:
+        raise ReadError(
+            f"{name}: {len(content):,} bytes are more than the {most:,} that are read"
+        )
+
+
 def decoded(
-    content: bytes, name: str, most: int = MOST_BYTES
+    content: bytes, name: str, most: int = MOST_BYTES, *, reads_utf16: bool = False
 ) -> tuple[str, tuple[str, ...]]:
     """Return the text of a file, and a remark if it is not UTF-8.
 
     Raises:
-        ReadError: If it is too large, is UTF-16, or has control characters.
+        ReadError: If it is larger than `most` bytes, or UTF-16 that is not wanted.
     """
-    if len(content) > most:
-        text = (
-            f"{name}: {len(content):,} bytes are more than the {most:,} that are read"
-        )
-        raise ReadError(text)
+    check_size(content, name, most)
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         sentence = "a file of UTF-16; it must be saved as UTF-8"
+        if reads_utf16:
+            try:
+                return content.decode("utf-16"), (
+                    "the file is not UTF-8; read as UTF-16",
+                )
+            except UnicodeDecodeError:
+                sentence = "the UTF-16 text of the file is incomplete"
         raise report(name, [(1, 1, sentence)])
-    remarks: tuple[str, ...] = ()
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8-sig"), ()
     except UnicodeDecodeError:
-        text = content.decode("latin-1")
-        remarks = ("the file is not UTF-8; read as Latin-1",)
-    wrong = _CONTROL.search(text)
-    if wrong:
-        sentence = f"character U+{ord(wrong.group()):04X}; the file may be damaged"
-        raise report(name, [(*_place(text[: wrong.start()]), sentence)])
-    return text, remarks
+        return content.decode("latin-1"), ("the file is not UTF-8; read as Latin-1",)
 
 
-def _place(before: str) -> tuple[int, int]:
-    lines = split_lines(before)
+def check_characters(text: str, name: str, forbidden: re.Pattern[str]) -> None:
+    """Refuse a text with a character that no such file has.
+
+    Raises:
+        ReadError: With the first of them.
+    """
+    match = forbidden.search(text)
+    if match:
+        code = f"U+{ord(match.group()):04X}"
+        sentence = f"the character {code} is not allowed here; the file may be damaged"
+        raise report(name, [(*position_behind(text[: match.start()]), sentence)])
+
+
+def position_behind(text: str) -> Position:
+    """Return the line and column of what follows a text."""
+    lines = split_lines(text)
     return len(lines), len(lines[-1]) + 1
 
 
@@ -120,8 +185,7 @@ def split_lines(text: str) -> list[str]:
 def words(text: str, line: int, column: int, signs: str = "") -> Iterator[Word]:
     """Yield the words of a text; each of `signs` is a word of its own.
 
-    Returns:
-        The words; one that is longer than any name ends in dots.
+    A word that is longer than any name ends in dots.
 
     Example:
         >>> [word.text for word in words("if (a is b)", 1, 1, "()")]
@@ -129,11 +193,11 @@ def words(text: str, line: int, column: int, signs: str = "") -> Iterator[Word]:
     """
     marked = re.escape(signs)
     pattern = rf"[{marked}]|[^\s{marked}]+" if signs else r"\S+"
-    for found in re.finditer(pattern, text):
-        word = found.group()
+    for match in re.finditer(pattern, text):
+        word = match.group()
         if len(word) > LONGEST_NAME:
             word = f"{word[:LONGEST_NAME]}..."
-        yield Word(word, line, column + found.start())
+        yield Word(word, line, column + match.start())
 
 
 def number_of(text: str) -> float | None:
@@ -143,9 +207,20 @@ def number_of(text: str) -> float | None:
         >>> number_of("-1.5e3"), number_of("inf"), number_of("1_000")
         (-1500.0, inf, None)
     """
-    if text.lower() in _UNLIMITED:
-        return _UNLIMITED[text.lower()]
+    if _UNLIMITED.fullmatch(text):
+        return float(text)
     if not _NUMBER.fullmatch(text):
         return None
     value = float(text)
     return None if math.isinf(value) else value
+
+
+def no_such(what: str, name: str, known: Sequence[str]) -> str:
+    """Return the sentence on an unknown name.
+
+    Example:
+        >>> no_such("method", "COK", ["COG", "COA"])
+        "no method 'COK'; there is COG, COA (did you mean 'COG'?)"
+    """
+    shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+    return f"no {what} {shown!r}; {name_choice(name[:99], known)}"

@@ -12,9 +12,9 @@ from msgspec import Meta, field
 from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.exporters.yaml_text import Entry, Noted, Short, joined
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.formats.text_files import Found, report
+from fuzzytree.formats.text_files import FileMistake, report
 from fuzzytree.formats.yaml.binding import entries, located, record, value_of
-from fuzzytree.formats.yaml.layout import Form, Name, Record
+from fuzzytree.formats.yaml.layout import FileRecord, KeyForm, Name
 from fuzzytree.formats.yaml.nodes import MappingNode, Scalar, compose
 from fuzzytree.model.rulebase import Mistake
 from fuzzytree.tactile.boards import (
@@ -56,7 +56,7 @@ Hexadecimal = Annotated[
 ]
 
 
-class SensorOfBoard(Record, frozen=True, kw_only=True):
+class SensorOfBoard(FileRecord, frozen=True, kw_only=True):
     """The matrix: its size, and what its cells read.
 
     `full` is what a cell reads that takes no more. A cell is pressed where it reads
@@ -76,7 +76,7 @@ class SensorOfBoard(Record, frozen=True, kw_only=True):
     ] = ()
 
 
-class MarkerOfBoard(Record, frozen=True, kw_only=True):
+class MarkerOfBoard(FileRecord, frozen=True, kw_only=True):
     """Frames that begin with a marker, and have a fixed length.
 
     Behind the marker come the `sizes` (16 bits each), `skip` bytes that are ignored,
@@ -93,7 +93,7 @@ class MarkerOfBoard(Record, frozen=True, kw_only=True):
     tail: Hexadecimal | None = None
 
 
-class SentinelOfBoard(Record, frozen=True, kw_only=True):
+class SentinelOfBoard(FileRecord, frozen=True, kw_only=True):
     """Frames that the byte `end` ends, a byte a cell.
 
     The byte `zero` begins a run of zeros, and the next byte is its length.
@@ -104,7 +104,7 @@ class SentinelOfBoard(Record, frozen=True, kw_only=True):
     zero: Byte = 0
 
 
-class RequestOfBoard(Record, frozen=True, kw_only=True):
+class RequestOfBoard(FileRecord, frozen=True, kw_only=True):
     """Frames that are asked for, and have a fixed length.
 
     `skip` bytes that are ignored, the cells, and the checksum of both. The `timeout`
@@ -120,7 +120,7 @@ class RequestOfBoard(Record, frozen=True, kw_only=True):
     timeout: Annotated[float, Meta(ge=0.001, le=LONGEST_TIMEOUT_S)] = 0.5
 
 
-class TextOfBoard(Record, frozen=True, kw_only=True):
+class TextOfBoard(FileRecord, frozen=True, kw_only=True):
     """Frames as numbers in lines of text.
 
     A frame is a line, or a block of lines, one for each row (column), with an empty
@@ -146,7 +146,7 @@ class TextOfBoard(Record, frozen=True, kw_only=True):
     skip: Skip = 0
 
 
-class PortOfBoard(Record, frozen=True, kw_only=True):
+class PortOfBoard(FileRecord, frozen=True, kw_only=True):
     """How the serial port is set."""
 
     noun: ClassVar[str] = "a port"
@@ -156,7 +156,7 @@ class PortOfBoard(Record, frozen=True, kw_only=True):
     stop_bits: Literal[1, 2] = field(name="stop bits", default=1)
 
 
-class StartOfBoard(Record, frozen=True, kw_only=True):
+class StartOfBoard(FileRecord, frozen=True, kw_only=True):
     """What is measured before the first frame counts.
 
     The baseline is the median of so many `frames`, cell by cell. A cell whose
@@ -168,7 +168,7 @@ class StartOfBoard(Record, frozen=True, kw_only=True):
     hot: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5
 
 
-class BoardFile(Record, frozen=True, kw_only=True):
+class BoardFile(FileRecord, frozen=True, kw_only=True):
     """A board with a tactile sensor: what it sends, and how it is connected.
 
     One of `marker`, `sentinel`, `request` and `text` says how a frame lies in the
@@ -176,11 +176,11 @@ class BoardFile(Record, frozen=True, kw_only=True):
     """
 
     noun: ClassVar[str] = "a board"
-    forms: ClassVar[tuple[Form, ...]] = (
-        Form(("marker",)),
-        Form(("sentinel",)),
-        Form(("request",)),
-        Form(("text",)),
+    forms: ClassVar[tuple[KeyForm, ...]] = (
+        KeyForm(("marker",)),
+        KeyForm(("sentinel",)),
+        KeyForm(("request",)),
+        KeyForm(("text",)),
     )
     format: Literal["fuzzytree-board/1"]
     name: Name
@@ -261,7 +261,7 @@ checksum='none', tail='')
     raise report(name, [*located(root, _renamed(file, mistakes))])
 
 
-def _format_mistakes(root: MappingNode) -> Iterator[Found]:
+def _format_mistakes(root: MappingNode) -> Iterator[FileMistake]:
     node = value_of(root, "format")
     if node is None:
         text = f"no 'format: {BOARD_FORMAT}' says what this file is"

@@ -358,7 +358,7 @@ MISTAKES = [
     (("Name='tip'", "Name=tip"), "3:6: Name must stand in quotes, such as 'tip'"),
     (("MF1='slow'", "MF2='slow'"), "26:1: MF1 is missing before MF2"),
     (("Version=2.0", "Version"), "5:1: 'Version' is no key and value, such as"),
-    (("a comment", "\x00"), "1:3: character U+0000 may not stand in a FIS file"),
+    (("a comment", "\x00"), "1:3: the character U+0000 is not allowed here"),
 ]
 
 

@@ -466,7 +466,11 @@ def test_a_file_of_latin_1_is_read_with_a_remark() -> None:
     ("content", "told"),
     [
         (b"", "x.fll:1:1: there is no OutputVariable that is enabled"),
-        (b"\0", "x.fll:1:1: character U+0000; the file may be damaged"),
+        (
+            b"\0",
+            "x.fll:1:1: the character U+0000 is not allowed here; "
+            "the file may be damaged",
+        ),
         ("Engine: a".encode("utf-16"), "a file of UTF-16; it must be saved as UTF-8"),
         (b"a" * (33 * 2**20), "x.fll: 34,603,008 bytes are more than the 33,554,432"),
     ],

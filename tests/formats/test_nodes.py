@@ -61,8 +61,8 @@ def test_a_byte_order_mark_of_utf_8_is_no_character() -> None:
         ),
         (
             b"a: 1\nb: \x1b[0m\n",
-            "x.yaml:2:4: character U+001B may not stand in a YAML file; "
-            "it may be damaged",
+            "x.yaml:2:4: the character U+001B is not allowed here; "
+            "the file may be damaged",
         ),
         (b"a: " + b"[" * 33, "x.yaml:1:35: more than 32 levels of nesting"),
         (b"- " * 33 + b"a", "x.yaml:1:65: more than 32 levels of nesting"),

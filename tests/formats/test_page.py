@@ -38,15 +38,15 @@ def test_the_first_example_is_a_whole_file() -> None:
 
 def test_every_other_example_fits_the_layout() -> None:
     _, size, points, clauses, nodes_and_leaves, sets = BLOCKS
-    bound: list[tuple[Node, type[layout.Record]]] = [
+    bound: list[tuple[Node, type[layout.FileRecord]]] = [
         *((item, layout.VariableOfModel) for item in items(size)),
         *((item, layout.TermOfVariable) for item in items(points)),
         *((item, layout.WrittenOut) for item in items(clauses)),
-        *((item, layout.Question) for item in items(nodes_and_leaves, "nodes")),
+        *((item, layout.NodeOfTree) for item in items(nodes_and_leaves, "nodes")),
         *((item, layout.End) for item in items(nodes_and_leaves, "leaves")),
-        *((item, layout.FittedSets) for item in items(sets, "sets")),
+        *((item, layout.SetsOfVariable) for item in items(sets, "sets")),
     ]
-    found: list[text_files.Found] = []
+    found: list[text_files.FileMistake] = []
     for item, kind in bound:
         assert bind(item, kind, found) is not None
     assert found == []

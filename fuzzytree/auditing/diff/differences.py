@@ -24,7 +24,7 @@ from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking.converting import kind_of
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.yaml.spots import in_system
+from fuzzytree.formats.positions import in_system
 from fuzzytree.model.agreement import version
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Path, RuleBase, fingerprint, name_choice

@@ -26,9 +26,9 @@ from msgspec import Meta, field
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.formats.text_files import Found, report
+from fuzzytree.formats.text_files import FileMistake, report
 from fuzzytree.formats.yaml.binding import bind, find
-from fuzzytree.formats.yaml.layout import Name, Record
+from fuzzytree.formats.yaml.layout import FileRecord, Name
 from fuzzytree.formats.yaml.nodes import MappingNode, compose
 from fuzzytree.model.naming import as_names
 from fuzzytree.model.rulebase import name_choice
@@ -143,7 +143,7 @@ _MOST_BYTES = 2**20
 _Codes = Annotated[tuple[Name, ...], Meta(max_length=1000)]
 
 
-class LimitsOfFile(Record, frozen=True, kw_only=True):
+class LimitsOfFile(FileRecord, frozen=True, kw_only=True):
     """The ends of one variable, or of a combination besides."""
 
     noun: ClassVar[str] = "limits"
@@ -152,7 +152,7 @@ class LimitsOfFile(Record, frozen=True, kw_only=True):
     to: float
 
 
-class SettingsOfFile(Record, frozen=True, kw_only=True):
+class SettingsOfFile(FileRecord, frozen=True, kw_only=True):
     """What is taken for small; see `AuditSettings`."""
 
     noun: ClassVar[str] = "settings"
@@ -166,7 +166,7 @@ class SettingsOfFile(Record, frozen=True, kw_only=True):
     budget: float | None = None
 
 
-class ConfigurationFile(Record, frozen=True, kw_only=True):
+class ConfigurationFile(FileRecord, frozen=True, kw_only=True):
     """A configuration of `fuzzytree audit`; what is left out is as without a file."""
 
     noun: ClassVar[str] = "a configuration"
@@ -264,7 +264,7 @@ def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
 
 
 def _settings(
-    given: SettingsOfFile, root: MappingNode, found: list[Found]
+    given: SettingsOfFile, root: MappingNode, found: list[FileMistake]
 ) -> AuditSettings:
     """Return settings, the defaults where a value is left out or wrong."""
     made = AuditSettings()

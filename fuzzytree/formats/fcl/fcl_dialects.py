@@ -9,21 +9,22 @@ from typing import Final, Literal, NamedTuple, TypeVar
 from lark import Token
 
 from fuzzytree.formats.fcl.fcl_syntax import (
-    Asked,
-    Block,
-    Condition,
     Declaration,
+    FclBlock,
+    FclCondition,
+    FclJunction,
+    FclNegation,
+    FclProposition,
     FclText,
     Header,
-    Joined,
-    Negated,
-    RuleText,
+    RuleStatement,
     Setting,
-    TermText,
+    TermStatement,
     place,
 )
 from fuzzytree.formats.fll.fll_terms import CLASSES
-from fuzzytree.formats.fll.fll_words import METHODS, S_NORMS, T_NORMS, Method, Notes
+from fuzzytree.formats.fll.fll_words import METHODS, S_NORMS, T_NORMS, Method
+from fuzzytree.formats.text_files import ReaderNotes
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import Defuzzifier, SNorm, TNorm
 
@@ -120,7 +121,7 @@ _OF_FUZZYLITE = frozenset(
 _ORDER: Final[list[Dialect]] = ["fuzzylite", "jfuzzylogic", "pyit2fls", "iec"]
 
 
-class Evidence(NamedTuple):
+class DialectEvidence(NamedTuple):
     """Something that a dialect has; the more it weighs the fewer others have it too."""
 
     dialect: Dialect
@@ -166,7 +167,7 @@ def _first_line(text: str) -> Dialect | None:
             return None
 
 
-def _listed(found: list[Evidence], dialect: Dialect) -> str:
+def _listed(found: list[DialectEvidence], dialect: Dialect) -> str:
     first: dict[str, int] = {}
     for one in found:
         if one.dialect == dialect:
@@ -175,15 +176,15 @@ def _listed(found: list[Evidence], dialect: Dialect) -> str:
     return ", ".join(shown[:4]) + (", ..." if len(shown) > 4 else "")
 
 
-def _evidence(text: FclText) -> Iterator[Evidence]:
+def _evidence(text: FclText) -> Iterator[DialectEvidence]:
     block = ""
     for one in text.statements:
         match one:
             case Header(keyword=keyword):
                 block = keyword.type
-            case TermText(kind="shape", tokens=tokens):
+            case TermStatement(kind="shape", tokens=tokens):
                 yield from _of_shape(tokens[0])
-            case RuleText():
+            case RuleStatement():
                 yield from _of_rule(one)
             case Setting(keyword=keyword, words=words):
                 yield from _of_setting(keyword, words, block)
@@ -192,7 +193,7 @@ def _evidence(text: FclText) -> Iterator[Evidence]:
             case _:
                 if block.startswith("VAR") and getattr(one, "low", None) is not None:
                     line = getattr(one, "keyword", None)
-                    yield Evidence(
+                    yield DialectEvidence(
                         "jfuzzylogic",
                         "RANGE among the variables",
                         line.line if isinstance(line, Token) and line.line else 1,
@@ -201,99 +202,99 @@ def _evidence(text: FclText) -> Iterator[Evidence]:
         before, found, _ = text.text.partition(sign)
         if found:
             line = before.count("\n") + 1
-            yield Evidence(dialect, f"comments {sign}", line, 1)
+            yield DialectEvidence(dialect, f"comments {sign}", line, 1)
     if text.text.startswith("//Code automatically generated with fuzzylite"):
-        yield Evidence("fuzzylite", "its first line", 1)
+        yield DialectEvidence("fuzzylite", "its first line", 1)
 
 
 _COMMENTS: Mapping[str, Dialect] = {"(*": "iec", "/*": "jfuzzylogic"}
 
 
-def _of_shape(word: Token) -> Iterator[Evidence]:
+def _of_shape(word: Token) -> Iterator[DialectEvidence]:
     if str(word) in CLASSES:
-        yield Evidence("fuzzylite", f"the term class {word}", word.line or 1, 4)
+        yield DialectEvidence("fuzzylite", f"the term class {word}", word.line or 1, 4)
     elif word.upper() in _OF_JFUZZYLOGIC or word.upper() == "FUNCTION":
-        yield Evidence("jfuzzylogic", f"the shape {word}", word.line or 1, 4)
+        yield DialectEvidence("jfuzzylogic", f"the shape {word}", word.line or 1, 4)
 
 
 def _of_setting(
     keyword: Token, words: tuple[Token, ...], block: str
-) -> Iterator[Evidence]:
+) -> Iterator[DialectEvidence]:
     line = keyword.line or 1
     for word in words:
         if word.upper() in _OF_JFUZZYLOGIC:
-            yield Evidence("jfuzzylogic", f"{keyword.upper()} {word}", line)
+            yield DialectEvidence("jfuzzylogic", f"{keyword.upper()} {word}", line)
         elif word.upper() in _OF_FUZZYLITE:
-            yield Evidence("fuzzylite", f"{keyword.upper()} {word}", line)
+            yield DialectEvidence("fuzzylite", f"{keyword.upper()} {word}", line)
     if keyword.type in ("ENABLED", "LOCK"):
-        yield Evidence("fuzzylite", keyword.upper(), line)
+        yield DialectEvidence("fuzzylite", keyword.upper(), line)
     if keyword.type == "ACCU" and block == "DEFUZZIFY":
-        yield Evidence("fuzzylite", "ACCU in DEFUZZIFY", line)
+        yield DialectEvidence("fuzzylite", "ACCU in DEFUZZIFY", line)
     elif keyword.type == "ACCU":  # fuzzylite refuses it there
-        yield Evidence("iec", "ACCU in RULEBLOCK", line)
-        yield Evidence("jfuzzylogic", "ACCU in RULEBLOCK", line, 1)
+        yield DialectEvidence("iec", "ACCU in RULEBLOCK", line)
+        yield DialectEvidence("jfuzzylogic", "ACCU in RULEBLOCK", line, 1)
     is_default = keyword.type == "DEFAULT"
     if is_default and (words[0].upper() == "NAN" or len(words) > 1):
         shown = " | ".join(map(str, words))
-        yield Evidence("fuzzylite", f"DEFAULT {shown}", line)
+        yield DialectEvidence("fuzzylite", f"DEFAULT {shown}", line)
 
 
 _HEDGES = frozenset({"ANY", "VERY", "SOMEWHAT", "EXTREMELY", "SELDOM"})
 
 
-def _of_rule(rule: RuleText) -> Iterator[Evidence]:
+def _of_rule(rule: RuleStatement) -> Iterator[DialectEvidence]:
     line = rule.keyword.line or 1
     asked = list(clauses(rule.condition))
     words = [word for one in asked for word in one.words[:-1]]
     is_any = any(one.words[-1].upper() == "ANY" for one in asked)
     if is_any or any(word.upper() in _HEDGES for word in words):
-        yield Evidence("fuzzylite", "hedges", line)
+        yield DialectEvidence("fuzzylite", "hedges", line)
     if is_lower(rule):
-        yield Evidence("fuzzylite", "rules in lower case", line, 1)
+        yield DialectEvidence("fuzzylite", "rules in lower case", line, 1)
     elif len(rule.conclusions) > 1:
         if rule.has_comma:
-            yield Evidence("iec", "conclusions with ','", line, 1)
-            yield Evidence("jfuzzylogic", "conclusions with ','", line, 1)
+            yield DialectEvidence("iec", "conclusions with ','", line, 1)
+            yield DialectEvidence("jfuzzylogic", "conclusions with ','", line, 1)
         else:
-            yield Evidence("pyit2fls", "conclusions with AND", line)
+            yield DialectEvidence("pyit2fls", "conclusions with AND", line)
     elif rule.is_grouped:
-        yield Evidence("pyit2fls", "brackets behind THEN", line)
+        yield DialectEvidence("pyit2fls", "brackets behind THEN", line)
 
 
-def is_lower(rule: RuleText) -> bool:
+def is_lower(rule: RuleStatement) -> bool:
     """Return whether the word behind a rule's variable is `is`."""
     return str(next(iter(clauses(rule.condition))).verb) == "is"
 
 
-def clauses(condition: Condition) -> Iterator[Asked]:
+def clauses(condition: FclCondition) -> Iterator[FclProposition]:
     """Yield what a condition asks, from left to right."""
     match condition:
-        case Asked():
+        case FclProposition():
             yield condition
-        case Negated(part=part):
+        case FclNegation(part=part):
             yield from clauses(part)
-        case Joined(parts=parts):
+        case FclJunction(parts=parts):
             for part in parts:
                 yield from clauses(part)
 
 
-def norm_of(block: Block, keyword: str, notes: Notes) -> SNorm | None:
+def norm_of(block: FclBlock, keyword: str, notes: ReaderNotes) -> SNorm | None:
     """Return the OR or ACCU of a block; None if it says none."""
     return _named(block, keyword, S_WORDS, notes)
 
 
-def t_norm_of(block: Block, keyword: str, notes: Notes) -> TNorm | None:
+def t_norm_of(block: FclBlock, keyword: str, notes: ReaderNotes) -> TNorm | None:
     """Return the AND or ACT of a block; None if it says none."""
     return _named(block, keyword, T_WORDS, notes)
 
 
 def _named(
-    block: Block, keyword: str, words: Mapping[str, _Norm], notes: Notes
+    block: FclBlock, keyword: str, words: Mapping[str, _Norm], notes: ReaderNotes
 ) -> _Norm | None:
     for word in block.words(keyword):
         if word.upper() != "NONE" and word.upper() not in words:
             choice = name_choice(word.upper()[:99], words)
             sentence = f"no {keyword} {str(word)!r}; {choice}"
-            notes.found.append((*place(word), sentence))
+            notes.mistake(place(word), sentence)
         return words.get(word.upper())
     return None

@@ -8,9 +8,9 @@ reads it. `docs/reference/fcl.md` lists the differences.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import msgspec
 from lark import Token
@@ -27,26 +27,25 @@ from fuzzytree.formats.fcl.fcl_dialects import (
     norm_of,
 )
 from fuzzytree.formats.fcl.fcl_rules import (
-    ReadBlock,
+    FclRuleBlock,
     Scope,
     read_block,
     without_questions,
 )
 from fuzzytree.formats.fcl.fcl_syntax import (
-    Block,
     Declaration,
-    Range,
-    TermText,
+    FclBlock,
+    FclRange,
+    TermStatement,
     blocks_of,
     parsed,
     place,
 )
 from fuzzytree.formats.fll.fll_differences import constant_degrees, fuzzylite_losses
-from fuzzytree.formats.fll.fll_terms import Place, Term, TermError, as_degree
-from fuzzytree.formats.fll.fll_words import Notes
-from fuzzytree.formats.text_files import number_of, report
-from fuzzytree.formats.yaml.spots import Group, Spots
-from fuzzytree.model.contracts import Document, Locate, Loss, Reading
+from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree
+from fuzzytree.formats.positions import PositionGroup, Positions
+from fuzzytree.formats.text_files import PartError, ReaderNotes, number_of, report
+from fuzzytree.model.contracts import Document, Locate, Reading
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
     Defuzzifier,
@@ -98,30 +97,13 @@ def places(content: bytes, name: str) -> Locate:
     Raises:
         ReadError: With all mistakes of the file.
     """
-    _, parts, facts = _read(content, name)
-    return parts.spots().of_facts(facts).find
+    _, locate = _read(content, name)
+    return locate()
 
 
-class _Parts(NamedTuple):
-    """What the parts of a system were made of."""
-
-    known: Known
-    blocks: Sequence[ReadBlock]
-
-    def spots(self) -> Spots:
-        return Spots(
-            _groups(self.known.inputs),
-            _groups(self.known.outputs),
-            tuple(
-                Group(place(one.head), tuple(map(place, one.tokens)))
-                for one in self.blocks
-            ),
-        )
-
-
-def _groups(variables: Mapping[str, Named]) -> tuple[Group, ...]:
+def _groups(variables: Mapping[str, FclVariable]) -> tuple[PositionGroup, ...]:
     return tuple(
-        Group(
+        PositionGroup(
             place(one.token),
             tuple(place(term.name) for term in (one.block.terms if one.block else ())),
         )
@@ -129,14 +111,12 @@ def _groups(variables: Mapping[str, Named]) -> tuple[Group, ...]:
     )
 
 
-def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
-    """Return what a file says, what of, and the facts of a rule base if it is one."""
+def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
+    """Return what a file says, and a function that locates its parts."""
     text = parsed(content, name)
-    notes = Notes(list(text.found), [], [])
+    notes = ReaderNotes(list(text.mistakes), remarks=list(text.remarks))
     dialect, sentence = detected(text)
-    notes.remarks.append(sentence)
-    if text.encoding != "UTF-8":
-        notes.remarks.append(f"the file is no UTF-8; it was read as {text.encoding}")
+    notes.remark(sentence)
     title, blocks = blocks_of(text, notes)
     known = known_variables(blocks, dialect, notes)
     inputs = tuple(read_input(one, known) for one in known.inputs)
@@ -147,23 +127,34 @@ def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
     scope = Scope(labels, set(known.outputs), curved, dialect, notes)
     read_blocks = _rule_blocks(blocks, scope)
     outputs = tuple(_aggregated(one, known, read_blocks) for one in outputs)
-    if not outputs and not notes.found:
-        notes.found.append((1, 1, "the file has no VAR_OUTPUT"))
-    if notes.found:
-        raise report(name, notes.found)
-    parts = _Parts(known, read_blocks)
+    if not outputs and not notes.mistakes:
+        notes.mistake((1, 1), "the file has no VAR_OUTPUT")
+    if notes.mistakes:
+        raise report(name, notes.mistakes)
+    rules = tuple(one.block for one in read_blocks)
+    positions = functools.partial(_positions, known, read_blocks)
     try:
-        rules = tuple(one.block for one in read_blocks)
         system = FuzzySystem(title or "system", inputs, outputs, rules)
     except InvalidModelError as error:
-        found = parts.spots().placed(error.mistakes)
-        raise report(name, list(found)) from error
+        raise report(name, [*positions().placed(error.mistakes)]) from error
     model, facts = _model(joined_by_number(system), text.text, notes)
-    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
-    return reading, parts, facts
+    return notes.reading(model), lambda: positions().of_facts(facts).find
 
 
-def _model(system: FuzzySystem, text: str, notes: Notes) -> tuple[Document, str | None]:
+def _positions(known: FclVariables, blocks: Sequence[FclRuleBlock]) -> Positions:
+    return Positions(
+        _groups(known.inputs),
+        _groups(known.outputs),
+        tuple(
+            PositionGroup(place(one.head), tuple(map(place, one.tokens)))
+            for one in blocks
+        ),
+    )
+
+
+def _model(
+    system: FuzzySystem, text: str, notes: ReaderNotes
+) -> tuple[Document, str | None]:
     """Return the rule base that a system stands for and its facts, or the system."""
     if not is_marked(text):
         return system, None
@@ -177,25 +168,25 @@ def _model(system: FuzzySystem, text: str, notes: Notes) -> tuple[Document, str 
     if rules is not None:
         return rules, facts
     text = "the facts in a comment belong to other rules; the file is read as a system"
-    notes.remarks.append(text)
+    notes.remark(text)
     return system, None
 
 
-def _rule_blocks(blocks: Sequence[Block], scope: Scope) -> list[ReadBlock]:
-    found: list[ReadBlock] = []
+def _rule_blocks(blocks: Sequence[FclBlock], scope: Scope) -> list[FclRuleBlock]:
+    found: list[FclRuleBlock] = []
     for block in blocks:
         if block.kind != "RULEBLOCK":
             continue
         if block.is_disabled:
             text = f"line {block.line}: a disabled block is left out"
-            scope.notes.remarks.append(text)
+            scope.notes.remark(text)
         else:
             found.append(read_block(block, scope))
     return found
 
 
 def _aggregated(
-    output: SystemOutput, known: Known, blocks: Sequence[ReadBlock]
+    output: SystemOutput, known: FclVariables, blocks: Sequence[FclRuleBlock]
 ) -> SystemOutput:
     """Return an output with the aggregation that its block, or its rules' block, says.
 
@@ -209,60 +200,56 @@ def _aggregated(
     where = f"output {output.name!r}"
     if len(set(norms)) > 1:
         what = f"its blocks say different ACCU; {norms[0]} is taken for all rules"
-        known.loss(where, what)
+        known.notes.loss(where, what)
     if output.defuzzifier.is_weighted:
         if not norms or norms[0] == "sum":
             return output
         if known.dialect in ("fuzzylite", "portable"):
-            known.remark(f"{where}: numbers are summed; fuzzylite ignores ACCU here")
+            known.notes.remark(
+                f"{where}: numbers are summed; fuzzylite ignores ACCU here"
+            )
             return output
         return replace(output, aggregation=norms[0])
     if norms:
         return replace(output, aggregation=norms[0])
     if known.dialect == "jfuzzylogic":
-        known.remark(f"{where}: ACCU is missing; SUM is taken, as in jFuzzyLogic")
+        known.notes.remark(f"{where}: ACCU is missing; SUM is taken, as in jFuzzyLogic")
         return replace(output, aggregation="sum")
     if any(output.name in one.concluded for one in blocks):
-        known.loss(where, "ACCU is missing, and engines differ; MAX is taken")
+        known.notes.loss(where, "ACCU is missing, and engines differ; MAX is taken")
     return replace(output, aggregation="maximum")
 
 
 _REAL = frozenset({"REAL", "LREAL", "FLOAT"})
 
 
-class Named(msgspec.Struct, frozen=True):
+class FclVariable(msgspec.Struct, frozen=True):
     """A declared variable: its name, range, and the block that describes it."""
 
     token: Token
     low: float | None = None
     high: float | None = None
-    block: Block | None = None
+    block: FclBlock | None = None
 
 
-class Known(msgspec.Struct, frozen=True):
+class FclVariables(msgspec.Struct, frozen=True):
     """All variables of a file, by name, and what is found on the way."""
 
-    inputs: dict[str, Named]
-    outputs: dict[str, Named]
+    inputs: dict[str, FclVariable]
+    outputs: dict[str, FclVariable]
     dialect: Dialect
-    notes: Notes
+    notes: ReaderNotes
 
     def mistake(self, token: Token, sentence: str) -> None:
         """Note a mistake at a token."""
-        self.notes.found.append((*place(token), sentence))
-
-    def remark(self, sentence: str) -> None:
-        """Note a remark."""
-        self.notes.remarks.append(sentence)
-
-    def loss(self, where: str, what: str) -> None:
-        """Note a loss."""
-        self.notes.losses.append(Loss(where, what))
+        self.notes.mistake(place(token), sentence)
 
 
-def known_variables(blocks: Sequence[Block], dialect: Dialect, notes: Notes) -> Known:
+def known_variables(
+    blocks: Sequence[FclBlock], dialect: Dialect, notes: ReaderNotes
+) -> FclVariables:
     """Return the variables of a file; mistakes are noted."""
-    known = Known({}, {}, dialect, notes)
+    known = FclVariables({}, {}, dialect, notes)
     for kind, found in (("VAR_INPUT", known.inputs), ("VAR_OUTPUT", known.outputs)):
         for block in blocks:
             if block.kind == kind:
@@ -278,7 +265,9 @@ def known_variables(blocks: Sequence[Block], dialect: Dialect, notes: Notes) -> 
     return known
 
 
-def _declare(block: Block, found: dict[str, Named], known: Known) -> None:
+def _declare(
+    block: FclBlock, found: dict[str, FclVariable], known: FclVariables
+) -> None:
     last = ""
     for one in block.statements:
         if isinstance(one, Declaration):
@@ -286,16 +275,18 @@ def _declare(block: Block, found: dict[str, Named], known: Known) -> None:
                 last = str(token)
                 if last in found:
                     known.mistake(token, f"{last!r} is declared twice")
-                found.setdefault(last, Named(token))
+                found.setdefault(last, FclVariable(token))
             if one.kind.upper() not in _REAL:
                 what = f"the type {one.kind!s} is read as REAL, without rounding"
-                known.loss(f"variable {last!r}", what)
-        elif isinstance(one, Range) and last:
+                known.notes.loss(f"variable {last!r}", what)
+        elif isinstance(one, FclRange) and last:
             low, high = _range(one, known)
             found[last] = replace(found[last], low=low, high=high)
 
 
-def _describe(block: Block, found: dict[str, Named], known: Known) -> None:
+def _describe(
+    block: FclBlock, found: dict[str, FclVariable], known: FclVariables
+) -> None:
     token = block.head.words[0]
     name = str(token)
     if name not in found:
@@ -307,13 +298,13 @@ def _describe(block: Block, found: dict[str, Named], known: Known) -> None:
         known.mistake(token, f"a second {block.kind} of {name!r}")
     named = replace(found[name], block=block)
     for one in block.statements:
-        if isinstance(one, Range):
+        if isinstance(one, FclRange):
             low, high = _range(one, known)
             named = replace(named, low=low, high=high)
     found[name] = named
 
 
-def _range(one: Range, known: Known) -> tuple[float | None, float | None]:
+def _range(one: FclRange, known: FclVariables) -> tuple[float | None, float | None]:
     ends = [number_of(token.lower()) for token in (one.low, one.high)]
     for token, end in zip((one.low, one.high), ends, strict=True):
         if end is None or math.isnan(end):
@@ -326,12 +317,12 @@ def _range(one: Range, known: Known) -> tuple[float | None, float | None]:
 
 
 def _terms(
-    name: str, block: Block | None, known: Known, *, is_weighted: bool = False
-) -> list[Term]:
-    found: list[Term] = []
+    name: str, block: FclBlock | None, known: FclVariables, *, is_weighted: bool = False
+) -> list[FllTerm]:
+    found: list[FllTerm] = []
     seen: set[str] = set()
     names = (*known.inputs, *known.outputs)
-    where = Place(name, tuple(known.inputs), names, is_weighted)
+    where = TermScope(name, tuple(known.inputs), names, is_weighted)
     for text in block.terms if block is not None else ():
         label = str(text.name)
         if label in seen:
@@ -340,17 +331,17 @@ def _terms(
         seen.add(label)
         try:
             made = fcl_terms.read(text, where, known.dialect)
-        except TermError as error:
-            known.notes.found.extend(error.found)
-            found.append(Term(Label(label, Singleton(0.0)), "Constant"))
+        except PartError as error:
+            known.notes.mistakes.extend(error.mistakes)
+            found.append(FllTerm(Label(label, Singleton(0.0)), "Constant"))
             continue
         if made.loss:
-            known.loss(f"term {label!r} of {name!r}", made.loss)
+            known.notes.loss(f"term {label!r} of {name!r}", made.loss)
         found.append(made.term)
     return found
 
 
-def read_input(name: str, known: Known) -> SystemInput:
+def read_input(name: str, known: FclVariables) -> SystemInput:
     """Return an input; mistakes are noted."""
     named = known.inputs[name]
     _tell_disabled(f"input {name!r}", named, known)
@@ -358,12 +349,12 @@ def read_input(name: str, known: Known) -> SystemInput:
     return SystemInput(name, labels, named.low, named.high)
 
 
-def _tell_disabled(where: str, named: Named, known: Known) -> None:
+def _tell_disabled(where: str, named: FclVariable, known: FclVariables) -> None:
     if named.block is not None and named.block.is_disabled:
-        known.loss(where, "it is disabled in the file, and read as enabled")
+        known.notes.loss(where, "it is disabled in the file, and read as enabled")
 
 
-def read_output(name: str, known: Known) -> SystemOutput:
+def read_output(name: str, known: FclVariables) -> SystemOutput:
     """Return an output, without its aggregation; mistakes are noted."""
     named = known.outputs[name]
     block = named.block
@@ -396,14 +387,14 @@ def read_output(name: str, known: Known) -> SystemOutput:
     if known.dialect == "fuzzylite":
         known.notes.losses.extend(fuzzylite_losses(found))
         for text in constant_degrees(found):
-            known.remark(text)
+            known.notes.remark(text)
     return found
 
 
 def _check_kinds(
-    texts: Iterable[TermText],
-    terms: Sequence[Term],
-    known: Known,
+    texts: Iterable[TermStatement],
+    terms: Sequence[FllTerm],
+    known: FclVariables,
     *,
     is_weighted: bool,
 ) -> None:
@@ -423,11 +414,11 @@ def _check_kinds(
 
 
 def _estimated(
-    named: Named, labels: Iterable[Label], known: Known
+    named: FclVariable, labels: Iterable[Label], known: FclVariables
 ) -> tuple[float, float]:
     """Return the range that an output's terms span, where the file says none."""
     name = str(named.token)
-    if known.notes.found:  # a term that was not read is no reason to ask for a range
+    if known.notes.mistakes:  # a term that was not read is no reason to ask for a range
         return 0.0, 1.0
     ends = [fcl_terms.extent(label.curve) for label in labels]
     spans = [one for one in ends if one is not None]
@@ -440,17 +431,17 @@ def _estimated(
         known.mistake(named.token, f"output {name!r} needs a RANGE for its METHOD")
         return 0.0, 1.0
     text = f"output {name!r}: RANGE is missing; its terms span {low!r} .. {high!r}"
-    known.remark(text)
+    known.notes.remark(text)
     return low, high
 
 
-def _defuzzifier(name: str, block: Block, known: Known) -> Defuzzifier:
+def _defuzzifier(name: str, block: FclBlock, known: FclVariables) -> Defuzzifier:
     default = DEFUZZIFIERS[known.dialect]
     words = block.words("METHOD")
     if not words:
         is_number = all(one.kind == "number" for one in block.terms)
         word = "COGS" if is_number else "COG"
-        known.remark(f"output {name!r}: METHOD is missing; {word} is taken")
+        known.notes.remark(f"output {name!r}: METHOD is missing; {word} is taken")
         return Defuzzifier("weighted average") if is_number else default
     method = METHOD_WORDS.get(words[0].upper())
     if method is None:
@@ -463,20 +454,20 @@ def _defuzzifier(name: str, block: Block, known: Known) -> Defuzzifier:
     text = f"output {name!r}: {made.samples} values of its range are looked at"
     if known.dialect == "jfuzzylogic":
         text += "; jFuzzyLogic takes the low ends of as many pieces, and not the middle"
-    known.remark(text)
+    known.notes.remark(text)
     return made
 
 
-def _default(name: str, block: Block, known: Known) -> float | None:
+def _default(name: str, block: FclBlock, known: FclVariables) -> float | None:
     words = block.words("DEFAULT")
     if not words:
         text = f"output {name!r}: DEFAULT is missing; NaN answers where no rule fires"
-        known.remark(text)
+        known.notes.remark(text)
         return None
     shown = [word.upper() for word in words]
     if "NC" in shown:
         what = "NC keeps the answer of the row before; here each row stands for itself"
-        known.loss(f"the default of {name!r}", what)
+        known.notes.loss(f"the default of {name!r}", what)
     value = number_of(shown[0].lower())
     is_wrong = value is None and shown[0] != "NC"
     if is_wrong or (len(shown) > 1 and shown[1] != "NC"):
@@ -485,12 +476,12 @@ def _default(name: str, block: Block, known: Known) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _clips(name: str, block: Block, known: Known) -> bool:
+def _clips(name: str, block: FclBlock, known: FclVariables) -> bool:
     words = block.words("LOCK")
     for word in words:
         if word.upper() not in ("PREVIOUS", "RANGE"):
             known.mistake(word, f"found {str(word)!r}; expected PREVIOUS or RANGE")
     if any(word.upper() == "PREVIOUS" for word in words):
         what = "LOCK keeps the answer of the row before; each row stands for itself"
-        known.loss(f"the default of {name!r}", what)
+        known.notes.loss(f"the default of {name!r}", what)
     return any(word.upper() == "RANGE" for word in words)

@@ -17,22 +17,22 @@ from fuzzytree.formats.fcl.fcl_dialects import (
     t_norm_of,
 )
 from fuzzytree.formats.fcl.fcl_syntax import (
-    Asked,
-    Block,
-    Condition,
-    Joined,
-    Negated,
-    RuleText,
+    FclBlock,
+    FclCondition,
+    FclJunction,
+    FclNegation,
+    FclProposition,
+    RuleStatement,
     place,
     raw,
 )
-from fuzzytree.formats.fll.fll_words import Notes
-from fuzzytree.formats.text_files import number_of
+from fuzzytree.formats.text_files import ReaderNotes, number_of
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import Points, name_choice
 from fuzzytree.model.system import (
     And,
     Conclusion,
+    Condition,
     FuzzySystem,
     Hedge,
     Is,
@@ -44,7 +44,6 @@ from fuzzytree.model.system import (
     TNorm,
     questions,
 )
-from fuzzytree.model.system import Condition as Meant
 
 _HEDGES: Mapping[str, Hedge] = {
     "any": "any",
@@ -63,15 +62,15 @@ class Scope(msgspec.Struct, frozen=True):
     outputs: Collection[str]
     curved: Collection[str]
     dialect: Dialect
-    notes: Notes
+    notes: ReaderNotes
 
 
-def _read(text: RuleText, number: int, scope: Scope) -> SystemRule:
+def _read(text: RuleStatement, number: int, scope: Scope) -> SystemRule:
     """Return a rule; its mistakes are noted."""
     when = _condition(text.condition, scope)
     if scope.dialect == "jfuzzylogic" and _is_ambiguous(text.condition):
         line = text.keyword.line
-        scope.notes.remarks.append(
+        scope.notes.remark(
             f"line {line}: AND binds closer than OR, as in the standard; jFuzzyLogic "
             "reads from left to right, write parentheses"
         )
@@ -85,23 +84,23 @@ def _weight(token: Token, scope: Scope) -> float:
     value = number_of(str(token))
     if value is None or not 0.0 <= value <= 1.0:
         sentence = f"the weight must lie in [0, 1], not {token}"
-        scope.notes.found.append((*place(token), sentence))
+        scope.notes.mistake(place(token), sentence)
         return 1.0
     return value
 
 
-def _condition(condition: Condition, scope: Scope) -> Meant:
+def _condition(condition: FclCondition, scope: Scope) -> Condition:
     match condition:
-        case Asked():
+        case FclProposition():
             return _asked(condition, scope)
-        case Negated(part=part):
+        case FclNegation(part=part):
             return Not(_condition(part, scope))
-        case Joined(connective=connective, parts=parts):
+        case FclJunction(connective=connective, parts=parts):
             made = tuple(_condition(part, scope) for part in parts)
             return And(made) if connective == "and" else Or(made)
 
 
-def _asked(asked: Asked, scope: Scope) -> Is:
+def _asked(asked: FclProposition, scope: Scope) -> Is:
     variable = str(asked.variable)
     if variable in scope.outputs and scope.dialect not in ("fuzzylite", "portable"):
         what = (
@@ -118,7 +117,7 @@ def _asked(asked: Asked, scope: Scope) -> Is:
     return Is(variable, label, _hedges(asked.words[:-1], scope))
 
 
-def _conclusion(asked: Asked, scope: Scope) -> Conclusion:
+def _conclusion(asked: FclProposition, scope: Scope) -> Conclusion:
     known = {name: scope.terms[name] for name in scope.outputs}
     label = _known(asked, known, scope.notes)
     return Conclusion(str(asked.variable), label, _hedges(asked.words[:-1], scope))
@@ -130,23 +129,25 @@ def _hedges(words: Sequence[Token], scope: Scope) -> tuple[Hedge, ...]:
         hedge = _HEDGES.get(word.lower())
         if hedge is None:
             sentence = f"no hedge {str(word)!r}; {name_choice(word[:99], _HEDGES)}"
-            scope.notes.found.append((*place(word), sentence))
+            scope.notes.mistake(place(word), sentence)
         else:
             found.append(hedge)
     return tuple(found)
 
 
 def _known_variable(
-    token: Token, terms: Mapping[str, Collection[str]], notes: Notes
+    token: Token, terms: Mapping[str, Collection[str]], notes: ReaderNotes
 ) -> bool:
     if str(token) in terms or notes.is_full:
         return True
     sentence = f"no variable {str(token)!r}; {name_choice(token[:99], terms)}"
-    notes.found.append((*place(token), sentence))
+    notes.mistake(place(token), sentence)
     return False
 
 
-def _known(asked: Asked, terms: Mapping[str, Collection[str]], notes: Notes) -> str:
+def _known(
+    asked: FclProposition, terms: Mapping[str, Collection[str]], notes: ReaderNotes
+) -> str:
     label = asked.words[-1]
     if _known_variable(asked.variable, terms, notes):
         known = terms.get(str(asked.variable), ())
@@ -154,22 +155,22 @@ def _known(asked: Asked, terms: Mapping[str, Collection[str]], notes: Notes) -> 
             choice = name_choice(label[:99], known)
             whose = repr(str(asked.variable))
             sentence = f"{whose} has no term {str(label)!r}; {choice}"
-            notes.found.append((*place(label), sentence))
+            notes.mistake(place(label), sentence)
     return str(label)
 
 
-def _is_ambiguous(condition: Condition) -> bool:
+def _is_ambiguous(condition: FclCondition) -> bool:
     """Return whether `a OR b AND c` stands somewhere without parentheses."""
     match condition:
-        case Asked():
+        case FclProposition():
             return False
-        case Negated(part=part):
+        case FclNegation(part=part):
             return _is_ambiguous(part)
-        case Joined(connective=connective, parts=parts):
+        case FclJunction(connective=connective, parts=parts):
             return any(map(_is_ambiguous, parts)) or (
                 connective == "or"
                 and any(
-                    isinstance(part, Joined)
+                    isinstance(part, FclJunction)
                     and part.connective == "and"
                     and not part.is_grouped
                     for part in parts[1:]
@@ -177,7 +178,7 @@ def _is_ambiguous(condition: Condition) -> bool:
             )
 
 
-class ReadBlock(msgspec.Struct, frozen=True):
+class FclRuleBlock(msgspec.Struct, frozen=True):
     """A block of rules, where it and each rule begins, what it says about ACCU."""
 
     block: RuleBlock
@@ -191,7 +192,7 @@ class ReadBlock(msgspec.Struct, frozen=True):
         return {one.output for rule in self.block.rules for one in rule.then}
 
 
-def read_block(block: Block, scope: Scope) -> ReadBlock:
+def read_block(block: FclBlock, scope: Scope) -> FclRuleBlock:
     """Return a block of rules; mistakes are noted."""
     rules: list[SystemRule] = []
     tokens: list[Token] = []
@@ -216,7 +217,7 @@ def read_block(block: Block, scope: Scope) -> ReadBlock:
         name=raw(block.head.words),
     )
     accu = norm_of(block, "ACCU", scope.notes)
-    return ReadBlock(made, block.head.keyword, tuple(tokens), accu)
+    return FclRuleBlock(made, block.head.keyword, tuple(tokens), accu)
 
 
 def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:
@@ -224,18 +225,18 @@ def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:
 
 
 def _implication(
-    block: Block, rules: Sequence[SystemRule], scope: Scope
+    block: FclBlock, rules: Sequence[SystemRule], scope: Scope
 ) -> TNorm | None:
     stated = t_norm_of(block, "ACT", scope.notes)
     is_needed = any(one.output in scope.curved for rule in rules for one in rule.then)
     if stated is not None or not is_needed:
         return stated
-    scope.notes.remarks.append(f"line {block.line}: ACT is missing; MIN is taken")
+    scope.notes.remark(f"line {block.line}: ACT is missing; MIN is taken")
     return "minimum"
 
 
 def _norms(
-    block: Block, rules: Sequence[SystemRule], scope: Scope
+    block: FclBlock, rules: Sequence[SystemRule], scope: Scope
 ) -> tuple[TNorm | None, SNorm | None]:
     """Return AND and OR; one that is missing and needed comes with the other one."""
     conjunction = t_norm_of(block, "AND", scope.notes)
@@ -245,11 +246,11 @@ def _norms(
     if conjunction is None and any(_uses(rule.when, And) for rule in rules):
         conjunction = _partner(disjunction, pairs)
         text = f"line {block.line}: AND is missing; {conjunction} is taken"
-        scope.notes.remarks.append(text)
+        scope.notes.remark(text)
     if disjunction is None and any(_uses(rule.when, Or) for rule in rules):
         disjunction = pairs.get(conjunction or "minimum", "maximum")
         text = f"line {block.line}: OR is missing; {disjunction} is taken"
-        scope.notes.remarks.append(text)
+        scope.notes.remark(text)
     if is_jfuzzylogic and conjunction is not None and disjunction is not None:
         _check_pair(block, pairs[conjunction], disjunction, scope)
     return conjunction, disjunction
@@ -263,16 +264,16 @@ def _partner(disjunction: SNorm | None, pairs: Mapping[TNorm, SNorm]) -> TNorm:
     return "minimum"
 
 
-def _check_pair(block: Block, wanted: SNorm, given: SNorm, scope: Scope) -> None:
+def _check_pair(block: FclBlock, wanted: SNorm, given: SNorm, scope: Scope) -> None:
     if wanted != given:
         what = (
             "AND and OR are taken as they are written; jFuzzyLogic takes the last of "
             "the two lines and the operator that belongs to it"
         )
-        scope.notes.losses.append(Loss(f"line {block.line}", what))
+        scope.notes.loss(f"line {block.line}", what)
 
 
-def _uses(condition: Meant | None, kind: type[And] | type[Or]) -> bool:
+def _uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
     match condition:
         case And(parts=parts) | Or(parts=parts):
             return isinstance(condition, kind) or any(_uses(p, kind) for p in parts)
@@ -295,7 +296,7 @@ def without_questions(system: FuzzySystem) -> FuzzySystem:
     if not system.inputs:
         return system
     first = system.inputs[0]
-    asked: Meant = Is(first.name, None, ("any",))
+    asked: Condition = Is(first.name, None, ("any",))
     if first.labels and first.labels[-1].curve == ALWAYS:
         asked = Is(first.name, first.labels[-1].name)
         first = replace(first, labels=first.labels[:-1])

@@ -21,14 +21,18 @@ from lark import Lark, Token, Transformer
 from lark.exceptions import UnexpectedInput
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fll.fll_words import Notes
-from fuzzytree.formats.text_files import LONGEST_NAME, Found, report
-from fuzzytree.model.contracts import Loss
+from fuzzytree.formats.text_files import (
+    LONGEST_NAME,
+    FileMistake,
+    ReaderNotes,
+    check_characters,
+    decoded,
+)
 
 Connective = Literal["and", "or"]
 
 
-class Asked(msgspec.Struct, frozen=True, gc=False):
+class FclProposition(msgspec.Struct, frozen=True, gc=False):
     """`variable is word ... word`: hedges and a label."""
 
     variable: Token
@@ -36,21 +40,21 @@ class Asked(msgspec.Struct, frozen=True, gc=False):
     words: tuple[Token, ...]
 
 
-class Joined(msgspec.Struct, frozen=True):
+class FclJunction(msgspec.Struct, frozen=True):
     """Conditions that AND or OR joins."""
 
     connective: Connective
-    parts: tuple[Asked | Joined | Negated, ...]
+    parts: tuple[FclProposition | FclJunction | FclNegation, ...]
     is_grouped: bool = False
 
 
-class Negated(msgspec.Struct, frozen=True):
+class FclNegation(msgspec.Struct, frozen=True):
     """NOT in front of a condition."""
 
-    part: Asked | Joined | Negated
+    part: FclProposition | FclJunction | FclNegation
 
 
-Condition = Asked | Joined | Negated
+FclCondition = FclProposition | FclJunction | FclNegation
 
 
 class Header(msgspec.Struct, frozen=True):
@@ -73,7 +77,7 @@ class Declaration(msgspec.Struct, frozen=True):
     kind: Token
 
 
-class Range(msgspec.Struct, frozen=True):
+class FclRange(msgspec.Struct, frozen=True):
     """The range of a variable."""
 
     keyword: Token
@@ -88,7 +92,7 @@ class Setting(msgspec.Struct, frozen=True):
     words: tuple[Token, ...]
 
 
-class TermText(msgspec.Struct, frozen=True):
+class TermStatement(msgspec.Struct, frozen=True):
     """A term: its name, and the tokens of its curve."""
 
     name: Token
@@ -96,19 +100,21 @@ class TermText(msgspec.Struct, frozen=True):
     tokens: tuple[Token, ...]
 
 
-class RuleText(msgspec.Struct, frozen=True):
+class RuleStatement(msgspec.Struct, frozen=True):
     """A rule; `has_comma` tells whether `,` joins its conclusions."""
 
     keyword: Token
     label: tuple[Token, ...]
-    condition: Condition
-    conclusions: tuple[Asked, ...]
+    condition: FclCondition
+    conclusions: tuple[FclProposition, ...]
     weight: Token | None
     is_grouped: bool
     has_comma: bool
 
 
-Statement = Header | Ending | Declaration | Range | Setting | TermText | RuleText
+Statement = (
+    Header | Ending | Declaration | FclRange | Setting | TermStatement | RuleStatement
+)
 
 
 def place(token: Token) -> tuple[int, int]:
@@ -142,9 +148,9 @@ class _Statements(Transformer[Token, Any]):
         words = [one for one in children if one.type == "WORD"]
         return Declaration(tuple(words[:-1]), words[-1])
 
-    def range(self, children: list[Token]) -> Range:
+    def range(self, children: list[Token]) -> FclRange:
         low, high = _words(children)
-        return Range(children[0], low, high)
+        return FclRange(children[0], low, high)
 
     def setting(self, children: list[Token]) -> Setting:
         return Setting(children[0], _words(children[1:]))
@@ -172,9 +178,9 @@ class _Statements(Transformer[Token, Any]):
         parts = (_parts(one) if one.type == "POINT" else (one,) for one in children)
         return "shape", tuple(itertools.chain.from_iterable(parts))
 
-    def term(self, children: list[Any]) -> TermText:
+    def term(self, children: list[Any]) -> TermStatement:
         kind, tokens = children[-1]
-        return TermText(children[1], kind, tokens)
+        return TermStatement(children[1], kind, tokens)
 
     def label(self, children: list[Token]) -> tuple[Token, ...]:
         return tuple(children)
@@ -182,24 +188,24 @@ class _Statements(Transformer[Token, Any]):
     def weight(self, children: list[Token]) -> Token:
         return children[-1]
 
-    def clause(self, children: list[Token]) -> Asked:
-        return Asked(children[0], children[1], tuple(children[2:]))
+    def clause(self, children: list[Token]) -> FclProposition:
+        return FclProposition(children[0], children[1], tuple(children[2:]))
 
-    def condition(self, children: list[Any]) -> Joined:
-        return Joined("or", tuple(one for one in children if not _is_token(one)))
+    def condition(self, children: list[Any]) -> FclJunction:
+        return FclJunction("or", tuple(one for one in children if not _is_token(one)))
 
-    def both(self, children: list[Any]) -> Joined:
-        return Joined("and", tuple(one for one in children if not _is_token(one)))
+    def both(self, children: list[Any]) -> FclJunction:
+        return FclJunction("and", tuple(one for one in children if not _is_token(one)))
 
-    def part(self, children: list[Any]) -> Condition:
+    def part(self, children: list[Any]) -> FclCondition:
         (inner,) = (one for one in children if not _is_token(one))
-        if isinstance(inner, Joined):
-            return Joined(inner.connective, inner.parts, is_grouped=True)
-        only: Condition = inner
+        if isinstance(inner, FclJunction):
+            return FclJunction(inner.connective, inner.parts, is_grouped=True)
+        only: FclCondition = inner
         return only
 
-    def negation(self, children: list[Any]) -> Negated:
-        return Negated(children[-1])
+    def negation(self, children: list[Any]) -> FclNegation:
+        return FclNegation(children[-1])
 
     def conclusions(self, children: list[Any]) -> tuple[list[Any], bool, bool]:
         """Return the conclusions, whether `,` joins some, and if any is in brackets."""
@@ -219,7 +225,7 @@ class _Statements(Transformer[Token, Any]):
         (inner,) = (one for one in children if not _is_token(one))
         return inner
 
-    def rule(self, children: list[Any]) -> RuleText:
+    def rule(self, children: list[Any]) -> RuleStatement:
         label: tuple[Token, ...] = ()
         rest = list(children[1:])
         if isinstance(rest[0], tuple):
@@ -227,7 +233,7 @@ class _Statements(Transformer[Token, Any]):
         weight = rest.pop() if _is_token(rest[-1]) else None
         inner, has_comma, is_grouped = rest.pop()
         condition = next(one for one in rest if not _is_token(one))
-        return RuleText(
+        return RuleStatement(
             keyword=children[0],
             label=label,
             condition=condition,
@@ -263,6 +269,7 @@ def _is_token(value: object) -> bool:
 
 MOST_BYTES: Final = 16 * 2**20
 MOST_TOKENS: Final = 300_000
+_FORBIDDEN = re.compile("[\x00-\x08\x0e-\x1f\ufffd]")
 MOST_LEVELS: Final = 50
 """How deep parentheses and `not` can be nested in one rule."""
 
@@ -274,15 +281,15 @@ class FclText(msgspec.Struct, frozen=True):
         text: The text; its lines end with LF.
         tokens: All of it but blanks and comments.
         statements: The statements that have no mistake.
-        found: The mistakes of the others.
-        encoding: `UTF-8`, or what else the bytes were taken for.
+        mistakes: Those of the other statements.
+        remarks: On an encoding other than UTF-8.
     """
 
     text: str
     tokens: tuple[Token, ...]
     statements: tuple[Statement, ...]
-    found: tuple[Found, ...]
-    encoding: str
+    mistakes: tuple[FileMistake, ...]
+    remarks: tuple[str, ...]
 
 
 def parsed(content: bytes, name: str) -> FclText:
@@ -291,7 +298,9 @@ def parsed(content: bytes, name: str) -> FclText:
     Raises:
         ReadError: If it is too large, or no text.
     """
-    text, encoding = _decoded(content, name)
+    text, remarks = decoded(content, name, MOST_BYTES, reads_utf16=True)
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    check_characters(text, name, _FORBIDDEN)
     tokens, found = _tokens(text, name)
     statements: list[Statement] = []
     for group in _groups(tokens):
@@ -300,33 +309,7 @@ def parsed(content: bytes, name: str) -> FclText:
             found.append(given)
         else:
             statements.append(given)
-    return FclText(text, tuple(tokens), tuple(statements), tuple(found), encoding)
-
-
-def _decoded(content: bytes, name: str) -> tuple[str, str]:
-    if len(content) > MOST_BYTES:
-        raise ReadError(
-            f"{name}: {len(content):,} bytes are more than the {MOST_BYTES:,} "
-            "that are read"
-        )
-    encoding = "UTF-8"
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        is_wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
-        encoding = "UTF-16" if is_wide else "Latin-1"
-        text = content.decode(encoding, "replace")
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    wrong = re.search("[\x00-\x08\x0e-\x1f\ufffd]", text)
-    if wrong:
-        before = text[: wrong.start()]
-        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-        sentence = (
-            f"character U+{ord(wrong.group()):04X} may not stand in an FCL file; "
-            "it may be damaged, or no text"
-        )
-        raise report(name, [(line, column, sentence)])
-    return text, encoding
+    return FclText(text, tuple(tokens), tuple(statements), tuple(found), remarks)
 
 
 _BLOCKS: Final = {
@@ -347,10 +330,10 @@ _LEADERS = {*_EDGES, *_SETTINGS, *_ASSIGNED, "TERM", "RULE"}
 _EVERYWHERE = {"IF", "THEN", "IS", "AND", "OR", "NOT", "WITH"}
 
 
-def _tokens(text: str, name: str) -> tuple[list[Token], list[Found]]:
+def _tokens(text: str, name: str) -> tuple[list[Token], list[FileMistake]]:
     """Return the tokens of a text that some statement can hold, and the others."""
     tokens: list[Token] = []
-    found: list[Found] = []
+    found: list[FileMistake] = []
     for token in itertools.islice(grammar().lex(text), MOST_TOKENS + 1):
         if token.type == "STRANGE":
             if len(found) < 1000:
@@ -447,7 +430,7 @@ def _typed(group: list[Token], *, in_variables: bool) -> list[Token]:
     return typed
 
 
-def _statement(group: list[Token]) -> Statement | Found:
+def _statement(group: list[Token]) -> Statement | FileMistake:
     """Return a statement, or its first mistake."""
     deep = _too_deep(group)
     if deep is not None:
@@ -482,7 +465,7 @@ def _too_deep(group: Iterable[Token]) -> Token | None:
     return None
 
 
-def _misspelt(group: Sequence[Token], token: Token) -> Found | None:
+def _misspelt(group: Sequence[Token], token: Token) -> FileMistake | None:
     """Return a keyword of a rule, wrongly written, that was taken for a name."""
     index = next(k for k, one in enumerate(group) if one is token)
     for one in group[max(1, index - 2) : index]:
@@ -493,7 +476,7 @@ def _misspelt(group: Sequence[Token], token: Token) -> Found | None:
     return None
 
 
-def _unexpected(group: list[Token], token: Token, accepted: set[str]) -> Found:
+def _unexpected(group: list[Token], token: Token, accepted: set[str]) -> FileMistake:
     shown = str(token) if len(token) <= 40 else f"{token[:40]}..."
     if token is group[0]:
         words = sorted(_LEADERS - {"VAR"})
@@ -544,7 +527,7 @@ _ALLOWED: Mapping[str, tuple[str, ...]] = {
 """What the settings of each kind of block are."""
 
 
-class Block(msgspec.Struct, frozen=True):
+class FclBlock(msgspec.Struct, frozen=True):
     """A block: its first line, and what stands in it."""
 
     head: Header
@@ -561,14 +544,14 @@ class Block(msgspec.Struct, frozen=True):
         return place(self.head.keyword)[0]
 
     @property
-    def terms(self) -> tuple[TermText, ...]:
+    def terms(self) -> tuple[TermStatement, ...]:
         """Its terms."""
-        return tuple(one for one in self.statements if isinstance(one, TermText))
+        return tuple(one for one in self.statements if isinstance(one, TermStatement))
 
     @property
-    def rules(self) -> tuple[RuleText, ...]:
+    def rules(self) -> tuple[RuleStatement, ...]:
         """Its rules."""
-        return tuple(one for one in self.statements if isinstance(one, RuleText))
+        return tuple(one for one in self.statements if isinstance(one, RuleStatement))
 
     def words(self, keyword: str) -> tuple[Token, ...]:
         """Return what the block says about a keyword; nothing if it does not."""
@@ -593,14 +576,14 @@ def raw(tokens: Sequence[Token]) -> str:
     return text
 
 
-def blocks_of(text: FclText, notes: Notes) -> tuple[str, list[Block]]:
+def blocks_of(text: FclText, notes: ReaderNotes) -> tuple[str, list[FclBlock]]:
     """Return the name of the first function block, and the blocks within.
 
     What stands in a wrong place, or is not closed, is noted.
     """
-    blocks: list[Block] = []
+    blocks: list[FclBlock] = []
     heads: list[Header] = []
-    current: Block | None = None
+    current: FclBlock | None = None
     for one in text.statements:
         if isinstance(one, Header):
             if current is not None:
@@ -609,35 +592,35 @@ def blocks_of(text: FclText, notes: Notes) -> tuple[str, list[Block]]:
             if one.keyword.type == "FUNCTION_BLOCK":
                 heads.append(one)
                 continue
-            current = Block(one, [])
+            current = FclBlock(one, [])
             if len(heads) < 2:
                 blocks.append(current)
         elif isinstance(one, Ending):
             wanted = ENDINGS[current.kind] if current else "END_FUNCTION_BLOCK"
             if one.keyword.type != wanted:
                 sentence = f"found {str(one.keyword)!r}; expected {wanted}"
-                notes.found.append((*place(one.keyword), sentence))
+                notes.mistake(place(one.keyword), sentence)
             current = None
         elif current is None:
             sentence = "it stands in no block; expected VAR_INPUT or another block"
-            notes.found.append((*place_of(one), sentence))
+            notes.mistake(place_of(one), sentence)
         else:
             current.statements.append(one)
     if current is not None:
         _note_unclosed(current, text.tokens[-1], notes)
     if not heads:
-        notes.found.append((1, 1, "the file has no FUNCTION_BLOCK"))
+        notes.mistake((1, 1), "the file has no FUNCTION_BLOCK")
     if len(heads) > 1:
         what = f"only the first of {len(heads)} function blocks is read"
-        notes.losses.append(Loss("the other function blocks", what))
+        notes.loss("the other function blocks", what)
     for block in blocks:
         _check(block, notes)
     return (raw(heads[0].words) if heads else ""), blocks
 
 
-def _note_unclosed(block: Block, token: Token, notes: Notes) -> None:
+def _note_unclosed(block: FclBlock, token: Token, notes: ReaderNotes) -> None:
     sentence = f"found {str(token)!r}; expected {ENDINGS[block.kind]} before it"
-    notes.found.append((*place(token), sentence))
+    notes.mistake(place(token), sentence)
 
 
 def place_of(one: Statement) -> tuple[int, int]:
@@ -645,23 +628,23 @@ def place_of(one: Statement) -> tuple[int, int]:
     match one:
         case Declaration(names=names):
             return place(names[0])
-        case TermText(name=name):
+        case TermStatement(name=name):
             return place(name)
         case _:
             return place(one.keyword)
 
 
-def _check(block: Block, notes: Notes) -> None:
+def _check(block: FclBlock, notes: ReaderNotes) -> None:
     """Note what cannot stand in a block, or stands twice."""
     seen: set[str] = set()
     for one in block.statements:
         if not _belongs(one, block.kind):
             sentence = f"{_shown(one)} cannot stand in {block.kind}"
-            notes.found.append((*place_of(one), sentence))
+            notes.mistake(place_of(one), sentence)
         elif isinstance(one, Setting):
             if one.keyword.type in seen:
                 sentence = f"a second {one.keyword.type} in one block"
-                notes.found.append((*place(one.keyword), sentence))
+                notes.mistake(place(one.keyword), sentence)
             seen.add(one.keyword.type)
 
 
@@ -669,13 +652,13 @@ def _belongs(one: Statement, kind: str) -> bool:
     match one:
         case Setting(keyword=keyword):
             return keyword.type in _ALLOWED[kind]
-        case TermText():
+        case TermStatement():
             return kind in ("FUZZIFY", "DEFUZZIFY")
-        case RuleText():
+        case RuleStatement():
             return kind == "RULEBLOCK"
         case Declaration():
             return kind.startswith("VAR")
-        case Range():
+        case FclRange():
             return kind != "RULEBLOCK"
         case _:
             return False
@@ -685,7 +668,7 @@ def _shown(one: Statement) -> str:
     match one:
         case Declaration():
             return "a variable"
-        case TermText():
+        case TermStatement():
             return "TERM"
         case _:
             return one.keyword.upper()

@@ -10,9 +10,9 @@ import msgspec
 from lark import Token
 
 from fuzzytree.formats.fcl.fcl_dialects import Dialect
-from fuzzytree.formats.fcl.fcl_syntax import TermText, place
-from fuzzytree.formats.fll.fll_terms import CLASSES, Place, Term, TermError, read_term
-from fuzzytree.formats.text_files import Word, number_of
+from fuzzytree.formats.fcl.fcl_syntax import TermStatement, place
+from fuzzytree.formats.fll.fll_terms import CLASSES, FllTerm, TermScope, read_term
+from fuzzytree.formats.text_files import PartError, Word, number_of
 from fuzzytree.model.rulebase import LR, Band, Points, name_choice
 from fuzzytree.model.system import (
     Bell,
@@ -33,14 +33,14 @@ from fuzzytree.model.system import (
 _FORMULA = "FUNCTION"
 
 
-class Made(msgspec.Struct, frozen=True):
+class FclTerm(msgspec.Struct, frozen=True):
     """A term that was read, and what its curve cannot hold of the file."""
 
-    term: Term
+    term: FllTerm
     loss: str = ""
 
 
-def read(text: TermText, where: Place, dialect: Dialect) -> Made:
+def read(text: TermStatement, where: TermScope, dialect: Dialect) -> FclTerm:
     """Return the term of a statement.
 
     Raises:
@@ -51,30 +51,30 @@ def read(text: TermText, where: Place, dialect: Dialect) -> Made:
     if text.kind == "number":
         kind = Word("Constant", *place(first))
         if dialect == "fuzzylite" or where.is_weighted:
-            return Made(read_term(name, kind, _words(text.tokens), where))
-        return Made(_checked(first, name, Singleton(_number(first)), where))
+            return FclTerm(read_term(name, kind, _words(text.tokens), where))
+        return FclTerm(_checked(first, name, Singleton(_number(first)), where))
     if text.kind == "points":
         numbers = [_number(one) for one in text.tokens]
         points = Points(tuple(numbers[::2]), tuple(numbers[1::2]))
-        return Made(_checked(first, name, points, where))
+        return FclTerm(_checked(first, name, points, where))
     if first.upper() == _FORMULA:
         kind = Word("Function", *place(first))
         words = _formula_words(text, dialect)
         formula = ""
         for word in words:
             formula = formula.ljust(word.column - words[0].column) + word.text
-        return Made(read_term(name, kind, words, where, formula))
+        return FclTerm(read_term(name, kind, words, where, formula))
     if str(first) not in CLASSES and first.upper() in _SHAPES:
         return _shape(text, where)
     exact = next((one for one in CLASSES if one.upper() == first.upper()), "")
     if not exact:
         known = ["FUNCTION", *_SHAPES, *CLASSES]
         sentence = f"no shape {str(first)!r}; {name_choice(str(first)[:99], known)}"
-        raise TermError((*place(first), sentence))
+        raise PartError((*place(first), sentence))
     kind = Word(exact, *place(first))
     plain = [one for one in text.tokens[1:] if one.type not in ("LPAR", "RPAR")]
     rest = [one for one in plain if one.type != "COMMA"]
-    return Made(read_term(name, kind, _words(rest), where))
+    return FclTerm(read_term(name, kind, _words(rest), where))
 
 
 def _words(tokens: Sequence[Token]) -> list[Word]:
@@ -88,22 +88,22 @@ def _number(token: Token) -> float:
             f"{str(token)!r} where a number must stand; curves that depend on "
             "variables are not held"
         )
-        raise TermError((*place(token), sentence))
+        raise PartError((*place(token), sentence))
     return value
 
 
-def _checked(token: Token, name: str, curve: Curve, where: Place) -> Term:
+def _checked(token: Token, name: str, curve: Curve, where: TermScope) -> FllTerm:
     for sentence in curve_mistakes(curve):
         whose = f"term {name!r} of {where.variable!r}"
-        raise TermError((*place(token), f"{whose}: {sentence}"))
-    return Term(Label(name, curve), "")
+        raise PartError((*place(token), f"{whose}: {sentence}"))
+    return FllTerm(Label(name, curve), "")
 
 
 _FUNCTIONS = {"LN": "log", "LOG": "log10"}
 """Functions of jFuzzyLogic that fuzzylite calls otherwise."""
 
 
-def _formula_words(text: TermText, dialect: Dialect) -> list[Word]:
+def _formula_words(text: TermStatement, dialect: Dialect) -> list[Word]:
     """Return a formula's words as fuzzylite writes them, on one line."""
     found: list[Word] = []
     column = place(text.tokens[0])[1]
@@ -121,17 +121,17 @@ def _formula_words(text: TermText, dialect: Dialect) -> list[Word]:
     return found
 
 
-def _shape(text: TermText, where: Place) -> Made:
+def _shape(text: TermStatement, where: TermScope) -> FclTerm:
     first, *rest = text.tokens
     count, make = _SHAPES[first.upper()]
     numbers = [_number(one) for one in rest]
     if len(numbers) != count:
         sentence = f"{first} takes {count} numbers, not {len(numbers)}"
-        raise TermError((*place(first), sentence))
+        raise PartError((*place(first), sentence))
     try:
         curve = make(numbers)
     except ValueError as error:
-        raise TermError((*place(first), str(error))) from error
+        raise PartError((*place(first), str(error))) from error
     loss = ""
     if isinstance(curve, SigmoidDifference):
         one, two = curve.first, curve.second
@@ -139,7 +139,7 @@ def _shape(text: TermText, where: Place) -> Made:
         if not is_plain:
             loss = "where the first sigmoid is below the second one, the difference "
             loss += "counts and not 0, as jFuzzyLogic has it"
-    return Made(_checked(first, str(text.name), curve, where), loss)
+    return FclTerm(_checked(first, str(text.name), curve, where), loss)
 
 
 def _two_gaussians(n: Sequence[float]) -> Curve:

@@ -8,10 +8,10 @@ import msgspec
 
 from fuzzytree.formats.fis import fis_text as text
 from fuzzytree.formats.fis import fis_words as words
-from fuzzytree.formats.fis.fis_text import Entry, Notes
+from fuzzytree.formats.fis.fis_text import FisEntry
 from fuzzytree.formats.fis.fis_words import Dialect
 from fuzzytree.formats.formulas import FormulaError, parse
-from fuzzytree.model.contracts import Loss
+from fuzzytree.formats.text_files import ReaderNotes
 from fuzzytree.model.naming import numbered
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
@@ -44,24 +44,27 @@ _WRONG = Formula(Number(0.0))
 
 
 def labels_of(
-    entries: Sequence[Entry], count: Entry | None, about: About, notes: Notes
+    entries: Sequence[FisEntry],
+    count: FisEntry | None,
+    about: About,
+    notes: ReaderNotes,
 ) -> tuple[Label, ...]:
     """Return the terms of a variable in the order of their numbers."""
     numbered = {int(entry.key[2:]): entry for entry in reversed(entries)}
     if len(numbered) < len(entries):
         twice = next(e for e in entries if numbered[int(e.key[2:])] is not e)
-        notes.found.append((twice.line, 1, f"{twice.key} stands twice"))
+        notes.mistake((twice.line, 1), f"{twice.key} stands twice")
     for place, number in enumerate(sorted(numbered), 1):
         if place != number:
             what = f"MF{place} is missing before MF{number}"
-            notes.found.append((numbered[number].line, 1, what))
+            notes.mistake((numbered[number].line, 1), what)
             break
     if count is not None and count.value.split("%")[0].strip() != str(len(entries)):
         what = f"NumMFs says {count.value[:20]}, and there are {len(entries)}"
         if about[1] == "fuzzylite":
-            notes.remarks.append(f"{about[0]!r}: {what}: fuzzylite reads them all")
+            notes.remark(f"{about[0]!r}: {what}: fuzzylite reads them all")
         else:
-            notes.found.append((count.line, count.column, what))
+            notes.mistake((count.line, count.column), what)
     labels: list[Label] = []
     taken: dict[str, int] = {}
     for number in sorted(numbered):
@@ -69,21 +72,23 @@ def labels_of(
     return tuple(labels)
 
 
-def _label(entry: Entry, about: About, taken: dict[str, int], notes: Notes) -> Label:
-    written = text.term_of(entry, notes.found)
+def _label(
+    entry: FisEntry, about: About, taken: dict[str, int], notes: ReaderNotes
+) -> Label:
+    written = text.term_of(entry, notes.mistakes)
     if written is None:
         return Label(entry.key, _WRONG)
     name = written.name or entry.key
     found = numbered(name, taken)
     if found != written.name:
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
-        notes.remarks.append(f"{what}; here it is {found!r}")
+        notes.remark(f"{what}; here it is {found!r}")
     curve = _curve(written, entry, about, notes)
     return Label(found, _WRONG if curve is None else curve)
 
 
 def _curve(
-    written: text.Written, entry: Entry, about: About, notes: Notes
+    written: text.FisTerm, entry: FisEntry, about: About, notes: ReaderNotes
 ) -> Curve | None:
     kind = written.kind
     place = (entry.line, written.column)
@@ -92,11 +97,11 @@ def _curve(
     if kind not in words.KINDS and kind not in words.OTHER_KINDS:
         known = [*words.KINDS, *words.OTHER_KINDS]
         what = f"no kind of curve {kind[:40]!r}; {name_choice(kind[:40], known)}"
-        notes.found.append((entry.line, entry.column, what))
+        notes.mistake(entry.position, what)
         return None
-    before = len(notes.found)
-    numbers = text.numbers_of(written.inside, *place, notes.found)
-    if len(notes.found) > before:
+    before = len(notes.mistakes)
+    numbers = text.numbers_of(written.inside, *place, notes.mistakes)
+    if len(notes.mistakes) > before:
         return None
     if kind in ("constant", "linear"):
         found = _conclusion_number(kind, numbers, about, notes)
@@ -105,10 +110,10 @@ def _curve(
         if about[2] is not None and about[2][0] and about[1] != "fuzzylite":
             found = f"a Sugeno system concludes constant and linear, not {kind!r}"
     if isinstance(found, str):
-        notes.found.append((*place, found))
+        notes.mistake(place, found)
         return None
     if isinstance(found, SigmoidDifference) and about[1] != "fuzzylite":
-        notes.remarks.append(
+        notes.remark(
             f"term {written.name!r} of {about[0]!r}: where the second sigmoid is above "
             "the first, MATLAB takes their distance, as here, and Octave 0"
         )
@@ -116,7 +121,7 @@ def _curve(
 
 
 def _conclusion_number(
-    kind: str, numbers: Sequence[float], about: About, notes: Notes
+    kind: str, numbers: Sequence[float], about: About, notes: ReaderNotes
 ) -> Curve | str:
     """Return what a `constant` or `linear` concludes."""
     name, dialect, output = about
@@ -137,7 +142,7 @@ def _conclusion_number(
         return next(curve_mistakes(curve), curve)
     if dialect != "fuzzylite" or kind == "linear":
         return f"a {kind!r} belongs to the outputs of a Sugeno system"
-    notes.remarks.append(
+    notes.remark(
         f"{name!r}: a 'constant' that is looked at as a curve has the same degree "
         "everywhere, as in fuzzylite"
     )
@@ -145,15 +150,15 @@ def _conclusion_number(
 
 
 def _formula(
-    written: text.Written, place: tuple[int, int], notes: Notes
+    written: text.FisTerm, place: tuple[int, int], notes: ReaderNotes
 ) -> Curve | None:
     try:
         curve = Formula(parse(written.inside))
     except FormulaError as error:
-        notes.found.append((place[0], place[1] + error.column - 1, error.sentence))
+        notes.mistake((place[0], place[1] + error.column - 1), error.sentence)
         return None
     for mistake in curve_mistakes(curve):
-        notes.found.append((*place, mistake))
+        notes.mistake(place, mistake)
     return curve
 
 
@@ -178,14 +183,17 @@ class _Code(msgspec.Struct, frozen=True):
 
 
 def rules_of(
-    lines: Sequence[Entry], variables: Variables, dialect: Dialect, notes: Notes
-) -> list[tuple[Entry, SystemRule]]:
+    lines: Sequence[FisEntry],
+    variables: Variables,
+    dialect: Dialect,
+    notes: ReaderNotes,
+) -> list[tuple[FisEntry, SystemRule]]:
     """Return the rules and their lines; what is found is added to the notes.
 
     A rule whose hedges act on several conclusions becomes one rule for each in Octave's
     dialect, where they act on each alone.
     """
-    rules: list[tuple[Entry, SystemRule]] = []
+    rules: list[tuple[FisEntry, SystemRule]] = []
     for number, entry in enumerate(lines, 1):
         line = _line(entry, variables, notes)
         if line is not None:
@@ -194,22 +202,22 @@ def rules_of(
     return rules
 
 
-def _line(entry: Entry, variables: Variables, notes: Notes) -> _Line | None:
+def _line(entry: FisEntry, variables: Variables, notes: ReaderNotes) -> _Line | None:
     before, comma, rest = entry.value.partition(",")
     behind, open_, rest = rest.partition("(")
     weight, close, rest = rest.partition(")")
     colon = rest.strip()[:1]
     if not (comma and open_ and close and colon == ":"):
         what = f"{entry.value.strip()[:60]!r} is no rule, such as 1 2, 1 (1) : 1"
-        notes.found.append((entry.line, 1, what))
+        notes.mistake((entry.line, 1), what)
         return None
-    found = len(notes.found)
+    found = len(notes.mistakes)
     places: list[list[float]] = []
     column = 1
     for part in (before, behind, weight, rest.replace(":", " ", 1)):
-        places.append(text.numbers_of(part, entry.line, column, notes.found))
+        places.append(text.numbers_of(part, entry.line, column, notes.mistakes))
         column += len(part) + 1
-    if len(notes.found) > found:
+    if len(notes.mistakes) > found:
         return None
     needed = (len(variables[0]), len(variables[1]), 1, 1)
     names = (
@@ -221,30 +229,30 @@ def _line(entry: Entry, variables: Variables, notes: Notes) -> _Line | None:
     for numbers, count, where in zip(places, needed, names, strict=True):
         if len(numbers) != count:
             what = f"{count} numbers stand {where}, not {len(numbers)}"
-            notes.found.append((entry.line, 1, what.replace("1 numbers", "1 number")))
-    if len(notes.found) > found:
+            notes.mistake((entry.line, 1), what.replace("1 numbers", "1 number"))
+    if len(notes.mistakes) > found:
         return None
     (share,), (connection,) = places[2:]
     if not 0.0 <= share <= 1.0:
         what = f"the weight must lie in [0, 1], not {share!r}"
-        notes.found.append((entry.line, len(before) + len(behind) + 3, what))
+        notes.mistake((entry.line, len(before) + len(behind) + 3), what)
     if connection not in (1.0, 2.0):
         what = f"the last number is 1 (and) or 2 (or), not {connection!r}"
-        notes.found.append((entry.line, len(entry.value), what))
-    if len(notes.found) > found:
+        notes.mistake((entry.line, len(entry.value)), what)
+    if len(notes.mistakes) > found:
         return None
     return _Line(places[0], places[1], share, connection)
 
 
 def _rules(
     line: _Line,
-    where: tuple[int, Entry],
+    where: tuple[int, FisEntry],
     variables: Variables,
     dialect: Dialect,
-    notes: Notes,
+    notes: ReaderNotes,
 ) -> Iterator[SystemRule]:
     number, _ = where
-    found = len(notes.found)
+    found = len(notes.mistakes)
     questions = [
         asked
         for variable, code in zip(variables[0], line.asked, strict=True)
@@ -255,14 +263,14 @@ def _rules(
         for output, code in zip(variables[1], line.concluded, strict=True)
         if (one := _conclusion(output, code, where, dialect, notes)) is not None
     ]
-    if len(notes.found) > found:
+    if len(notes.mistakes) > found:
         return
     if not conclusions:
-        notes.losses.append(Loss(f"rule {number}", "it concludes nothing; left out"))
+        notes.loss(f"rule {number}", "it concludes nothing; left out")
         return
     if any(one.label and one.hedges[-1:] == ("any",) for one in questions):
         what = "it asks 'any' (.99) of a term, and fuzzylite does not load it; left out"
-        notes.losses.append(Loss(f"rule {number}", what))
+        notes.loss(f"rule {number}", what)
         return
     is_or = line.connection == 2.0
     if not questions and (is_or or dialect == "fuzzylite"):
@@ -270,11 +278,11 @@ def _rules(
             "fuzzylite does not load it" if dialect == "fuzzylite" else "an or of none"
         )
         what = f"it asks nothing and never fires ({why}); left out"
-        notes.losses.append(Loss(f"rule {number}", what))
+        notes.loss(f"rule {number}", what)
         return
     if not questions and dialect == "octave":
         what = f"rule {number} asks nothing and always fires; Octave cannot run it"
-        notes.remarks.append(what)
+        notes.remark(what)
     when: Condition | None = questions[0] if questions else None
     if len(questions) > 1:
         when = Or(tuple(questions)) if is_or else And(tuple(questions))
@@ -288,8 +296,8 @@ def _rules(
 def _code(
     code: float,
     variable: SystemInput | SystemOutput,
-    where: tuple[int, Entry],
-    notes: Notes,
+    where: tuple[int, FisEntry],
+    notes: ReaderNotes,
 ) -> _Code | None:
     """Return what a number means; None if there is no such term."""
     size = abs(code)
@@ -299,7 +307,7 @@ def _code(
             f"rule {number}: {variable.name!r} has {len(variable.labels)} terms, "
             f"and no term {size:g}"
         )
-        notes.found.append((entry.line, 1, what))
+        notes.mistake((entry.line, 1), what)
         return None
     place = int(size)
     return _Code(place, round(100.0 * (size - place)), code < 0.0)
@@ -308,9 +316,9 @@ def _code(
 def _question(
     variable: SystemInput,
     code: float,
-    where: tuple[int, Entry],
+    where: tuple[int, FisEntry],
     dialect: Dialect,
-    notes: Notes,
+    notes: ReaderNotes,
 ) -> Is | None:
     """Return what is asked of an input; None if nothing."""
     if code == 0.0:
@@ -323,7 +331,7 @@ def _question(
         if hedges[-1:] == ("any",):
             return Is(variable.name, None, hedges)
         what = f"rule {where[0]}: a hedge of no term of {variable.name!r}"
-        notes.found.append((where[1].line, 1, what))
+        notes.mistake((where[1].line, 1), what)
         return None
     return Is(variable.name, variable.labels[found.place - 1].name, hedges)
 
@@ -331,9 +339,9 @@ def _question(
 def _conclusion(
     output: SystemOutput,
     code: float,
-    where: tuple[int, Entry],
+    where: tuple[int, FisEntry],
     dialect: Dialect,
-    notes: Notes,
+    notes: ReaderNotes,
 ) -> Conclusion | None:
     if code == 0.0:
         return None
@@ -346,7 +354,7 @@ def _conclusion(
             f"rule {where[0]}: a term of {output.name!r} that is negated or hedged; "
             "it must be a term of its own"
         )
-        notes.found.append((where[1].line, 1, what))
+        notes.mistake((where[1].line, 1), what)
         return None
     table = words.HEDGES[dialect]
     if dialect == "octave":
@@ -358,14 +366,14 @@ def _conclusion(
 def _hedges(
     table: Mapping[int, tuple[Hedge, ...]],
     code: _Code,
-    about: tuple[str, tuple[int, Entry]],
-    notes: Notes,
+    about: tuple[str, tuple[int, FisEntry]],
+    notes: ReaderNotes,
 ) -> tuple[Hedge, ...]:
     """Return what hundredths and a sign do to a degree."""
     found = table.get(code.hundredths)
     if found is None:
         variable, (number, _) = about
         what = f"no hedge is known by .{code.hundredths:02d}; it is left out"
-        notes.losses.append(Loss(f"rule {number}, {variable!r}", what))
+        notes.loss(f"rule {number}, {variable!r}", what)
         found = ()
     return ("not", *found) if code.is_negated else found

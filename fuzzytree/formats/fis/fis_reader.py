@@ -7,10 +7,11 @@ and takes MATLAB's meaning by default.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import PurePath
-from typing import Final, NamedTuple
+from typing import Final
 
 import msgspec
 
@@ -18,12 +19,12 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fis import fis_text as text
 from fuzzytree.formats.fis import fis_words as words
 from fuzzytree.formats.fis.fis_parts import labels_of, rules_of
-from fuzzytree.formats.fis.fis_text import Entry, Notes, Section
+from fuzzytree.formats.fis.fis_text import FisEntry, FisSection
 from fuzzytree.formats.fis.fis_words import Dialect
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
-from fuzzytree.formats.text_files import report
-from fuzzytree.formats.yaml.spots import Spots
-from fuzzytree.model.contracts import Locate, Loss, Reading
+from fuzzytree.formats.positions import Positions
+from fuzzytree.formats.text_files import ReaderNotes, number_of, report
+from fuzzytree.model.contracts import Locate, Reading
 from fuzzytree.model.naming import numbered, printable
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
@@ -41,17 +42,8 @@ from fuzzytree.semantics.conversion import as_written, joined_by_number
 DIALECT: Final = "dialect: "
 
 _SYSTEM_KEYS: Final = (
-    "Name",
-    "Type",
-    "Version",
-    "NumInputs",
-    "NumOutputs",
-    "NumRules",
-    "AndMethod",
-    "OrMethod",
-    "ImpMethod",
-    "AggMethod",
-    "DefuzzMethod",
+    *("Name", "Type", "Version", "NumInputs", "NumOutputs", "NumRules"),
+    *("AndMethod", "OrMethod", "ImpMethod", "AggMethod", "DefuzzMethod"),
 )
 _VARIABLE_KEYS: Final = ("Name", "Range", "NumMFs", "MF1")
 _PRIVATE_KEYS: Final = frozenset({"Enabled", "Default", "LockPrevious", "LockRange"})
@@ -71,7 +63,7 @@ class _Methods(msgspec.Struct, frozen=True):
     implication: TNorm | None
     aggregation: SNorm | None
     defuzzifier: Defuzzifier
-    counts: Mapping[str, Entry]
+    counts: Mapping[str, FisEntry]
 
 
 def reading(content: bytes, name: str, *, dialect: Dialect | None = None) -> Reading:
@@ -105,50 +97,36 @@ def places(content: bytes, name: str) -> Locate:
     Raises:
         ReadError: With every mistake of the file.
     """
-    _, parts, facts = _read(content, name, None)
-    return parts.spots().of_facts(facts).find
-
-
-class _Parts(NamedTuple):
-    """A system, and what its parts were made of."""
-
-    system: FuzzySystem
-    inputs: Sequence[Section]
-    outputs: Sequence[Section]
-    rules: Sequence[Entry]
-
-    def spots(self) -> Spots:
-        return text.spots_of(self.inputs, self.outputs, self.rules)
+    _, locate = _read(content, name, None)
+    return locate()
 
 
 def _read(
     content: bytes, name: str, dialect: Dialect | None
-) -> tuple[Reading, _Parts, str | None]:
-    """Return what a file says, what of, and the facts of a rule base if it is one."""
-    notes = Notes([], [], [])
-    page = text.read_page(content, name, notes.found)
-    notes.remarks.extend(page.remarks)
-    meant = dialect or _dialect(page, notes)
-    parts = _system(page, name, meant, notes)
-    if notes.found or parts is None:
-        raise report(name, notes.found)
-    model, facts = as_written(parts.system, page.comments)
-    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
-    return reading, parts, facts
+) -> tuple[Reading, Callable[[], Locate]]:
+    """Return what a file says, and a function that locates its parts."""
+    notes = ReaderNotes()
+    page = text.read_page(content, name, notes)
+    parts = _system(page, name, dialect or _dialect(page, notes), notes)
+    if notes.mistakes or parts is None:
+        raise report(name, notes.mistakes)
+    system, positions = parts
+    model, facts = as_written(system, page.comments)
+    return notes.reading(model), lambda: positions().of_facts(facts).find
 
 
-def _dialect(page: text.Page, notes: Notes) -> Dialect:
+def _dialect(page: text.FisFile, notes: ReaderNotes) -> Dialect:
     """Return whose file it is, by its comments and words, and say why."""
     for known in words.DIALECTS:
         if f"{DIALECT}{known}" in page.comments:
-            notes.remarks.append(f"read as {known}'s, as the file says")
+            notes.remark(f"read as {known}'s, as the file says")
             return known
     found, why = _signs(page)
-    notes.remarks.append(f"read as {found}'s: {why}")
+    notes.remark(f"read as {found}'s: {why}")
     return found
 
 
-def _signs(page: text.Page) -> tuple[Dialect, str]:
+def _signs(page: text.FisFile) -> tuple[Dialect, str]:
     comments = " ".join(page.comments).lower()
     entries = [entry for section in page.sections for entry in section.entries]
     for entry in entries:
@@ -177,10 +155,10 @@ def _indices(rule: str) -> str:
 
 
 def _system(
-    page: text.Page, name: str, dialect: Dialect, notes: Notes
-) -> _Parts | None:
-    parts: dict[str, list[Section]] = {"input": [], "output": []}
-    single: dict[str, Section] = {}
+    page: text.FisFile, name: str, dialect: Dialect, notes: ReaderNotes
+) -> tuple[FuzzySystem, Callable[[], Positions]] | None:
+    parts: dict[str, list[FisSection]] = {"input": [], "output": []}
+    single: dict[str, FisSection] = {}
     for section in page.sections:
         if section.kind in parts:
             parts[section.kind].append(section)
@@ -189,12 +167,12 @@ def _system(
     for kind, sections in parts.items():
         sections.sort(key=lambda section: section.number)
         for place, section in enumerate(sections, 1):
-            if section.number != place and not notes.found:
+            if section.number != place and not notes.mistakes:
                 what = f"[{kind.capitalize()}{place}] is missing before this one"
-                notes.found.append((section.line, 1, what))
+                notes.mistake((section.line, 1), what)
     if "system" not in single or not parts["output"]:
         missing = "[Output1]" if "system" in single else "[System]"
-        notes.found.append((1, 1, f"the file has no section {missing}"))
+        notes.mistake((1, 1), f"the file has no section {missing}")
         return None
     methods = _methods(single["system"], name, dialect, notes)
     taken: dict[str, int] = {}
@@ -206,7 +184,7 @@ def _system(
     lines = single["rules"].entries if "rules" in single else []
     found = rules_of(lines, (inputs, outputs), dialect, notes)
     _check_counts(methods, (len(inputs), len(outputs), len(lines)), dialect, notes)
-    if notes.found:
+    if notes.mistakes:
         return None
     is_weighted = methods.defuzzifier.is_weighted
     block = RuleBlock(
@@ -221,73 +199,78 @@ def _system(
     if dialect == "fuzzylite":
         for output in outputs:
             notes.losses.extend(fuzzylite_losses(output))
-    given = parts["input"], parts["output"], [entry for entry, _ in found]
+    entries = [entry for entry, _ in found]
+    positions = functools.partial(
+        text.positions_of, parts["input"], parts["output"], entries
+    )
     try:
         system = FuzzySystem(methods.name, inputs, outputs, (block,))
     except InvalidModelError as error:
-        notes.found.extend(text.spots_of(*given).placed(error.mistakes))
+        notes.mistakes.extend(positions().placed(error.mistakes))
         return None
-    return _Parts(joined_by_number(system), *given)
+    return joined_by_number(system), positions
 
 
 def _keyed(
-    section: Section, known: Sequence[str], notes: Notes
-) -> tuple[dict[str, Entry], list[Entry]]:
+    section: FisSection, known: Sequence[str], notes: ReaderNotes
+) -> tuple[dict[str, FisEntry], list[FisEntry]]:
     """Return the entries by key, and those of terms."""
-    found: dict[str, Entry] = {}
-    terms: list[Entry] = []
+    found: dict[str, FisEntry] = {}
+    terms: list[FisEntry] = []
     for entry in section.entries:
         if section.kind != "system" and text.TERM.fullmatch(entry.key):
             terms.append(entry)
         elif entry.key not in known and entry.key not in _PRIVATE_KEYS:
             what = f"no key {entry.key[:40]!r}; {name_choice(entry.key[:40], known)}"
-            notes.found.append((entry.line, 1, what))
+            notes.mistake((entry.line, 1), what)
         elif entry.key in found:
             what = f"{entry.key} stands twice; the first is in line"
-            notes.found.append((entry.line, 1, f"{what} {found[entry.key].line}"))
+            notes.mistake((entry.line, 1), f"{what} {found[entry.key].line}")
         else:
             found[entry.key] = entry
     return found, terms
 
 
-def _methods(section: Section, name: str, dialect: Dialect, notes: Notes) -> _Methods:
+def _methods(
+    section: FisSection, name: str, dialect: Dialect, notes: ReaderNotes
+) -> _Methods:
     entries, _ = _keyed(section, _SYSTEM_KEYS, notes)
 
     def word(key: str) -> str:
-        return text.unquoted(entries[key], notes.found) if key in entries else ""
+        return text.unquoted(entries[key], notes.mistakes) if key in entries else ""
 
     def norm(key: str, known: Mapping[str, str]) -> str | None:
         given = word(key)
         if given and given not in known:
             entry = entries[key]
             what = f"no {key} {given[:40]!r}; {name_choice(given[:40], known)}"
-            notes.found.append((entry.line, entry.column, what))
+            notes.mistake(entry.position, what)
         return known.get(given)
 
     title = word("Name")
     if not title:
         title = printable(PurePath(name).stem) or "system"
-        notes.remarks.append(f"the system has no name; {title!r} stands for it")
+        notes.remark(f"the system has no name; {title!r} stands for it")
     method = norm("DefuzzMethod", words.METHODS)
     is_sugeno = word("Type").lower() == "sugeno"
     if method is None:
         method = "weighted average" if is_sugeno else "centroid"
         if "DefuzzMethod" not in entries:
-            notes.remarks.append(f"the file has no DefuzzMethod; read as {method}")
+            notes.remark(f"the file has no DefuzzMethod; read as {method}")
     how = msgspec.structs.replace(DEFAULTS[dialect], method=method)
     if how.is_weighted:
         how = Defuzzifier(how.method)
     else:
-        notes.remarks.append(
+        notes.remark(
             f"FIS has no resolution: curves are looked at in {how.samples} places, "
             f"as {dialect} does unless told otherwise"
         )
     if is_sugeno != how.is_weighted and dialect != "fuzzylite" and "Type" in entries:
         entry = entries["Type"]
         what = f"a {word('Type')!r} system cannot have the DefuzzMethod {method!r}"
-        notes.found.append((entry.line, entry.column, what))
+        notes.mistake(entry.position, what)
     if how.method == "bisector" and dialect == "octave":
-        notes.remarks.append(
+        notes.remark(
             "Octave's bisector answers the number of a sample and not its value; "
             "this is read as the value"
         )
@@ -303,7 +286,7 @@ def _methods(section: Section, name: str, dialect: Dialect, notes: Notes) -> _Me
 
 
 def _check_counts(
-    methods: _Methods, found: tuple[int, int, int], dialect: Dialect, notes: Notes
+    methods: _Methods, found: tuple[int, int, int], dialect: Dialect, notes: ReaderNotes
 ) -> None:
     for key, count in zip(("NumInputs", "NumOutputs", "NumRules"), found, strict=True):
         entry = methods.counts.get(key)
@@ -311,45 +294,48 @@ def _check_counts(
             continue
         what = f"{key} says {entry.value[:20]}, and there are {count}"
         if key == "NumRules" and dialect == "fuzzylite":
-            notes.remarks.append(f"{what}: fuzzylite reads them all")
+            notes.remark(f"{what}: fuzzylite reads them all")
         else:
-            notes.found.append((entry.line, entry.column, what))
+            notes.mistake(entry.position, what)
 
 
 def _range(
-    entries: Mapping[str, Entry], notes: Notes
+    entries: Mapping[str, FisEntry], notes: ReaderNotes
 ) -> tuple[float | None, float | None]:
     entry = entries.get("Range")
     if entry is None:
         return None, None
     inside = entry.value.partition("[")[2].partition("]")[0]
     start = entry.column + entry.value.find("[") + 1
-    ends = text.numbers_of(inside, entry.line, start, notes.found)
+    ends = text.numbers_of(inside, entry.line, start, notes.mistakes)
     if len(ends) != 2 or not ends[0] <= ends[1]:
         what = f"the Range must be two rising numbers, [0 1], not {entry.value[:40]!r}"
-        notes.found.append((entry.line, entry.column, what))
+        notes.mistake(entry.position, what)
         return None, None
     low, high = (end if abs(end) < words.FAR else None for end in ends)
     return low, high
 
 
 def _name(
-    section: Section, entries: Mapping[str, Entry], taken: dict[str, int], notes: Notes
+    section: FisSection,
+    entries: Mapping[str, FisEntry],
+    taken: dict[str, int],
+    notes: ReaderNotes,
 ) -> str:
     entry = entries.get("Name")
-    name = text.unquoted(entry, notes.found) if entry else ""
+    name = text.unquoted(entry, notes.mistakes) if entry else ""
     if not name:
         name = f"{section.kind} {section.number}"
-        notes.remarks.append(f"{name} has no name of its own")
+        notes.remark(f"{name} has no name of its own")
     found = numbered(name, taken)
     if found != name:
         what = f"{section.kind} {section.number} is called {name!r} like another"
-        notes.remarks.append(f"{what}; here it is {found!r}")
+        notes.remark(f"{what}; here it is {found!r}")
     return found
 
 
 def _input(
-    section: Section, dialect: Dialect, taken: dict[str, int], notes: Notes
+    section: FisSection, dialect: Dialect, taken: dict[str, int], notes: ReaderNotes
 ) -> SystemInput:
     entries, terms = _keyed(section, _VARIABLE_KEYS, notes)
     name = _name(section, entries, taken, notes)
@@ -360,11 +346,11 @@ def _input(
 
 
 def _output(
-    section: Section,
+    section: FisSection,
     methods: _Methods,
     dialect: Dialect,
     known: tuple[tuple[SystemInput, ...], dict[str, int]],
-    notes: Notes,
+    notes: ReaderNotes,
 ) -> SystemOutput:
     inputs, taken = known
     entries, terms = _keyed(section, _VARIABLE_KEYS, notes)
@@ -376,14 +362,14 @@ def _output(
     labels = labels_of(terms, entries.get("NumMFs"), about, notes)
     if _is_set(entries, "LockPrevious"):
         what = "where no rule fires, fuzzylite answers as for the row before"
-        notes.losses.append(Loss(f"output {name!r}", f"{what}; here it is no number"))
+        notes.loss(f"output {name!r}", f"{what}; here it is no number")
     default: float | None = None
     if "Default" in entries:
-        default = text.number_of(entries["Default"].value)
+        default = number_of(entries["Default"].value)
         if default is None or math.isinf(default):
             entry = entries["Default"]
             what = f"the Default must be a number or nan, not {entry.value[:40]!r}"
-            notes.found.append((entry.line, entry.column, what))
+            notes.mistake(entry.position, what)
     is_joined = not how.is_weighted or (
         dialect == "octave" and methods.aggregation != "sum"
     )
@@ -399,18 +385,20 @@ def _output(
     )
 
 
-def _is_set(entries: Mapping[str, Entry], key: str) -> bool:
+def _is_set(entries: Mapping[str, FisEntry], key: str) -> bool:
     return key in entries and entries[key].value.lower() in ("1", "true")
 
 
-def _note_enabled(entries: Mapping[str, Entry], name: str, notes: Notes) -> None:
+def _note_enabled(
+    entries: Mapping[str, FisEntry], name: str, notes: ReaderNotes
+) -> None:
     if "Enabled" in entries and not _is_set(entries, "Enabled"):
         what = "it is not enabled in the file, and takes part here"
-        notes.losses.append(Loss(f"variable {name!r}", what))
+        notes.loss(f"variable {name!r}", what)
 
 
 def _with_middles(
-    outputs: Iterable[SystemOutput], rules: Sequence[SystemRule], notes: Notes
+    outputs: Iterable[SystemOutput], rules: Sequence[SystemRule], notes: ReaderNotes
 ) -> tuple[SystemOutput, ...]:
     """Return outputs with what MATLAB answers where no rule fires."""
     found = []
@@ -421,7 +409,7 @@ def _with_middles(
             default = middle(one.low, one.high)
         found.append(msgspec.structs.replace(one, default=default))
     if any(one.default is not None for one in found):
-        notes.remarks.append(
+        notes.remark(
             "where no rule fires, an output is the middle of its range, as in MATLAB"
         )
     return tuple(found)
@@ -458,7 +446,7 @@ def _compare(
     block: RuleBlock,
     methods: _Methods,
     dialect: Dialect,
-    notes: Notes,
+    notes: ReaderNotes,
 ) -> None:
     """Say where Octave would answer otherwise than the others."""
     is_weighted = methods.defuzzifier.is_weighted
@@ -472,7 +460,7 @@ def _compare(
             if one.output == output.name
         ]
         if len(set(concluded)) < len(concluded):
-            notes.remarks.append(
+            notes.remark(
                 f"output {output.name!r}: several rules conclude one term, and their "
                 f"degrees are summed, as {dialect} does; Octave would join them by "
                 f"{methods.aggregation}"

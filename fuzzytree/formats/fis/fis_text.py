@@ -9,9 +9,17 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.text_files import LONGEST_NAME, Found
-from fuzzytree.formats.yaml.spots import Group, Spots
-from fuzzytree.model.contracts import Loss
+from fuzzytree.formats.positions import PositionGroup, Positions
+from fuzzytree.formats.text_files import (
+    LONGEST_NAME,
+    FileMistake,
+    Position,
+    ReaderNotes,
+    check_characters,
+    decoded,
+    number_of,
+    split_lines,
+)
 
 MOST_BYTES: Final = 4 * 2**20
 MOST_LINES: Final = 60_000
@@ -19,15 +27,12 @@ MOST_LINES: Final = 60_000
 TERM: Final = re.compile(r"MF([0-9]{1,6})")
 """The key of a term."""
 
-_LINE_END = re.compile(r"\r\n|\r|\n")
-_FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+_FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _NUMBERED = re.compile(r"(input|output)\s*([0-9]{1,6})")
-_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
-_INFINITE = re.compile(r"[-+]?inf(?:inity)?|nan", re.IGNORECASE)
 _TOKEN = re.compile(r"[^\s,;]+")
 
 
-class Entry(msgspec.Struct, frozen=True):
+class FisEntry(msgspec.Struct, frozen=True):
     """A key and its value; line and column of the value, from 1."""
 
     key: str
@@ -35,54 +40,48 @@ class Entry(msgspec.Struct, frozen=True):
     line: int
     column: int
 
+    @property
+    def position(self) -> Position:
+        """Where the value stands."""
+        return self.line, self.column
 
-class Section(msgspec.Struct, frozen=True):
+
+class FisSection(msgspec.Struct, frozen=True):
     """A section: `system`, `rules`, or a numbered `input` or `output`."""
 
     kind: str
     number: int
     line: int
-    entries: list[Entry]
+    entries: list[FisEntry]
 
 
-class Notes(msgspec.Struct, frozen=True):
-    """What is found on the way: mistakes, losses and remarks are added to the lists."""
-
-    found: list[Found]
-    losses: list[Loss]
-    remarks: list[str]
-
-
-class Page(msgspec.Struct, frozen=True):
+class FisFile(msgspec.Struct, frozen=True):
     """A file: its sections in their order, and the comments between them."""
 
-    sections: tuple[Section, ...]
+    sections: tuple[FisSection, ...]
     comments: tuple[str, ...]
-    remarks: tuple[str, ...]
 
 
-def read_page(content: bytes, name: str, found: list[Found]) -> Page:
+def read_page(content: bytes, name: str, notes: ReaderNotes) -> FisFile:
     """Return the sections of a file.
 
     Raises:
         ReadError: If it is too large.
     """
-    text, remarks = _decoded(content, name)
-    sections: list[Section] = []
+    text, remarks = decoded(content, name, MOST_BYTES, reads_utf16=True)
+    notes.remarks.extend(remarks)
+    found = notes.mistakes
+    check_characters(text, name, _FORBIDDEN)
+    sections: list[FisSection] = []
     comments: list[str] = []
     seen: dict[tuple[str, int], int] = {}
-    lines = _LINE_END.split(text)
+    lines = split_lines(text)
     if len(lines) > MOST_LINES:
         raise ReadError(
             f"{name}: {len(lines):,} lines are more than the {MOST_LINES:,} "
             "that are read"
         )
     for number, line in enumerate(lines, 1):
-        wrong = _FORBIDDEN.search(line)
-        if wrong:
-            what = f"character U+{ord(wrong.group()):04X} may not stand in a FIS file"
-            found.append((number, wrong.start() + 1, f"{what}; it may be damaged"))
-            continue
         plain = line.strip()
         if plain.startswith(("#", "%", "//")):
             comments.append(plain.lstrip("#%/").strip())
@@ -93,32 +92,15 @@ def read_page(content: bytes, name: str, found: list[Found]) -> Page:
             found.append((number, 1, what))
         elif plain:
             _add_entry(sections[-1], line, number, found)
-    return Page(tuple(sections), tuple(comments), remarks)
-
-
-def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
-    if len(content) > MOST_BYTES:
-        raise ReadError(
-            f"{name}: {len(content):,} bytes are more than the {MOST_BYTES:,} "
-            "that are read"
-        )
-    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        try:
-            return content.decode("utf-16"), ("the file is UTF-16",)
-        except UnicodeDecodeError as error:
-            raise ReadError(f"{name}:1:1: the file is no whole UTF-16") from error
-    try:
-        return content.decode("utf-8-sig"), ()
-    except UnicodeDecodeError:
-        return content.decode("latin-1"), ("the file is not UTF-8; read as Latin-1",)
+    return FisFile(tuple(sections), tuple(comments))
 
 
 def _start_section(
-    so_far: tuple[list[Section], dict[tuple[str, int], int]],
+    so_far: tuple[list[FisSection], dict[tuple[str, int], int]],
     plain: str,
     line: int,
     column: int,
-    found: list[Found],
+    found: list[FileMistake],
 ) -> None:
     sections, seen = so_far
     inside = plain[1:].partition("]")[0].strip().lower()
@@ -133,14 +115,16 @@ def _start_section(
     if first != line:
         what = f"section [{inside[:40]}] stands twice; the first is in line {first}"
         found.append((line, column, what))
-    sections.append(Section(kind, number, line, []))
+    sections.append(FisSection(kind, number, line, []))
 
 
-def _add_entry(section: Section, line: str, number: int, found: list[Found]) -> None:
+def _add_entry(
+    section: FisSection, line: str, number: int, found: list[FileMistake]
+) -> None:
     start = len(line) - len(line.lstrip())
     if section.kind == "rules":
         cut = min((at for at in map(line.find, "%#") if at >= 0), default=len(line))
-        section.entries.append(Entry("", line[:cut].rstrip(), number, 1))
+        section.entries.append(FisEntry("", line[:cut].rstrip(), number, 1))
         return
     key, sign, value = line.partition("=")
     if not sign:
@@ -148,23 +132,12 @@ def _add_entry(section: Section, line: str, number: int, found: list[Found]) -> 
         found.append((number, start + 1, what))
         return
     column = len(key) + 2 + len(value) - len(value.lstrip())
-    section.entries.append(Entry(key.strip(), value.strip(), number, column))
+    section.entries.append(FisEntry(key.strip(), value.strip(), number, column))
 
 
-def number_of(text: str) -> float | None:
-    """Return a number, `inf` and `nan` included; None if it is none.
-
-    Example:
-        >>> number_of("-.5e2"), number_of("1_0"), number_of("1e999")
-        (-50.0, None, None)
-    """
-    if _NUMBER.fullmatch(text):
-        value = float(text)
-        return value if abs(value) != float("inf") else None
-    return float(text) if _INFINITE.fullmatch(text) else None
-
-
-def numbers_of(text: str, line: int, column: int, found: list[Found]) -> list[float]:
+def numbers_of(
+    text: str, line: int, column: int, found: list[FileMistake]
+) -> list[float]:
     """Return the numbers of a text, parted by blanks or commas."""
     numbers: list[float] = []
     for token in _TOKEN.finditer(text):
@@ -177,7 +150,7 @@ def numbers_of(text: str, line: int, column: int, found: list[Found]) -> list[fl
     return numbers
 
 
-def unquoted(entry: Entry, found: list[Found]) -> str:
+def unquoted(entry: FisEntry, found: list[FileMistake]) -> str:
     """Return the text between the quotes of a value."""
     value = entry.value
     if value.find("'", 1) > LONGEST_NAME + 1:
@@ -195,7 +168,7 @@ def unquoted(entry: Entry, found: list[Found]) -> str:
     return value.strip("'")
 
 
-class Written(msgspec.Struct, frozen=True):
+class FisTerm(msgspec.Struct, frozen=True):
     """`'name' : 'kind', [numbers]`, and the column where the numbers start."""
 
     name: str
@@ -204,7 +177,7 @@ class Written(msgspec.Struct, frozen=True):
     column: int
 
 
-def term_of(entry: Entry, found: list[Found]) -> Written | None:
+def term_of(entry: FisEntry, found: list[FileMistake]) -> FisTerm | None:
     """Return the parts of a term; the last quotes are the kind's."""
     value = entry.value
     open_, close = value.rfind("["), value.rfind("]")
@@ -220,23 +193,25 @@ def term_of(entry: Entry, found: list[Found]) -> Written | None:
         return None
     kind = value[first + 1 : last].strip()
     column = entry.column + open_ + 1
-    return Written(name[1:-1], kind, value[open_ + 1 : close], column)
+    return FisTerm(name[1:-1], kind, value[open_ + 1 : close], column)
 
 
-def spots_of(
-    inputs: Sequence[Section], outputs: Sequence[Section], rules: Sequence[Entry]
-) -> Spots:
+def positions_of(
+    inputs: Sequence[FisSection],
+    outputs: Sequence[FisSection],
+    rules: Sequence[FisEntry],
+) -> Positions:
     """Return where the parts of a system stand."""
     lines = [(one.line, one.value) for one in rules]
     begins = tuple((n, len(line) - len(line.lstrip()) + 1) for n, line in lines)
-    block = Group(begins[0] if begins else (1, 1), begins)
-    return Spots(tuple(map(_group, inputs)), tuple(map(_group, outputs)), (block,))
+    block = PositionGroup(begins[0] if begins else (1, 1), begins)
+    return Positions(tuple(map(_group, inputs)), tuple(map(_group, outputs)), (block,))
 
 
-def _group(section: Section) -> Group:
+def _group(section: FisSection) -> PositionGroup:
     terms = sorted(
-        (int(entry.key[2:]), (entry.line, entry.column))
+        (int(entry.key[2:]), entry.position)
         for entry in section.entries
         if TERM.fullmatch(entry.key)
     )
-    return Group((section.line, 1), tuple(spot for _, spot in terms))
+    return PositionGroup((section.line, 1), tuple(position for _, position in terms))

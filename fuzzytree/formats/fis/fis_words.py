@@ -101,7 +101,7 @@ CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
 """The same behind the comma of a Sugeno rule in Octave, which takes the root there."""
 
 
-class Kind(msgspec.Struct, frozen=True):
+class CurveKind(msgspec.Struct, frozen=True):
     """A kind of curve: the names of its numbers, and how they make one."""
 
     numbers: str
@@ -150,37 +150,37 @@ def _falling(start: float, end: float) -> Curve:
     return Binary((start + end) / 2, is_above=False)
 
 
-KINDS: Final[Mapping[str, Kind]] = {
-    "trimf": Kind("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
-    "trapmf": Kind("a b c d", lambda n: trapezoid(*n)),
-    "linzmf": Kind("a b", lambda n: _ramp(n[1], n[0])),
-    "linsmf": Kind("a b", lambda n: _ramp(*n)),
-    "gaussmf": Kind("deviation mean", lambda n: Gaussian(n[1], abs(n[0]))),
-    "gauss2mf": Kind(
+KINDS: Final[Mapping[str, CurveKind]] = {
+    "trimf": CurveKind("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
+    "trapmf": CurveKind("a b c d", lambda n: trapezoid(*n)),
+    "linzmf": CurveKind("a b", lambda n: _ramp(n[1], n[0])),
+    "linsmf": CurveKind("a b", lambda n: _ramp(*n)),
+    "gaussmf": CurveKind("deviation mean", lambda n: Gaussian(n[1], abs(n[0]))),
+    "gauss2mf": CurveKind(
         "deviation mean deviation mean",
         lambda n: TwoGaussians(n[1], abs(n[0]), n[3], abs(n[2])),
     ),
-    "gbellmf": Kind("width slope center", lambda n: Bell(n[2], abs(n[0]), n[1])),
-    "sigmf": Kind("slope inflection", lambda n: Sigmoid(n[1], n[0])),
-    "dsigmf": Kind(
+    "gbellmf": CurveKind("width slope center", lambda n: Bell(n[2], abs(n[0]), n[1])),
+    "sigmf": CurveKind("slope inflection", lambda n: Sigmoid(n[1], n[0])),
+    "dsigmf": CurveKind(
         "slope inflection slope inflection",
         lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
     ),
-    "psigmf": Kind(
+    "psigmf": CurveKind(
         "slope inflection slope inflection",
         lambda n: SigmoidProduct(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
     ),
-    "smf": Kind("start end", lambda n: _rising(*n)),
-    "zmf": Kind("start end", lambda n: _falling(*n)),
-    "pimf": Kind("a b c d", lambda n: PiCurve(*n)),
-    "rampmf": Kind("start end", lambda n: _ramp(*n), is_private=True),
-    "rectmf": Kind(
+    "smf": CurveKind("start end", lambda n: _rising(*n)),
+    "zmf": CurveKind("start end", lambda n: _falling(*n)),
+    "pimf": CurveKind("a b c d", lambda n: PiCurve(*n)),
+    "rampmf": CurveKind("start end", lambda n: _ramp(*n), is_private=True),
+    "rectmf": CurveKind(
         "start end", lambda n: Trapezoid(n[0], n[0], n[1], n[1]), is_private=True
     ),
-    "cosinemf": Kind("center width", lambda n: Cosine(*n), is_private=True),
-    "spikemf": Kind("center width", lambda n: Spike(*n), is_private=True),
-    "concavemf": Kind("inflection end", lambda n: Concave(*n), is_private=True),
-    "binarymf": Kind(
+    "cosinemf": CurveKind("center width", lambda n: Cosine(*n), is_private=True),
+    "spikemf": CurveKind("center width", lambda n: Spike(*n), is_private=True),
+    "concavemf": CurveKind("inflection end", lambda n: Concave(*n), is_private=True),
+    "binarymf": CurveKind(
         "start direction",
         lambda n: Binary(n[0], is_above=n[1] > n[0]),
         is_private=True,

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import PurePath
-from typing import Final, NamedTuple
+from typing import Final
 
 import msgspec
 from msgspec.structs import replace
@@ -17,19 +18,23 @@ from msgspec.structs import replace
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fll import fll_words as fll
 from fuzzytree.formats.fll.fll_differences import differences
-from fuzzytree.formats.fll.fll_rules import RuleError, Variable, Vocabulary, read_rule
-from fuzzytree.formats.fll.fll_terms import Place, Term, TermError, as_degree, read_term
-from fuzzytree.formats.fll.fll_words import MOST_BYTES, Entry, Notes, Section, read_page
+from fuzzytree.formats.fll.fll_rules import FllVariable, Vocabulary, read_rule
+from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree, read_term
+from fuzzytree.formats.fll.fll_words import MOST_BYTES, FllEntry, FllSection, read_page
+from fuzzytree.formats.positions import PositionGroup, Positions
 from fuzzytree.formats.text_files import (
+    CONTROL,
     LONGEST_NAME,
     MOST_SHOWN,
+    PartError,
+    ReaderNotes,
     Word,
+    check_characters,
     decoded,
     number_of,
     report,
 )
-from fuzzytree.formats.yaml.spots import Group, Spots
-from fuzzytree.model.contracts import Locate, Loss, Reading
+from fuzzytree.model.contracts import Locate, Reading
 from fuzzytree.model.naming import printable
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
@@ -73,39 +78,30 @@ def places(content: bytes, name: str) -> Locate:
     Raises:
         ReadError: With every mistake of the file.
     """
-    _, parts, facts = _read(content, name)
-    return parts.spots().of_facts(facts).find
+    _, locate = _read(content, name)
+    return locate()
 
 
-class _Parts(NamedTuple):
-    """A system, and what its parts were made of."""
-
-    system: FuzzySystem
-    inputs: Sequence[Known]
-    outputs: Sequence[Known]
-    blocks: Sequence[ReadBlock]
-
-    def spots(self) -> Spots:
-        return _spots(self.inputs, self.outputs, self.blocks)
-
-
-def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
-    """Return what a file says, what of, and the facts of a rule base if it is one."""
-    notes = Notes([], [], [])
+def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
+    """Return what a file says, and a function that locates its parts."""
+    notes = ReaderNotes()
     text, remarks = decoded(content, name, MOST_BYTES)
+    check_characters(text, name, CONTROL)
     notes.remarks.extend(remarks)
     page = read_page(text, notes)
     parts = None
     if not notes.is_full:
         parts = _system(page.sections, printable(PurePath(name).stem), notes)
-    if notes.found or parts is None:
-        raise report(name, notes.found)
-    model, facts = as_written(parts.system, page.comments)
-    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
-    return reading, parts, facts
+    if notes.mistakes or parts is None:
+        raise report(name, notes.mistakes)
+    system, positions = parts
+    model, facts = as_written(system, page.comments)
+    return notes.reading(model), lambda: positions().of_facts(facts).find
 
 
-def _system(sections: Sequence[Section], stem: str, notes: Notes) -> _Parts | None:
+def _system(
+    sections: Sequence[FllSection], stem: str, notes: ReaderNotes
+) -> tuple[FuzzySystem, Callable[[], Positions]] | None:
     """Return the system; None where it has mistakes, which are noted."""
     variables = read_variables(sections, notes)
     vocabulary = vocabulary_of(variables)
@@ -115,14 +111,15 @@ def _system(sections: Sequence[Section], stem: str, notes: Notes) -> _Parts | No
         if section.kind == "RuleBlock" and not notes.is_full
     ]
     if not any(one.is_output and one.is_enabled for one in variables):
-        notes.found.append((1, 1, "there is no OutputVariable that is enabled"))
-    if notes.found:
+        notes.mistake((1, 1), "there is no OutputVariable that is enabled")
+    if notes.mistakes:
         return None
     variables, blocks = _without_disabled(variables, blocks, notes)
     _tell_descriptions(sections, notes)
     outputs = [one for one in variables if one.is_output]
     inputs = [one for one in variables if not one.is_output]
     engine = next((one for one in sections if one.kind == "Engine"), None)
+    positions = functools.partial(_positions, inputs, outputs, blocks)
     described = None if engine is None else engine.one_of("description")
     try:
         system = FuzzySystem(
@@ -136,13 +133,13 @@ def _system(sections: Sequence[Section], stem: str, notes: Notes) -> _Parts | No
         )
     except InvalidModelError as error:
         mistakes = error.mistakes[: MOST_SHOWN + 1]
-        notes.found.extend(_spots(inputs, outputs, blocks).placed(mistakes))
+        notes.mistakes.extend(positions().placed(mistakes))
         return None
     notes.remarks.extend(differences(system))
-    return _Parts(system, inputs, outputs, blocks)
+    return system, positions
 
 
-def _tell_descriptions(sections: Sequence[Section], notes: Notes) -> None:
+def _tell_descriptions(sections: Sequence[FllSection], notes: ReaderNotes) -> None:
     told = [
         one.head.value or one.kind
         for one in sections
@@ -150,23 +147,25 @@ def _tell_descriptions(sections: Sequence[Section], notes: Notes) -> None:
     ]
     if told:
         names = ", ".join(map(repr, told[:5])) + (", ..." if len(told) > 5 else "")
-        notes.remarks.append(f"descriptions have no place here: of {names}")
+        notes.remark(f"descriptions have no place here: of {names}")
 
 
-def _spots(
-    inputs: Sequence[Known], outputs: Sequence[Known], blocks: Sequence[ReadBlock]
-) -> Spots:
+def _positions(
+    inputs: Sequence[ReadVariable],
+    outputs: Sequence[ReadVariable],
+    blocks: Sequence[FllRuleBlock],
+) -> Positions:
     """Return where the parts of the system stand."""
-    return Spots(
+    return Positions(
         tuple(_group(one.section, one.lines) for one in inputs),
         tuple(_group(one.section, one.lines) for one in outputs),
         tuple(_group(one.section, one.lines) for one in blocks),
     )
 
 
-def _group(section: Section, lines: Sequence[Entry]) -> Group:
-    spots = tuple((one.line, one.start) for one in lines)
-    return Group((section.head.line, section.head.start), spots)
+def _group(section: FllSection, lines: Sequence[FllEntry]) -> PositionGroup:
+    positions = tuple((one.line, one.start) for one in lines)
+    return PositionGroup((section.head.line, section.head.start), positions)
 
 
 MOST_VARIABLES: Final = 2000
@@ -174,13 +173,13 @@ MOST_VARIABLES: Final = 2000
 _DROPPED = re.compile(r"[^\w.]")
 
 
-class Known(msgspec.Struct, frozen=True):
+class ReadVariable(msgspec.Struct, frozen=True):
     """A variable as it was read."""
 
-    section: Section
+    section: FllSection
     name: str
-    terms: tuple[Term, ...]
-    lines: tuple[Entry, ...]
+    terms: tuple[FllTerm, ...]
+    lines: tuple[FllEntry, ...]
     said: tuple[tuple[str, ...], ...]
     variable: SystemInput | SystemOutput
     kind: str = ""
@@ -192,21 +191,23 @@ class Known(msgspec.Struct, frozen=True):
         return isinstance(self.variable, SystemOutput)
 
 
-class ReadBlock(msgspec.Struct, frozen=True):
+class FllRuleBlock(msgspec.Struct, frozen=True):
     """A block as it was read, and where it and its rules stand."""
 
-    section: Section
+    section: FllSection
     block: RuleBlock
-    lines: tuple[Entry, ...]
+    lines: tuple[FllEntry, ...]
     is_enabled: bool = True
 
 
-def read_variables(sections: Sequence[Section], notes: Notes) -> list[Known]:
+def read_variables(
+    sections: Sequence[FllSection], notes: ReaderNotes
+) -> list[ReadVariable]:
     """Return the inputs and outputs of a file; their mistakes are noted."""
     found = [one for one in sections if one.kind in ("InputVariable", "OutputVariable")]
     if len(found) > MOST_VARIABLES:
         sentence = f"more variables than the {MOST_VARIABLES:,} that are read"
-        notes.found.append(found[MOST_VARIABLES].head.mistake(sentence))
+        notes.mistake(found[MOST_VARIABLES].head.position, sentence)
         return []
     names = [_variable_name(one, notes) for one in found]
     pairs = list(zip(names, found, strict=True))
@@ -214,9 +215,9 @@ def read_variables(sections: Sequence[Section], notes: Notes) -> list[Known]:
     known: set[str] = set()
     for name, one in pairs:
         if name in known:
-            notes.found.append(one.head.mistake(f"a second variable {name!r}"))
+            notes.mistake(one.head.position, f"a second variable {name!r}")
         known.add(name)
-    place = Place("", inputs, dict.fromkeys(names))
+    place = TermScope("", inputs, dict.fromkeys(names))
     return [
         _variable(one, name, msgspec.structs.replace(place, variable=name), notes)
         for name, one in pairs
@@ -224,35 +225,33 @@ def read_variables(sections: Sequence[Section], notes: Notes) -> list[Known]:
     ]
 
 
-def vocabulary_of(variables: Sequence[Known]) -> Vocabulary:
+def vocabulary_of(variables: Sequence[ReadVariable]) -> Vocabulary:
     """Return the variables by the words that stand for them in rules."""
-    found: dict[str, Variable] = {}
+    found: dict[str, FllVariable] = {}
     for one in variables:
         terms: dict[str, str] = {}
         for term, said in zip(one.terms, one.said, strict=True):
             for word in said:
                 terms.setdefault(word, term.label.name)
-        entry = Variable(one.name, terms, one.is_output)
+        entry = FllVariable(one.name, terms, one.is_output)
         for word in (one.name, one.section.head.value, *_other_names(one.name)):
             found.setdefault(word, entry)
     return found
 
 
-def _variable_name(section: Section, notes: Notes) -> str:
+def _variable_name(section: FllSection, notes: ReaderNotes) -> str:
     given = section.head.value
     if not given or len(given) > LONGEST_NAME:
         what = "a name" if not given else f"a name of at most {LONGEST_NAME} characters"
-        notes.found.append(section.head.mistake(f"{section.kind} needs {what}"))
+        notes.mistake(section.head.position, f"{section.kind} needs {what}")
     return _cleaned(given, notes)
 
 
-def _cleaned(given: str, notes: Notes) -> str:
+def _cleaned(given: str, notes: ReaderNotes) -> str:
     """Return a name without the characters that the engines drop."""
     name = _DROPPED.sub("", given) or "_"
     if name != given:
-        notes.remarks.append(
-            f"the name {given!r} is read as {name!r}, as the engines do"
-        )
+        notes.remark(f"the name {given!r} is read as {name!r}, as the engines do")
     return name
 
 
@@ -264,7 +263,9 @@ def _other_names(name: str) -> Iterator[str]:
         yield f"_{plain}"
 
 
-def _variable(section: Section, name: str, place: Place, notes: Notes) -> Known:
+def _variable(
+    section: FllSection, name: str, place: TermScope, notes: ReaderNotes
+) -> ReadVariable:
     is_enabled = fll.truth(section.one_of("enabled"), True, notes)
     is_output = section.kind == "OutputVariable"
     how = _defuzzifier(section, name, notes) if is_output else None
@@ -294,7 +295,7 @@ def _variable(section: Section, name: str, place: Place, notes: Notes) -> Known:
         )
         _tell_locked(section.one_of("lock-previous"), name, notes)
     kind = "" if how is None else how[1]
-    return Known(
+    return ReadVariable(
         section,
         name,
         tuple(terms),
@@ -307,10 +308,10 @@ def _variable(section: Section, name: str, place: Place, notes: Notes) -> Known:
 
 
 def _terms(
-    section: Section, place: Place, notes: Notes
-) -> tuple[list[Term], list[Entry], list[tuple[str, ...]]]:
+    section: FllSection, place: TermScope, notes: ReaderNotes
+) -> tuple[list[FllTerm], list[FllEntry], list[tuple[str, ...]]]:
     """Return the terms of a variable, where they stand, and what stands for each."""
-    found: dict[str, tuple[Term, Entry, tuple[str, ...]]] = {}
+    found: dict[str, tuple[FllTerm, FllEntry, tuple[str, ...]]] = {}
     for entry in section.all_of("term"):
         term = _term(entry, place, notes)
         if term is not None:
@@ -329,55 +330,61 @@ def _terms(
     )
 
 
-def _tell_second(name: str, first: Entry, second: Entry, notes: Notes) -> None:
+def _tell_second(
+    name: str, first: FllEntry, second: FllEntry, notes: ReaderNotes
+) -> None:
     what = (
         f"the term {name!r} stands in line {second.line} again, which counts as in "
         "pyfuzzylite; fuzzylite 6 takes the first"
     )
-    notes.losses.append(Loss(f"line {first.line}", what))
+    notes.loss(f"line {first.line}", what)
 
 
-def _defuzzifier(section: Section, name: str, notes: Notes) -> tuple[Defuzzifier, str]:
+def _defuzzifier(
+    section: FllSection, name: str, notes: ReaderNotes
+) -> tuple[Defuzzifier, str]:
     found = fll.defuzzifier(section.one_of("defuzzifier"), notes)
     if found is not None:
         return found
     entry = section.one_of("defuzzifier") or section.head
-    if fll.truth(section.one_of("enabled"), True, Notes([], [], [])):
-        notes.found.append(entry.mistake(f"output {name!r} needs a defuzzifier"))
+    if fll.truth(section.one_of("enabled"), True, ReaderNotes()):
+        notes.mistake(entry.position, f"output {name!r} needs a defuzzifier")
     return Defuzzifier("weighted average"), ""
 
 
-def _term(entry: Entry, place: Place, notes: Notes) -> Term | None:
+def _term(entry: FllEntry, place: TermScope, notes: ReaderNotes) -> FllTerm | None:
     """Return a term; None where not even its name is known. Mistakes are noted."""
     found = entry.words()
     if len(found) < 2:
         sentence = "a term is a name, a class such as Triangle, and numbers"
-        notes.found.append(entry.mistake(sentence))
+        notes.mistake(entry.position, sentence)
         return None
     given, kind, *rest = found
     if len(given.text) > LONGEST_NAME:
         sentence = f"a term needs a name of at most {LONGEST_NAME} characters"
-        notes.found.append(given.mistake(sentence))
+        notes.mistake(given.position, sentence)
         return None
     name = _cleaned(given.text, notes)
     try:
         formula = entry.value[rest[0].column - entry.start :] if rest else ""
         term = read_term(name, kind, rest, place, formula)
-    except TermError as error:
-        notes.found.extend(error.found)
+    except PartError as error:
+        notes.mistakes.extend(error.mistakes)
         # Rules may ask for it all the same.
-        return Term(Label(name, Singleton(0.0)), "")
+        return FllTerm(Label(name, Singleton(0.0)), "")
     _tell_odd(term, rest, place, notes)
     return term
 
 
-def _tell_odd(term: Term, rest: Sequence[Word], place: Place, notes: Notes) -> None:
+def _tell_odd(
+    term: FllTerm, rest: Sequence[Word], place: TermScope, notes: ReaderNotes
+) -> None:
     """Note a term by which the two engines mean other things."""
     where = f"term {term.label.name!r} of {place.variable!r}"
     if term.kind == "Rectangle":
         start, end = (number_of(word.text) or 0.0 for word in rest[:2])
         if start > end:
-            notes.remarks.append(
+            notes.remark(
                 f"{where} ends before it starts: its ends are exchanged, as in "
                 "pyfuzzylite; fuzzylite 6 makes it 0 everywhere"
             )
@@ -385,24 +392,26 @@ def _tell_odd(term: Term, rest: Sequence[Word], place: Place, notes: Notes) -> N
     if term.kind != "Discrete" or not isinstance(curve, Points):
         return
     if len(set(curve.values)) < len(curve.values):
-        notes.remarks.append(
+        notes.remark(
             f"{where} has a step: at the value itself its first degree holds, as in "
             "fuzzylite 6; pyfuzzylite takes the second"
         )
 
 
-def _range(entry: Entry | None, notes: Notes) -> tuple[float | None, float | None]:
+def _range(
+    entry: FllEntry | None, notes: ReaderNotes
+) -> tuple[float | None, float | None]:
     """Return the ends of a range; None for one that is not finite."""
     if entry is None:
         return None, None
     found = entry.words()
     if len(found) != 2:
-        notes.found.append(entry.mistake(f"a range has 2 numbers, not {len(found)}"))
+        notes.mistake(entry.position, f"a range has 2 numbers, not {len(found)}")
         return None, None
     low, high = (fll.number(word, notes) for word in found)
     if low > high:
         sentence = f"the range starts at {low!r} and ends below it, at {high!r}"
-        notes.found.append(entry.mistake(sentence))
+        notes.mistake(entry.position, sentence)
         return None, None
     return (
         low if math.isfinite(low) else None,
@@ -410,45 +419,45 @@ def _range(entry: Entry | None, notes: Notes) -> tuple[float | None, float | Non
     )
 
 
-def _default(entry: Entry | None, notes: Notes) -> float | None:
+def _default(entry: FllEntry | None, notes: ReaderNotes) -> float | None:
     if entry is None or entry.value == "":
         return None
     found = entry.words()
     if len(found) != 1:
-        notes.found.append(entry.mistake(f"a default is 1 number, not {len(found)}"))
+        notes.mistake(entry.position, f"a default is 1 number, not {len(found)}")
         return None
     value = fll.number(found[0], notes)
     if math.isinf(value):
-        notes.found.append(entry.mistake("a default cannot be infinite"))
+        notes.mistake(entry.position, "a default cannot be infinite")
     return value if math.isfinite(value) else None
 
 
-def _tell_locked(entry: Entry | None, name: str, notes: Notes) -> None:
+def _tell_locked(entry: FllEntry | None, name: str, notes: ReaderNotes) -> None:
     if fll.truth(entry, False, notes):
-        notes.losses.append(
-            Loss(
-                f"output {name!r}",
-                "lock-previous: where no rule concludes it, the answer to the row "
-                "before; the default answers instead",
-            )
+        notes.loss(
+            f"output {name!r}",
+            "lock-previous: where no rule concludes it, the answer to the row "
+            "before; the default answers instead",
         )
 
 
-def read_block(section: Section, vocabulary: Vocabulary, notes: Notes) -> ReadBlock:
+def read_block(
+    section: FllSection, vocabulary: Vocabulary, notes: ReaderNotes
+) -> FllRuleBlock:
     """Return a block of rules; its mistakes are noted."""
     rules: list[SystemRule] = []
-    lines: list[Entry] = []
+    lines: list[FllEntry] = []
     for entry in section.all_of("rule"):
         try:
             rules.append(read_rule(entry.words("()"), entry.end, vocabulary))
             lines.append(entry)
-        except RuleError as error:
-            notes.found.extend(error.found)
+        except PartError as error:
+            notes.mistakes.extend(error.mistakes)
         if notes.is_full:
             break
     is_enabled = fll.truth(section.one_of("enabled"), True, notes)
     if section.one_of("activation") is None and rules and is_enabled:
-        notes.remarks.append(
+        notes.remark(
             f"line {section.head.line}: a block without activation is read as General"
         )
     block = RuleBlock(
@@ -459,12 +468,14 @@ def read_block(section: Section, vocabulary: Vocabulary, notes: Notes) -> ReadBl
         fll.activation(section.one_of("activation"), notes),
         section.head.value,
     )
-    return ReadBlock(section, block, tuple(lines), is_enabled)
+    return FllRuleBlock(section, block, tuple(lines), is_enabled)
 
 
 def _without_disabled(
-    variables: Sequence[Known], blocks: Sequence[ReadBlock], notes: Notes
-) -> tuple[list[Known], list[ReadBlock]]:
+    variables: Sequence[ReadVariable],
+    blocks: Sequence[FllRuleBlock],
+    notes: ReaderNotes,
+) -> tuple[list[ReadVariable], list[FllRuleBlock]]:
     """Return variables and blocks without what is disabled; remarks tell it.
 
     What is asked of a disabled variable has degree 0, whatever the hedges. A disabled
@@ -473,13 +484,13 @@ def _without_disabled(
     for block in blocks:
         if not block.is_enabled:
             line = block.section.head.line
-            notes.remarks.append(f"line {line}: a disabled block is left out")
+            notes.remark(f"line {line}: a disabled block is left out")
     kept_blocks = [one for one in blocks if one.is_enabled]
     off = [one.name for one in variables if not one.is_enabled]
     kept = [one for one in variables if one.is_enabled or not one.is_output]
     for name in off:
         text = f"{name!r} is disabled: nothing concludes it, and it is nothing"
-        notes.remarks.append(text)
+        notes.remark(text)
     outputs = [one.name for one in kept if one.is_output]
     if not off or not outputs:
         return kept, kept_blocks
@@ -488,11 +499,11 @@ def _without_disabled(
 
 
 def _without(
-    read: ReadBlock, off: Collection[str], never: Condition, notes: Notes
-) -> ReadBlock:
+    read: FllRuleBlock, off: Collection[str], never: Condition, notes: ReaderNotes
+) -> FllRuleBlock:
     """Return a block whose rules do not know the disabled variables."""
     rules: list[SystemRule] = []
-    lines: list[Entry] = []
+    lines: list[FllEntry] = []
     for rule, line in zip(read.block.rules, read.lines, strict=True):
         then = tuple(one for one in rule.then if one.output not in off)
         when = None if rule.when is None else _asked(rule.when, off, never)
@@ -501,7 +512,7 @@ def _without(
             lines.append(line)
         elif read.block.activation.method not in ("general", "threshold"):
             what = "it concludes only what is disabled, and is not counted any more"
-            notes.losses.append(Loss(f"the rule in line {line.line}", what))
+            notes.loss(f"the rule in line {line.line}", what)
     block = replace(read.block, rules=tuple(rules))
     return replace(read, block=block, lines=tuple(lines))
 
@@ -518,7 +529,7 @@ def _asked(condition: Condition, off: Collection[str], never: Condition) -> Cond
             return Not(_asked(part, off, never))
 
 
-def _as_meant(output: Known, notes: Notes) -> SystemOutput:
+def _as_meant(output: ReadVariable, notes: ReaderNotes) -> SystemOutput:
     """Return an output whose weighted terms are numbers where the file says so.
 
     Fuzzylite calls it the type: `TakagiSugeno` takes the degree of every term at the
@@ -536,7 +547,7 @@ def _as_meant(output: Known, notes: Notes) -> SystemOutput:
             "numbers and monotone terms are mixed, which fuzzylite 6 takes by the "
             "first that is activated and pyfuzzylite refuses; each is taken by its kind"
         )
-        notes.losses.append(Loss(f"output {output.name!r}", what))
+        notes.loss(f"output {output.name!r}", what)
     is_sugeno = output.kind == "TakagiSugeno"
     labels = tuple(
         as_degree(term.label) if is_sugeno or not term.is_monotone else term.label

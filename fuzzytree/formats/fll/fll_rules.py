@@ -7,8 +7,13 @@ from typing import Final
 
 import msgspec
 
-from fuzzytree.errors import ReadError
-from fuzzytree.formats.text_files import MOST_SHOWN, Found, Word, number_of
+from fuzzytree.formats.text_files import (
+    MOST_SHOWN,
+    FileMistake,
+    PartError,
+    Word,
+    number_of,
+)
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
     MOST_LEVELS,
@@ -34,7 +39,7 @@ HEDGES: Mapping[str, Hedge] = {
 RULE_WORDS: Final = ("if", "is", "then", "and", "or", "with", *HEDGES)
 
 
-class Variable(msgspec.Struct, frozen=True):
+class FllVariable(msgspec.Struct, frozen=True):
     """What a rule can say of a variable."""
 
     name: str
@@ -42,16 +47,8 @@ class Variable(msgspec.Struct, frozen=True):
     is_output: bool
 
 
-Vocabulary = Mapping[str, Variable]
+Vocabulary = Mapping[str, FllVariable]
 """Variables by the words that stand for them."""
-
-
-class RuleError(ReadError):
-    """A rule that cannot be read."""
-
-    def __init__(self, *found: Found) -> None:
-        self.found = found
-        super().__init__("; ".join(sentence for _, _, sentence in found))
 
 
 class _Read(msgspec.Struct, frozen=True):
@@ -70,20 +67,20 @@ class _Rule(msgspec.Struct, frozen=True):
 
     words: tuple[Word, ...]
     vocabulary: Vocabulary
-    found: list[Found]
+    found: list[FileMistake]
 
-    def note(self, mistake: Found) -> None:
+    def note(self, mistake: FileMistake) -> None:
         """Keep a mistake behind which reading can go on."""
         self.found.append(mistake)
         if len(self.found) >= MOST_SHOWN:
-            raise RuleError(*self.found)
+            raise PartError(*self.found)
 
-    def error(self, place: int, wanted: str) -> RuleError:
+    def error(self, place: int, wanted: str) -> PartError:
         """Return the error of a word where another must stand."""
         word = self.words[place]
         what = repr(word.text) if word.text else "the end"
         mistake = word.mistake(f"{what} where {wanted} must stand")
-        return RuleError(*self.found, mistake)
+        return PartError(*self.found, mistake)
 
 
 def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> SystemRule:
@@ -92,7 +89,7 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
     A condition that is nothing but `v is any` holds always.
 
     Raises:
-        RuleError: If they say none, with all mistakes that can be told apart.
+        PartError: If they say none, with all mistakes that can be told apart.
     """
     rule = _Rule((*words, end), vocabulary, [])
     if rule.words[0].text != "if":
@@ -111,7 +108,7 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
     if place < len(words):
         raise rule.error(place, "'and', 'with' or the end")
     if rule.found:
-        raise RuleError(*rule.found)
+        raise PartError(*rule.found)
     always = isinstance(read.condition, Is) and read.condition.hedges == ("any",)
     return SystemRule(None if always else read.condition, tuple(then), weight)
 
@@ -150,9 +147,9 @@ def _joined(rule: _Rule, kind: type[And | Or], parts: Sequence[_Read]) -> _Read:
     return _Read(kind(tuple(part.condition for part in parts)), parts[-1].end, depth)
 
 
-def _too_deep(rule: _Rule, place: int) -> RuleError:
+def _too_deep(rule: _Rule, place: int) -> PartError:
     sentence = f"the condition is nested deeper than {MOST_LEVELS} levels"
-    return RuleError(rule.words[place].mistake(sentence))
+    return PartError(rule.words[place].mistake(sentence))
 
 
 def _single(rule: _Rule, place: int, level: int) -> _Read:
@@ -182,7 +179,7 @@ def _statement(rule: _Rule, place: int, *, concludes: bool = False) -> tuple[Is,
     return Is(variable.name, _term(rule, place, variable), tuple(hedges)), place + 1
 
 
-def _variable(rule: _Rule, place: int, *, concludes: bool) -> Variable:
+def _variable(rule: _Rule, place: int, *, concludes: bool) -> FllVariable:
     word = rule.words[place]
     if word.text in ("", "(", ")", *RULE_WORDS):
         wanted = "an output" if concludes else "a variable or '('"
@@ -197,11 +194,11 @@ def _variable(rule: _Rule, place: int, *, concludes: bool) -> Variable:
         what = "output" if concludes else "variable"
         sentence = f"no {what} {word.text!r}; {name_choice(word.text, names)}"
         rule.note(word.mistake(sentence))
-        return Variable(word.text, {}, concludes) if known is None else known
+        return FllVariable(word.text, {}, concludes) if known is None else known
     return known
 
 
-def _term(rule: _Rule, place: int, variable: Variable) -> str:
+def _term(rule: _Rule, place: int, variable: FllVariable) -> str:
     word = rule.words[place]
     if word.text in ("", "(", ")", *RULE_WORDS):
         raise rule.error(place, f"a term of {variable.name!r}")

@@ -8,9 +8,8 @@ from typing import Final
 
 import msgspec
 
-from fuzzytree.errors import ReadError
 from fuzzytree.formats.formulas import FormulaError, parse
-from fuzzytree.formats.text_files import Found, Word, number_of
+from fuzzytree.formats.text_files import FileMistake, PartError, Word, number_of
 from fuzzytree.model.rulebase import Points, name_choice
 from fuzzytree.model.system import (
     Arc,
@@ -44,7 +43,7 @@ from fuzzytree.semantics.conversion.points import stepped
 _FURTHEST: Final = 1e308  # an end that no value comes near
 
 
-class Place(msgspec.Struct, frozen=True):
+class TermScope(msgspec.Struct, frozen=True):
     """What a term's meaning depends on beside its own line.
 
     Attributes:
@@ -62,7 +61,7 @@ class Place(msgspec.Struct, frozen=True):
     is_inverse: bool = False
 
 
-class Term(msgspec.Struct, frozen=True):
+class FllTerm(msgspec.Struct, frozen=True):
     """A term as it was read."""
 
     label: Label
@@ -83,15 +82,15 @@ _MONOTONE = frozenset({"Arc", "Concave", "Ramp", "Sigmoid", "SShape", "ZShape"})
 
 
 def read_term(
-    name: str, kind: Word, rest: Sequence[Word], place: Place, formula: str = ""
-) -> Term:
+    name: str, kind: Word, rest: Sequence[Word], place: TermScope, formula: str = ""
+) -> FllTerm:
     """Return a term of a class and its parameters.
 
     Raises:
         TermError: If it is none.
     """
     if kind.text == "Function":
-        return Term(Label(name, _function(kind, rest, place, formula)), kind.text)
+        return FllTerm(Label(name, _function(kind, rest, place, formula)), kind.text)
     numbers = _numbers(rest)
     height = 1.0
     match kind.text:
@@ -124,22 +123,14 @@ def read_term(
             raise _error(kind, f"no term {kind.text!r}; {choice}")
     found = Label(name, curve, height)
     _check(kind, found, place)
-    return Term(found, kind.text)
+    return FllTerm(found, kind.text)
 
 
-class TermError(ReadError):
-    """A term that cannot be read."""
-
-    def __init__(self, *found: Found) -> None:
-        self.found = found
-        super().__init__("; ".join(sentence for _, _, sentence in found))
+def _error(word: Word, sentence: str) -> PartError:
+    return PartError(word.mistake(sentence))
 
 
-def _error(word: Word, sentence: str) -> TermError:
-    return TermError(word.mistake(sentence))
-
-
-def _check(kind: Word, label: Label, place: Place) -> None:
+def _check(kind: Word, label: Label, place: TermScope) -> None:
     where = f"term {label.name!r} of {place.variable!r}"
     for sentence in curve_mistakes(label.curve):
         raise _error(kind, f"{where}: {sentence}")
@@ -157,7 +148,7 @@ def _check_count(
 
 def _numbers(words: Sequence[Word]) -> list[float]:
     values: list[float] = []
-    found: list[Found] = []
+    found: list[FileMistake] = []
     for word in words:
         value = number_of(word.text)
         if value is None or math.isnan(value):
@@ -165,7 +156,7 @@ def _numbers(words: Sequence[Word]) -> list[float]:
         else:
             values.append(value)
     if found:
-        raise TermError(*found)
+        raise PartError(*found)
     return values
 
 
@@ -178,7 +169,9 @@ def _made(
         raise _error(kind, str(error)) from error
 
 
-def _function(kind: Word, rest: Sequence[Word], place: Place, formula: str) -> Formula:
+def _function(
+    kind: Word, rest: Sequence[Word], place: TermScope, formula: str
+) -> Formula:
     if not rest:
         raise _error(kind, "Function takes a formula")
     if "x" in place.names:
@@ -188,10 +181,10 @@ def _function(kind: Word, rest: Sequence[Word], place: Place, formula: str) -> F
         return Formula(parse(formula, place.names))
     except FormulaError as error:
         column = rest[0].column + error.column - 1
-        raise TermError((rest[0].line, column, error.sentence)) from error
+        raise PartError((rest[0].line, column, error.sentence)) from error
 
 
-def _linear(kind: Word, numbers: Sequence[float], place: Place) -> Curve:
+def _linear(kind: Word, numbers: Sequence[float], place: TermScope) -> Curve:
     count = len(place.inputs)
     wanted = f"{count} weights, one for each input, and perhaps an offset"
     _check_count(kind, numbers, (count, count + 1), wanted)

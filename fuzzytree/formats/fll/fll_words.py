@@ -10,14 +10,13 @@ import msgspec
 
 from fuzzytree.formats.text_files import (
     LONGEST_NAME,
-    MOST_SHOWN,
-    Found,
+    Position,
+    ReaderNotes,
     Word,
     number_of,
     split_lines,
     words,
 )
-from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import Activation, Defuzzifier, SNorm, TNorm
 
@@ -112,20 +111,7 @@ RELATIONS: Mapping[str, Relation] = {
 }
 
 
-class Notes(msgspec.Struct, frozen=True):
-    """What is found on the way through a file."""
-
-    found: list[Found]
-    losses: list[Loss]
-    remarks: list[str]
-
-    @property
-    def is_full(self) -> bool:
-        """Whether so many mistakes were found that no more are looked for."""
-        return len(self.found) >= MOST_SHOWN
-
-
-class Entry(msgspec.Struct, frozen=True):
+class FllEntry(msgspec.Struct, frozen=True):
     """A line `key: value`, and where the key and the value stand."""
 
     key: str
@@ -134,9 +120,10 @@ class Entry(msgspec.Struct, frozen=True):
     column: int
     start: int
 
-    def mistake(self, sentence: str) -> Found:
-        """Return a mistake of the value."""
-        return self.line, self.start, sentence
+    @property
+    def position(self) -> Position:
+        """Where the value stands."""
+        return self.line, self.start
 
     def words(self, signs: str = "") -> tuple[Word, ...]:
         """Return the words of the value, as many as a line may have."""
@@ -149,42 +136,42 @@ class Entry(msgspec.Struct, frozen=True):
         return Word("", self.line, self.start + len(self.value))
 
 
-class Section(msgspec.Struct, frozen=True):
+class FllSection(msgspec.Struct, frozen=True):
     """A section: its first line, and those behind it."""
 
-    head: Entry
-    entries: tuple[Entry, ...]
+    head: FllEntry
+    entries: tuple[FllEntry, ...]
 
     @property
     def kind(self) -> str:
         """Engine, InputVariable, OutputVariable or RuleBlock."""
         return self.head.key
 
-    def all_of(self, key: str) -> tuple[Entry, ...]:
+    def all_of(self, key: str) -> tuple[FllEntry, ...]:
         """Return the lines of a key, in order."""
         return tuple(one for one in self.entries if one.key == key)
 
-    def one_of(self, key: str) -> Entry | None:
+    def one_of(self, key: str) -> FllEntry | None:
         """Return the line of a key that stands once; None where it is missing."""
         return next((one for one in self.entries if one.key == key), None)
 
 
-class Page(msgspec.Struct, frozen=True):
+class FllFile(msgspec.Struct, frozen=True):
     """A file: its sections, and its comments without their sign."""
 
-    sections: tuple[Section, ...]
+    sections: tuple[FllSection, ...]
     comments: tuple[str, ...]
 
 
-def read_page(text: str, notes: Notes) -> Page:
+def read_page(text: str, notes: ReaderNotes) -> FllFile:
     """Return the sections of a text; what is wrong with its lines is noted."""
     comments: list[str] = []
-    heads: list[tuple[Entry, list[Entry]]] = []
+    heads: list[tuple[FllEntry, list[FllEntry]]] = []
     count = max(text.count("\n"), text.count("\r"))
     if count > MOST_LINES:
         found = f"{count:,} lines are more than the {MOST_LINES:,} that are read"
-        notes.found.append((MOST_LINES + 1, 1, found))
-        return Page((), ())
+        notes.mistake((MOST_LINES + 1, 1), found)
+        return FllFile((), ())
     for number, line in enumerate(split_lines(text), 1):
         said, sign, comment = line.partition("#")
         if sign:
@@ -198,37 +185,39 @@ def read_page(text: str, notes: Notes) -> Page:
             heads.append((entry, []))
         elif _belongs(entry, heads, notes):
             heads[-1][1].append(entry)
-    sections = tuple(Section(head, tuple(entries)) for head, entries in heads)
+    sections = tuple(FllSection(head, tuple(entries)) for head, entries in heads)
     for extra in [one for one in sections if one.kind == "Engine"][1:]:
         found = "a second Engine; a file holds one"
-        notes.found.append((extra.head.line, extra.head.column, found))
-    return Page(sections, tuple(comments))
+        notes.mistake((extra.head.line, extra.head.column), found)
+    return FllFile(sections, tuple(comments))
 
 
-def _entry(text: str, line: int, notes: Notes) -> Entry | None:
+def _entry(text: str, line: int, notes: ReaderNotes) -> FllEntry | None:
     key, colon, value = text.partition(":")
     column = len(key) - len(key.lstrip()) + 1
     if not colon:
         sentence = f"{_short(text)!r} where 'key: value' must stand"
-        notes.found.append((line, column, sentence))
+        notes.mistake((line, column), sentence)
         return None
     start = len(key) + 2 + len(value) - len(value.lstrip())
-    return Entry(key.strip(), value.strip(), line, column, start)
+    return FllEntry(key.strip(), value.strip(), line, column, start)
 
 
-def _is_too_long(entry: Entry, notes: Notes) -> bool:
+def _is_too_long(entry: FllEntry, notes: ReaderNotes) -> bool:
     if len(entry.value) < MOST_WORDS:
         return False
     found = words(entry.value, entry.line, entry.start, "()")
     extra = next(itertools.islice(found, MOST_WORDS - 1, None), None)
     if extra is not None:
         sentence = f"a line of more words than the {MOST_WORDS:,} that are read"
-        notes.found.append(extra.mistake(sentence))
+        notes.mistake(extra.position, sentence)
     return extra is not None
 
 
 def _belongs(
-    entry: Entry, heads: Sequence[tuple[Entry, list[Entry]]], notes: Notes
+    entry: FllEntry,
+    heads: Sequence[tuple[FllEntry, list[FllEntry]]],
+    notes: ReaderNotes,
 ) -> bool:
     """Return whether an entry may stand in the last section."""
     key = entry.key
@@ -245,7 +234,7 @@ def _belongs(
         sentence = f"a second {key!r} in one {heads[-1][0].key}"
     else:
         return True
-    notes.found.append((entry.line, entry.column, sentence))
+    notes.mistake((entry.line, entry.column), sentence)
     return False
 
 
@@ -254,48 +243,48 @@ def _short(text: str) -> str:
     return text if len(text) <= LONGEST_NAME else text[:LONGEST_NAME] + "..."
 
 
-def truth(entry: Entry | None, default: bool, notes: Notes) -> bool:
+def truth(entry: FllEntry | None, default: bool, notes: ReaderNotes) -> bool:
     """Return what an entry of `true` or `false` says."""
     if entry is None:
         return default
     if entry.value not in ("true", "false"):
         sentence = f"{entry.key} is true or false, not {_short(entry.value)!r}"
-        notes.found.append(entry.mistake(sentence))
+        notes.mistake(entry.position, sentence)
     return entry.value == "true"
 
 
-def number(word: Word, notes: Notes) -> float:
+def number(word: Word, notes: ReaderNotes) -> float:
     """Return the number that a word is; NaN, and a mistake, where it is none."""
     value = number_of(word.text)
     if value is None:
-        notes.found.append(
-            word.mistake(f"{_short(word.text)!r} where a number must stand")
-        )
+        notes.mistake(word.position, f"{_short(word.text)!r} where a number must stand")
         return float("nan")
     return value
 
 
-def t_norm(entry: Entry | None, notes: Notes) -> TNorm | None:
+def t_norm(entry: FllEntry | None, notes: ReaderNotes) -> TNorm | None:
     """Return the AND that an entry names; None for none."""
     return _named(entry, T_NORMS, notes)
 
 
-def s_norm(entry: Entry | None, notes: Notes) -> SNorm | None:
+def s_norm(entry: FllEntry | None, notes: ReaderNotes) -> SNorm | None:
     """Return the OR that an entry names; None for none."""
     return _named(entry, S_NORMS, notes)
 
 
-def _named(entry: Entry | None, table: Mapping[str, T], notes: Notes) -> T | None:
+def _named(
+    entry: FllEntry | None, table: Mapping[str, T], notes: ReaderNotes
+) -> T | None:
     if entry is None or entry.value in ("", "none"):
         return None
     if entry.value not in table:
         choice = name_choice(entry.value[:99], [*table, "none"])
         sentence = f"no {entry.key} {_short(entry.value)!r}; {choice}"
-        notes.found.append(entry.mistake(sentence))
+        notes.mistake(entry.position, sentence)
     return table.get(entry.value)
 
 
-def activation(entry: Entry | None, notes: Notes) -> Activation:
+def activation(entry: FllEntry | None, notes: ReaderNotes) -> Activation:
     """Return the activation method that an entry says."""
     if entry is None or entry.value in ("", "none"):
         return Activation()
@@ -303,12 +292,12 @@ def activation(entry: Entry | None, notes: Notes) -> Activation:
     method = ACTIVATIONS.get(name.text)
     if method is None:
         sentence = f"no activation {name.text!r}; {name_choice(name.text, ACTIVATIONS)}"
-        notes.found.append(name.mistake(sentence))
+        notes.mistake(name.position, sentence)
         return Activation()
     counts = {"first": 2, "last": 2, "threshold": 2, "highest": 1, "lowest": 1}
     if len(rest) not in (0, counts.get(method, 0)):
         sentence = f"{name.text} takes {_WANTED[method]}"
-        notes.found.append(name.mistake(sentence))
+        notes.mistake(name.position, sentence)
         return Activation()
     if not rest or method in ("general", "proportional"):
         return Activation(method)
@@ -316,7 +305,7 @@ def activation(entry: Entry | None, notes: Notes) -> Activation:
         relation = RELATIONS.get(rest[0].text)
         if relation is None:
             sentence = f"no relation {rest[0].text!r}; {name_choice('', RELATIONS)}"
-            notes.found.append(rest[0].mistake(sentence))
+            notes.mistake(rest[0].position, sentence)
         threshold = _threshold(rest[1], notes)
         return Activation(method, threshold=threshold, relation=relation or ">=")
     count = _count(rest[0], 1, notes)
@@ -335,26 +324,28 @@ _WANTED: Mapping[Choice, str] = {
 }
 
 
-def _threshold(word: Word, notes: Notes) -> float:
+def _threshold(word: Word, notes: ReaderNotes) -> float:
     value = number(word, notes)
     if not 0.0 <= value <= 1.0:
-        notes.found.append(word.mistake(f"a threshold lies in [0, 1], not {word.text}"))
+        notes.mistake(word.position, f"a threshold lies in [0, 1], not {word.text}")
         return 0.0
     return value
 
 
-def _count(word: Word, least: int, notes: Notes) -> int:
+def _count(word: Word, least: int, notes: ReaderNotes) -> int:
     text = word.text
     if not (
         text.isascii() and text.isdigit() and len(text) < 10 and int(text) >= least
     ):
         sentence = f"{_short(text)!r} where a whole number from {least} on must stand"
-        notes.found.append(word.mistake(sentence))
+        notes.mistake(word.position, sentence)
         return least
     return int(text)
 
 
-def defuzzifier(entry: Entry | None, notes: Notes) -> tuple[Defuzzifier, str] | None:
+def defuzzifier(
+    entry: FllEntry | None, notes: ReaderNotes
+) -> tuple[Defuzzifier, str] | None:
     """Return the defuzzifier that an entry names, and the type of a weighted one.
 
     Returns:
@@ -366,19 +357,19 @@ def defuzzifier(entry: Entry | None, notes: Notes) -> tuple[Defuzzifier, str] | 
     method = METHODS.get(name.text)
     if method is None:
         sentence = f"no defuzzifier {name.text!r}; {name_choice(name.text, METHODS)}"
-        notes.found.append(name.mistake(sentence))
+        notes.mistake(name.position, sentence)
         return Defuzzifier("centroid"), ""
     if len(rest) > 1:
-        notes.found.append(rest[1].mistake(f"{name.text} takes one word behind it"))
+        notes.mistake(rest[1].position, f"{name.text} takes one word behind it")
     if method in ("weighted average", "weighted sum"):
         kind = rest[0].text if rest else "Automatic"
         if kind not in TYPES:
             sentence = f"no type {kind!r}; {name_choice(kind, TYPES)}"
-            notes.found.append(rest[0].mistake(sentence))
+            notes.mistake(rest[0].position, sentence)
         return Defuzzifier(method), kind
     samples = _count(rest[0], 2, notes) if rest else SAMPLES
     if not rest:
-        notes.remarks.append(
+        notes.remark(
             f"line {entry.line}: {name.text} without a resolution looks at {SAMPLES} "
             "values, as in pyfuzzylite; fuzzylite 6 looks at 100"
         )

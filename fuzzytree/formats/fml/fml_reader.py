@@ -8,17 +8,17 @@ their own name back.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fml import fml_words as words
 from fuzzytree.formats.fml import xml
-from fuzzytree.formats.fml.fml_rules import Variables, blocks_of
-from fuzzytree.formats.fml.fml_words import CIRCULAR, Notes, curve_of, number
-from fuzzytree.formats.fml.xml import Element
-from fuzzytree.formats.text_files import report
-from fuzzytree.formats.yaml.spots import Group, Spots
+from fuzzytree.formats.fml.fml_rules import FmlVariables, blocks_of
+from fuzzytree.formats.fml.fml_words import CIRCULAR, curve_of, number
+from fuzzytree.formats.fml.xml import FmlElement
+from fuzzytree.formats.positions import PositionGroup, Positions
+from fuzzytree.formats.text_files import ReaderNotes, report
 from fuzzytree.model.contracts import Locate, Reading
 from fuzzytree.model.naming import numbered
 from fuzzytree.model.rulebase import Points, name_choice
@@ -61,18 +61,18 @@ def places(content: bytes, name: str) -> Locate:
     Raises:
         ReadError: With every mistake of the file.
     """
-    _, parts, facts = _read(content, name)
-    return parts.spots().of_facts(facts).find
+    _, locate = _read(content, name)
+    return locate()
 
 
 class _Parts(NamedTuple):
     """The parts of a system, each with what it was made of."""
 
-    inputs: Sequence[tuple[Element, SystemInput]]
-    outputs: Sequence[tuple[Element, SystemOutput]]
+    inputs: Sequence[tuple[FmlElement, SystemInput]]
+    outputs: Sequence[tuple[FmlElement, SystemOutput]]
     blocks: tuple[RuleBlock, ...]
-    rules: Sequence[tuple[Element, Element]]
-    variables: Variables
+    rules: Sequence[tuple[FmlElement, FmlElement]]
+    variables: FmlVariables
 
     def system(self, title: str) -> FuzzySystem:
         """Return the system.
@@ -81,88 +81,98 @@ class _Parts(NamedTuple):
             InvalidModelError: With everything that is wrong with it.
         """
         inputs = tuple(one for _, one in self.inputs)
-        return FuzzySystem(
-            title, inputs, tuple(one for _, one in self.outputs), self.blocks
-        )
+        outputs = tuple(one for _, one in self.outputs)
+        return FuzzySystem(title, inputs, outputs, self.blocks)
 
-    def spots(self) -> Spots:
+    def positions(self) -> Positions:
         """Return where its parts stand."""
         waiting = iter(self.rules)
-        blocks: list[Group] = []
+        blocks: list[PositionGroup] = []
         for block in self.blocks:
             rules = [next(waiting) for _ in block.rules]
-            places = tuple(_place(rule) for _, rule in rules)
-            blocks.append(Group(_place(rules[0][0]) if rules else (1, 1), places))
-        return Spots(
+            places = tuple(rule.position for _, rule in rules)
+            blocks.append(
+                PositionGroup(rules[0][0].position if rules else (1, 1), places)
+            )
+        return Positions(
             tuple(self._group(*one) for one in self.inputs),
             tuple(self._group(*one) for one in self.outputs),
             tuple(blocks),
         )
 
-    def _group(self, element: Element, variable: SystemInput | SystemOutput) -> Group:
+    def _group(
+        self, element: FmlElement, variable: SystemInput | SystemOutput
+    ) -> PositionGroup:
         names = self.variables.labels[variable.name]
         terms = {
-            names[name]: _place(child)
+            names[name]: child.position
             for child in element.children
             if (name := child.attributes.get("name")) in names
         }
-        return Group(_place(element), tuple(terms[one.name] for one in variable.labels))
+        return PositionGroup(
+            element.position, tuple(terms[one.name] for one in variable.labels)
+        )
 
 
-def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
-    """Return what a file says, what of, and the facts of a rule base if it is one."""
+def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
+    """Return what a file says, and a function that locates its parts."""
     document = xml.parse(content, name)
-    notes = Notes([], [], [])
+    notes = ReaderNotes()
     root = document.root
     if root.name != "fuzzySystem":
         what = f"the root is <{root.name[:40]}>; that of FML is <fuzzySystem>"
-        notes.wrong(root, what)
+        notes.mistake(root.position, what)
     elif root.namespace != words.NAMESPACE:
         given = repr(root.namespace) if root.namespace else "none"
         what = (
             f"the namespace is {given} and not {words.NAMESPACE!r}; read as if it was"
         )
-        notes.remarks.append(what)
-    parts = None if notes.found else _parts(root, notes)
-    if notes.found or parts is None:
-        raise report(name, notes.found)
+        notes.remark(what)
+    parts = None if notes.mistakes else _parts(root, notes)
+    if notes.mistakes or parts is None:
+        raise report(name, notes.mistakes)
     title = root.attributes.get("name", "") or name.rpartition(".")[0] or "system"
     try:
         system = parts.system(title)
     except InvalidModelError as error:
-        raise report(name, list(parts.spots().placed(error.mistakes))) from error
+        raise report(name, list(parts.positions().placed(error.mistakes))) from error
     model, facts = as_written(system, document.comments)
-    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
-    return reading, parts, facts
+    return notes.reading(model), lambda: parts.positions().of_facts(facts).find
 
 
-def _parts(root: Element, notes: Notes) -> _Parts | None:
+def _parts(root: FmlElement, notes: ReaderNotes) -> _Parts | None:
     """Return the parts of the system; None where something is wrong, which is noted."""
     bases = root.all("knowledgeBase")
     if len(bases) != 1:
         has = f"has {len(bases)} <knowledgeBase>" if bases else "has no <knowledgeBase>"
-        notes.wrong(root, f"<fuzzySystem> {has}")
+        notes.mistake(root.position, f"<fuzzySystem> {has}")
         return None
-    elements: list[Element] = []
+    elements: list[FmlElement] = []
     for child in bases[0].children:
         if child.name in _VARIABLES:
             elements.append(child)
         elif child.name in _OUTSIDE:
-            notes.wrong(child, f"<{child.name}> has no place in a system here")
+            notes.mistake(
+                child.position, f"<{child.name}> has no place in a system here"
+            )
         else:
             choice = name_choice(child.name[:40], _VARIABLES)
-            notes.wrong(child, f"no kind of variable <{child.name[:40]}>; {choice}")
+            notes.mistake(
+                child.position, f"no kind of variable <{child.name[:40]}>; {choice}"
+            )
     names: dict[str, str] = {}
     for element in elements:
         given = element.attributes.get("name", "")
         if not given:
-            notes.wrong(element, f"<{element.name}> needs the attribute name")
+            notes.mistake(
+                element.position, f"<{element.name}> needs the attribute name"
+            )
         elif given in names:
-            notes.wrong(element, f"variable {given!r} stands twice")
+            notes.mistake(element.position, f"variable {given!r} stands twice")
         names[given] = given
     inputs = [one for one in elements if not _is_output(one)]
     outputs = [one for one in elements if _is_output(one)]
-    variables = Variables({}, {}, {})
+    variables = FmlVariables({}, {}, {})
     found_inputs = tuple(_input(one, variables, notes) for one in inputs)
     found_outputs = tuple(
         _output(one, len(inputs), variables, notes) for one in outputs
@@ -170,7 +180,7 @@ def _parts(root: Element, notes: Notes) -> _Parts | None:
     variables.outputs.update({one.name: one for one in found_outputs})
     rule_bases = [child for child in root.children if child.name != "knowledgeBase"]
     blocks = blocks_of(rule_bases, variables, notes)
-    if notes.found:
+    if notes.mistakes:
         return None
     rules = [(base, child) for base in rule_bases for child in base.children]
     pairs = (
@@ -180,15 +190,15 @@ def _parts(root: Element, notes: Notes) -> _Parts | None:
     return _Parts([*pairs[0]], [*pairs[1]], blocks, rules, variables)
 
 
-def _is_output(element: Element) -> bool:
+def _is_output(element: FmlElement) -> bool:
     if element.name != "fuzzyVariable":
         return True
     return element.attributes.get("type", "input").lower() == "output"
 
 
 def _terms(
-    element: Element, variables: Variables, notes: Notes
-) -> list[tuple[str, Element]]:
+    element: FmlElement, variables: FmlVariables, notes: ReaderNotes
+) -> list[tuple[str, FmlElement]]:
     """Return the names and elements of terms, and note how each is called in rules."""
     variable = element.attributes.get("name", "")
     kind = element.name.replace("Variable", "Term")
@@ -197,7 +207,9 @@ def _terms(
     terms = [t for t in element.all(kind) if t.attributes.get("name") != start]
     for other in element.children:
         if other.name != kind:
-            notes.wrong(other, f"<{other.name[:40]}> stands where <{kind}> does")
+            notes.mistake(
+                other.position, f"<{other.name[:40]}> stands where <{kind}> does"
+            )
     given = [term.attributes.get("name", "") for term in terms]
     is_ours = all(one.startswith(start) and len(one) > len(start) for one in given)
     taken: dict[str, int] = {}
@@ -206,17 +218,19 @@ def _terms(
         plain = one.removeprefix(start) if is_ours else one
         if not one or plain in taken:
             what = "stands twice" if one else "has no name"
-            notes.wrong(term, f"term {one!r} of {variable!r} {what}")
+            notes.mistake(term.position, f"term {one!r} of {variable!r} {what}")
         called.append(numbered(plain, taken))
     variables.labels[variable] = dict(zip(given, called, strict=True))
     return [*zip(called, terms, strict=True)]
 
 
-def _is_complement(term: Element) -> bool:
+def _is_complement(term: FmlElement) -> bool:
     return term.attributes.get("complement", "false").lower() == "true"
 
 
-def _input(element: Element, variables: Variables, notes: Notes) -> SystemInput:
+def _input(
+    element: FmlElement, variables: FmlVariables, notes: ReaderNotes
+) -> SystemInput:
     name = element.attributes.get("name", "")
     labels: list[Label] = []
     for plain, term in _terms(element, variables, notes):
@@ -234,7 +248,9 @@ def _input(element: Element, variables: Variables, notes: Notes) -> SystemInput:
     return SystemInput(name, tuple(labels), low, high, unit=unit)
 
 
-def _range(element: Element, notes: Notes) -> tuple[float | None, float | None]:
+def _range(
+    element: FmlElement, notes: ReaderNotes
+) -> tuple[float | None, float | None]:
     """Return the two ends of a domain; None for one without end."""
     low, high = (
         None
@@ -246,14 +262,16 @@ def _range(element: Element, notes: Notes) -> tuple[float | None, float | None]:
 
 
 def _output(
-    element: Element, inputs: int, variables: Variables, notes: Notes
+    element: FmlElement, inputs: int, variables: FmlVariables, notes: ReaderNotes
 ) -> SystemOutput:
     name = element.attributes.get("name", "")
     labels: list[Label] = []
     for plain, term in _terms(element, variables, notes):
         where = f"term {plain!r} of {name!r}"
         if _is_complement(term) or term.all(CIRCULAR):
-            notes.wrong(term, f"{where}: an output's term must be a curve of its own")
+            notes.mistake(
+                term.position, f"{where}: an output's term must be a curve of its own"
+            )
             continue
         match element.name:
             case "tskVariable":
@@ -273,11 +291,13 @@ def _output(
         how = _defuzzifier(element, notes)
         aggregation = _word(element, "accumulation", words.SNORMS, "MAX", notes)
         if not all(isinstance(label.curve, Singleton) for label in labels):
-            notes.remarks.append(
+            notes.remark(
                 f"output {name!r}: FML says nothing of samples; read with {how.samples}"
             )
     elif element.attributes.get("combination", "WA").upper() != "WA":
-        notes.wrong(element, "the combination must be WA, the weighted average")
+        notes.mistake(
+            element.position, "the combination must be WA, the weighted average"
+        )
     return SystemOutput(
         name,
         tuple(labels),
@@ -290,51 +310,55 @@ def _output(
     )
 
 
-def _defuzzifier(element: Element, notes: Notes) -> Defuzzifier:
+def _defuzzifier(element: FmlElement, notes: ReaderNotes) -> Defuzzifier:
     method = _word(element, "defuzzifier", words.METHODS, "COG", notes)
     return Defuzzifier(method or "centroid", words.USUAL.samples, words.USUAL.grid)
 
 
 def _word(
-    element: Element, key: str, known: Mapping[str, _T], default: str, notes: Notes
+    element: FmlElement,
+    key: str,
+    known: Mapping[str, _T],
+    default: str,
+    notes: ReaderNotes,
 ) -> _T | None:
     given = element.attributes.get(key, default)
     if given.upper() not in known:
         choice = name_choice(given[:40].upper(), known)
-        notes.wrong(element, f"no {key} {given[:40]!r}; {choice}")
+        notes.mistake(element.position, f"no {key} {given[:40]!r}; {choice}")
     return known.get(given.upper())
 
 
-def _tsk_term(term: Element, plain: str, inputs: int, notes: Notes) -> Label | None:
+def _tsk_term(
+    term: FmlElement, plain: str, inputs: int, notes: ReaderNotes
+) -> Label | None:
     numbers: list[float] = []
     for value in term.all("tskValue"):
-        holder = xml.Element("tskValue", "", {"": value.text}, *_place(value), [])
+        holder = xml.FmlElement("tskValue", "", {"": value.text}, *value.position, [])
         numbers.append(number(holder, "", notes))
     order = term.attributes.get("order", "")
     needed = {"0": 1, "1": inputs + 1}.get(order)
     if needed is None:
-        notes.wrong(term, f"the order of {plain!r} is 0 or 1, not {order[:20]!r}")
+        notes.mistake(
+            term.position, f"the order of {plain!r} is 0 or 1, not {order[:20]!r}"
+        )
         return None
     if len(numbers) != needed:
         what = f"{plain!r} of order {order} needs {needed} <tskValue>"
-        notes.wrong(term, f"{what}, not {len(numbers)}")
+        notes.mistake(term.position, f"{what}, not {len(numbers)}")
         return None
     if order == "0":
         return Label(plain, Singleton(numbers[0]))
     return Label(plain, Linear(tuple(numbers[1:]), numbers[0]))
 
 
-def _place(element: Element) -> tuple[int, int]:
-    return element.line, element.column
-
-
 def _tsukamoto_term(
-    term: Element, plain: str, where: str, notes: Notes
+    term: FmlElement, plain: str, where: str, notes: ReaderNotes
 ) -> Label | None:
     curve = curve_of(term, where, notes)
     is_ramp = isinstance(curve, Points) and sorted(curve.degrees) == [0.0, 1.0]
     if curve is not None and not (is_ramp or isinstance(curve, SCurve)):
         what = "only linear, s and z shapes can be turned round, as Tsukamoto's must"
-        notes.wrong(term, f"{where}: {what}")
+        notes.mistake(term.position, f"{where}: {what}")
         return None
     return None if curve is None else Label(plain, curve)

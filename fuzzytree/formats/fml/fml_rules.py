@@ -8,9 +8,9 @@ from typing import Final, NamedTuple, TypeVar
 import msgspec
 
 from fuzzytree.formats.fml import fml_words as words
-from fuzzytree.formats.fml.fml_words import Notes, number
-from fuzzytree.formats.fml.xml import Element
-from fuzzytree.model.contracts import Loss
+from fuzzytree.formats.fml.fml_words import number
+from fuzzytree.formats.fml.xml import FmlElement
+from fuzzytree.formats.text_files import ReaderNotes
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
     And,
@@ -40,7 +40,7 @@ _MOST_LEVELS: Final = 20
 _MOST_ASKED: Final = 50_000
 
 
-class Variables(msgspec.Struct, frozen=True):
+class FmlVariables(msgspec.Struct, frozen=True):
     """What rules can ask and conclude.
 
     Attributes:
@@ -53,7 +53,7 @@ class Variables(msgspec.Struct, frozen=True):
     """
 
     labels: dict[str, dict[str, str]]
-    circular: dict[tuple[str, str], Element]
+    circular: dict[tuple[str, str], FmlElement]
     outputs: dict[str, SystemOutput]
     negated: set[tuple[str, str]] = msgspec.field(default_factory=set)
     spent: list[None] = msgspec.field(default_factory=list)
@@ -68,17 +68,17 @@ class _Norms(msgspec.Struct, frozen=True):
 class _Inner(NamedTuple):
     """An <and> or <or> of a circular definition, and what it joins by."""
 
-    element: Element
+    element: FmlElement
     t_norm: TNorm | None = None
     s_norm: SNorm | None = None
 
 
-_About = tuple[Variables, list[_Inner]]
+_About = tuple[FmlVariables, list[_Inner]]
 """What rules can ask, and the joints of the terms that one rule asks."""
 
 
 def blocks_of(
-    bases: Sequence[Element], variables: Variables, notes: Notes
+    bases: Sequence[FmlElement], variables: FmlVariables, notes: ReaderNotes
 ) -> tuple[RuleBlock, ...]:
     """Return the rule bases; rules in a row with equal norms are one block."""
     blocks: list[RuleBlock] = []
@@ -87,7 +87,7 @@ def blocks_of(
             what = "has no place in a system here"
             if base.name != "anYaRuleBase":
                 what = f"is no rule base; {name_choice(base.name[:40], _RULES)}"
-            notes.wrong(base, f"<{base.name[:40]}> {what}")
+            notes.mistake(base.position, f"<{base.name[:40]}> {what}")
             continue
         name = base.attributes.get("name", "")
         rule_name, *_ = _RULES[base.name]
@@ -95,7 +95,9 @@ def blocks_of(
         norms: _Norms | None = None
         for element in base.children:
             if element.name != rule_name:
-                notes.wrong(element, f"<{element.name[:40]}> is no <{rule_name}>")
+                notes.mistake(
+                    element.position, f"<{element.name[:40]}> is no <{rule_name}>"
+                )
                 continue
             made = _rule(base, element, variables, notes)
             if made is None:
@@ -116,16 +118,16 @@ def _block(rules: Sequence[SystemRule], norms: _Norms, name: str) -> RuleBlock:
     return RuleBlock(tuple(rules), *how, name=name)
 
 
-def _norms(base: Element, rule: Element, notes: Notes) -> _Norms:
+def _norms(base: FmlElement, rule: FmlElement, notes: ReaderNotes) -> _Norms:
     """Return the norms of a rule: its own, or those of its base."""
 
     def norm(
-        key: str, known: Mapping[str, _Norm], default: str, own: Element
+        key: str, known: Mapping[str, _Norm], default: str, own: FmlElement
     ) -> _Norm | None:
         element = own if key in own.attributes else base
         text = element.attributes.get(key, default)
         if text.upper() not in known:
-            notes.wrong(element, _unknown(key, text, known))
+            notes.mistake(element.position, _unknown(key, text, known))
         return known.get(text.upper())
 
     conjunction = norm("andMethod", words.TNORMS, "MIN", rule)
@@ -141,14 +143,14 @@ def _unknown(key: str, text: str, known: Iterable[str]) -> str:
 
 
 def _rule(
-    base: Element, element: Element, variables: Variables, notes: Notes
+    base: FmlElement, element: FmlElement, variables: FmlVariables, notes: ReaderNotes
 ) -> tuple[SystemRule, _Norms] | None:
     """Return a rule and its norms, with those that its terms are made with."""
     norms = _norms(base, element, notes)
     inner: list[_Inner] = []
     about = variables, inner
     _, consequent, then, otherwise, clause = _RULES[base.name]
-    before = len(notes.found)
+    before = len(notes.mistakes)
     name = element.attributes.get("name", "")
     asked = _only(element, "antecedent", notes)
     concluded = _only(element, consequent, notes)
@@ -159,11 +161,11 @@ def _rule(
         for one in asked.all("clause")
         if (part := _question(one, about, notes)) is not None
     ]
-    if not parts and len(notes.found) == before:
-        notes.wrong(asked, f"rule {name!r} asks nothing")
+    if not parts and len(notes.mistakes) == before:
+        notes.mistake(asked.position, f"rule {name!r} asks nothing")
     for one in concluded.all(otherwise):
         what = "its else is left out"
-        notes.losses.append(Loss(f"rule {name!r}, line {one.line}", what))
+        notes.loss(f"rule {name!r}, line {one.line}", what)
     wanted = _only(concluded, then, notes)
     found = [
         conclusion
@@ -171,14 +173,18 @@ def _rule(
         if (conclusion := _conclusion(child, about[0], name, notes)) is not None
     ]
     weight = number(element, "weight", notes, 1.0)
-    if len(notes.found) > before:
+    if len(notes.mistakes) > before:
         return None
     if not 0.0 <= weight <= 1.0:
-        notes.wrong(element, f"the weight must lie in [0, 1], not {weight!r}")
+        notes.mistake(
+            element.position, f"the weight must lie in [0, 1], not {weight!r}"
+        )
         return None
     connector = element.attributes.get("connector", "and").lower()
     if connector not in ("and", "or"):
-        notes.wrong(element, f"the connector is and or or, not {connector[:20]!r}")
+        notes.mistake(
+            element.position, f"the connector is and or or, not {connector[:20]!r}"
+        )
         return None
     joined = (Or if connector == "or" else And)(tuple(parts))
     when: Condition = parts[0] if len(parts) == 1 else joined
@@ -188,7 +194,7 @@ def _rule(
 
 
 def _with_inner(
-    norms: _Norms, connector: str | None, inner: Iterable[_Inner], notes: Notes
+    norms: _Norms, connector: str | None, inner: Iterable[_Inner], notes: ReaderNotes
 ) -> _Norms:
     """Return the norms of a rule, of which its terms may settle what it leaves open."""
     t_norms = {norms.conjunction} if connector == "and" else set()
@@ -201,7 +207,7 @@ def _with_inner(
         if max(len(t_norms), len(s_norms)) > 1:
             both = sorted(t_norms if len(t_norms) > 1 else s_norms)
             what = f"one rule cannot join by {both[0]} and by {both[1]}"
-            notes.wrong(one.element, what)
+            notes.mistake(one.element.position, what)
             return norms
     return msgspec.structs.replace(
         norms,
@@ -210,17 +216,17 @@ def _with_inner(
     )
 
 
-def _only(element: Element, name: str, notes: Notes) -> Element | None:
+def _only(element: FmlElement, name: str, notes: ReaderNotes) -> FmlElement | None:
     found = element.all(name)
     if len(found) != 1:
         what = f"<{element.name}> needs one <{name}>, and has {len(found)}"
-        notes.wrong(element, what)
+        notes.mistake(element.position, what)
         return None
     return found[0]
 
 
 def _named(
-    clause: Element, variables: Variables, notes: Notes
+    clause: FmlElement, variables: FmlVariables, notes: ReaderNotes
 ) -> tuple[str, str] | None:
     """Return the variable and the term of a clause, as the file calls them."""
     variable, term = _only(clause, "variable", notes), _only(clause, "term", notes)
@@ -228,18 +234,20 @@ def _named(
         return None
     if variable.text not in variables.labels:
         choice = name_choice(variable.text[:40], variables.labels)
-        notes.wrong(variable, f"no variable {variable.text[:40]!r}; {choice}")
+        notes.mistake(
+            variable.position, f"no variable {variable.text[:40]!r}; {choice}"
+        )
         return None
     known = variables.labels[variable.text]
     if term.text not in known:
         choice = name_choice(term.text[:40], known)
         what = f"{variable.text!r} has no term {term.text[:40]!r}; {choice}"
-        notes.wrong(term, what)
+        notes.mistake(term.position, what)
         return None
     return variable.text, term.text
 
 
-def _modifier(clause: Element, notes: Notes) -> tuple[Hedge, ...]:
+def _modifier(clause: FmlElement, notes: ReaderNotes) -> tuple[Hedge, ...]:
     word = clause.attributes.get("modifier")
     if word is None:
         return ()
@@ -247,14 +255,16 @@ def _modifier(clause: Element, notes: Notes) -> tuple[Hedge, ...]:
         return (words.MODIFIERS[word],)
     if word not in words.OTHER_MODIFIERS and not word.startswith("custom_"):
         known = [*words.MODIFIERS, *words.OTHER_MODIFIERS]
-        notes.wrong(clause, _unknown("modifier", word, known))
+        notes.mistake(clause.position, _unknown("modifier", word, known))
         return ()
     what = f"the modifier {word!r} has no meaning here and is left out"
-    notes.losses.append(Loss(f"line {clause.line}", what))
+    notes.loss(f"line {clause.line}", what)
     return ()
 
 
-def _question(clause: Element, about: _About, notes: Notes) -> Condition | None:
+def _question(
+    clause: FmlElement, about: _About, notes: ReaderNotes
+) -> Condition | None:
     named = _named(clause, about[0], notes)
     if named is None:
         return None
@@ -273,12 +283,12 @@ def _question(clause: Element, about: _About, notes: Notes) -> Condition | None:
             return asked
         case _:
             what = f"{hedges[0]!r} of a term that is made of others has no place here"
-            notes.wrong(clause, what)
+            notes.mistake(clause.position, what)
             return None
 
 
 def _asked(
-    named: tuple[str, str], about: _About, notes: Notes, level: int
+    named: tuple[str, str], about: _About, notes: ReaderNotes, level: int
 ) -> Condition | None:
     """Return what a term asks: itself, or what it is made of."""
     variables, _ = about
@@ -290,7 +300,7 @@ def _asked(
     variables.spent.append(None)
     if level > _MOST_LEVELS or len(variables.spent) > _MOST_ASKED:
         what = f"the term {named[1]!r} is made of too many others, or of itself"
-        notes.wrong(definition, what)
+        notes.mistake(definition.position, what)
         return None
     parts = [
         part
@@ -298,29 +308,31 @@ def _asked(
         if (part := _joined(child, named[0], about, notes, level)) is not None
     ]
     if len(parts) != 1:
-        notes.wrong(definition, f"the term {named[1]!r} needs one <and> or <or>")
+        notes.mistake(
+            definition.position, f"the term {named[1]!r} needs one <and> or <or>"
+        )
         return None
     return Not(parts[0]) if named in variables.negated else parts[0]
 
 
-def _inner(element: Element, notes: Notes) -> _Inner:
+def _inner(element: FmlElement, notes: ReaderNotes) -> _Inner:
     """Return what an <and> or an <or> joins its parts by."""
     if element.name == "and":
         word = element.attributes.get("t-norm", "MIN")
         if word.upper() not in words.TNORMS:
-            notes.wrong(element, _unknown("t-norm", word, words.TNORMS))
+            notes.mistake(element.position, _unknown("t-norm", word, words.TNORMS))
         return _Inner(element, t_norm=words.TNORMS.get(word.upper()))
     word = element.attributes.get("t-conorm", "MAX")
     if word.upper() not in words.SNORMS:
-        notes.wrong(element, _unknown("t-conorm", word, words.SNORMS))
+        notes.mistake(element.position, _unknown("t-conorm", word, words.SNORMS))
     return _Inner(element, s_norm=words.SNORMS.get(word.upper()))
 
 
 def _joined(
-    element: Element,
+    element: FmlElement,
     variable: str,
     about: _About,
-    notes: Notes,
+    notes: ReaderNotes,
     level: int,
 ) -> Condition | None:
     """Return an <and>, an <or> or a <termName> of a circular definition."""
@@ -329,7 +341,7 @@ def _joined(
         if element.text not in variables.labels[variable]:
             choice = name_choice(element.text[:40], variables.labels[variable])
             what = f"{variable!r} has no term {element.text[:40]!r}; {choice}"
-            notes.wrong(element, what)
+            notes.mistake(element.position, what)
             return None
         found = _asked((variable, element.text), about, notes, level + 1)
         is_not = element.attributes.get("complement", "false").lower() == "true"
@@ -337,7 +349,9 @@ def _joined(
             return Is(variable, found.label, ("not", *found.hedges))
         return Not(found) if is_not and found is not None else found
     if element.name not in ("and", "or"):
-        notes.wrong(element, f"<{element.name[:40]}> is no <and>, <or> or <termName>")
+        notes.mistake(
+            element.position, f"<{element.name[:40]}> is no <and>, <or> or <termName>"
+        )
         return None
     inner_norms.append(_inner(element, notes))
     parts = [
@@ -346,7 +360,9 @@ def _joined(
         if (part := _joined(child, variable, about, notes, level)) is not None
     ]
     if len(parts) != 2:
-        notes.wrong(element, f"<{element.name}> needs two parts, not {len(parts)}")
+        notes.mistake(
+            element.position, f"<{element.name}> needs two parts, not {len(parts)}"
+        )
         return None
     kind = And if element.name == "and" else Or
     first, second = parts
@@ -356,16 +372,18 @@ def _joined(
 
 
 def _conclusion(
-    clause: Element, variables: Variables, rule: str, notes: Notes
+    clause: FmlElement, variables: FmlVariables, rule: str, notes: ReaderNotes
 ) -> Conclusion | None:
     named = _named(clause, variables, notes)
     if named is None:
         return None
     if named[0] not in variables.outputs:
-        notes.wrong(clause, f"rule {rule!r} concludes {named[0]!r}, which is an input")
+        notes.mistake(
+            clause.position, f"rule {rule!r} concludes {named[0]!r}, which is an input"
+        )
         return None
     if "modifier" in clause.attributes:
         word = clause.attributes["modifier"][:40]
         what = f"the modifier {word!r} of a conclusion is left out"
-        notes.losses.append(Loss(f"rule {rule!r}", what))
+        notes.loss(f"rule {rule!r}", what)
     return Conclusion(named[0], variables.labels[named[0]][named[1]])

@@ -6,11 +6,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Literal
 
-import msgspec
-
-from fuzzytree.formats.fml.xml import Element
-from fuzzytree.formats.text_files import Found, number_of
-from fuzzytree.model.contracts import Loss
+from fuzzytree.formats.fml.xml import FmlElement
+from fuzzytree.formats.text_files import ReaderNotes, number_of
 from fuzzytree.model.rulebase import Points, name_choice
 from fuzzytree.model.system import (
     Curve,
@@ -108,74 +105,66 @@ POINTS: Final = ("pointSetShape", "pointSetMonotonicShape")
 CIRCULAR: Final = "circularDefinition"
 
 
-class Notes(msgspec.Struct, frozen=True):
-    """What is found on the way: mistakes, losses and remarks are added to the lists."""
-
-    found: list[Found]
-    losses: list[Loss]
-    remarks: list[str]
-
-    def wrong(self, element: Element, sentence: str) -> None:
-        """Note a mistake of an element."""
-        self.found.append((element.line, element.column, sentence))
-
-
 def number(
-    element: Element, key: str, notes: Notes, default: float | None = None
+    element: FmlElement, key: str, notes: ReaderNotes, default: float | None = None
 ) -> float:
     """Return an attribute as a number; NaN, and a mistake, if it is none."""
     text = element.attributes.get(key)
     if text is None:
         if default is None:
-            notes.wrong(element, f"<{element.name}> needs the attribute {key}")
+            notes.mistake(
+                element.position, f"<{element.name}> needs the attribute {key}"
+            )
             return math.nan
         return default
     value = number_of(text.strip())
     if value is None:
         what = f"{key} of <{element.name}> must be a number, not {text[:40]!r}"
-        notes.wrong(element, what)
+        notes.mistake(element.position, what)
         return math.nan
     return value
 
 
-def curve_of(term: Element, where: str, notes: Notes) -> Curve | None:
+def curve_of(term: FmlElement, where: str, notes: ReaderNotes) -> Curve | None:
     """Return the curve of a term; None, and a mistake, if there is none."""
     shapes = [child for child in term.children if child.name != CIRCULAR]
     if len(shapes) != 1:
-        notes.wrong(term, f"{where} needs one shape, and has {len(shapes)}")
+        notes.mistake(term.position, f"{where} needs one shape, and has {len(shapes)}")
         return None
     shape = shapes[0]
-    before = len(notes.found)
+    before = len(notes.mistakes)
     if shape.name in POINTS:
         curve: Curve = _points(shape, where, notes)
     elif shape.name in SHAPES:
         count, make = SHAPES[shape.name]
         numbers = [number(shape, f"param{k + 1}", notes) for k in range(count)]
-        if len(notes.found) > before:
+        if len(notes.mistakes) > before:
             return None
         curve = make(numbers)
         if shape.name == "piShape":
             what = "a piShape falls behind its second number as it rose before it"
-            notes.remarks.append(f"{where}: {what}, as in the reference implementation")
+            notes.remark(f"{where}: {what}, as in the reference implementation")
     else:
         known = [*SHAPES, *POINTS, CIRCULAR]
         choice = name_choice(shape.name[:40], known)
-        notes.wrong(shape, f"{where}: no shape <{shape.name[:40]}>; {choice}")
+        notes.mistake(
+            shape.position, f"{where}: no shape <{shape.name[:40]}>; {choice}"
+        )
         return None
-    if len(notes.found) > before:
+    if len(notes.mistakes) > before:
         return None
     for text in curve_mistakes(curve):
-        notes.wrong(shape, f"{where}: {text}")
+        notes.mistake(shape.position, f"{where}: {text}")
     if isinstance(curve, Trapezoid) and curve.a == curve.d:
         return Singleton(curve.b)  # JFML samples the corners of each shape
     return curve
 
 
-def _points(shape: Element, where: str, notes: Notes) -> Points:
+def _points(shape: FmlElement, where: str, notes: ReaderNotes) -> Points:
     method = shape.attributes.get("interpolationMethod", "linear")
     if method.lower() != "linear":
         what = f"points joined by {method} are joined by lines here"
-        notes.losses.append(Loss(where, what))
+        notes.loss(where, what)
     points = shape.all("point")
     values = tuple(number(point, "x", notes) for point in points)
     return Points(values, tuple(number(point, "y", notes) for point in points))

@@ -12,7 +12,7 @@ from xml.parsers import expat
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.text_files import report
+from fuzzytree.formats.text_files import Position, check_size, report
 
 MOST_BYTES: Final = 16 * 2**20
 MOST_ELEMENTS: Final = 200_000
@@ -20,7 +20,7 @@ MOST_LEVELS: Final = 64
 LONGEST_TEXT: Final = 100_000
 
 
-class Element(msgspec.Struct):
+class FmlElement(msgspec.Struct):
     """An element; line and column from 1."""
 
     name: str
@@ -28,22 +28,27 @@ class Element(msgspec.Struct):
     attributes: dict[str, str]
     line: int
     column: int
-    children: list[Element]
+    children: list[FmlElement]
     text: str = ""
 
-    def all(self, name: str) -> list[Element]:
+    @property
+    def position(self) -> Position:
+        """Where it starts."""
+        return self.line, self.column
+
+    def all(self, name: str) -> list[FmlElement]:
         """Return the children of a name."""
         return [child for child in self.children if child.name == name]
 
 
-class Document(msgspec.Struct, frozen=True):
+class FmlDocument(msgspec.Struct, frozen=True):
     """A file: its root, and its comments in order."""
 
-    root: Element
+    root: FmlElement
     comments: tuple[str, ...]
 
 
-def parse(content: bytes, name: str) -> Document:
+def parse(content: bytes, name: str) -> FmlDocument:
     """Return what a file holds.
 
     Raises:
@@ -53,11 +58,7 @@ def parse(content: bytes, name: str) -> Document:
         >>> parse(b'<a x="1"><b>  c </b></a>', "a.xml").root.all("b")[0].text
         'c'
     """
-    if len(content) > MOST_BYTES:
-        raise ReadError(
-            f"{name}: {len(content):,} bytes are more than the {MOST_BYTES:,} "
-            "that are read"
-        )
+    check_size(content, name, MOST_BYTES)
     building = _Building(name)
     try:
         building.parser.Parse(content, True)
@@ -69,7 +70,7 @@ def parse(content: bytes, name: str) -> Document:
     except (LookupError, ValueError) as error:  # an encoding that Python does not know
         raise report(name, [(1, 1, "the file's encoding is unknown")]) from error
     assert building.root is not None  # a document without a root is not well-formed
-    return Document(building.root, tuple(building.comments))
+    return FmlDocument(building.root, tuple(building.comments))
 
 
 class _Building:
@@ -77,9 +78,9 @@ class _Building:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.root: Element | None = None
+        self.root: FmlElement | None = None
         self.comments: list[str] = []
-        self.open: list[Element] = []
+        self.open: list[FmlElement] = []
         self.texts: list[list[str]] = []
         self.count = 0
         parser = expat.ParserCreate(namespace_separator=" ")
@@ -108,7 +109,7 @@ class _Building:
         if len(self.open) >= MOST_LEVELS:
             raise self._refuse(f"nested deeper than {MOST_LEVELS} levels")
         namespace, _, name = full.rpartition(" ")
-        found = Element(
+        found = FmlElement(
             name,
             namespace,
             {key: value for key, value in attributes.items() if " " not in key},

@@ -10,8 +10,8 @@ from typing import Final, TypeVar
 
 from msgspec import inspect
 
-from fuzzytree.formats.text_files import MOST_SHOWN, Found
-from fuzzytree.formats.yaml.layout import Form, Record
+from fuzzytree.formats.text_files import MOST_SHOWN, FileMistake
+from fuzzytree.formats.yaml.layout import FileRecord, KeyForm
 from fuzzytree.formats.yaml.nodes import (
     ListNode,
     MappingNode,
@@ -22,12 +22,12 @@ from fuzzytree.formats.yaml.nodes import (
 )
 from fuzzytree.model.rulebase import Mistake, Path
 
-R = TypeVar("R", bound=Record)
+R = TypeVar("R", bound=FileRecord)
 Entries = dict[str, Node]
 _LONGEST_DIGITS: Final = 18
 
 
-def bind(node: Node, kind: type[R], found: list[Found]) -> R | None:
+def bind(node: Node, kind: type[R], found: list[FileMistake]) -> R | None:
     """Return a mapping as a record, or None if it cannot be one.
 
     Args:
@@ -42,7 +42,9 @@ def bind(node: Node, kind: type[R], found: list[Found]) -> R | None:
     return record(entries(node, kind, found), kind, found)
 
 
-def entries(node: MappingNode, kind: type[Record], found: list[Found]) -> Entries:
+def entries(
+    node: MappingNode, kind: type[FileRecord], found: list[FileMistake]
+) -> Entries:
     """Return the values of a mapping by key; check its keys and their choice."""
     known = _fields(kind)
     kept: Entries = {}
@@ -67,7 +69,7 @@ def entries(node: MappingNode, kind: type[Record], found: list[Found]) -> Entrie
     return kept
 
 
-def record(kept: Entries, kind: type[R], found: list[Found]) -> R | None:
+def record(kept: Entries, kind: type[R], found: list[FileMistake]) -> R | None:
     """Return the record of checked entries; entries of no field are left alone."""
     values: dict[str, object] = {}
     is_whole = True
@@ -83,20 +85,20 @@ def record(kept: Entries, kind: type[R], found: list[Found]) -> R | None:
 
 
 @functools.cache
-def _fields(kind: type[Record]) -> dict[str, inspect.Field]:
+def _fields(kind: type[FileRecord]) -> dict[str, inspect.Field]:
     info = inspect.type_info(kind)
     fields = info.fields if isinstance(info, inspect.StructType) else ()
     return {field.encode_name: field for field in fields}
 
 
-def _fits_a_form(kind: type[Record], kept: Iterable[str]) -> bool:
+def _fits_a_form(kind: type[FileRecord], kept: Iterable[str]) -> bool:
     chosen = frozenset[str]().union(*map(_keys, kind.forms)).intersection(kept)
     return not kind.forms or any(
         chosen.issuperset(form.needs) and chosen <= _keys(form) for form in kind.forms
     )
 
 
-def _form_mistake(kind: type[Record], kept: Iterable[str]) -> str:
+def _form_mistake(kind: type[FileRecord], kept: Iterable[str]) -> str:
     """Return which keys belong together."""
     sets: dict[frozenset[str], str] = {}
     for form in kind.forms:
@@ -108,12 +110,12 @@ def _form_mistake(kind: type[Record], kept: Iterable[str]) -> str:
 
 
 @functools.cache
-def _keys(form: Form) -> frozenset[str]:
+def _keys(form: KeyForm) -> frozenset[str]:
     return frozenset((*form.needs, *form.may))
 
 
 def _value(
-    node: Node, what: str, kind: inspect.Type, found: list[Found], about: str = ""
+    node: Node, what: str, kind: inspect.Type, found: list[FileMistake], about: str = ""
 ) -> object | None:
     """Return a value of a type, or None after adding why there is none."""
     match kind:
@@ -138,8 +140,8 @@ def _value(
             raise TypeError(f"no rule for {kind}")
 
 
-def _record_type(kind: inspect.StructType) -> type[Record]:
-    if not issubclass(kind.cls, Record):
+def _record_type(kind: inspect.StructType) -> type[FileRecord]:
+    if not issubclass(kind.cls, FileRecord):
         raise TypeError(f"{kind.cls} is no record of the layout")
     return kind.cls
 
@@ -154,7 +156,7 @@ def _chosen(node: Node, union: inspect.UnionType) -> inspect.Type:
 
 
 def _list(
-    node: Node, what: str, kind: inspect.VarTupleType, found: list[Found]
+    node: Node, what: str, kind: inspect.VarTupleType, found: list[FileMistake]
 ) -> tuple[object, ...] | None:
     if not isinstance(node, ListNode):
         _expected(node, f"{what} must be a list", found)
@@ -172,7 +174,7 @@ def _list(
 
 
 def _text(
-    node: Node, what: str, kind: inspect.StrType, about: str, found: list[Found]
+    node: Node, what: str, kind: inspect.StrType, about: str, found: list[FileMistake]
 ) -> str | None:
     if not isinstance(node, Scalar):
         _expected(node, f"{what} must be text", found)
@@ -195,7 +197,7 @@ def _text(
 
 
 def _integer(
-    node: Node, what: str, kind: inspect.IntType, found: list[Found]
+    node: Node, what: str, kind: inspect.IntType, found: list[FileMistake]
 ) -> int | None:
     if not isinstance(node, Scalar) or meaning(node) != "an integer":
         _expected(node, f"{what} must be an integer", found)
@@ -215,7 +217,7 @@ def _integer(
 
 
 def _number(
-    node: Node, what: str, kind: inspect.FloatType, found: list[Found]
+    node: Node, what: str, kind: inspect.FloatType, found: list[FileMistake]
 ) -> float | None:
     is_number = isinstance(node, Scalar) and meaning(node) in (
         "a number",
@@ -249,7 +251,7 @@ def _read_integer(text: str) -> int:
 
 
 def _literal(
-    node: Node, what: str, kind: inspect.LiteralType, found: list[Found]
+    node: Node, what: str, kind: inspect.LiteralType, found: list[FileMistake]
 ) -> str | int | None:
     if isinstance(node, Scalar):
         for value in kind.values:
@@ -261,12 +263,12 @@ def _literal(
     return None
 
 
-def not_a_list(node: Node, key: str, found: list[Found]) -> None:
+def not_a_list(node: Node, key: str, found: list[FileMistake]) -> None:
     """Add that the value of a key must be a list."""
     _expected(node, f"{shortened(key)} must be a list", found)
 
 
-def _expected(node: Node, what: str, found: list[Found], hint: str = "") -> None:
+def _expected(node: Node, what: str, found: list[FileMistake], hint: str = "") -> None:
     """Add that a node is not what it must be; a refused one was added before."""
     match node:
         case Scalar():
@@ -281,7 +283,7 @@ def _expected(node: Node, what: str, found: list[Found], hint: str = "") -> None
     _add(found, node, f"{what}, not {it}{hint}")
 
 
-def _add(found: list[Found], node: Node, sentence: str) -> None:
+def _add(found: list[FileMistake], node: Node, sentence: str) -> None:
     found.append((node.line, node.column, sentence))
 
 
@@ -319,13 +321,15 @@ def value_of(node: Node, key: str) -> Node | None:
     return None
 
 
-def record_at(kept: Entries, key: str, kind: type[R], found: list[Found]) -> R | None:
+def record_at(
+    kept: Entries, key: str, kind: type[R], found: list[FileMistake]
+) -> R | None:
     """Return the record under a key, None if it is broken or left out."""
     return bind(kept[key], kind, found) if key in kept else None
 
 
 def records_at(
-    kept: Entries, key: str, kind: type[R], found: list[Found]
+    kept: Entries, key: str, kind: type[R], found: list[FileMistake]
 ) -> list[R | None] | None:
     """Return the records of a list, None for a broken one; None if it is no list."""
     node = kept.get(key)
@@ -339,7 +343,7 @@ def records_at(
 
 def located(
     root: Node, mistakes: Iterable[Mistake], broken: Collection[Path] = ()
-) -> Iterator[Found]:
+) -> Iterator[FileMistake]:
     """Yield mistakes with their places, but not those in broken parts."""
     for path, text in mistakes:
         if path[:2] not in broken and path[:4] not in broken:

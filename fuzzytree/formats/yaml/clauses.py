@@ -31,20 +31,20 @@ _NOT: Final = "not "
 _MOST_ORS: Final = 8  # keeps the search linear; names with more are written out
 
 
-class Words(msgspec.Struct, frozen=True):
+class TermWords(msgspec.Struct, frozen=True):
     """The terms of a variable: their names, and the most ` or ` within one name."""
 
     terms: frozenset[str]
     most_ors: int
 
 
-Vocabulary = Mapping[str, Words]
+Vocabulary = Mapping[str, TermWords]
 
 
-def words(terms: Iterable[str]) -> Words:
+def words(terms: Iterable[str]) -> TermWords:
     """Return what `readings` needs to know about a variable's terms."""
     names = frozenset(terms)
-    return Words(names, max((len(_places(name)) for name in names), default=0))
+    return TermWords(names, max((len(_places(name)) for name in names), default=0))
 
 
 def vocabulary_of(variables: Iterable[Variable]) -> Vocabulary:
@@ -90,7 +90,7 @@ def guess(text: str, vocabulary: Vocabulary) -> Clause | None:
     return Clause(text[:best], tuple(terms.split(_OR)), negated)
 
 
-def _lists(text: str, known: Words) -> list[tuple[str, ...]]:
+def _lists(text: str, known: TermWords) -> list[tuple[str, ...]]:
     """Return the lists of terms, joined by OR, that a text can mean: two at most."""
     if not known.most_ors and " or or " not in text:
         terms = tuple(text.split(_OR))
@@ -140,24 +140,24 @@ def _walk(steps: list[list[tuple[str, int]]], term: str, position: int) -> list[
 
 _MOST_COMPARED: Final = 200_000
 
-Asked = tuple[Path, str, Clause]
+LocatedClause = tuple[Path, str, Clause]
 """Where a clause stands, in the model and in words, and the clause."""
 
 
-def clauses_of_rules(rules: Sequence[Rule]) -> Iterator[Asked]:
+def clauses_of_rules(rules: Sequence[Rule]) -> Iterator[LocatedClause]:
     """Yield the clauses of rules."""
     for number, rule in enumerate(rules, 1):
         for index, clause in enumerate(rule.when):
             yield ("rules", number - 1, "when", index), f"rule {number}", clause
 
 
-def clauses_of_nodes(nodes: Sequence[Node]) -> Iterator[Asked]:
+def clauses_of_nodes(nodes: Sequence[Node]) -> Iterator[LocatedClause]:
     """Yield the branches of nodes as clauses."""
     for path, where, node, branch in _branches(nodes):
         yield path, where, Clause(node.variable, branch.terms)
 
 
-def sets_of_nodes(nodes: Sequence[Node]) -> Iterator[Asked]:
+def sets_of_nodes(nodes: Sequence[Node]) -> Iterator[LocatedClause]:
     """Yield the fitted sets of branches as clauses."""
     for path, where, node, branch in _branches(nodes):
         if branch.sets:
@@ -171,7 +171,9 @@ def _branches(nodes: Sequence[Node]) -> Iterator[tuple[Path, str, Node, Branch]]
             yield path, f"node {number}", node, branch
 
 
-def unknown_terms(asked: Iterable[Asked], vocabulary: Vocabulary) -> Iterator[Mistake]:
+def unknown_terms(
+    asked: Iterable[LocatedClause], vocabulary: Vocabulary
+) -> Iterator[Mistake]:
     """Yield the clauses that name an unknown variable or term."""
     known: dict[int, Clause] = {}  # rules share clauses
     for path, where, clause in asked:

@@ -64,21 +64,21 @@ Sentence = Annotated[
 ]
 
 
-class Form(msgspec.Struct, frozen=True):
+class KeyForm(msgspec.Struct, frozen=True):
     """Keys that may stand together: all of `needs`, and any of `may`."""
 
     needs: tuple[str, ...]
     may: tuple[str, ...] = ()
 
 
-class Record(msgspec.Struct, frozen=True, kw_only=True):
+class FileRecord(msgspec.Struct, frozen=True, kw_only=True):
     """A mapping of the file."""
 
     noun: ClassVar[str]
-    forms: ClassVar[tuple[Form, ...]] = ()
+    forms: ClassVar[tuple[KeyForm, ...]] = ()
 
 
-class Range(Record, frozen=True, kw_only=True):
+class RangeOfVariable(FileRecord, frozen=True, kw_only=True):
     """The values seen or allowed, ends included; an unknown end is left out."""
 
     noun: ClassVar[str] = "a range"
@@ -86,7 +86,7 @@ class Range(Record, frozen=True, kw_only=True):
     to: float | None = None
 
 
-class PartOfSum(Record, frozen=True, kw_only=True):
+class PartOfSum(FileRecord, frozen=True, kw_only=True):
     """A summand, `weight * (input - centre)`; the centre is 0 if left out."""
 
     noun: ClassVar[str] = "a summand"
@@ -95,7 +95,7 @@ class PartOfSum(Record, frozen=True, kw_only=True):
     centre: float = 0.0
 
 
-class Fall(Record, frozen=True, kw_only=True):
+class Fall(FileRecord, frozen=True, kw_only=True):
     """How the degree falls from 1 at `from` to 0 at `to`.
 
     With q falling in a straight line from 1 to 0, the degree is
@@ -109,7 +109,7 @@ class Fall(Record, frozen=True, kw_only=True):
     fit_error: float | None = field(name="fit error", default=None)
 
 
-class HalfSet(Record, frozen=True, kw_only=True):
+class HalfSet(FileRecord, frozen=True, kw_only=True):
     """One side of an LR set; see `TermOfVariable`."""
 
     noun: ClassVar[str] = "a side"
@@ -118,7 +118,7 @@ class HalfSet(Record, frozen=True, kw_only=True):
     reach: float
 
 
-class TermOfVariable(Record, frozen=True, kw_only=True):
+class TermOfVariable(FileRecord, frozen=True, kw_only=True):
     """A label of a variable, in one of five shapes.
 
     A plateau: degree 1 `above` one value and `up to` another, with flanks.
@@ -132,13 +132,13 @@ class TermOfVariable(Record, frozen=True, kw_only=True):
     """
 
     noun: ClassVar[str] = "a term"
-    forms: ClassVar[tuple[Form, ...]] = (
-        Form(("above",), ("up to", "left flank", "right flank")),
-        Form(("up to",), ("above", "left flank", "right flank")),
-        Form(("mean", "spread", "curve", "reach")),
-        Form(("mean", "left", "right")),
-        Form(("points",)),
-        Form(("degree",)),
+    forms: ClassVar[tuple[KeyForm, ...]] = (
+        KeyForm(("above",), ("up to", "left flank", "right flank")),
+        KeyForm(("up to",), ("above", "left flank", "right flank")),
+        KeyForm(("mean", "spread", "curve", "reach")),
+        KeyForm(("mean", "left", "right")),
+        KeyForm(("points",)),
+        KeyForm(("degree",)),
     )
     name: Name
     above: float | None = None
@@ -155,28 +155,28 @@ class TermOfVariable(Record, frozen=True, kw_only=True):
     degree: Literal[1] | None = None
 
 
-class VariableOfModel(Record, frozen=True, kw_only=True):
+class VariableOfModel(FileRecord, frozen=True, kw_only=True):
     """An input column, or a sum of weighted inputs, with its terms."""
 
     noun: ClassVar[str] = "a variable"
     name: Name
     unit: Name | None = None
-    range: Range | None = None
+    range: RangeOfVariable | None = None
     sum_of: tuple[PartOfSum, ...] = field(name="sum of", default=())
     terms: tuple[TermOfVariable, ...] = ()
 
 
-class WrittenOut(Record, frozen=True, kw_only=True):
+class WrittenOut(FileRecord, frozen=True, kw_only=True):
     """A clause whose names would make a sentence ambiguous."""
 
     noun: ClassVar[str] = "a clause"
-    forms: ClassVar[tuple[Form, ...]] = (Form(("is",)), Form(("is not",)))
+    forms: ClassVar[tuple[KeyForm, ...]] = (KeyForm(("is",)), KeyForm(("is not",)))
     variable: Name
     is_: tuple[Name, ...] | None = field(name="is", default=None)
     is_not: tuple[Name, ...] | None = field(name="is not", default=None)
 
 
-class RuleOfModel(Record, frozen=True, kw_only=True):
+class RuleOfModel(FileRecord, frozen=True, kw_only=True):
     """If all clauses hold, then the class; support counts training rows."""
 
     noun: ClassVar[str] = "a rule"
@@ -185,7 +185,7 @@ class RuleOfModel(Record, frozen=True, kw_only=True):
     support: Count | None = None
 
 
-class RuleSemantics(Record, frozen=True, kw_only=True):
+class RuleSemantics(FileRecord, frozen=True, kw_only=True):
     """What an answer depends on beside the rules."""
 
     noun: ClassVar[str] = "the semantics of rules"
@@ -198,7 +198,7 @@ class RuleSemantics(Record, frozen=True, kw_only=True):
     answer: Literal["the class of the first of the strongest rules"]
 
 
-class TreeSemantics(Record, frozen=True, kw_only=True):
+class TreeSemantics(FileRecord, frozen=True, kw_only=True):
     """What an answer depends on beside the nodes, and the AND of the tree's rules."""
 
     noun: ClassVar[str] = "the semantics of a tree"
@@ -210,7 +210,7 @@ class TreeSemantics(Record, frozen=True, kw_only=True):
     answer: Literal["the class of the leaf that the nodes lead to"]
 
 
-class Way(Record, frozen=True, kw_only=True):
+class Way(FileRecord, frozen=True, kw_only=True):
     """A branch of a node: taken where the variable is one of the terms."""
 
     noun: ClassVar[str] = "a branch"
@@ -219,7 +219,7 @@ class Way(Record, frozen=True, kw_only=True):
     go_to: GoTo = field(name="go to")
 
 
-class Question(Record, frozen=True, kw_only=True):
+class NodeOfTree(FileRecord, frozen=True, kw_only=True):
     """A node: k cuts make k + 1 intervals, and each belongs to a branch.
 
     Interval and branch have the same number unless `interval owners` gives the
@@ -234,7 +234,7 @@ class Question(Record, frozen=True, kw_only=True):
     branches: tuple[Way, ...]
 
 
-class End(Record, frozen=True, kw_only=True):
+class End(FileRecord, frozen=True, kw_only=True):
     """A leaf: a class, and the pattern of that class."""
 
     noun: ClassVar[str] = "a leaf"
@@ -244,7 +244,7 @@ class End(Record, frozen=True, kw_only=True):
     support: Count | None = None
 
 
-class FittedSets(Record, frozen=True, kw_only=True):
+class SetsOfVariable(FileRecord, frozen=True, kw_only=True):
     """The fitted sets of the patterns on one variable."""
 
     noun: ClassVar[str] = "a group of sets"
@@ -252,7 +252,7 @@ class FittedSets(Record, frozen=True, kw_only=True):
     terms: tuple[TermOfVariable, ...]
 
 
-class Head(Record, frozen=True, kw_only=True):
+class Head(FileRecord, frozen=True, kw_only=True):
     """What rule bases and trees begin with."""
 
     noun: ClassVar[str] = "a model"
@@ -289,9 +289,9 @@ class TreeFile(TreeHead, frozen=True, kw_only=True):
     """A fuzzy decision tree of fuzzytree."""
 
     variables: tuple[VariableOfModel, ...] = ()
-    nodes: tuple[Question, ...] = ()
+    nodes: tuple[NodeOfTree, ...] = ()
     leaves: Annotated[tuple[End, ...], Meta(min_length=1)]
-    sets: tuple[FittedSets, ...] = ()
+    sets: tuple[SetsOfVariable, ...] = ()
     semantics: TreeSemantics
 
 
@@ -329,7 +329,7 @@ ConclusionText = Annotated[
 ]
 
 
-class RangeOfSystem(Range, frozen=True, kw_only=True):
+class RangeOfSystem(RangeOfVariable, frozen=True, kw_only=True):
     """The values seen or allowed, ends included; an unknown end is left out.
 
     With `outside: clipped` a value beyond an end is moved to it.
@@ -338,7 +338,7 @@ class RangeOfSystem(Range, frozen=True, kw_only=True):
     outside: Literal["clipped"] | None = None
 
 
-class GaussianCurve(Record, frozen=True, kw_only=True):
+class GaussianCurve(FileRecord, frozen=True, kw_only=True):
     """`exp(-(x - mean)^2 / (2 deviation^2))`."""
 
     noun: ClassVar[str] = "a gaussian"
@@ -346,7 +346,7 @@ class GaussianCurve(Record, frozen=True, kw_only=True):
     deviation: float
 
 
-class TwoGaussiansCurve(Record, frozen=True, kw_only=True):
+class TwoGaussiansCurve(FileRecord, frozen=True, kw_only=True):
     """A gaussian below `left` times another one above `right`, each 1 elsewhere."""
 
     noun: ClassVar[str] = "a curve of two gaussians"
@@ -356,7 +356,7 @@ class TwoGaussiansCurve(Record, frozen=True, kw_only=True):
     right_deviation: float = field(name="right deviation")
 
 
-class BellCurve(Record, frozen=True, kw_only=True):
+class BellCurve(FileRecord, frozen=True, kw_only=True):
     """`1 / (1 + |(x - center) / width|^(2 slope))`."""
 
     noun: ClassVar[str] = "a bell"
@@ -365,7 +365,7 @@ class BellCurve(Record, frozen=True, kw_only=True):
     slope: float
 
 
-class SigmoidCurve(Record, frozen=True, kw_only=True):
+class SigmoidCurve(FileRecord, frozen=True, kw_only=True):
     """`1 / (1 + exp(-slope (x - inflection)))`."""
 
     noun: ClassVar[str] = "a sigmoid"
@@ -373,7 +373,7 @@ class SigmoidCurve(Record, frozen=True, kw_only=True):
     slope: float
 
 
-class WideCurve(Record, frozen=True, kw_only=True):
+class WideCurve(FileRecord, frozen=True, kw_only=True):
     """A cosine or a spike about a centre."""
 
     noun: ClassVar[str] = "a curve about a center"
@@ -381,7 +381,7 @@ class WideCurve(Record, frozen=True, kw_only=True):
     width: float
 
 
-class CurveFromTo(Record, frozen=True, kw_only=True):
+class CurveFromTo(FileRecord, frozen=True, kw_only=True):
     """Where a curve has the degree 0, and where it has 1 (or ends)."""
 
     noun: ClassVar[str] = "a curve between two values"
@@ -389,7 +389,7 @@ class CurveFromTo(Record, frozen=True, kw_only=True):
     end: float
 
 
-class ConcaveCurve(Record, frozen=True, kw_only=True):
+class ConcaveCurve(FileRecord, frozen=True, kw_only=True):
     """Rises or falls to 1 at the end, ever more steeply."""
 
     noun: ClassVar[str] = "a concave curve"
@@ -397,7 +397,7 @@ class ConcaveCurve(Record, frozen=True, kw_only=True):
     end: float
 
 
-class LinearCurve(Record, frozen=True, kw_only=True):
+class LinearCurve(FileRecord, frozen=True, kw_only=True):
     """A weight for each column, in order, and what is added."""
 
     noun: ClassVar[str] = "a linear term"
@@ -424,9 +424,9 @@ class LabelOfVariable(TermOfVariable, frozen=True, kw_only=True):
     is multiplied by the height.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = (
+    forms: ClassVar[tuple[KeyForm, ...]] = (
         *TermOfVariable.forms,
-        *(Form((name,)) for name in _CURVES),
+        *(KeyForm((name,)) for name in _CURVES),
     )
     height: float = 1.0
     trapezoid: Four | None = None
@@ -451,7 +451,7 @@ class LabelOfVariable(TermOfVariable, frozen=True, kw_only=True):
     formula: FormulaText | None = None
 
 
-class InputOfSystem(Record, frozen=True, kw_only=True):
+class InputOfSystem(FileRecord, frozen=True, kw_only=True):
     """An input column, or a sum of weighted inputs, with its terms."""
 
     noun: ClassVar[str] = "an input"
@@ -462,7 +462,7 @@ class InputOfSystem(Record, frozen=True, kw_only=True):
     terms: tuple[LabelOfVariable, ...] = ()
 
 
-class OutputOfSystem(Record, frozen=True, kw_only=True):
+class OutputOfSystem(FileRecord, frozen=True, kw_only=True):
     """An output, and how it becomes a number.
 
     Without an aggregation weighted numbers are summed one by one. The default answers
@@ -481,7 +481,7 @@ class OutputOfSystem(Record, frozen=True, kw_only=True):
     default: float | None = None
 
 
-class ActivationOfBlock(Record, frozen=True, kw_only=True):
+class ActivationOfBlock(FileRecord, frozen=True, kw_only=True):
     """Which rules of a block are activated."""
 
     noun: ClassVar[str] = "an activation"
@@ -491,7 +491,7 @@ class ActivationOfBlock(Record, frozen=True, kw_only=True):
     relation: Relation = ">="
 
 
-class RuleOfSystem(Record, frozen=True, kw_only=True):
+class RuleOfSystem(FileRecord, frozen=True, kw_only=True):
     """If a condition holds, then some terms are concluded."""
 
     noun: ClassVar[str] = "a rule"
@@ -501,7 +501,7 @@ class RuleOfSystem(Record, frozen=True, kw_only=True):
     weight: float = 1.0
 
 
-class BlockHead(Record, frozen=True, kw_only=True):
+class BlockHead(FileRecord, frozen=True, kw_only=True):
     """What rules share; an operator that none of them needs may be left out."""
 
     noun: ClassVar[str] = "a block"
@@ -518,7 +518,7 @@ class BlockOfSystem(BlockHead, frozen=True, kw_only=True):
     rules: tuple[RuleOfSystem, ...]
 
 
-class SystemSemantics(Record, frozen=True, kw_only=True):
+class SystemSemantics(FileRecord, frozen=True, kw_only=True):
     """What an answer depends on beside the rules."""
 
     noun: ClassVar[str] = "the semantics of a system"
@@ -527,7 +527,7 @@ class SystemSemantics(Record, frozen=True, kw_only=True):
     missing: Literal["a value that is missing or infinite makes every output nan"]
 
 
-class SystemHead(Record, frozen=True, kw_only=True):
+class SystemHead(FileRecord, frozen=True, kw_only=True):
     """The beginning of a system."""
 
     noun: ClassVar[str] = "a system"

@@ -24,8 +24,13 @@ from yaml.events import (
     SequenceStartEvent,
 )
 
-from fuzzytree.errors import ReadError
-from fuzzytree.formats.text_files import Found, report
+from fuzzytree.formats.text_files import (
+    FileMistake,
+    check_characters,
+    check_size,
+    position_behind,
+    report,
+)
 
 MOST_BYTES: Final = 64 * 2**20
 MOST_NODES: Final = 1_000_000
@@ -102,7 +107,7 @@ def meaning(scalar: Scalar) -> Meaning:
     return "a number" if _NUMBER.fullmatch(text) else "text"
 
 
-def compose(content: bytes, name: str) -> tuple[Node, list[Found]]:
+def compose(content: bytes, name: str) -> tuple[Node, list[FileMistake]]:
     """Return the only document of a YAML file, and the tags and anchors refused.
 
     Raises:
@@ -113,7 +118,7 @@ def compose(content: bytes, name: str) -> tuple[Node, list[Found]]:
     if text.count(",") + text.count("\n") > 2 * MOST_NODES:
         raise report(name, [(1, 1, f"more than {MOST_NODES:,} entries")])
     root: list[Node] = []
-    found: list[Found] = []
+    found: list[FileMistake] = []
     open_: list[tuple[Event, list[Node]]] = []
     count = 0
     for event in _events(text, name):
@@ -160,33 +165,16 @@ def _start(event: Event) -> tuple[int, int]:
 
 
 def _decoded(content: bytes, name: str) -> str:
-    if len(content) > MOST_BYTES:
-        raise ReadError(
-            f"{name}: {len(content):,} bytes are more than the {MOST_BYTES:,} "
-            "that are read"
-        )
+    check_size(content, name, MOST_BYTES)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = content[: error.start].decode("utf-8", "replace")
-        sentence = (
-            f"byte 0x{content[error.start]:02x} is not UTF-8; "
-            "the file must be saved as UTF-8"
-        )
-        raise report(name, [(*_place(before), sentence)]) from error
-    wrong = _FORBIDDEN.search(text)
-    if wrong:
-        sentence = (
-            f"character U+{ord(wrong.group()):04X} may not stand in a YAML file; "
-            "it may be damaged"
-        )
-        raise report(name, [(*_place(text[: wrong.start()]), sentence)])
+        byte = f"byte 0x{content[error.start]:02x} is not UTF-8"
+        sentence = f"{byte}; the file must be saved as UTF-8"
+        raise report(name, [(*position_behind(before), sentence)]) from error
+    check_characters(text, name, _FORBIDDEN)
     return text
-
-
-def _place(before: str) -> tuple[int, int]:
-    """Return the line and column of what follows a text."""
-    return before.count("\n") + 1, len(before) - before.rfind("\n")
 
 
 def _events(text: str, name: str) -> Iterator[Event]:
@@ -205,7 +193,9 @@ def _events(text: str, name: str) -> Iterator[Event]:
         raise report(name, [(1, 1, f"not YAML: {what}")]) from error
 
 
-def _document_mistakes(event: DocumentStartEvent, *, is_first: bool) -> list[Found]:
+def _document_mistakes(
+    event: DocumentStartEvent, *, is_first: bool
+) -> list[FileMistake]:
     if not is_first:
         return [(*_start(event), "a second document; a file holds one model")]
     if event.version not in (None, (1, 2)):
@@ -215,7 +205,7 @@ def _document_mistakes(event: DocumentStartEvent, *, is_first: bool) -> list[Fou
     return []
 
 
-def _refused(event: Event) -> Iterator[Found]:
+def _refused(event: Event) -> Iterator[FileMistake]:
     if isinstance(event, AliasEvent):
         yield *_start(event), "aliases are not read; repeat the value"
     elif isinstance(event, ScalarEvent | MappingStartEvent | SequenceStartEvent):

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.formulas import FormulaError, parse
-from fuzzytree.formats.text_files import MOST_SHOWN, Found
+from fuzzytree.formats.text_files import MOST_SHOWN, FileMistake
 from fuzzytree.formats.yaml import layout, values
 from fuzzytree.formats.yaml.binding import (
     Entries,
@@ -66,7 +66,7 @@ from fuzzytree.model.system import (
 )
 
 
-def read_system(root: MappingNode, found: list[Found]) -> FuzzySystem | None:
+def read_system(root: MappingNode, found: list[FileMistake]) -> FuzzySystem | None:
     """Return the system of a file of `kind: system`.
 
     Returns:
@@ -97,7 +97,7 @@ def read_system(root: MappingNode, found: list[Found]) -> FuzzySystem | None:
 
 
 def _inputs(
-    kept: Entries, found: list[Found], mistakes: list[Mistake], broken: set[Path]
+    kept: Entries, found: list[FileMistake], mistakes: list[Mistake], broken: set[Path]
 ) -> tuple[SystemInput, ...] | None:
     """Return the inputs; a broken one has its name and those of its terms only."""
     inputs: list[SystemInput] = []
@@ -120,7 +120,7 @@ def _inputs(
 
 
 def _outputs(
-    kept: Entries, found: list[Found], mistakes: list[Mistake], broken: set[Path]
+    kept: Entries, found: list[FileMistake], mistakes: list[Mistake], broken: set[Path]
 ) -> tuple[SystemOutput, ...] | None:
     """Return the outputs; a broken one has its name and those of its terms only."""
     outputs: list[SystemOutput] = []
@@ -242,7 +242,7 @@ def _spare(outputs: Sequence[SystemOutput]) -> SystemRule | None:
 
 def _blocks(
     kept: Entries,
-    found: list[Found],
+    found: list[FileMistake],
     mistakes: list[Mistake],
     broken: set[Path],
     spare: SystemRule | None,

@@ -84,12 +84,12 @@ def leaf(one: layout.End) -> Leaf:
     return Leaf(one.class_, one.pattern or "", one.support)
 
 
-def sets(one: layout.FittedSets) -> Sets:
+def sets(one: layout.SetsOfVariable) -> Sets:
     """Return the fitted sets on a variable."""
     return Sets(one.variable, tuple(map(_term, one.terms)))
 
 
-def node(one: layout.Question) -> Node:
+def node(one: layout.NodeOfTree) -> Node:
     """Return a node; its owners count from 0, those of the file from 1."""
     branches = tuple(_branch(way) for way in one.branches)
     owners = tuple(owner - 1 for owner in one.interval_owners)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Final, TypeVar
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.formats.text_files import Found, report
+from fuzzytree.formats.text_files import FileMistake, report
 from fuzzytree.formats.yaml import layout, values
 from fuzzytree.formats.yaml.binding import (
     Entries,
@@ -105,7 +105,7 @@ def places(content: bytes, name: str) -> Locate:
 class _UnreadableError(Exception):
     """What stops a file from being read at all."""
 
-    def __init__(self, *found: Found) -> None:
+    def __init__(self, *found: FileMistake) -> None:
         self.found = found
         super().__init__()
 
@@ -136,7 +136,7 @@ def _kind(root: MappingNode) -> str:
     raise _UnreadableError((place.line, place.column, text))
 
 
-def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
+def _rule_base(root: MappingNode, found: list[FileMistake]) -> RuleBase | None:
     kept = entries(root, RuleBaseFile, found)
     head = record(kept, layout.RuleBaseHead, found)
     semantics = record_at(kept, "semantics", layout.RuleSemantics, found)
@@ -171,13 +171,13 @@ def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
     )  # fmt: skip
 
 
-def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
+def _tree(root: MappingNode, found: list[FileMistake]) -> FuzzyTree | None:
     kept = entries(root, TreeFile, found)
     head = record(kept, layout.TreeHead, found)
     semantics = record_at(kept, "semantics", layout.TreeSemantics, found)
-    questions = records_at(kept, "nodes", layout.Question, found)
+    questions = records_at(kept, "nodes", layout.NodeOfTree, found)
     ends = records_at(kept, "leaves", layout.End, found)
-    groups = records_at(kept, "sets", layout.FittedSets, found)
+    groups = records_at(kept, "sets", layout.SetsOfVariable, found)
     known = _variables(kept, found)
     if questions is not None and ends is not None:
         found += located(root, [*_number_mistakes(questions, ends)])
@@ -224,7 +224,7 @@ M = TypeVar("M", RuleBase, FuzzyTree)
 
 
 def _built(
-    build: Callable[[], M], root: Node, found: list[Found], broken: set[Path]
+    build: Callable[[], M], root: Node, found: list[FileMistake], broken: set[Path]
 ) -> M | None:
     """Return the model, or None after adding what is wrong with it."""
     try:
@@ -239,7 +239,9 @@ def _names_declared(head: layout.Head, *vocabularies: Vocabulary) -> int:
     return len(head.classes) + len(head.columns) + of_variables
 
 
-_READERS: Final[Mapping[str, Callable[[MappingNode, list[Found]], Document | None]]] = {
+_READERS: Final[
+    Mapping[str, Callable[[MappingNode, list[FileMistake]], Document | None]]
+] = {
     "rule base": _rule_base,
     "tree": _tree,
     "system": read_system,
@@ -253,7 +255,7 @@ def _whole(items: list[R | None] | None) -> list[R] | None:
 
 
 def _variables(
-    kept: Entries, found: list[Found]
+    kept: Entries, found: list[FileMistake]
 ) -> tuple[tuple[Variable, ...], set[Path]] | None:
     """Return the variables and which are broken; None if names cannot be known.
 
@@ -290,7 +292,7 @@ def _names(variables: Node, position: int) -> list[str] | None:
 
 
 def _number_mistakes(
-    questions: list[layout.Question | None], ends: list[layout.End | None]
+    questions: list[layout.NodeOfTree | None], ends: list[layout.End | None]
 ) -> Iterator[Mistake]:
     """Compare the numbers that stand in nodes and leaves with their places."""
     for place, node in enumerate(questions, 1):

@@ -45,7 +45,7 @@ Function = Callable[[float], float]
 Error = Callable[[float, float], float]
 
 
-class Piece(NamedTuple):
+class CurvePiece(NamedTuple):
     """A stretch of a curve."""
 
     start: float
@@ -53,7 +53,7 @@ class Piece(NamedTuple):
     error: Error
 
 
-class Plan(NamedTuple):
+class PointPlan(NamedTuple):
     """How points can be placed along a curve.
 
     Attributes:
@@ -65,7 +65,7 @@ class Plan(NamedTuple):
         last: The degree of the last one.
     """
 
-    parts: tuple[Piece | tuple[float, float], ...]
+    parts: tuple[CurvePiece | tuple[float, float], ...]
     tail: float = 0.0
     slack: float = 0.0
     first: float | None = None
@@ -112,7 +112,7 @@ def _meeting(
 _TAIL = 0.99  # tails end a little below the tolerance, so that rounding has room
 
 
-def plan_of(curve: Curve, tolerance: float) -> Plan:
+def plan_of(curve: Curve, tolerance: float) -> PointPlan:
     """Return how points can be placed along a curve that is no points itself.
 
     Raises:
@@ -150,7 +150,7 @@ def plan_of(curve: Curve, tolerance: float) -> Plan:
             raise LossError("it is a formula, of which nothing is known between points")
 
 
-def _pieces(curve: Curve, knots: Iterable[float], slope: Function) -> list[Piece]:
+def _pieces(curve: Curve, knots: Iterable[float], slope: Function) -> list[CurvePiece]:
     """Return the pieces between some places, on each of which the curve bends once."""
 
     def value(x: float) -> float:
@@ -158,7 +158,7 @@ def _pieces(curve: Curve, knots: Iterable[float], slope: Function) -> list[Piece
 
     error = bent(value, slope)
     places = sorted(set(knots))
-    return [Piece(a, b, error) for a, b in itertools.pairwise(places)]
+    return [CurvePiece(a, b, error) for a, b in itertools.pairwise(places)]
 
 
 def _slack(scale: float, knots: Iterable[float], power: float = 1.0) -> float:
@@ -172,7 +172,7 @@ def _slack(scale: float, knots: Iterable[float], power: float = 1.0) -> float:
     return (2.0**-44 + coarse * coarse) * (1.0 + power)
 
 
-def _two_gaussians(curve: Curve, two: TwoGaussians, tail: float) -> Plan:
+def _two_gaussians(curve: Curve, two: TwoGaussians, tail: float) -> PointPlan:
     left, right = two.left, two.right
     below, above = two.left_deviation, two.right_deviation
     reach = math.sqrt(-2.0 * math.log(tail))
@@ -187,7 +187,7 @@ def _two_gaussians(curve: Curve, two: TwoGaussians, tail: float) -> Plan:
         knots += [mean]
         knots += [x for x in (mean - spread, mean + spread) if right < x < left]
         if not start < end:  # nowhere above the tolerance
-            return Plan(((mean, curve_degree(curve, mean)),), tail)
+            return PointPlan(((mean, curve_degree(curve, mean)),), tail)
 
     def slope(x: float) -> float:
         rising = (left - min(x, left)) / below / below
@@ -196,12 +196,12 @@ def _two_gaussians(curve: Curve, two: TwoGaussians, tail: float) -> Plan:
 
     inner = [start, *(x for x in knots if start < x < end), end]
     slack = _slack(min(below, above), [*inner, left, right])
-    return Plan(tuple(_pieces(curve, inner, slope)), tail, slack)
+    return PointPlan(tuple(_pieces(curve, inner, slope)), tail, slack)
 
 
 def _halves(
     curve: Curve, center: float, places: Sequence[float], steepness: Function
-) -> list[Piece]:
+) -> list[CurvePiece]:
     """Return the pieces of a curve that falls alike on both sides of its center."""
     left = [*(center - d for d in places), center]
     right = [center, *(center + d for d in places)]
@@ -211,10 +211,10 @@ def _halves(
     ]
 
 
-def _bell(curve: Bell, tail: float) -> Plan:
+def _bell(curve: Bell, tail: float) -> PointPlan:
     power, width = 2.0 * abs(curve.slope), curve.width
     if power == 0.0:
-        return Plan(((curve.center, 0.5),))
+        return PointPlan(((curve.center, 0.5),))
     sign = math.copysign(1.0, curve.slope)
 
     def steepness(distance: float) -> float:
@@ -228,10 +228,12 @@ def _bell(curve: Bell, tail: float) -> Plan:
         places.append(width * raised((power - 1.0) / (power + 1.0), 1.0 / power))
     inflections = [curve.center + d for d in (0.0, *places[1:])]
     slack = _slack(width, inflections, power)
-    return Plan(tuple(_halves(curve, curve.center, places, steepness)), tail, slack)
+    return PointPlan(
+        tuple(_halves(curve, curve.center, places, steepness)), tail, slack
+    )
 
 
-def _spike(curve: Spike, tail: float) -> Plan:
+def _spike(curve: Spike, tail: float) -> PointPlan:
     rate = 10.0 / curve.width
 
     def steepness(distance: float) -> float:
@@ -240,10 +242,12 @@ def _spike(curve: Spike, tail: float) -> Plan:
     places = [-math.log(tail) / rate]
     ends = [curve.center + places[0], curve.center - places[0]]
     slack = _slack(curve.width / 10.0, ends)
-    return Plan(tuple(_halves(curve, curve.center, places, steepness)), tail, slack)
+    return PointPlan(
+        tuple(_halves(curve, curve.center, places, steepness)), tail, slack
+    )
 
 
-def _cosine(curve: Cosine) -> Plan:
+def _cosine(curve: Cosine) -> PointPlan:
     width = curve.width
 
     def steepness(distance: float) -> float:
@@ -252,13 +256,13 @@ def _cosine(curve: Cosine) -> Plan:
     places = [width / 2.0, width / 4.0]
     ends = [curve.center + places[0], curve.center - places[0]]
     parts = _halves(curve, curve.center, places, steepness)
-    return Plan(tuple(parts), 0.0, _slack(width / 6.0, ends), 0.0, 0.0)
+    return PointPlan(tuple(parts), 0.0, _slack(width / 6.0, ends), 0.0, 0.0)
 
 
-def _sigmoid(curve: Sigmoid, tail: float) -> Plan:
+def _sigmoid(curve: Sigmoid, tail: float) -> PointPlan:
     center, rate = curve.inflection, curve.slope
     if rate == 0.0:
-        return Plan(((center, 0.5),))
+        return PointPlan(((center, 0.5),))
 
     def slope(x: float) -> float:
         small = math.exp(-abs(rate * (x - center)))
@@ -267,10 +271,10 @@ def _sigmoid(curve: Sigmoid, tail: float) -> Plan:
     reach = math.log(1.0 / tail - 1.0) / abs(rate)
     knots = [center - reach, center, center + reach]
     slack = _slack(1.0 / abs(rate), knots)
-    return Plan(tuple(_pieces(curve, knots, slope)), tail, slack)
+    return PointPlan(tuple(_pieces(curve, knots, slope)), tail, slack)
 
 
-def _s_pieces(curve: Curve, start: float, end: float) -> tuple[list[Piece], float]:
+def _s_pieces(curve: Curve, start: float, end: float) -> tuple[list[CurvePiece], float]:
     """Return the pieces of an S from one value to another, and its slack.
 
     In the middle the bend jumps to the other side: a middle that is rounded moves a
@@ -288,34 +292,34 @@ def _s_pieces(curve: Curve, start: float, end: float) -> tuple[list[Piece], floa
     return _pieces(curve, knots, slope), 2.0**-44 + coarse
 
 
-def _s(curve: SCurve) -> Plan:
+def _s(curve: SCurve) -> PointPlan:
     if curve.start == curve.end:
-        return Plan(((curve.start, 0.0), (curve.start, 1.0)))
+        return PointPlan(((curve.start, 0.0), (curve.start, 1.0)))
     parts, slack = _s_pieces(curve, curve.start, curve.end)
-    return Plan(tuple(parts), 0.0, slack)
+    return PointPlan(tuple(parts), 0.0, slack)
 
 
-def _pi(curve: PiCurve) -> Plan:
+def _pi(curve: PiCurve) -> PointPlan:
     a, b, c, d = curve.a, curve.b, curve.c, curve.d
     if a == d:
-        return Plan(((a, 0.0),))
-    parts: list[Piece | tuple[float, float]] = [(a, 0.0), (a, 1.0)]
+        return PointPlan(((a, 0.0),))
+    parts: list[CurvePiece | tuple[float, float]] = [(a, 0.0), (a, 1.0)]
     slack = 0.0
     if a < b:
         rising, slack = _s_pieces(curve, a, b)
         parts = [*rising]
     if c == d:
-        return Plan((*parts, (c, 1.0), (c, 0.0)), 0.0, slack)
+        return PointPlan((*parts, (c, 1.0), (c, 0.0)), 0.0, slack)
     falling, more = _s_pieces(curve, d, c)
-    return Plan((*parts, *falling), 0.0, max(slack, more))
+    return PointPlan((*parts, *falling), 0.0, max(slack, more))
 
 
-def _concave(curve: Concave, tail: float) -> Plan:
+def _concave(curve: Concave, tail: float) -> PointPlan:
     end = curve.end
     width = end - curve.inflection
     if width == 0.0:
         before = math.nextafter(end, -math.inf)
-        return Plan(((before, 0.0), (before, 1.0)))
+        return PointPlan(((before, 0.0), (before, 1.0)))
 
     def slope(x: float) -> float:
         degree = curve_degree(curve, x)
@@ -323,10 +327,10 @@ def _concave(curve: Concave, tail: float) -> Plan:
 
     knots = [end, end - width * (1.0 / tail - 1.0)]
     slack = _slack(abs(width), knots)
-    return Plan(tuple(_pieces(curve, knots, slope)), tail, slack)
+    return PointPlan(tuple(_pieces(curve, knots, slope)), tail, slack)
 
 
-def _arc(curve: Arc) -> Plan:
+def _arc(curve: Arc) -> PointPlan:
     start, end = curve.start, curve.end
     width = end - start
     if width == 0.0:
@@ -337,21 +341,23 @@ def _arc(curve: Arc) -> Plan:
         return math.inf if u <= 0.0 else (1.0 - u) / math.sqrt(u * (2.0 - u)) / width
 
     knots = [start, end]
-    return Plan(tuple(_pieces(curve, knots, slope)), 0.0, _slack(abs(width), knots))
+    return PointPlan(
+        tuple(_pieces(curve, knots, slope)), 0.0, _slack(abs(width), knots)
+    )
 
 
-def _semi_ellipse(curve: SemiEllipse) -> Plan:
+def _semi_ellipse(curve: SemiEllipse) -> PointPlan:
     start, end = curve.start, curve.end
     width = end - start
     if not width > 0.0:
-        return Plan(((start, 0.0),))
+        return PointPlan(((start, 0.0),))
 
     def slope(x: float) -> float:
         p, q = (x - start) / width, (end - x) / width
         return (q - p) / math.sqrt(p * q) / width if p * q > 0.0 else math.inf
 
     knots = [start, start + width / 2.0, end]
-    return Plan(tuple(_pieces(curve, knots, slope)), 0.0, _slack(width, knots))
+    return PointPlan(tuple(_pieces(curve, knots, slope)), 0.0, _slack(width, knots))
 
 
 _EXTREME = math.log(2.0 + math.sqrt(3.0))
@@ -373,7 +379,9 @@ class _Range(NamedTuple):
         return _Range(self.low + other.low, self.high + other.high)
 
 
-def sigmoid_plan(curve: SigmoidDifference | SigmoidProduct, tolerance: float) -> Plan:
+def sigmoid_plan(
+    curve: SigmoidDifference | SigmoidProduct, tolerance: float
+) -> PointPlan:
     """Return how points can be placed along two sigmoids.
 
     Where each sigmoid is within an eighth of the tolerance of 0 or 1, and so on for
@@ -382,7 +390,7 @@ def sigmoid_plan(curve: SigmoidDifference | SigmoidProduct, tolerance: float) ->
     pair = [one for one in (curve.first, curve.second) if one.slope != 0.0]
     if not pair:
         x = curve.first.inflection
-        return Plan(((x, curve_degree(curve, x)),))
+        return PointPlan(((x, curve_degree(curve, x)),))
     reach = math.log(8.0 / tolerance)
     start = min(one.inflection - reach / abs(one.slope) for one in pair)
     end = max(one.inflection + reach / abs(one.slope) for one in pair)
@@ -393,10 +401,10 @@ def sigmoid_plan(curve: SigmoidDifference | SigmoidProduct, tolerance: float) ->
             knots.add(edge)
     error = _error(curve)
     places = sorted(knots)
-    parts = [Piece(a, b, error) for a, b in itertools.pairwise(places)]
+    parts = [CurvePiece(a, b, error) for a, b in itertools.pairwise(places)]
     steepness = sum(abs(one.slope) for one in pair) / 4.0
     slack = 2.0**-44 + 16.0 * math.ulp(max(map(abs, places))) * steepness
-    return Plan(tuple(parts), tolerance / 2.0, slack)
+    return PointPlan(tuple(parts), tolerance / 2.0, slack)
 
 
 def _crossing(first: Sigmoid, second: Sigmoid) -> float | None:

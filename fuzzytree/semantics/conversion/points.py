@@ -49,7 +49,7 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.numerics.curves import BELOW_ONE
 from fuzzytree.numerics.placing import points_of
-from fuzzytree.semantics.conversion.point_plans import Piece, Plan, plan_of
+from fuzzytree.semantics.conversion.point_plans import CurvePiece, PointPlan, plan_of
 from fuzzytree.semantics.inference.membership import curve_degree
 
 EXACT = 2.0**-52
@@ -173,7 +173,7 @@ class _Change:
         return found.points
 
 
-class Found(NamedTuple):
+class PlacedPoints(NamedTuple):
     """Points in the place of a curve."""
 
     points: Points
@@ -181,7 +181,7 @@ class Found(NamedTuple):
     tail: str = ""
 
 
-def points_for(curve: Curve, tolerance: float) -> Found:
+def points_for(curve: Curve, tolerance: float) -> PlacedPoints:
     """Return points in the place of a curve, and how far they can be off.
 
     Raises:
@@ -198,10 +198,10 @@ def points_for(curve: Curve, tolerance: float) -> Found:
     tolerance = min(tolerance, 0.5)  # half of all degrees: no plan needs more
     shape = shape_of(curve)
     if isinstance(shape, Points):
-        return Found(shape, 0.0)
+        return PlacedPoints(shape, 0.0)
     if shape is not None:
         straight = straight_points(shape) if isinstance(shape, Band) else None
-        return Found(*(straight or points_of(shape, tolerance)))
+        return PlacedPoints(*(straight or points_of(shape, tolerance)))
     return _placed(curve, plan_of(curve, tolerance), tolerance)
 
 
@@ -247,7 +247,7 @@ def straight_points(band: Band) -> tuple[Points, float] | None:
     return Points(values, degrees), bound
 
 
-def _placed(curve: Curve, plan: Plan, tolerance: float) -> Found:
+def _placed(curve: Curve, plan: PointPlan, tolerance: float) -> PlacedPoints:
     """Return points along the pieces of a curve."""
     room = (tolerance - plan.slack) / _ROUNDING
     if not room > plan.tail:
@@ -255,7 +255,7 @@ def _placed(curve: Curve, plan: Plan, tolerance: float) -> Found:
     points: list[tuple[float, float]] = []
     worst = plan.tail
     for part in plan.parts:
-        if isinstance(part, Piece):
+        if isinstance(part, CurvePiece):
             if not points or points[-1][0] != part.start:
                 points.append((part.start, curve_degree(curve, part.start)))
             for place, error in _march(part, room, MOST_POINTS - len(points)):
@@ -275,16 +275,16 @@ def _placed(curve: Curve, plan: Plan, tolerance: float) -> Found:
     if not all(map(math.isfinite, values)) or math.isinf(values[-1] - values[0]):
         raise LossError("it reaches beyond the largest double")
     bound = worst * _ROUNDING + plan.slack
-    return Found(Points(values, degrees), bound, _tail_text(degrees, plan))
+    return PlacedPoints(Points(values, degrees), bound, _tail_text(degrees, plan))
 
 
-def _tail_text(degrees: Sequence[float], plan: Plan) -> str:
+def _tail_text(degrees: Sequence[float], plan: PointPlan) -> str:
     if plan.tail == 0.0:
         return ""
     return f"before them it stays at {degrees[0]:.2g}, after them at {degrees[-1]:.2g}"
 
 
-def _march(piece: Piece, room: float, most: int) -> Iterator[tuple[float, float]]:
+def _march(piece: CurvePiece, room: float, most: int) -> Iterator[tuple[float, float]]:
     """Yield where the next point of a piece stands, and the error before it."""
     place, end = piece.start, piece.end
     stuck = 0

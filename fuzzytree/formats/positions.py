@@ -1,7 +1,4 @@
-"""Where the parts of a system stand in a file, for formats that hold systems alone.
-
-A reader keeps what it made each part of, and makes spots of it only when asked.
-"""
+"""Where the parts of a fuzzy system stand in a file."""
 
 from __future__ import annotations
 
@@ -10,51 +7,49 @@ from typing import NamedTuple
 
 import msgspec
 
-from fuzzytree.formats.text_files import Found
+from fuzzytree.formats.text_files import FileMistake, Position
 from fuzzytree.model.rulebase import Mistake, Path
 from fuzzytree.semantics.conversion.facts import numbers_of, places_of
 
-Spot = tuple[int, int]
-"""A line and a column, from 1."""
 
-
-class Group(NamedTuple):
+class PositionGroup(NamedTuple):
     """Where a variable or a block stands, and its terms or rules."""
 
-    head: Spot
-    parts: tuple[Spot, ...]
+    head: Position
+    parts: tuple[Position, ...]
 
 
-class Spots(msgspec.Struct, frozen=True, gc=False):
+class Positions(msgspec.Struct, frozen=True, gc=False):
     """Where the parts of a system stand.
 
     Attributes:
         inputs: Each input with its terms.
         outputs: Each output with its terms.
         blocks: Each block with its rules.
-        rules: Where the file stands for a rule base: for each rule the place of the
-            rule of the system that holds it, over all blocks.
-        variables: Likewise for each variable the place of the input, None if the file
+        rules: If the file represents a rule base: for each rule the index of the
+            system's rule that contains it, over all blocks.
+        variables: Likewise for each variable the index of the input, None if the file
             does not have it.
     """
 
-    inputs: tuple[Group, ...]
-    outputs: tuple[Group, ...]
-    blocks: tuple[Group, ...]
+    inputs: tuple[PositionGroup, ...]
+    outputs: tuple[PositionGroup, ...]
+    blocks: tuple[PositionGroup, ...]
     rules: tuple[int, ...] = ()
     variables: tuple[int | None, ...] = ()
 
-    def find(self, path: Path) -> Spot | None:
+    def find(self, path: Path) -> Position | None:
         """Return where a part of the system, or of its rule base, stands.
 
         Example:
-            >>> spots = Spots((), (), (Group((3, 1), ((4, 7), (5, 7))),))
-            >>> spots.find(("blocks", 0, "rules", 1, "when")), spots.find(("name",))
-            ((5, 7), None)
+            >>> block = PositionGroup((3, 1), ((4, 7), (5, 7)))
+            >>> positions = Positions((), (), (block,))
+            >>> positions.find(("blocks", 0, "rules", 1, "when"))
+            (5, 7)
         """
         match path:
             case ("rules", int(place), *_):
-                every = [spot for block in self.blocks for spot in block.parts]
+                every = [position for block in self.blocks for position in block.parts]
                 return every[self.rules[place] if self.rules else place]
             case ("variables", int(place), *rest):
                 found = self.variables[place] if self.variables else place
@@ -62,7 +57,7 @@ class Spots(msgspec.Struct, frozen=True, gc=False):
                     return None
                 return self.find(in_system(("variables", found, *rest)))
             case (("inputs" | "outputs" | "blocks") as field, int(place), *rest):
-                group: Group = getattr(self, field)[place]
+                group: PositionGroup = getattr(self, field)[place]
             case _:
                 return None
         match rest:
@@ -71,13 +66,13 @@ class Spots(msgspec.Struct, frozen=True, gc=False):
             case _:
                 return group.head
 
-    def placed(self, mistakes: Iterable[Mistake]) -> Iterator[Found]:
+    def placed(self, mistakes: Iterable[Mistake]) -> Iterator[FileMistake]:
         """Yield what is wrong with the system where it stands."""
         for path, sentence in mistakes:
             line, column = self.find(path) or (1, 1)
             yield line, column, sentence
 
-    def of_facts(self, facts: str | None) -> Spots:
+    def of_facts(self, facts: str | None) -> Positions:
         """Return the same for a file that stands for the rule base of its facts."""
         if facts is None:
             return self
