@@ -2,9 +2,9 @@
 
 A format is a module here with a constant `FORMAT` (see
 `fuzzytree.model.contracts.Format`) and a line in `TABLE`; `docs/how-to/add-a-format.md`
-shows how to add one. Packages of others offer theirs by the entry point group
-`fuzzytree.formats`. A module is imported when its format is asked for, and a package of
-others only for a format that is not ours.
+shows how to add one. Third-party packages offer theirs by the entry point group
+`fuzzytree.formats`. A module is imported when its format is used, and a third-party
+package only for a format that this table lacks.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ def find_format(name: str) -> Format:
             return _load(known)
     from fuzzytree.exporters.plugins import Plugin, find_plugin, plugin_names
 
-    found = find_plugin(wanted)
-    if isinstance(found, Plugin) and found.format is not None:
-        return found.format
-    if isinstance(found, Plugin):
-        raise ValueError(f"the format {name!r} cannot be used: {found.fault}")
+    plugin = find_plugin(wanted)
+    if isinstance(plugin, Plugin) and plugin.format is not None:
+        return plugin.format
+    if isinstance(plugin, Plugin):
+        raise ValueError(f"the format {name!r} cannot be used: {plugin.fault}")
     names = [*TABLE, *plugin_names()]
     every = [suffix for suffixes in TABLE.values() for suffix in suffixes]
     pool = every if name.startswith(".") else names
@@ -74,7 +74,7 @@ def find_format(name: str) -> Format:
 
 
 def all_formats() -> tuple[Format, ...]:
-    """Return every format of the table, in its order, and none of others."""
+    """Return every format of the table, in its order, without third-party ones."""
     return tuple(map(_load, TABLE))
 
 

@@ -30,7 +30,7 @@ from fuzzytree.exporters.c_text import (
     remark,
     whole_table,
 )
-from fuzzytree.exporters.c_tree import CTreeTest, questions_of, tree_code
+from fuzzytree.exporters.c_tree import CTreeTest, cut_tests, tree_code
 from fuzzytree.exporters.reference_tables import places_of
 from fuzzytree.model.contracts import Document, Format, Model, Written
 from fuzzytree.model.losses import narrowing_refusal
@@ -162,20 +162,20 @@ def write(
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)
-    made = CFile(model, _NUMBERS[dtype], prefix)
-    return Written("".join(made.text()).encode("ascii"), lost)
+    code = CFile(model, _NUMBERS[dtype], prefix)
+    return Written("".join(code.text()).encode("ascii"), lost)
 
 
-def beginning(own: str, asked: str | None) -> str:
+def beginning(own: str, name: str | None) -> str:
     """Return the beginning of all names in a file.
 
     Raises:
-        ValueError: If it is asked for and no beginning of names in C.
+        ValueError: If the name is given and cannot begin names in C.
     """
-    prefix = prefix_of(own if asked is None else asked)
-    if asked is not None and prefix != asked:
+    prefix = prefix_of(own if name is None else name)
+    if name is not None and prefix != name:
         raise ValueError(
-            f"the name {asked!r} cannot begin the names of C; {prefix!r} can"
+            f"the name {name!r} cannot begin the names of C; {prefix!r} can"
         )
     return prefix
 
@@ -217,12 +217,12 @@ class CFile:
     def __init__(self, model: Model, numbers: CNumbers, prefix: str) -> None:
         self.model, self.numbers, self.prefix = model, numbers, prefix
         self.line = places_of(model.variables)
-        self.asked: list[CTreeTest] = []
+        self.tests: list[CTreeTest] = []
         self.tables: Tables | None = None
         if isinstance(model, RuleBase):
             self.tables = tables_of(model, self.line, numbers)
         else:
-            self.asked = questions_of(model, self.line)
+            self.tests = cut_tests(model, self.line)
 
     def text(self) -> Iterator[str]:
         """Yield the file."""
@@ -230,7 +230,7 @@ class CFile:
         yield from self.declarations()
         yield from self.definitions(is_arithmetic=mixed or self.tables is not None)
         yield from selftest_code(
-            examples_of(self.model, self.asked, self.tables, self.line, self.numbers),
+            examples_of(self.model, self.tests, self.tables, self.line, self.numbers),
             self.numbers,
             self.prefix,
             has_strengths=self.tables is not None,
@@ -279,11 +279,11 @@ class CFile:
 
     def _defaults(self) -> Iterator[str]:
         semantics = self.model.semantics
-        given = {"MISSING": semantics.missing}
+        defaults = {"MISSING": semantics.missing}
         if self.tables is not None:
-            given["UNCOVERED"] = semantics.uncovered
+            defaults["UNCOVERED"] = semantics.uncovered
         yield "\n/* The class where a value is missing, or no rule fires. */\n"
-        for word, label in given.items():
+        for word, label in defaults.items():
             yield self._fill(
                 f"#define NAME_WHEN_{word} {number_of(label, self.model)}\n"
             )

@@ -322,7 +322,7 @@ def _data(tables: Tables, numbers: CNumbers, prefix: str) -> Iterator[str]:
         ("term_first", tables.term_first, "Where each term begins among them."),
         ("clause_first", tables.clause_first, "Where the terms of a clause begin."),
         ("clause_term", tables.clause_term, "The terms of all clauses."),
-        ("clause_line", tables.clause_line, "The value that a clause asks about."),
+        ("clause_line", tables.clause_line, "The value that each clause tests."),
         ("negated", tables.negated if any(tables.negated) else None, "1: is not."),
         ("clause", places.clause, "Beginnings of rules, in order: the last clause,"),
         ("depth", places.depth, "how many there are,"),

@@ -51,7 +51,7 @@ class Example(msgspec.Struct, frozen=True):
 
 def examples_of(
     model: Model,
-    asked: Sequence[CTreeTest],
+    tests: Sequence[CTreeTest],
     tables: Tables | None,
     line: Mapping[str, int],
     numbers: CNumbers,
@@ -62,14 +62,16 @@ def examples_of(
     for row in rows:
         if numbers.kind is np.float64:
             given = row
-            answer = _reference(model, given)
+            prediction = _reference(model, given)
         else:
             given = {name: _as_float(value) for name, value in row.items()}
-            answer = _computed(model, asked, tables, line, numbers, given)
-        label = number_of(answer.label, model)
-        digest = digest_of(answer.strengths, numbers)
+            prediction = _computed(model, tests, tables, line, numbers, given)
+        label = number_of(prediction.label, model)
+        digest = digest_of(prediction.strengths, numbers)
         values = tuple(given[name] for name in model.inputs)
-        found.append(Example(values, label, answer.rule, int(answer.status), digest))
+        found.append(
+            Example(values, label, prediction.rule, int(prediction.status), digest)
+        )
     return found
 
 
@@ -89,7 +91,7 @@ def _reference(model: Model, row: Row) -> Answer:
 
 def _computed(
     model: Model,
-    asked: Sequence[CTreeTest],
+    tests: Sequence[CTreeTest],
     tables: Tables | None,
     line: Mapping[str, int],
     numbers: CNumbers,
@@ -101,7 +103,7 @@ def _computed(
     if isinstance(model, FuzzyTree) or tables is None:
         if values is None:
             return Answer(0, model.semantics.missing, Status.MISSING)
-        rule = leaf(asked, values, numbers)
+        rule = leaf(tests, values, numbers)
         labels = model.leaves if isinstance(model, FuzzyTree) else ()
         return Answer(rule, labels[rule - 1].label, Status.DECIDED)
     if values is None:
@@ -270,14 +272,14 @@ def axis_values(
     return found if all(map(np.isfinite, found)) else None
 
 
-def leaf(asked: Sequence[CTreeTest], values: Sequence[Real], numbers: CNumbers) -> int:
+def leaf(tests: Sequence[CTreeTest], values: Sequence[Real], numbers: CNumbers) -> int:
     """Return the number of the leaf that a walk arrives at, from 1."""
     place = 0
-    while place < len(asked):
-        one = asked[place]
+    while place < len(tests):
+        one = tests[place]
         (cut,) = numbers.nearest([one.cut])
         place = one.yes if values[one.line] > numbers.kind(cut) else one.no
-    return place - len(asked) + 1
+    return place - len(tests) + 1
 
 
 @np.errstate(all="ignore")

@@ -51,7 +51,7 @@ class Tables:
         count: How many coefficients or points it has.
         first: Where its numbers begin.
         term_first: Where the atoms of each term begin; one more entry than terms.
-        clause_line: The value that each clause asks about.
+        clause_line: The value that each clause tests.
         clause_first: Where the terms of each clause begin; one more entry.
         clause_term: The terms of all clauses.
         negated: 1 where a clause is negated.

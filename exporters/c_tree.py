@@ -1,4 +1,4 @@
-"""A tree as C: a table of questions `x > cut` and a walk through it."""
+"""A tree as C: a table of tests `x > cut` and a walk through it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ from fuzzytree.model.tree import FuzzyTree, Node
 class CTreeTest:
     """Whether a value lies above a cut, and where no and yes lead.
 
-    A place below the number of questions is a question, and k places behind is leaf
-    k + 1.
+    A place below the number of tests is a test, and k places behind is leaf k + 1.
     """
 
     line: int
@@ -30,10 +29,10 @@ class CTreeTest:
     yes: int
 
 
-def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[CTreeTest]:
-    """Return the questions of a tree; the first is asked first.
+def cut_tests(tree: FuzzyTree, line: Mapping[str, int]) -> list[CTreeTest]:
+    """Return the tests of a tree; the first is that of the root.
 
-    A node of several cuts becomes several questions, by halves.
+    A node of several cuts becomes several tests, by halves.
     """
     starts, count = [0], 0
     for node in tree.nodes:
@@ -51,18 +50,18 @@ def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[CTreeTest]:
 
 
 def _halved(node: Node, line: int, ends: list[int], start: int) -> list[CTreeTest]:
-    """Return a node's questions, numbered from `start`, each half behind its whole."""
+    """Return a node's tests, numbered from `start`, each half behind its whole."""
 
-    def lay(first: int, last: int, place: int) -> list[CTreeTest]:
+    def arrange(first: int, last: int, place: int) -> list[CTreeTest]:
         middle = (first + last) // 2
-        left = lay(first, middle, place + 1) if first < middle else []
+        left = arrange(first, middle, place + 1) if first < middle else []
         behind = place + 1 + len(left)
-        right = lay(middle + 1, last, behind) if middle + 1 < last else []
+        right = arrange(middle + 1, last, behind) if middle + 1 < last else []
         no = place + 1 if left else ends[first]
         yes = behind if right else ends[last]
         return [CTreeTest(line, node.cuts[middle], no, yes), *left, *right]
 
-    return lay(0, len(node.cuts), start)
+    return arrange(0, len(node.cuts), start)
 
 
 _WALK = """
@@ -83,7 +82,7 @@ TAKE_AXES
 """
 
 _TABLES = """\
-/* Is the value at `line` above the cut? No and yes lead to the next two: a question, or
+/* Is the value at `line` above the cut? No and yes lead to the next two: a test, or
  * NAME_QUESTIONS + leaf - 1. And the class of each leaf. */
 static const struct {
 """
@@ -109,18 +108,18 @@ def tree_code(
     axes: str,
 ) -> Iterator[str]:
     """Yield the tables of a tree and the function that walks through them."""
-    asked = questions_of(tree, line)
+    tests = cut_tests(tree, line)
     numbered = {label: place for place, label in enumerate(tree.classes)}
     labels = [numbered[leaf.label] for leaf in tree.leaves]
-    if not asked:
+    if not tests:
         plain = axes.replace("    const name_real *value = x;\n", "")
         text = _ONE_LEAF.replace("LABEL", str(labels[0]))
         yield fill(text.replace("TAKE_AXES\n", plain), prefix)
         return
-    ends = [place for question in asked for place in (question.no, question.yes)]
-    lines = [question.line for question in asked]
-    cuts = numbers.nearest([question.cut for question in asked])
-    yield fill(f"#define NAME_QUESTIONS {len(asked)}u\n\n", prefix)
+    ends = [place for test in tests for place in (test.no, test.yes)]
+    lines = [test.line for test in tests]
+    cuts = numbers.nearest([test.cut for test in tests])
+    yield fill(f"#define NAME_QUESTIONS {len(tests)}u\n\n", prefix)
     yield fill(_TABLES, prefix)
     for name, values in (("line", lines), ("next", ends), ("label", labels)):
         yield f"    {integer_type(max(values))} {name}[{len(values)}];\n"
@@ -129,6 +128,6 @@ def tree_code(
     for values in (lines, ends, labels):
         yield from ("    {\n", *whole_lines(values), "    },\n")
     yield from ("    {\n", *real_lines(cuts, numbers), "    }\n};\n")
-    kind = place_type(2 * len(asked) + len(labels))
+    kind = place_type(2 * len(tests) + len(labels))
     walk = _WALK.replace("PLACE_TYPE", kind).replace("TAKE_AXES\n", axes)
     yield fill(walk, prefix)

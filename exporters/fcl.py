@@ -66,9 +66,9 @@ def write(
 
     Args:
         model: The model.
-        allow_loss: Whether to write what the dialect cannot hold as near as it can.
+        allow_loss: Whether to write what the dialect cannot express as near as it can.
         dialect: `portable` is read alike by fuzzylite 6, jFuzzyLogic and JFML.
-        scores: What the outputs say of a rule base: a score for each rule (`rule`) or
+        scores: What the outputs of a rule base are: a score for each rule (`rule`) or
             class (`class`); see `fuzzytree.semantics.conversion.scores`.
         tolerance: The largest error of a degree where points stand for a curve.
         checklist: Whether the standard's data check list is added as comments.
@@ -76,7 +76,7 @@ def write(
     Raises:
         LossError: If something would be lost, unless allowed; and always if rules,
             terms or methods have no place in the dialect.
-        ValueError: If scores are asked for, and the model is a system.
+        ValueError: If `scores` is set, and the model is a system.
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
@@ -209,7 +209,7 @@ def _refused(system: FuzzySystem, words: FclWords) -> FuzzySystem:
             except LossError as error:
                 reasons.append(f"rule block {k}: {error}")
     if any(rule.when is None for rule in system.rules) and not system.inputs:
-        reasons.append("a rule without a condition needs an input that it can ask")
+        reasons.append("a rule without a condition needs an input to test")
     refuse(system.name, "fcl", reasons)
     return replace(system, blocks=tuple(blocks))
 
@@ -320,7 +320,7 @@ FORMAT = Format(
         "polynomial flanks and LR sets; they become points",
         "the strongest rule alone; each rule has a score, and the highest one wins",
         "how many values of a range are looked at",
-        "inputs that are held in their range",
+        "inputs that are clamped to their range",
         "portable: outputs with curves, hedges, more than one form of ACCU",
     ),
     dtype="float64",

@@ -1,6 +1,6 @@
 """The data check list of IEC 61131-7: what a controller must be able to do for a model.
 
-The standard asks each vendor to state it, and divides models into three classes:
+The standard requires each vendor to state it, and divides models into three classes:
 *Basic*, *Extension* and *Open*.
 """
 

@@ -34,7 +34,7 @@ from fuzzytree.semantics.conversion import number_losses
 def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
     """Return a system whose rules all have a condition.
 
-    One that has none asks whether the first input is a term of degree 1 everywhere.
+    A rule without one tests the first input for a term of degree 1 everywhere.
     """
     rules = [rule for block in system.blocks for rule in block.rules]
     is_needed = any(rule.when is None for rule in rules)
@@ -101,7 +101,7 @@ def _text(rule: SystemRule, words: FclWords, speak: Speak, always: str) -> str:
     says = str.lower if words.is_lower else str.upper
     when = always if rule.when is None else _condition(rule.when, speak, says)
     then = words.joiner.join(
-        _asked(Is(one.output, one.label), speak, says) for one in rule.then
+        _proposition(Is(one.output, one.label), speak, says) for one in rule.then
     )
     weight = "" if rule.weight == 1.0 else f"{says(' with ')}{float(rule.weight)!r}"
     return f"{says('if ')}{when}{says(' then ')}{then}{weight};"
@@ -116,7 +116,7 @@ def _condition(
     """
     match condition:
         case Is():
-            return _asked(condition, speak, says)
+            return _proposition(condition, speak, says)
         case Not(part=part):
             return f"{says('not ')}({_condition(part, speak, says)})"
         case And(parts=parts) | Or(parts=parts):
@@ -126,7 +126,7 @@ def _condition(
             return f"({text})" if level and len(parts) > 1 else text
 
 
-def _asked(one: Is, speak: Speak, says: Callable[[str], str]) -> str:
+def _proposition(one: Is, speak: Speak, says: Callable[[str], str]) -> str:
     name, term = speak(one.variable, one.label)
     nots = one.hedges.count("not")
     text = f"{name}{says(' is not ' if nots else ' is ')}{term}"
@@ -168,10 +168,10 @@ def rule_losses(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
             names = ", ".join(map(repr, [*unknown, *then]))
             what = f"the dialect {words.name} has no {names}: left out"
             yield Loss(f"rule {number}", what)
-        asked = {one.variable for one in questions(rule.when)} & outputs
-        if asked:
-            names = ", ".join(map(repr, sorted(asked)))
-            what = f"engines ask the value of {names}, and not how far it is concluded"
+        tested = {one.variable for one in questions(rule.when)} & outputs
+        if tested:
+            names = ", ".join(map(repr, sorted(tested)))
+            what = f"engines test the value of {names}, and not how far it is concluded"
             yield Loss(f"rule {number}", what)
 
 
@@ -184,10 +184,12 @@ def norm_losses(block: RuleBlock, number: int, words: FclWords) -> Iterator[str]
         yield f"{where}: the dialect {words.name} has no AND {block.conjunction!r}"
     if uses_or and block.disjunction not in words.ors:
         yield f"{where}: the dialect {words.name} has no OR {block.disjunction!r}"
-    asked = [one for rule in block.rules for one in questions(rule.when)]
-    if not words.has_hedges and any(one.label is None for one in asked):
+    propositions = [one for rule in block.rules for one in questions(rule.when)]
+    if not words.has_hedges and any(one.label is None for one in propositions):
         yield f"{where}: the dialect {words.name} has no 'any'"
-    if words.name == "portable" and any(one.hedges.count("not") > 1 for one in asked):
+    if words.name == "portable" and any(
+        one.hedges.count("not") > 1 for one in propositions
+    ):
         yield f"{where}: the dialect portable has one 'not' in front of a term"
     if block.activation.method != "general":
         yield (
@@ -201,7 +203,7 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
     default = DEFUZZIFIERS[words.name]
     for one in system.inputs:
         if one.clips:
-            yield Loss(f"input {one.name!r}", "its values are not held in its range")
+            yield Loss(f"input {one.name!r}", "its values are not clamped to its range")
     for output in system.outputs:
         where = f"output {output.name!r}"
         how = output.defuzzifier
@@ -211,11 +213,11 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
         ):
             yield Loss(
                 where,
-                f"{how.samples} values of its range are looked at; FCL does not say "
+                f"{how.samples} values of its range are sampled; FCL does not say "
                 f"how many, {words.name} means {default.samples}",
             )
         if output.clips and words.name != "fuzzylite":
-            yield Loss(where, "its answer is not held in its range")
+            yield Loss(where, "its value is not clamped to its range")
         if not _says_nothing(output, words) and not _is_always_concluded(
             output, system
         ):
@@ -255,12 +257,12 @@ def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
     for rule in system.rules:
         if rule.weight == 0.0 or output.name not in {one.output for one in rule.then}:
             continue
-        asked = list(questions(rule.when))
+        propositions = list(questions(rule.when))
         if all(
             (one.variable, one.label) in constants or one.hedges == ("any",)
-            for one in asked
+            for one in propositions
         ):
-            return not any(one.hedges and one.label for one in asked)
+            return not any(one.hedges and one.label for one in propositions)
     return False
 
 

@@ -1,7 +1,7 @@
 """FIS: rule bases and systems for MATLAB, Octave's fuzzy-logic-toolkit and fuzzylite.
 
-`docs/reference/fis.md` describes the file. A rule asks every input at most once and all
-of them by `and` or all by `or`: what a model asks otherwise becomes terms of its own
+`docs/reference/fis.md` describes the file. A rule tests every input at most once and
+joins all of them by `and` or all by `or`: other conditions become terms of their own
 (`fuzzytree.exporters.fis_rules`), or the file is not written.
 """
 
@@ -88,7 +88,7 @@ def write(
     Args:
         model: The model. Of a rule base each rule has a score, see
             `fuzzytree.semantics.conversion.scores`.
-        allow_loss: Whether to write what FIS cannot hold as near as it can.
+        allow_loss: Whether to write what FIS cannot express as near as it can.
         dialect: For whom the file is: `matlab`, `octave` or `fuzzylite`.
         tolerance: The largest error of a degree where points stand for a curve.
         curves: `standard` counts lists of points, `discretemf`, as a loss: MATLAB and
@@ -204,7 +204,7 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
         ):
             yield Loss(
                 where,
-                f"its curve is looked at in {how.samples} values ({how.grid}), and FIS "
+                f"its curve is sampled at {how.samples} values ({how.grid}), and FIS "
                 f"does not say so; {dialect} takes {usual.samples} ({usual.grid})",
             )
         if output.aggregation != first.aggregation:
@@ -397,10 +397,10 @@ def _range(
 
 
 def _rule(line: FisRule, system: FuzzySystem) -> str:
-    asked = " ".join(line.asked.get(one.name, "0") for one in system.inputs)
+    codes = " ".join(line.codes.get(one.name, "0") for one in system.inputs)
     concluded = " ".join(line.concluded.get(one.name, "0") for one in system.outputs)
     connection = 2 if line.is_or else 1
-    return f"{asked}, {concluded} ({line.weight!r}) : {connection}"
+    return f"{codes}, {concluded} ({line.weight!r}) : {connection}"
 
 
 FORMAT = Format(
@@ -412,7 +412,7 @@ FORMAT = Format(
     places=places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
-        "maximum; a rule that asks an output",
+        "maximum; a rule that tests an output",
         "several blocks of rules, defuzzifiers or aggregations",
         "combinations of inputs: each becomes an input",
         "an answer where no rule fires",

@@ -1,6 +1,6 @@
 """Conditions as FIS says them: a number for each input, all joined by and or by or.
 
-What asks an input more than once becomes one term of that input: the least or the
+Several propositions on one input become one term of that input: the least or the
 greatest of the degrees at each value, which is exact but for rounding, or their
 product within a tolerance.
 """
@@ -43,7 +43,7 @@ EVERYWHERE: Final = Points((0.0,), (1.0,))
 class FisRule(msgspec.Struct, frozen=True):
     """A rule: the codes of its inputs and outputs by name, and how it is joined."""
 
-    asked: Mapping[str, str]
+    codes: Mapping[str, str]
     concluded: Mapping[str, str]
     weight: float
     is_or: bool = False
@@ -66,9 +66,11 @@ class FisTerms:
         return names.index(label) + 1
 
     def everywhere(self) -> dict[str, str]:
-        """Return a question that always holds."""
+        """Return a condition that is always true."""
         if not self.inputs:
-            raise LossError("it asks nothing, and there is no input that it could ask")
+            raise LossError(
+                "it has no condition, and there is no input that it could test"
+            )
         first = next(iter(self.inputs))
         if self.dialect == "fuzzylite":
             return {first: "0.99"}
@@ -82,20 +84,24 @@ class FisTerms:
         labels.append(Label(unlike(name, [one.name for one in labels]), curve))
         return len(labels)
 
-    def code(self, asked: Is) -> str | None:
-        """Return the number of a question with its hedges; None if it has none."""
-        hedges = _merged(asked.hedges)
+    def code(self, proposition: Is) -> str | None:
+        """Return the number of a proposition with its hedges; None if it has none."""
+        hedges = _merged(proposition.hedges)
         is_negated = hedges[:1] == ("not",)
         hundredths = _hundredths(HEDGES[self.dialect], hedges[is_negated:])
         if hundredths is None:
             return None
         # Fuzzylite loads no rule with `any` before a term.
-        has_label = asked.label is not None and hedges[-1:] != ("any",)
-        place = self.place(asked.variable, asked.label or "") if has_label else 0
+        has_label = proposition.label is not None and hedges[-1:] != ("any",)
+        place = (
+            self.place(proposition.variable, proposition.label or "")
+            if has_label
+            else 0
+        )
         return _code(place, hundredths, is_negated=is_negated)
 
     def joined(self, parts: Sequence[Condition], *, is_or: bool) -> str:
-        """Return the number of a term for several questions of one input."""
+        """Return the number of a term for several propositions on one input."""
         whole = Or(tuple(parts)) if is_or else And(tuple(parts))
         if whole in self._made:
             return str(self.place(*self._made[whole]))
@@ -105,14 +111,14 @@ class FisTerms:
             points, rounding = pointwise.rounded(lines)
         except LossError as error:
             raise LossError(
-                f"{variable!r} is asked several things, and {error}"
+                f"{variable!r} has several conditions, and {error}"
             ) from error
-        number = self._added(variable, _words(whole)[:60], points)
+        number = self._added(variable, _text_of(whole)[:60], points)
         label = self.labels[variable][number - 1].name
         self._made[whole] = (variable, label)
-        what = f"the rules ask it together; the term {label!r} stands for that"
+        what = f"the rules test it jointly; the term {label!r} stands for that"
         self.losses.append(
-            Loss(f"{_words(whole)} of {variable!r}"[:200], what, bound + rounding)
+            Loss(f"{_text_of(whole)} of {variable!r}"[:200], what, bound + rounding)
         )
         return str(number)
 
@@ -120,7 +126,7 @@ class FisTerms:
         """Return the degree of a condition on one input as lines, and their error."""
         match condition:
             case Is():
-                return self._asked(condition), 0.0
+                return self._lines_of(condition), 0.0
             case Not(part=part):
                 lines, bound = self._lines(part)
                 return pointwise.negated(lines), bound
@@ -134,17 +140,21 @@ class FisTerms:
                     bound = bound + error + more
                 return total, bound
 
-    def _asked(self, asked: Is) -> Lines:
-        hedges = _merged(asked.hedges)
+    def _lines_of(self, proposition: Is) -> Lines:
+        hedges = _merged(proposition.hedges)
         if hedges == ("any",):
             return pointwise.lines_of(EVERYWHERE)
-        if asked.label is None or hedges not in ((), ("not",)):
-            raise LossError(f"{asked.variable!r} is asked several things with hedges")
-        label = self.labels[asked.variable][self.place(asked.variable, asked.label) - 1]
+        if proposition.label is None or hedges not in ((), ("not",)):
+            raise LossError(
+                f"{proposition.variable!r} has several conditions with hedges"
+            )
+        label = self.labels[proposition.variable][
+            self.place(proposition.variable, proposition.label) - 1
+        ]
         shape = shape_of(label.curve)
         if not isinstance(shape, Points):
-            text = f"the term {asked.label!r} of {asked.variable!r}"
-            raise LossError(f"{text} is asked with others and is no list of points")
+            text = f"the term {proposition.label!r} of {proposition.variable!r}"
+            raise LossError(f"{text} has several conditions and is no list of points")
         lines = pointwise.scaled(pointwise.lines_of(shape), label.height)
         return pointwise.negated(lines) if hedges else lines
 
@@ -159,7 +169,7 @@ class FisTerms:
             case "product":
                 return lambda one, other: pointwise.product(one, other, self.tolerance)
             case _:
-                raise LossError(f"one input is asked several things, joined by {norm}")
+                raise LossError(f"one input has several conditions, joined by {norm}")
 
 
 def lines_of(
@@ -182,42 +192,42 @@ def lines_of(
         if len(rules) < 2:
             raise
     lines = [line for one in rules for line in _lines(one, terms)]
-    what = f"it is {len(rules)} rules, joined by maximum: that says the same"
+    what = f"it is {len(rules)} rules, joined by maximum: that is equivalent"
     terms.losses.append(Loss(f"rule {number}", what, 0.0))
     return lines
 
 
 def _lines(rule: SystemRule, terms: FisTerms) -> list[FisRule]:
     is_or = isinstance(rule.when, Or)
-    asked = _asked(rule.when, terms)
+    codes = _codes(rule.when, terms)
     found: list[dict[str, str]] = []
     for name, code in _conclusions(rule, terms):
         if not found or name in found[-1]:
             found.append({})
         found[-1][name] = code
-    return [FisRule(asked, concluded, rule.weight, is_or) for concluded in found]
+    return [FisRule(codes, concluded, rule.weight, is_or) for concluded in found]
 
 
-def _asked(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
+def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
     if condition is None:
         return {} if terms.dialect == "matlab" else terms.everywhere()
     is_or = isinstance(condition, Or)
     groups: dict[str, list[Condition]] = {}
     parts = [_simple(one) for one in operands(condition, terms.system.blocks[0])]
     if terms.dialect != "fuzzylite":
-        plain = [part for part in parts if not _always_holds(part)]
+        plain = [part for part in parts if not _is_always_true(part)]
         if not plain or (is_or and len(plain) < len(parts)):
-            return _asked(None, terms)
+            return _codes(None, terms)
         parts = plain
     for part in parts:
-        names = {asked.variable for asked in questions(part)}
+        names = {proposition.variable for proposition in questions(part)}
         if len(names) > 1:
             raise LossError("it mixes and, or and not over several inputs")
         (name,) = names
         if name not in terms.inputs:
-            raise LossError(f"it asks the output {name!r}")
+            raise LossError(f"it tests the output {name!r}")
         groups.setdefault(name, []).append(part)
-    asked: dict[str, str] = {}
+    codes: dict[str, str] = {}
     for name, parts in groups.items():
         code = None
         if len(parts) == 1 and isinstance(parts[0], Is):
@@ -225,11 +235,11 @@ def _asked(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
             if code is None:
                 hedges = " ".join(parts[0].hedges)
                 raise LossError(f"{terms.dialect} has no way to say {hedges!r}")
-        asked[name] = code or terms.joined(parts, is_or=is_or)
-    return {name: code for name, code in asked.items() if code != "0"}
+        codes[name] = code or terms.joined(parts, is_or=is_or)
+    return {name: code for name, code in codes.items() if code != "0"}
 
 
-def _always_holds(part: Condition) -> bool:
+def _is_always_true(part: Condition) -> bool:
     return isinstance(part, Is) and part.hedges == ("any",)
 
 
@@ -292,13 +302,13 @@ def _hundredths(
     return known.get(hedges)
 
 
-def _words(condition: Condition) -> str:
+def _text_of(condition: Condition) -> str:
     match condition:
         case Is(label=label, hedges=hedges):
             return " ".join((*hedges, label or ""))
         case Not(part=part):
-            return f"not {_words(part)}"
+            return f"not {_text_of(part)}"
         case And(parts=parts):
-            return " and ".join(map(_words, parts))
+            return " and ".join(map(_text_of, parts))
         case Or(parts=parts):
-            return " or ".join(map(_words, parts))
+            return " or ".join(map(_text_of, parts))

@@ -80,8 +80,8 @@ def write(
 
     Args:
         model: The model.
-        allow_loss: Whether to write what FLL cannot hold as near as it can.
-        scores: What the outputs say of a rule base: the number of the class that wins
+        allow_loss: Whether to write what FLL cannot express as near as it can.
+        scores: What the outputs of a rule base are: the number of the class that wins
             (`winner`), or a score for each rule (`rule`) or class (`class`); see
             `fuzzytree.semantics.conversion.scores`.
         tolerance: The largest error of a degree where points stand for a curve.
@@ -89,7 +89,7 @@ def write(
     Raises:
         LossError: If something would be lost, unless allowed; and always if rules or
             terms have no place in FLL.
-        ValueError: If scores are asked for, and the model is a system.
+        ValueError: If `scores` is set, and the model is a system.
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
@@ -180,7 +180,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
         if not how.is_weighted and how.grid != "middle":
             yield Loss(
                 f"output {output.name!r}",
-                f"its curve is looked at in the middle of {how.samples} pieces of the "
+                f"its curve is sampled in the middle of {how.samples} pieces of the "
                 f"range, and not at {how.samples} values with the ends",
             )
     yield from hedge_losses(system.rules)
@@ -236,8 +236,8 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
         yield "  lock-previous: false"
         yield from _terms(output, names)
     # One with terms: pyfuzzylite takes a variable without them for none.
-    asked = next((one for one in system.variables if one.labels), system.outputs[0])
-    always = f"{names.variables[asked.name]} is any"
+    variable = next((one for one in system.variables if one.labels), system.outputs[0])
+    always = f"{names.variables[variable.name]} is any"
     for block in system.blocks:
         yield f"RuleBlock: {_line(block.name)}".rstrip()
         yield "  enabled: true"

@@ -106,7 +106,7 @@ def _has_joined_not(condition: Condition | None) -> bool:
 
 
 def _pushed(condition: Condition, nots: int) -> Condition:
-    """Return a condition behind so many NOTs, with the NOTs at what it asks."""
+    """Return a condition behind some NOTs, which move to its propositions."""
     match condition:
         case Is(hedges=hedges):
             return replace(condition, hedges=(*("not",) * nots, *hedges))
@@ -201,7 +201,7 @@ def degree_text(label: Label, names: Mapping[str, str]) -> str | None:
 def weighted_type(output: SystemOutput) -> str:
     """Return how a weighted output takes its terms: all of them in one way.
 
-    `Tsukamoto` where it asks each of them where it has a degree, else `TakagiSugeno`.
+    `Tsukamoto` if it inverts each of them at a degree, else `TakagiSugeno`.
     """
     curves = [label.curve for label in output.labels]
     is_inverse = [value_at(one, 0.5) is not None for one in curves]

@@ -77,7 +77,7 @@ def write(
     Args:
         model: The model. Of a rule base each rule has a score, see
             `fuzzytree.semantics.conversion.scores`.
-        allow_loss: Whether to write what FML cannot hold as near as it can.
+        allow_loss: Whether to write what FML cannot express as near as it can.
         tolerance: The largest error of a degree where points stand for a curve.
 
     Raises:
@@ -188,7 +188,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
         if has_grid and (how.samples, how.grid) != (USUAL.samples, USUAL.grid):
             yield Loss(
                 where,
-                f"its curve is looked at in {how.samples} values ({how.grid}), and FML "
+                f"its curve is sampled at {how.samples} values ({how.grid}), and FML "
                 f"does not say so; it is read as {USUAL.samples} ({USUAL.grid})",
             )
         if output.aggregation not in SNORMS.values():
@@ -223,12 +223,12 @@ def _lines(
         yield from _output(output, names)
     yield "  </knowledgeBase>"
     number = 0
-    for place, (kind, block, held) in enumerate(rules.bases, 1):
+    for place, (kind, block, own_rules) in enumerate(rules.bases, 1):
         tag = f"{kind}RuleBase"
         norms = _norms(block)
         act = "" if kind == "tsk" else f' activationMethod="{_t(block.implication)}"'
         yield f'  <{tag} name="rules.{place}."{act}{norms}>'
-        for rule in held:
+        for rule in own_rules:
             number += 1
             yield from _rule(rule, number, (kind == "tsk", norms), names)
         yield f"  </{tag}>"
@@ -250,7 +250,7 @@ def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> Iterator[str]:
     yield (f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="input">')
     for label in one.labels:
         yield from _term("fuzzyTerm", one.name, label, names)
-    if not one.labels:  # the schema wants one; nobody can ask it
+    if not one.labels:  # the schema requires one; no rule can use it
         yield f'      <fuzzyTerm name="{names.variables[one.name]}.">'
         yield '        <pointSetShape><point x="0.0" y="1.0"/></pointSetShape>'
         yield "      </fuzzyTerm>"
@@ -396,7 +396,7 @@ def _rule(
         f'weight="{_float(rule.weight)}">'
     )
     yield "      <antecedent>"
-    for variable, label, modifier in rule.asked:
+    for variable, label, modifier in rule.clauses:
         given = f' modifier="{modifier}"' if modifier else ""
         yield from _clause("clause", given, (variable, label), names, 8)
     yield "      </antecedent>"
@@ -438,7 +438,7 @@ FORMAT = Format(
     places=places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
-        "maximum; a rule that asks an output",
+        "maximum; a rule that tests an output",
         "hedges of conclusions, and two hedges in a row other than not behind one",
         "other ways to activate rules than all, weighted sums, numbers of samples",
         "combinations of inputs: each becomes an input",

@@ -72,7 +72,7 @@ class CircularTerm(msgspec.Struct, frozen=True):
 class FmlRule(msgspec.Struct, frozen=True):
     """A rule with its clauses."""
 
-    asked: tuple[Clause, ...]
+    clauses: tuple[Clause, ...]
     concluded: tuple[tuple[str, str], ...]
     weight: float
     is_or: bool
@@ -113,7 +113,7 @@ def rules_of(system: FuzzySystem) -> FmlRules:
                 continue
             if len(several) > len({kind for kind, _ in several}):
                 count = len(several)
-                what = f"it is {count} rules, joined by maximum: that says the same"
+                what = f"it is {count} rules, joined by maximum: that is equivalent"
                 rules.losses.append(Loss(f"rule {number}", what, 0.0))
             for kind, one in several:
                 found.setdefault(kind, []).append(one)
@@ -171,18 +171,18 @@ def _rules(
 ) -> Iterator[tuple[str, FmlRule]]:
     """Yield a rule for each kind of output that it concludes."""
     if rule.when is None:
-        raise LossError("it asks nothing, and a rule of FML must")
+        raise LossError("it has no condition, and a rule of FML must have one")
     if any(one.hedges for one in rule.then):
         raise LossError("FML has no hedges of conclusions")
     is_or = isinstance(rule.when, Or)
-    asked: list[Clause] = []
+    clauses: list[Clause] = []
     for part in operands(rule.when, block):
-        asked.append(_clause(part, block, kinds, known))
+        clauses.append(_clause(part, block, kinds, known))
     for kind in dict.fromkeys(kinds[one.output] for one in rule.then):
         concluded = tuple(
             (one.output, one.label) for one in rule.then if kinds[one.output] == kind
         )
-        yield kind, FmlRule(tuple(asked), concluded, rule.weight, is_or)
+        yield kind, FmlRule(tuple(clauses), concluded, rule.weight, is_or)
 
 
 def _clause(
@@ -193,7 +193,7 @@ def _clause(
 ) -> Clause:
     match condition:
         case Is(variable=variable) if variable in kinds:
-            raise LossError(f"it asks the output {variable!r}")
+            raise LossError(f"it tests the output {variable!r}")
         case Is(variable=variable, label=label, hedges=hedges):
             return _question(variable, label, hedges, known)
         case Not(part=Is(variable=variable, label=label, hedges=hedges)):
@@ -216,7 +216,7 @@ def _question(
     if hedges[-1:] == ("any",) and len(hedges) == 1:
         names = known[1][variable]
         if not names:
-            raise LossError(f"{variable!r} has no term that could be asked for")
+            raise LossError(f"{variable!r} has no term that a rule could test")
         return variable, label or names[0], "any"
     if label is None or len(hedges) > 1 or any(one not in _WORDS for one in hedges):
         raise LossError(f"FML has no way to say {' '.join(hedges)!r}")
@@ -228,10 +228,10 @@ def _made(
     block: RuleBlock,
     known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
 ) -> Clause:
-    """Return a clause that asks a term made of several of one variable."""
-    asked = [*questions(condition)]
-    variables = {one.variable for one in asked}
-    if len(variables) > 1 or len(asked) != len(condition.parts):
+    """Return a clause on a term that combines several of one variable."""
+    propositions = [*questions(condition)]
+    variables = {one.variable for one in propositions}
+    if len(variables) > 1 or len(propositions) != len(condition.parts):
         raise LossError("it mixes and, or and not over several inputs")
     (variable,) = variables
     parts: list[tuple[str, bool]] = []

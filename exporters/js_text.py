@@ -271,7 +271,7 @@ function horner(coefficients, x) {
   return total;
 }
 
-/* Return a value held between 0 and high; 0.0 of -0.0. */
+/* Return a value clamped to 0 and high; 0.0 of -0.0. */
 function clip(value, high) {
   return smaller(larger(0.0, value), high);
 }

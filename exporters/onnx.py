@@ -34,10 +34,10 @@ Output = Literal["label", "rule", "strengths", "status", "outputs", "activations
 Signature = Literal["needed", "all"]
 
 OPSETS = range(12, 27)
-"""The operator sets that can be asked for: in 12, ArgMax began to define ties."""
+"""The operator sets that can be written: in 12, ArgMax began to define ties."""
 
 IRS = range(4, 14)
-"""The file versions that can be asked for; constants need no input from 4 on."""
+"""The file versions that can be written; constants need no input from 4 on."""
 
 READABLE_OPSET = 13
 READABLE_IR = 8
@@ -49,7 +49,7 @@ OLDEST: Mapping[str, str] = {
     "system": "1.15.0",
     "tree": "1.21.0",
 }
-"""The oldest onnxruntime that was seen to give equal answers, for systems answers
+"""The oldest onnxruntime that gave equal predictions in tests, for systems predictions
 within their bounds; 1.15 is the oldest there is for Python 3.11, and `TreeEnsemble`
 came with 1.21."""
 
@@ -99,7 +99,7 @@ def write(
         readable: Whether degrees and the winner are functions of the domain
             `fuzzytree`, for people who look into the file (rules only).
         plain: Whether a tree does without the operators of ai.onnx.ml.
-        verify: Whether to load the file in onnxruntime and to compare its answers.
+        verify: Whether to load the file in onnxruntime and to compare its predictions.
 
     Returns:
         The file and what was lost.
@@ -108,7 +108,7 @@ def write(
         LossError: If float32 cannot hold a number of the model, unless allowed; if a
             system needs a function that onnxruntime lacks in double; or if the
             installed onnxruntime does not load the file.
-        DisagreementError: If the file, run in onnxruntime, gives another answer.
+        DisagreementError: If the file, run in onnxruntime, gives another prediction.
         MissingExtraError: If onnx is not installed, or onnxruntime to verify with.
         ValueError: If an option is not one of those above.
 

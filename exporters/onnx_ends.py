@@ -24,14 +24,14 @@ class InputBlock(msgspec.Struct, frozen=True):
     """The values of the variables, features first.
 
     A combination of which an input is not finite is not finite either, for no weight
-    is 0. So an input stands in the block only if it is asked, or in no combination.
+    is 0. So an input stands in the block only if it is used, or in no combination.
 
     Attributes:
         block: Their name, of shape (variables, rows); empty if there is no variable,
-            or if the values themselves are not asked for.
+            or if the values themselves are not needed.
         order: The row of each variable in the block.
         guard: 0 where all values of a row are finite, otherwise NaN; of shape
-            (1, rows), or (rows,) if asked for flat.
+            (1, rows), or (rows,) if flat.
     """
 
     block: str
@@ -96,13 +96,13 @@ def flat_guard(
 
 
 def _direct(model: Model) -> tuple[str, ...]:
-    """Return the inputs that are asked, or that no combination guards."""
+    """Return the inputs that are used, or that no combination guards."""
     if isinstance(model, RuleBase):
-        asked = {clause.variable for rule in model.rules for clause in rule.when}
+        used = {clause.variable for rule in model.rules for clause in rule.when}
     else:
-        asked = {node.variable for node in model.nodes}
+        used = {node.variable for node in model.nodes}
     guarded = {part.input for variable in model.variables for part in variable.parts}
-    return tuple(n for n in model.inputs if n in asked or n not in guarded)
+    return tuple(n for n in model.inputs if n in used or n not in guarded)
 
 
 def is_known(graph: OnnxGraph, frame: InputBlock, numbers: Precision) -> str:

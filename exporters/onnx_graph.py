@@ -77,7 +77,7 @@ class OnnxGraph:
 
     Attributes:
         opset: The version of the operators.
-        source: The name of the values that a model is asked with, (rows, columns).
+        source: The name of the input values, of shape (rows, columns).
         topic: What the next nodes are part of: their names begin with it.
         is_readable: Whether `block` makes functions or writes their nodes in place.
         nodes: The nodes so far.
@@ -141,7 +141,7 @@ class OnnxGraph:
         return result
 
     def constant(self, value: Constant, hint: str) -> str:
-        """Return the name of a constant, made the first time that it is asked for."""
+        """Return the name of a constant, which is added once."""
         key = (value.dtype.str, value.shape, value.tobytes())
         if key not in self._known:
             name = self._fresh(_number_name(value, hint))

@@ -1,6 +1,6 @@
 """A tree as a graph that follows one path, as `descent` does.
 
-Every cut becomes one question `x <= cut`; the cuts of a node form a balanced cascade.
+Every cut becomes one test `x <= cut`; the cuts of a node form a balanced cascade.
 `TreeEnsemble` of ai.onnx.ml 5 holds them in double, with the leaf's number as value;
 the plain form walks all rows one level at a time with ordinary operators.
 """
@@ -32,7 +32,7 @@ _MOST_LEAVES = 2**24  # as float32 counts
 class OnnxTreeTest(msgspec.Struct, frozen=True):
     """`variable <= cut`: on to the left if so, else to the right.
 
-    A way on is the position of a question, or minus the number of a leaf.
+    A way on is the position of a test, or minus the number of a leaf.
     """
 
     variable: str
@@ -55,26 +55,26 @@ def tree_graph(
     Returns:
         The values of the variables, with a flat guard.
     """
-    questions = questions_of(tree)
-    is_direct = not (is_plain and questions) and not any(
+    tests = cut_tests(tree)
+    is_direct = not (is_plain and tests) and not any(
         variable.parts for variable in tree.variables
     )
     if is_direct:
         frame = flat_guard(graph, tree, numbers, columns)
     else:
         frame = axes(graph, tree, numbers, columns, is_flat=True)
-    if not questions:
+    if not tests:
         leaf = graph.constant(np.array(1, np.int64), "leaf")
     elif is_plain:
         with graph.about("path"):
-            leaf = _walk(graph, questions, frame, numbers, start=_root(tree))
+            leaf = _walk(graph, tests, frame, numbers, start=_root(tree))
     else:
         place = {name: columns.index(name) for name in tree.inputs}
         values = graph.source
         if not is_direct:
             place = frame.order
             values = graph.node("Transpose", frame.block, hint="values", perm=[1, 0])
-        leaf = _ensemble(graph, questions, values, place, numbers, start=_root(tree))
+        leaf = _ensemble(graph, tests, values, place, numbers, start=_root(tree))
     zero = graph.constant(np.array(0, np.int64), "nothing")
     known = is_known(graph, frame, numbers)
     graph.node("Where", known, leaf, zero, named=named)
@@ -95,7 +95,7 @@ def _root(tree: FuzzyTree) -> int:
     return len(tree.nodes[0].cuts) // 2
 
 
-def questions_of(tree: FuzzyTree) -> list[OnnxTreeTest]:
+def cut_tests(tree: FuzzyTree) -> list[OnnxTreeTest]:
     """Return the cuts of all nodes in order, each with its two ways on.
 
     A node is entered at its middle cut.
@@ -110,7 +110,7 @@ def questions_of(tree: FuzzyTree) -> list[OnnxTreeTest]:
             return -(branch.leaf or 0)
         return first[branch.node - 1] + len(tree.nodes[branch.node - 1].cuts) // 2
 
-    questions: list[OnnxTreeTest] = []
+    tests: list[OnnxTreeTest] = []
     for start, node in zip(first, tree.nodes, strict=False):
         ways: dict[int, tuple[int, int]] = {}
         todo = [(0, len(node.cuts))]
@@ -123,16 +123,16 @@ def questions_of(tree: FuzzyTree) -> list[OnnxTreeTest]:
                 start + sum(right) // 2 if right[0] < right[1] else way(node, high),
             )
             todo += [span for span in (left, right) if span[0] < span[1]]
-        questions += [
+        tests += [
             OnnxTreeTest(node.variable, cut, *ways[i])
             for i, cut in enumerate(node.cuts)
         ]
-    return questions
+    return tests
 
 
 def _ensemble(
     graph: OnnxGraph,
-    questions: Sequence[OnnxTreeTest],
+    tests: Sequence[OnnxTreeTest],
     values: str,
     place: dict[str, int],
     numbers: Precision,
@@ -153,12 +153,12 @@ def _ensemble(
         targets[parent, is_left] = (len(order), 0)
         number = len(order)
         order.append(way)
-        todo.append((questions[way].left, number, True))
-        todo.append((questions[way].right, number, False))
+        todo.append((tests[way].left, number, True))
+        todo.append((tests[way].right, number, False))
     left = [targets[number, True] for number in range(len(order))]
     right = [targets[number, False] for number in range(len(order))]
-    asked = [questions[position] for position in order]
-    cuts = rounded([question.cut for question in asked], numbers.axis)
+    ordered = [tests[position] for position in order]
+    cuts = rounded([test.cut for test in ordered], numbers.axis)
     leaf = graph.node(
         "TreeEnsemble",
         values,
@@ -168,8 +168,8 @@ def _ensemble(
         aggregate_function=1,
         post_transform=0,
         tree_roots=[0],
-        nodes_featureids=[place[question.variable] for question in asked],
-        nodes_modes=_tensor(np.zeros(len(asked), np.uint8)),
+        nodes_featureids=[place[test.variable] for test in ordered],
+        nodes_modes=_tensor(np.zeros(len(ordered), np.uint8)),
         nodes_splits=_tensor(cuts),
         nodes_truenodeids=[node for node, _ in left],
         nodes_trueleafs=[is_leaf for _, is_leaf in left],
@@ -188,33 +188,33 @@ def _tensor(values: Constant) -> onnx.TensorProto:
 
 def _walk(
     graph: OnnxGraph,
-    questions: Sequence[OnnxTreeTest],
+    tests: Sequence[OnnxTreeTest],
     frame: InputBlock,
     numbers: Precision,
     *,
     start: int,
 ) -> str:
     """Add one step for each level; a row that has reached its leaf stays there."""
-    count = len(questions)
-    leaves = 1 + max(-way for q in questions for way in (q.left, q.right))
+    count = len(tests)
+    leaves = 1 + max(-way for q in tests for way in (q.left, q.right))
 
     def state(way: int) -> int:
         return way if way >= 0 else count - way
 
     own = range(count, count + leaves)
-    places = [frame.order[q.variable] for q in questions] + [0] * leaves
-    cuts = rounded([q.cut for q in questions] + [0.0] * leaves, numbers.axis)
+    places = [frame.order[q.variable] for q in tests] + [0] * leaves
+    cuts = rounded([q.cut for q in tests] + [0.0] * leaves, numbers.axis)
     place = graph.numbers(places, "variables")
     cut = graph.constant(cuts, "cuts")
-    left = graph.numbers([*(state(q.left) for q in questions), *own], "left")
-    right = graph.numbers([*(state(q.right) for q in questions), *own], "right")
+    left = graph.numbers([*(state(q.left) for q in tests), *own], "left")
+    right = graph.numbers([*(state(q.right) for q in tests), *own], "right")
     value = graph.take(frame.block, [places[start]])
     here = graph.node("Less", graph.constant(cuts[[start]], "cut"), value)
-    there = [graph.numbers([state(w)], "way") for w in _ways(questions[start])]
+    there = [graph.numbers([state(w)], "way") for w in _ways(tests[start])]
     here = graph.node("Where", here, there[1], there[0])
-    for _ in range(_depth(questions, start) - 1):
-        asked = graph.node("Gather", place, here, axis=0)
-        value = graph.node("GatherElements", frame.block, asked, axis=0)
+    for _ in range(_depth(tests, start) - 1):
+        column = graph.node("Gather", place, here, axis=0)
+        value = graph.node("GatherElements", frame.block, column, axis=0)
         is_right = graph.node("Less", graph.node("Gather", cut, here, axis=0), value)
         onward = [graph.node("Gather", way, here, axis=0) for way in (right, left)]
         here = graph.node("Where", is_right, *onward)
@@ -222,14 +222,14 @@ def _walk(
     return graph.node("Sub", flat, graph.constant(np.array(count), "questions"))
 
 
-def _ways(question: OnnxTreeTest) -> tuple[int, int]:
-    return question.left, question.right
+def _ways(test: OnnxTreeTest) -> tuple[int, int]:
+    return test.left, test.right
 
 
-def _depth(questions: Sequence[OnnxTreeTest], start: int) -> int:
-    """Return how many questions the longest path asks."""
+def _depth(tests: Sequence[OnnxTreeTest], start: int) -> int:
+    """Return how many tests the longest path has."""
     level, depth = {start}, 0
     while level:
         depth += 1
-        level = {w for p in level for w in _ways(questions[p]) if w >= 0}
+        level = {w for p in level for w in _ways(tests[p]) if w >= 0}
     return depth

@@ -3,8 +3,8 @@
     [project.entry-points."fuzzytree.formats"]
     turtle = "turtle_rules.format:FORMAT"
 
-A package of others is imported when its format is asked for, and never because it is
-there. Whatever goes wrong in it is a sentence beside its name: no verb fails for it.
+A third-party package is imported when its format is used, and not because it is
+installed. Its errors become a sentence beside its name: no command fails for them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fuzzytree.model.contracts import Format
 
 GROUP = "fuzzytree.formats"
 
-_LONGEST = 200  # characters of an error of others that are told
+_LONGEST = 200  # characters of the reported error of a package
 
 
 class Plugin(msgspec.Struct, frozen=True):
@@ -38,12 +38,12 @@ class Plugin(msgspec.Struct, frozen=True):
 
 
 def all_plugins() -> tuple[Plugin, ...]:
-    """Return every format of other packages, imported, by name."""
+    """Return every third-party format, imported, by name."""
     return tuple(map(_loaded, _entry_points()))
 
 
 def plugin_names() -> tuple[str, ...]:
-    """Return the names of the formats of other packages; nothing is imported."""
+    """Return the names of third-party formats; nothing is imported."""
     return tuple(dict.fromkeys(entry.name for entry in _entry_points()))
 
 
@@ -62,8 +62,8 @@ def find_plugin(name: str) -> Plugin | None:
 
 
 def _entry_points() -> list[importlib.metadata.EntryPoint]:
-    found = importlib.metadata.entry_points(group=GROUP)
-    return sorted(found, key=lambda entry: (entry.name, entry.value))
+    entries = importlib.metadata.entry_points(group=GROUP)
+    return sorted(entries, key=lambda entry: (entry.name, entry.value))
 
 
 def _loaded(entry: importlib.metadata.EntryPoint) -> Plugin:

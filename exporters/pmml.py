@@ -116,7 +116,7 @@ def write(
 def _written_system(system: FuzzySystem) -> Written:
     """Return a system: its program, and a model that hands on the first output."""
     taken = {one.name for one in system.variables}
-    made = SystemFields(system, taken)
+    system_fields = SystemFields(system, taken)
     first, *others = system.outputs
     result = unlike("result", taken)
     number = {"optype": "continuous", "dataType": "double"}
@@ -128,7 +128,7 @@ def _written_system(system: FuzzySystem) -> Written:
             feature="transformedValue",
             **number,
         )
-        for one, value in zip(others, made.outputs[1:], strict=True)
+        for one, value in zip(others, system_fields.outputs[1:], strict=True)
     ]
     model = element(
         "RegressionModel",
@@ -152,9 +152,9 @@ def _written_system(system: FuzzySystem) -> Written:
     target = element("DataField", name=first.name, **number)
     dictionary = element(
         "TransformationDictionary",
-        *made.functions.values(),
-        *made.fields,
-        derived(result, made.outputs[0]),
+        *system_fields.functions.values(),
+        *system_fields.fields,
+        derived(result, system_fields.outputs[0]),
     )
     data = element("DataDictionary", *_columns(system.inputs), target)
     header = _heading(
@@ -162,7 +162,7 @@ def _written_system(system: FuzzySystem) -> Written:
     )
     content = _content(header, data, dictionary, model)
     remark = "exp, powers and the like are good to a few last digits"
-    return Written(content, (), (remark,) if made.is_inexact else ())
+    return Written(content, (), (remark,) if system_fields.is_inexact else ())
 
 
 def _content(*parts: PmmlElement) -> bytes:
@@ -173,7 +173,7 @@ def _content(*parts: PmmlElement) -> bytes:
 
 
 class _Names(NamedTuple):
-    """Names that are made for the file, besides those of variables and classes.
+    """Names of the file, besides those of variables and classes.
 
     Attributes:
         target: The field of the class.
@@ -349,8 +349,8 @@ def _rules(
 
 
 def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> PmmlElement:
-    asked = [ref(terms[clause.variable, term]) for term in clause.terms]
-    whole = joined("max", asked)
+    degrees = [ref(terms[clause.variable, term]) for term in clause.terms]
+    whole = joined("max", degrees)
     return apply("-", constant(1.0), whole) if clause.negated else whole
 
 
@@ -428,19 +428,23 @@ def _tree(
     usable = names.new("usable")
     fields = [derived(usable, _usable(tree.variables, names, functions))]
     is_usable = _predicate(usable, "equal", 1.0)
-    made: dict[int, PmmlElement] = {}  # by number; a node's children have higher ones
+    nodes_by_number: dict[
+        int, PmmlElement
+    ] = {}  # by number; a node's children have higher ones
     for number in range(len(tree.nodes), 0, -1):
         node = tree.nodes[number - 1]
         children: list[PmmlElement] = []
         for owner, branch in enumerate(node.branches):
             predicate = _owned(node, owner, node.variable)
             if branch.node is not None:
-                children.append(_with_predicate(made.pop(branch.node), predicate))
+                children.append(
+                    _with_predicate(nodes_by_number.pop(branch.node), predicate)
+                )
             else:
                 children.append(_leaf(tree, branch.leaf or 0, predicate, names))
-        made[number] = element("Node", *children, id=f"node {number}")
+        nodes_by_number[number] = element("Node", *children, id=f"node {number}")
     root = (
-        _with_predicate(made[1], is_usable)
+        _with_predicate(nodes_by_number[1], is_usable)
         if tree.nodes
         else _leaf(tree, 1, is_usable, names)
     )

@@ -106,7 +106,7 @@ def joined(function: str, parts: list[PmmlElement]) -> PmmlElement:
 
 
 class Functions:
-    """The functions that a file needs, as they are asked for.
+    """The functions that a file needs, in the order of their first use.
 
     Attributes:
         defined: Each function's definition, by name; what another one needs stands
@@ -179,8 +179,8 @@ class Functions:
         return name
 
     def _clipped(self, value: PmmlElement, high: PmmlElement) -> PmmlElement:
-        held = apply("max", ref("value"), constant(0.0))
-        body = apply("min", held, ref("high"))
+        clamped = apply("max", ref("value"), constant(0.0))
+        body = apply("min", clamped, ref("high"))
         return apply(self._define("clip", ("value", "high"), body), value, high)
 
     def _flank(self, flank: Flank | None, x: PmmlElement) -> PmmlElement:
@@ -188,8 +188,8 @@ class Functions:
             return constant(0.0)
         names = _names(len(flank.curve))
         top = apply("*", _horner(names, ref("q")), ref("q"))
-        held = apply("min", apply("max", top, constant(0.0)), constant(BELOW_ONE))
-        curve = self._define(f"flank{len(names)}", ("q", *names), held)
+        clamped = apply("min", apply("max", top, constant(0.0)), constant(BELOW_ONE))
+        curve = self._define(f"flank{len(names)}", ("q", *names), clamped)
         run = constant(flank.start - flank.end)
         q = apply("/", apply("-", x, constant(flank.end)), run)
         return apply(
@@ -255,7 +255,7 @@ class Functions:
             anchor, other, near, far = other, anchor, far, near
         share = apply("/", apply("-", ref("x"), ref("anchor")), ref("run"))
         line = apply("+", ref("near"), apply("*", share, ref("rise")))
-        held = apply("min", apply("max", line, ref("low")), ref("high"))
+        clamped = apply("min", apply("max", line, ref("low")), ref("high"))
         names = ("x", "anchor", "run", "near", "rise", "low", "high")
         numbers = (
             anchor,
@@ -265,14 +265,14 @@ class Functions:
             min(near, far),
             max(near, far),
         )
-        name = self._define("line", names, held)
+        name = self._define("line", names, clamped)
         return apply(name, x, *map(constant, numbers))
 
 
 def norm_continuous(points: Points, field: str) -> PmmlElement:
     """Return points as PMML's own lists, one for each stretch between steps.
 
-    An engine rounds in its own order: a stretch whose degrees are below 1 is held at
+    An engine rounds in its own order: a stretch whose degrees are below 1 is clamped to
     the highest of them, so that no rounding makes it 1.
     """
     runs: list[list[tuple[float, float]]] = [[]]

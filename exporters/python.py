@@ -166,7 +166,7 @@ def horner(coefficients, x):
 
 
 def clip(value, high):
-    \"\"\"Return a value held between 0 and high.\"\"\"
+    \"\"\"Return a value clamped to 0 and high.\"\"\"
     return min(max(0.0, value), high)
 
 

@@ -199,9 +199,9 @@ def _halves(
     cut = query.number(node.cuts[middle])
     below = _halves(query, tree, line, node, (low, middle), level + 1)
     above = _halves(query, tree, line, node, (middle + 1, high), level + 1)
-    asked = _comment(node.variable)
+    comment = _comment(node.variable)
     return (
-        f"{pad}CASE WHEN {line[node.variable]} <= {cut} THEN{asked}\n{below}\n"
+        f"{pad}CASE WHEN {line[node.variable]} <= {cut} THEN{comment}\n{below}\n"
         f"{pad}ELSE\n{above}\n{pad}END"
     )
 

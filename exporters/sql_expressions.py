@@ -139,7 +139,7 @@ def _ratio(value: float) -> str:
 
 
 class SqlDegrees:
-    """Degrees as expressions; what a polynomial is asked at is a column before."""
+    """Degrees as expressions; the argument of a polynomial is a column before."""
 
     def __init__(self, query: Query) -> None:
         self.query = query

@@ -86,16 +86,16 @@ class SystemSteps:
     def _is_outside(self, place: int) -> bool:
         """Return whether a number only stands for samples that are not chosen.
 
-        Then the lowest or highest of the chosen is asked for, and the largest number
-        of the type does as well as an infinite one.
+        Then the step that follows takes the lowest or highest of the chosen, and the
+        largest number of the type does as well as an infinite one.
         """
         choices = self._users(place)
-        asked = [user for choice in choices for user in self._users(choice)]
+        reducers = [user for choice in choices for user in self._users(choice)]
         steps = self.program.steps
         return all(
             steps[choice].operation == "where" and steps[choice].samples
             for choice in choices
-        ) and all(steps[user].operation in ("lowest", "highest") for user in asked)
+        ) and all(steps[user].operation in ("lowest", "highest") for user in reducers)
 
     def _users(self, place: int) -> list[int]:
         """Return the steps that use a step and that are computed when it runs."""
@@ -201,8 +201,8 @@ class SystemSteps:
                 one, two = map(self.is_odd, step.arguments[1:])
                 yield f"IF {test} THEN {odd} := {one}; ELSE {odd} := {two}; END_IF;"
             return
-        asked = [self.is_odd(a) for a in step.arguments if a in self.odd]
-        odds = list(dict.fromkeys(asked))
+        flags = [self.is_odd(a) for a in step.arguments if a in self.odd]
+        odds = list(dict.fromkeys(flags))
         if step.kind == "truth":
             yield f"{name} := {self._truth(step, given)};"
             for one in odds:  # NaN is neither less than a number nor equal to one

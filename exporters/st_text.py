@@ -57,8 +57,8 @@ class StNumbers:
 
     def nearest(self, value: float) -> float:
         """Return the nearest number of the type: finite, and 0 only for 0."""
-        held = max(-self.largest, min(value, self.largest))
-        (found,) = rounded([held], self.kind, is_divisor=value != 0.0).tolist()
+        clamped = max(-self.largest, min(value, self.largest))
+        (found,) = rounded([clamped], self.kind, is_divisor=value != 0.0).tolist()
         return float(found)
 
     def at_most(self, value: float) -> float:

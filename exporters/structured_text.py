@@ -3,8 +3,8 @@
 Trees and rules depend on no library: comparisons, `+ - * /`, `ABS`, loops with a fixed
 number of turns, arrays of fixed length. What is compared and computed, and in which
 order, is the reference's. Controllers may stop where a number is NaN or a division is
-by zero: so what is given is looked at first, and nothing is computed with what is
-missing.
+by zero: so inputs are checked first, and nothing is computed from a missing
+value.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from fuzzytree.semantics.programs.system_program import from_system
 
 _OUTPUTS = ("class_number", "rule", "status", "strengths")
 _LOCALS = (
-    *("is_known", "k", "level", "node", "place", "asked", "axis"),
+    *("is_known", "k", "level", "node", "place", "value_of_node", "axis"),
     *("rule_class", "leaf_class", "node_axis", "node_first", "node_last"),
     *("cut", "target"),
 )
@@ -157,7 +157,7 @@ def _guard(
     combined: Mapping[str, str],
     numbers: StNumbers,
 ) -> Iterator[str]:
-    """Yield statements that find out what is missing, and answer where something is."""
+    """Yield statements that find missing values and set the outputs for them."""
     yield from known_inputs(list(names.accepted.values()), numbers)
     if mixed:
         largest = numbers.literal(numbers.largest)
@@ -204,8 +204,8 @@ def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: StNumbers) -> Par
     if not tree.nodes:
         body = ["    rule := 1;\n    status := 0;\n"]
         return constants, [], [*body, "    class_number := leaf_class[0];\n"]
-    asked = list(dict.fromkeys(node.variable for node in tree.nodes))
-    line = {name: place for place, name in enumerate(asked)}
+    variables = list(dict.fromkeys(node.variable for node in tree.nodes))
+    line = {name: place for place, name in enumerate(variables)}
     firsts: list[str] = []
     lasts: list[str] = []
     cuts: list[str] = []
@@ -218,7 +218,7 @@ def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: StNumbers) -> Par
         cuts.append("0.0")  # so that a cut and the target below it share a place
     axes = [str(line[node.variable]) for node in tree.nodes]
     constants += [
-        *table("node_axis", "INT", axes, "which value each node asks"),
+        *table("node_axis", "INT", axes, "which value each node tests"),
         *table("node_first", "DINT", firsts, "place of its first cut"),
         *table("node_last", "DINT", lasts, "place of its last cut"),
         *table("cut", numbers.name, cuts, "0.0 ends the cuts of a node"),
@@ -226,10 +226,10 @@ def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: StNumbers) -> Par
     ]
     local = [
         "    node : DINT;\n    place : DINT;\n    level : DINT;\n",
-        f"    asked : {numbers.name};\n",
-        f"    axis : ARRAY [0..{len(asked) - 1}] OF {numbers.name};\n",
+        f"    value_of_node : {numbers.name};\n",
+        f"    axis : ARRAY [0..{len(variables) - 1}] OF {numbers.name};\n",
     ]
-    given = [f"    axis[{line[name]}] := {values[name]};\n" for name in asked]
+    given = [f"    axis[{line[name]}] := {values[name]};\n" for name in variables]
     return constants, local, [*given, *_walk(_depth(tree))]
 
 
@@ -237,10 +237,10 @@ def _walk(depth: int) -> Iterator[str]:
     yield "    node := 0;\n"
     yield f"    FOR level := 1 TO {depth} DO\n"
     yield "        IF node >= 0 THEN\n"
-    yield "            asked := axis[node_axis[node]];\n"
+    yield "            value_of_node := axis[node_axis[node]];\n"
     yield "            place := node_first[node];\n"
     yield "            FOR k := node_first[node] TO node_last[node] DO\n"
-    yield "                IF asked > cut[k] THEN place := k + 1; END_IF;\n"
+    yield "                IF value_of_node > cut[k] THEN place := k + 1; END_IF;\n"
     yield "            END_FOR;\n"
     yield "            node := target[place];\n"
     yield "        END_IF;\n"
@@ -250,7 +250,7 @@ def _walk(depth: int) -> Iterator[str]:
 
 
 def _depth(tree: FuzzyTree) -> int:
-    """Return how many nodes the longest path asks."""
+    """Return how many nodes the longest path has."""
     depths = [1] * len(tree.nodes)
     for place in range(len(tree.nodes) - 1, -1, -1):
         below = [b.node for b in tree.nodes[place].branches if b.node is not None]
@@ -309,7 +309,7 @@ def written_system(
     changed = [f"{old!r} is called {new}" for old, new in names.changed.items()]
     if block != given:
         changed.insert(0, f"{given!r} is called {block}")
-    changed.append("an output that has no number is 0, and `is_number` tells it")
+    changed.append("an output without a number is 0 and its `is_number` is FALSE")
     return Written(text.encode("ascii"), (), tuple(changed))
 
 

@@ -41,7 +41,7 @@ from fuzzytree.model.tree import Branch, FuzzyTree, Node
 
 _TITLES: Final = {
     "rule base": "# A fuzzy rule base of fuzzytree: IF clauses THEN class.",
-    "tree": "# A fuzzy decision tree of fuzzytree: node 1 asks first.",
+    "tree": "# A fuzzy decision tree of fuzzytree: node 1 is the root.",
     "system": "# A fuzzy system of fuzzytree: rules whose conclusions become numbers.",
 }
 _ORIGINS: Final = {
@@ -65,7 +65,7 @@ def write(model: Document, /, *, allow_loss: bool = False) -> Written:
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> print(write(random_tree(1, leaves=1)).content.decode().splitlines()[0])
-        # A fuzzy decision tree of fuzzytree: node 1 asks first.
+        # A fuzzy decision tree of fuzzytree: node 1 is the root.
     """
     found = losses_of(model) if isinstance(model, FuzzySystem) else _losses(model)
     losses = [*found]

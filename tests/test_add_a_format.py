@@ -1,4 +1,4 @@
-"""The page that tells how to add a format is followed, word by word."""
+"""The page on adding a format is followed, word by word."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from fuzzytree.exporters.c_selftest import axis_values, digest_of, leaf, strengt
 from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
-from fuzzytree.exporters.c_tree import questions_of
+from fuzzytree.exporters.c_tree import cut_tests
 from fuzzytree.exporters.reference_tables import places_of
 from fuzzytree.model.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
@@ -116,8 +116,8 @@ def test_numbers_are_written_with_all_their_bits() -> None:
 def test_the_tables_of_a_tree_say_what_the_reference_says(seed: int) -> None:
     tree = random_tree(seed, leaves=9, combinations=0.3)
     line = places_of(tree.variables)
-    asked = questions_of(tree, line)
-    assert len(asked) == sum(len(node.cuts) for node in tree.nodes)
+    tests = cut_tests(tree, line)
+    assert len(tests) == sum(len(node.cuts) for node in tree.nodes)
     for row in probes(tree, limit=300):
         found = descend(tree, row)
         given = [row[name] for name in tree.inputs]
@@ -126,7 +126,7 @@ def test_the_tables_of_a_tree_say_what_the_reference_says(seed: int) -> None:
             assert values is None
         else:
             assert values is not None
-            assert leaf(asked, values, DOUBLE) == found.rule
+            assert leaf(tests, values, DOUBLE) == found.rule
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -1,4 +1,4 @@
-"""FIS: what is written is read back alike, and what cannot be written is told."""
+"""FIS: written files are read back alike, and every loss is reported."""
 
 from __future__ import annotations
 
@@ -139,11 +139,11 @@ def _random_rule(
         first: Sequence[tuple[Hedge, ...]] = ((), ("not",))
         return (*chance.choice(first), *chance.choice(known))
 
-    asked = [*HEDGES[dialect].values()]
+    known = [*HEDGES[dialect].values()]
 
     def question(name: str) -> Is:
-        found = hedges(asked)
-        is_any = found[-1:] == ("any",)  # which asks no term
+        found = hedges(known)
+        is_any = found[-1:] == ("any",)  # which tests no term
         return Is(name, None if is_any else f"t{chance.randrange(3)}", found)
 
     parts = [question(f"x{k}") for k in range(3) if chance.random() < 0.7]
@@ -154,7 +154,7 @@ def _random_rule(
     if dialect == "octave" and is_weighted:
         concluded = [*CONCLUDING_HEDGES.values()]
     if dialect == "fuzzylite":
-        concluded = [one for one in asked if one != ("any",)]
+        concluded = [one for one in known if one != ("any",)]
     then = (
         Conclusion(
             f"y{chance.randrange(2)}",
@@ -371,7 +371,7 @@ def test_an_input_that_is_asked_twice_becomes_a_term_with_a_bound() -> None:
         ),
         (
             SystemRule(Is("tip", "small"), (_small(),)),
-            "rule 1: it asks the output 'tip'",
+            "rule 1: it tests the output 'tip'",
         ),
         (
             SystemRule(Is("a", "low", ("seldom",)), (_small(),)),
@@ -406,7 +406,7 @@ def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
         write(system)
     assert str(caught.value).splitlines() == [
         "cannot write s as fis without loss:",
-        "  output 'y': its curve is looked at in 200 values (middle), and FIS does not "
+        "  output 'y': its curve is sampled at 200 values (middle), and FIS does not "
         "say so; octave takes 101 (half ends)",
         "  variable 'y': values are not moved into the range",
         "  block 2 of rules: the file has one set of norms, those of the first block",

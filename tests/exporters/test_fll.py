@@ -258,7 +258,7 @@ def test_what_is_lost_is_listed_and_refused() -> None:
     assert curve.endswith(" (largest error 0.0054)")
     assert rest == [
         "  combination 'b': it is an input, to be given as 2.0 * ('a' - 0.5)",
-        "  output 'y': its curve is looked at in the middle of 101 pieces of the "
+        "  output 'y': its curve is sampled in the middle of 101 pieces of the "
         "range, and not at 101 values with the ends",
         "  rule 1: FLL has no 'cubed': left out",
         "  pass allow_loss=True to write it as stated",

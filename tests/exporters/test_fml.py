@@ -1,4 +1,4 @@
-"""FML: what is written is read back alike, and what cannot be written is told."""
+"""FML: written files are read back alike, and every loss is reported."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ def test_every_line_of_a_small_file() -> None:
     [
         (
             SystemRule(None, (Conclusion("y", "t0"),)),
-            "rule 1: it asks nothing, and a rule of FML must",
+            "rule 1: it has no condition, and a rule of FML must have one",
         ),
         (
             SystemRule(Is("x0", "t0", ("very", "very")), (Conclusion("y", "t0"),)),

@@ -206,7 +206,7 @@ def test_a_system_has_its_outputs_and_tells_whether_they_are_numbers() -> None:
     )
     assert written.remarks[0] == "'fan' is called fan_2"
     assert written.remarks[-1] == (
-        "an output that has no number is 0, and `is_number` tells it"
+        "an output without a number is 0 and its `is_number` is FALSE"
     )
 
 

@@ -253,7 +253,7 @@ def test_a_file_begins_with_what_it_is() -> None:
         b"kind: rule base\n"
     )
     assert write(tree).content.startswith(
-        b"# A fuzzy decision tree of fuzzytree: node 1 asks first.\n"
+        b"# A fuzzy decision tree of fuzzytree: node 1 is the root.\n"
         b"format: fuzzytree/1\n"
         b"kind: tree\n"
     )
