@@ -57,22 +57,22 @@ def examples_of(
     numbers: CNumbers,
 ) -> list[Example]:
     """Return rows and their answers: the reference's in double, else the tables'."""
-    found: list[Example] = []
+    result: list[Example] = []
     rows = rows_of(model, len(tables.label) if tables else 1)
     for row in rows:
         if numbers.kind is np.float64:
-            given = row
-            prediction = _reference(model, given)
+            row_values = row
+            prediction = _reference(model, row_values)
         else:
-            given = {name: _as_float(value) for name, value in row.items()}
-            prediction = _computed(model, tests, tables, line, numbers, given)
+            row_values = {name: _as_float(value) for name, value in row.items()}
+            prediction = _computed(model, tests, tables, line, numbers, row_values)
         label = number_of(prediction.label, model)
         digest = digest_of(prediction.strengths, numbers)
-        values = tuple(given[name] for name in model.inputs)
-        found.append(
+        values = tuple(row_values[name] for name in model.inputs)
+        result.append(
             Example(values, label, prediction.rule, int(prediction.status), digest)
         )
-    return found
+    return result
 
 
 @np.errstate(over="ignore")
@@ -98,8 +98,8 @@ def _computed(
     row: Row,
 ) -> Answer:
     """Return the answer that the tables give in their number type."""
-    given = [row[name] for name in model.inputs]
-    values = axis_values(model.variables, line, given, numbers)
+    row_values = [row[name] for name in model.inputs]
+    values = axis_values(model.variables, line, row_values, numbers)
     if isinstance(model, FuzzyTree) or tables is None:
         if values is None:
             return Answer(0, model.semantics.missing, Status.MISSING)
@@ -256,20 +256,20 @@ def axis_values(
     numbers: CNumbers,
 ) -> list[Real] | None:
     """Return the value of each variable; None if one is not finite."""
-    given = [numbers.kind(value) for value in row]
-    found = list(given)
+    row_values = [numbers.kind(value) for value in row]
+    result = list(row_values)
     for variable in variables:
         total: Real | None = None
         for part in variable.parts:
             (weight,) = numbers.nearest([part.weight], is_divisor=True)
             (centre,) = numbers.nearest([part.centre])
             one = numbers.kind(weight) * (
-                given[line[part.input]] - numbers.kind(centre)
+                row_values[line[part.input]] - numbers.kind(centre)
             )
             total = one if total is None else total + one
         if total is not None:
-            found.append(total)
-    return found if all(map(np.isfinite, found)) else None
+            result.append(total)
+    return result if all(map(np.isfinite, result)) else None
 
 
 def leaf(tests: Sequence[CTreeTest], values: Sequence[Real], numbers: CNumbers) -> int:
@@ -289,7 +289,7 @@ def strengths(
     """Return the strength of each rule."""
     one = numbers.kind(1)
     path = [one] * (max(tables.places.depth) + 1)
-    found = [one] * len(tables.label)
+    result = [one] * len(tables.label)
     degrees: dict[int, Real] = {}
     places = tables.places
     for clause, depth, rule in zip(
@@ -300,8 +300,8 @@ def strengths(
         degree, before = degrees[clause], path[depth - 1]
         path[depth] = before * degree if is_product else min(before, degree)
         if rule:
-            found[rule - 1] = path[depth]
-    return tuple(map(float, found))
+            result[rule - 1] = path[depth]
+    return tuple(map(float, result))
 
 
 def _clause(
@@ -352,8 +352,8 @@ def _line(
         return degrees[near]
     largest = numbers.kind(numbers.largest)
     width = _held(values[far] - values[near], -largest, largest)
-    found = degrees[near] + (x - values[near]) / width * (degrees[far] - degrees[near])
-    return _held(found, *sorted((degrees[near], degrees[far])))
+    result = degrees[near] + (x - values[near]) / width * (degrees[far] - degrees[near])
+    return _held(result, *sorted((degrees[near], degrees[far])))
 
 
 def _curve(coefficients: Sequence[Real], x: Real) -> Real:

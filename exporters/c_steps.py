@@ -203,17 +203,17 @@ class CSteps:
 
     def value(self, place: int) -> str:
         """Return a step's result as an expression, within a loop if it has samples."""
-        found = self.still[place]
-        if found is None:
+        result = self.still[place]
+        if result is None:
             step = self.program.steps[place]
             if place in self.kept and step.samples:
                 return f"s{place}[i]"
             return f"v{place}"
-        if isinstance(found, list):
-            return f"{self._table(tuple(map(float, found)))}[i]"
-        if isinstance(found, bool):
-            return str(int(found))
-        return self._number(found)
+        if isinstance(result, list):
+            return f"{self._table(tuple(map(float, result)))}[i]"
+        if isinstance(result, bool):
+            return str(int(result))
+        return self._number(result)
 
     def _number(self, value: float) -> str:
         if not math.isfinite(value):
@@ -229,15 +229,15 @@ class CSteps:
 
     def _rounds(self) -> list[int]:
         """Return after how many loops each step can be computed."""
-        found: list[int] = []
+        result: list[int] = []
         for place, step in enumerate(self.program.steps):
             moving = [a for a in step.arguments if self.still[a] is None]
-            after = max((found[a] for a in moving), default=0)
+            after = max((result[a] for a in moving), default=0)
             is_reduced = not step.samples and any(
                 self.program.steps[a].samples for a in moving
             )
-            found.append(0 if self.still[place] is not None else after + is_reduced)
-        return found
+            result.append(0 if self.still[place] is not None else after + is_reduced)
+        return result
 
     def _kept(self) -> set[int]:
         """Return the steps with samples that a later loop needs, or a sum by halves."""
@@ -254,7 +254,7 @@ class CSteps:
         return kept
 
     def _body(self) -> Iterator[str]:
-        moving = [p for p, found in enumerate(self.still) if found is None]
+        moving = [p for p, result in enumerate(self.still) if result is None]
         for turn in range(max((self.round[p] for p in moving), default=0) + 1):
             now = [p for p in moving if self.round[p] == turn]
             single = [p for p in now if not self.program.steps[p].samples]
@@ -306,11 +306,13 @@ class CSteps:
         for place in places:
             if place in running:
                 (argument,) = self.program.steps[place].arguments
-                given = self.value(argument)
-                yield f"        r{place} = i == 0 ? {given} : r{place} + {given};\n"
+                term = self.value(argument)
+                yield f"        r{place} = i == 0 ? {term} : r{place} + {term};\n"
             if place in self.kept:
-                made = f"r{place}" if place in running else self._made(place)
-                yield f"        s{place}[i] = {made};\n"
+                text_of_step = (
+                    f"r{place}" if place in running else self._step_text(place)
+                )
+                yield f"        s{place}[i] = {text_of_step};\n"
             elif place in running:
                 yield f"        const name_real v{place} = r{place};\n"
             else:
@@ -319,17 +321,17 @@ class CSteps:
             yield f"        {self._carried(place)};\n"
         yield "    }\n"
 
-    def _made(self, place: int) -> str:
+    def _step_text(self, place: int) -> str:
         return self._expression(self.program.steps[place])
 
     def _carried(self, place: int) -> str:
         step = self.program.steps[place]
-        given = self.value(step.arguments[0])
+        operands = self.value(step.arguments[0])
         if step.operation == "last":
-            return f"v{place} = {given}"
+            return f"v{place} = {operands}"
         helper = _REDUCED[step.operation]
         self.needs.add(helper)
-        return f"v{place} = i == 0 ? {given} : name_{helper}(v{place}, {given})"
+        return f"v{place} = i == 0 ? {operands} : name_{helper}(v{place}, {operands})"
 
     def _total(self, place: int) -> Iterator[str]:
         """Yield statements that sum an array by halves."""
@@ -343,22 +345,22 @@ class CSteps:
 
     def _expression(self, step: Step) -> str:
         operation = step.operation
-        given = [self.value(argument) for argument in step.arguments]
+        operands = [self.value(argument) for argument in step.arguments]
         if operation == "input":
             return f"x[{self.program.inputs.index(step.name)}]"
         if operation in _SIGNS:
-            return f"{given[0]} {_SIGNS[operation]} {given[1]}"
+            return f"{operands[0]} {_SIGNS[operation]} {operands[1]}"
         if operation == "where":
-            return f"{given[0]} ? {given[1]} : {given[2]}"
+            return f"{operands[0]} ? {operands[1]} : {operands[2]}"
         if operation in ("not", "negate"):
-            return f"{'!' if operation == 'not' else '-'}{given[0]}"
+            return f"{'!' if operation == 'not' else '-'}{operands[0]}"
         self.needs.add(operation)
         if operation in self.library:
-            return f"{self.library[operation]}({', '.join(given)})"
+            return f"{self.library[operation]}({', '.join(operands)})"
         if step.table:
             table = self._table(step.table)
-            return f"name_{operation}({table}, {len(step.table)}u, {given[0]})"
-        return f"name_{operation}({', '.join(given)})"
+            return f"name_{operation}({table}, {len(step.table)}u, {operands[0]})"
+        return f"name_{operation}({', '.join(operands)})"
 
 
 _ROWS = 100
@@ -494,10 +496,10 @@ def system_selftest(
     yield f"    uint64_t x[{inputs}];\n    uint64_t outputs[{outputs}];\n"
     yield f"    uint64_t most[{outputs}];\n    int status;\n"
     yield fill(f"}} name_example[{len(examples)}] = {{\n", prefix)
-    for given, found, bound, status in examples:
-        shown = ", ".join(map(repr, given)) or "no inputs"
-        yield f"    /* {shown}: {', '.join(map(repr, found))} */\n"
-        parts = ", ".join(map(_bits, (given, found, bound)))
+    for operands, result, bound, status in examples:
+        shown = ", ".join(map(repr, operands)) or "no inputs"
+        yield f"    /* {shown}: {', '.join(map(repr, result))} */\n"
+        parts = ", ".join(map(_bits, (operands, result, bound)))
         yield f"    {{{parts}, {status}}},\n"
     yield "};\n"
     yield fill(_MAIN, prefix)
@@ -517,13 +519,13 @@ def _examples(system: FuzzySystem, *, activations: bool) -> list[Example]:
     bounds = _bounds(system, rows, activations=activations)
     for row, bound in zip(rows, bounds, strict=True):
         answer = infer(system, row)
-        found = answer.outputs + (answer.activations if activations else ())
+        result = answer.outputs + (answer.activations if activations else ())
         most = [
             0.0 if math.isnan(number) else min(one, _SHARE * max(abs(number), 1.0))
-            for one, number in zip(bound, found, strict=True)
+            for one, number in zip(bound, result, strict=True)
         ]
-        given = [row[name] for name in system.columns]
-        every.append((given, found, most, int(answer.status)))
+        operands = [row[name] for name in system.columns]
+        every.append((operands, result, most, int(answer.status)))
     every.sort(key=lambda one: max(one[2]))
     step = max(len(every) // (2 * _ROWS), 1)
     return every[: _ROWS * step : step]
@@ -536,8 +538,8 @@ def _bounds(
     program = from_system(system, activations=activations)
     table = np.array([[row[name] for row in rows] for name in program.inputs])
     values = table.reshape(len(program.inputs), len(rows)).astype(np.float64)
-    found: list[list[float]] = error_bounds(program, values)[:-1].T.tolist()
-    return found
+    result: list[list[float]] = error_bounds(program, values)[:-1].T.tolist()
+    return result
 
 
 def _bits(values: Sequence[float]) -> str:

@@ -82,16 +82,16 @@ def tables_of(rules: RuleBase, line: Mapping[str, int], numbers: CNumbers) -> Ta
     keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
     at = {key: place for place, key in enumerate(keys)}
     labels = {label: place for place, label in enumerate(rules.classes)}
-    found = Tables([], [], [], [], [0], [], [0], [], [], places, [])
+    result = Tables([], [], [], [], [0], [], [0], [], [], places, [])
     for key in keys:
-        _add_term(found, shapes[key], numbers)
+        _add_term(result, shapes[key], numbers)
     for clause in clauses:
-        found.clause_line.append(line.get(clause.variable, 0))
-        found.clause_term += [at[clause.variable, term] for term in clause.terms]
-        found.clause_first.append(len(found.clause_term))
-        found.negated.append(int(clause.negated))
-    found.label = [labels[rule.then] for rule in rules.rules]
-    return found
+        result.clause_line.append(line.get(clause.variable, 0))
+        result.clause_term += [at[clause.variable, term] for term in clause.terms]
+        result.clause_first.append(len(result.clause_term))
+        result.negated.append(int(clause.negated))
+    result.label = [labels[rule.then] for rule in rules.rules]
+    return result
 
 
 def _places(rules: RuleBase) -> tuple[RulePrefixes, list[Clause]]:
@@ -112,7 +112,7 @@ def _places(rules: RuleBase) -> tuple[RulePrefixes, list[Clause]]:
             here = children[here][clause]
         ending[here].append(number)
     clauses: dict[Clause, int] = {}
-    found = RulePrefixes()
+    result = RulePrefixes()
     todo: list[tuple[Clause, int, int, int]] = []  # clause, fork or -1, rule, depth
 
     def expand(fork: int, depth: int) -> None:
@@ -126,13 +126,13 @@ def _places(rules: RuleBase) -> tuple[RulePrefixes, list[Clause]]:
     expand(0, 1)
     while todo:
         clause, fork, rule, depth = todo.pop()
-        found.clause.append(clauses.setdefault(clause, len(clauses)))
-        found.rule.append(rule)
-        found.depth.append(depth)
+        result.clause.append(clauses.setdefault(clause, len(clauses)))
+        result.rule.append(rule)
+        result.depth.append(depth)
         if fork >= 0:
             expand(fork, depth + 1)
-    _add_skips(found)
-    return found, list(clauses)
+    _add_skips(result)
+    return result, list(clauses)
 
 
 def _add_skips(places: RulePrefixes) -> None:
@@ -144,30 +144,30 @@ def _add_skips(places: RulePrefixes) -> None:
         open_ones.append(place)
 
 
-def _add_term(found: Tables, shape: Shape, numbers: CNumbers) -> None:
+def _add_term(result: Tables, shape: Shape, numbers: CNumbers) -> None:
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             ends = ((LOW_END, low, left), (HIGH_END, high, right))
             for kind, bound, flank in ends:
                 if bound is not None:
                     curve = flank.curve if flank else ()
-                    _add(found, kind, len(curve), _edge(bound, flank, numbers))
+                    _add(result, kind, len(curve), _edge(bound, flank, numbers))
         case LR(mean=mean, left=below, right=above):
             for kind, sign, side in (
                 (LEFT_SIDE, -1.0, below),
                 (RIGHT_SIDE, 1.0, above),
             ):
-                _add(found, kind, len(side.curve), _side(mean, sign, side, numbers))
+                _add(result, kind, len(side.curve), _side(mean, sign, side, numbers))
         case Points(values=values):
-            _add(found, POINTS, len(values), _points(shape, numbers))
-    found.term_first.append(len(found.kind))
+            _add(result, POINTS, len(values), _points(shape, numbers))
+    result.term_first.append(len(result.kind))
 
 
-def _add(found: Tables, kind: int, count: int, own: list[float]) -> None:
-    found.kind.append(kind)
-    found.count.append(count)
-    found.first.append(len(found.number))
-    found.number += own
+def _add(result: Tables, kind: int, count: int, own: list[float]) -> None:
+    result.kind.append(kind)
+    result.count.append(count)
+    result.first.append(len(result.number))
+    result.number += own
 
 
 def _edge(bound: float, flank: Flank | None, numbers: CNumbers) -> list[float]:

@@ -41,8 +41,8 @@ class CNumbers:
 
     def nearest(self, values: Sequence[float], *, is_divisor: bool = False) -> Reals:
         """Return numbers of the type, never infinite; a divisor is never 0."""
-        found: Reals = rounded(values, self.kind, is_divisor=is_divisor).tolist()
-        return found
+        result: Reals = rounded(values, self.kind, is_divisor=is_divisor).tolist()
+        return result
 
     def text(self, value: float) -> str:
         """Return a number of the type as a constant; for infinite ones see math.h.
@@ -88,8 +88,8 @@ def prefix_of(name: str) -> str:
         small = f"model_{small}"
     letters = string.ascii_lowercase
     rest = letters + DIGITS + "_"
-    found = Names.of([small], first=letters, rest=rest, longest=_LONGEST_PREFIX)
-    return found[small].rstrip("_")
+    result = Names.of([small], first=letters, rest=rest, longest=_LONGEST_PREFIX)
+    return result[small].rstrip("_")
 
 
 def constants(prefix: str, names: Sequence[str]) -> list[str]:
@@ -101,8 +101,8 @@ def constants(prefix: str, names: Sequence[str]) -> list[str]:
     """
     every = LETTERS + DIGITS + "_"
     longest = _LONGEST_CONSTANT - len(prefix)
-    found = Names.of(names, first=every, longest=longest, ignores_case=True)
-    return [prefix + found[name].upper() for name in names]
+    result = Names.of(names, first=every, longest=longest, ignores_case=True)
+    return [prefix + result[name].upper() for name in names]
 
 
 def remark(text: str) -> str:

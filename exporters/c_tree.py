@@ -38,15 +38,15 @@ def cut_tests(tree: FuzzyTree, line: Mapping[str, int]) -> list[CTreeTest]:
     for node in tree.nodes:
         count += len(node.cuts)
         starts.append(count)
-    found: list[CTreeTest] = []
+    result: list[CTreeTest] = []
     for node in tree.nodes:
         targets = [
             count + branch.leaf - 1 if branch.leaf else starts[(branch.node or 1) - 1]
             for branch in node.branches
         ]
         ends = [targets[owner] for owner in node.owners]
-        found += _halved(node, line[node.variable], ends, len(found))
-    return found
+        result += _halved(node, line[node.variable], ends, len(result))
+    return result
 
 
 def _halved(node: Node, line: int, ends: list[int], start: int) -> list[CTreeTest]:

@@ -82,30 +82,30 @@ def _some(reasons: list[str]) -> str:
 
 
 def _span(counts: Iterator[int] | list[int] | map[int]) -> str:
-    found = list(counts)
-    if not found:
+    result = list(counts)
+    if not result:
         return "none"
-    low, high = min(found), max(found)
+    low, high = min(result), max(result)
     return str(low) if low == high else f"{low} to {high}"
 
 
 def _operators(system: FuzzySystem) -> Iterator[str]:
     """Yield the operators that rules use, each once."""
-    found: list[str] = []
+    result: list[str] = []
     is_curved = any(not output.defuzzifier.is_weighted for output in system.outputs)
     for block in system.blocks:
         if any(uses(rule.when, And) for rule in block.rules):
-            found.append(f"AND {block.conjunction}")
+            result.append(f"AND {block.conjunction}")
         if any(uses(rule.when, Or) for rule in block.rules):
-            found.append(f"OR {block.disjunction}")
+            result.append(f"OR {block.disjunction}")
         if is_curved:
-            found.append(f"ACT {block.implication}")
-    found += [
+            result.append(f"ACT {block.implication}")
+    result += [
         f"ACCU {output.aggregation}"
         for output in system.outputs
         if output.aggregation is not None
     ]
-    yield from dict.fromkeys(found)
+    yield from dict.fromkeys(result)
 
 
 def _beyond_basic(system: FuzzySystem, labels: list[Label]) -> Iterator[str]:

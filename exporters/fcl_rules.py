@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from msgspec.structs import replace
 
 from fuzzytree.exporters.fcl_dialects import FclWords
-from fuzzytree.exporters.fll_text import Speak, hedge_losses, rule_text
+from fuzzytree.exporters.fll_text import WordsOf, hedge_losses, rule_text
 from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, PAIRS
 from fuzzytree.formats.fcl.fcl_rules import ALWAYS
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
@@ -61,7 +61,12 @@ def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
 
 
 def block_lines(
-    block: RuleBlock, name: str, words: FclWords, speak: Speak, always: str, accu: str
+    block: RuleBlock,
+    name: str,
+    words: FclWords,
+    words_of: WordsOf,
+    always: str,
+    accu: str,
 ) -> Iterator[str]:
     """Yield the lines of a block of rules."""
     yield f"RULEBLOCK {name}"
@@ -72,11 +77,11 @@ def block_lines(
         yield f"  ACCU : {accu};"
     for number, rule in enumerate(block.rules, 1):
         if words.joiner:
-            yield f"  RULE {number} : {_text(rule, words, speak, always)}"
+            yield f"  RULE {number} : {_text(rule, words, words_of, always)}"
             continue
         for one in rule.then:
             alone = replace(rule, then=(one,))
-            yield f"  RULE {number} : {_text(alone, words, speak, always)}"
+            yield f"  RULE {number} : {_text(alone, words, words_of, always)}"
     yield "END_RULEBLOCK"
 
 
@@ -95,20 +100,20 @@ def _operators(block: RuleBlock, words: FclWords) -> Iterator[str]:
         yield f"AND : {words.ands[block.conjunction]};"
 
 
-def _text(rule: SystemRule, words: FclWords, speak: Speak, always: str) -> str:
+def _text(rule: SystemRule, words: FclWords, words_of: WordsOf, always: str) -> str:
     if words.has_hedges:
-        return rule_text(rule, speak, always)
+        return rule_text(rule, words_of, always)
     says = str.lower if words.is_lower else str.upper
-    when = always if rule.when is None else _condition(rule.when, speak, says)
+    when = always if rule.when is None else _condition(rule.when, words_of, says)
     then = words.joiner.join(
-        _proposition(Is(one.output, one.label), speak, says) for one in rule.then
+        _proposition(Is(one.output, one.label), words_of, says) for one in rule.then
     )
     weight = "" if rule.weight == 1.0 else f"{says(' with ')}{float(rule.weight)!r}"
     return f"{says('if ')}{when}{says(' then ')}{then}{weight};"
 
 
 def _condition(
-    condition: Condition, speak: Speak, says: Callable[[str], str], level: int = 0
+    condition: Condition, words_of: WordsOf, says: Callable[[str], str], level: int = 0
 ) -> str:
     """Return a condition; what is nested always has parentheses.
 
@@ -116,18 +121,18 @@ def _condition(
     """
     match condition:
         case Is():
-            return _proposition(condition, speak, says)
+            return _proposition(condition, words_of, says)
         case Not(part=part):
-            return f"{says('not ')}({_condition(part, speak, says)})"
+            return f"{says('not ')}({_condition(part, words_of, says)})"
         case And(parts=parts) | Or(parts=parts):
             word = says(" and " if isinstance(condition, And) else " or ")
-            inner = [_condition(part, speak, says, level + 1) for part in parts]
+            inner = [_condition(part, words_of, says, level + 1) for part in parts]
             text = word.join(inner)
             return f"({text})" if level and len(parts) > 1 else text
 
 
-def _proposition(one: Is, speak: Speak, says: Callable[[str], str]) -> str:
-    name, term = speak(one.variable, one.label)
+def _proposition(one: Is, words_of: WordsOf, says: Callable[[str], str]) -> str:
+    name, term = words_of(one.variable, one.label)
     nots = one.hedges.count("not")
     text = f"{name}{says(' is not ' if nots else ' is ')}{term}"
     for _ in range(nots - 1):
@@ -271,19 +276,19 @@ def _accu_losses(
 ) -> Iterator[Loss]:
     """Yield what an output's aggregation means that the dialect cannot say."""
     where = f"output {output.name!r}"
-    norm, said = output.aggregation, output.aggregation
+    norm, written = output.aggregation, output.aggregation
     is_weighted = output.defuzzifier.is_weighted
     if has_accu(words):
         blocks = [
             {one.output for rule in block.rules for one in rule.then}
             for block in system.blocks
         ]
-        found = [accu_of(system, one, words) for one in blocks if output.name in one]
-        said = next(filter(None, found), None)
-        if said == "sum" and is_weighted:
-            said = None
+        result = [accu_of(system, one, words) for one in blocks if output.name in one]
+        written = next(filter(None, result), None)
+        if written == "sum" and is_weighted:
+            written = None
     elif is_weighted:
-        said = None
+        written = None
     curves = {one.name: one.curve for one in output.labels}
     counts = Counter(
         curves[one.label]
@@ -293,8 +298,8 @@ def _accu_losses(
     )
     if is_weighted and max(counts.values(), default=0) < 2:
         return  # there is nothing to join
-    if said != norm and counts:
-        meant = "summed one by one" if said is None else f"joined by {said!r}"
+    if written != norm and counts:
+        meant = "summed one by one" if written is None else f"joined by {written!r}"
         wanted = "one by one" if norm is None else f"by {norm!r}"
         yield Loss(where, f"its conclusions are {meant}, and not {wanted}")
     elif norm is None and words.name == "iec":

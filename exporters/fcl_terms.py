@@ -175,12 +175,12 @@ def _pointed(
     if is_kept and term_text(variable, label, words, {}) is not None:
         return label
     where = f"term {label.name!r} of {variable.name!r}"
-    found = points_for(label.curve, tolerance)
-    points = found.points
-    if found.bound > EXACT:
-        tail = f"; {found.tail}" if found.tail else ""
+    result = points_for(label.curve, tolerance)
+    points = result.points
+    if result.bound > EXACT:
+        tail = f"; {result.tail}" if result.tail else ""
         what = f"it becomes {len(points.values)} points joined by lines{tail}"
-        losses.append(Loss(where, what, found.bound))
+        losses.append(Loss(where, what, result.bound))
     if label.height != 1.0:
         what = f"its height {label.height!r} is multiplied into its points"
         losses.append(Loss(where, what, EXACT))

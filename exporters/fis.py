@@ -234,8 +234,8 @@ def _default_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             what = f"FIS has no default, {output.default!r}, where no rule fires"
             yield Loss(where, what)
         elif dialect == "matlab" and output.name not in always:
-            found = [_term(output, label, dialect) for label in output.labels]
-            number = middle(*_range(output, found))
+            result = [_term(output, label, dialect) for label in output.labels]
+            number = middle(*_range(output, result))
             if number != output.default:
                 default = output.default
                 other = "no number" if default is None else repr(default)
@@ -289,11 +289,11 @@ def _s_norm(norm: SNorm, dialect: Dialect) -> str:
 def _private_losses(terms: FisTerms, dialect: Dialect) -> Iterator[Loss]:
     for name, labels in terms.labels.items():
         for label in labels:
-            found = term_of(label.curve, dialect)
-            if found is not None and found[0] in PRIVATE:
+            result = term_of(label.curve, dialect)
+            if result is not None and result[0] in PRIVATE:
                 yield Loss(
                     f"term {label.name!r} of {name!r}",
-                    f"it is a {found[0]}, which MATLAB and Octave do not have",
+                    f"it is a {result[0]}, which MATLAB and Octave do not have",
                 )
 
 
@@ -307,12 +307,12 @@ def _term(
 def _text(
     system: FuzzySystem,
     rules: tuple[FisTerms, list[FisRule]],
-    said: tuple[list[str], FileNames],
+    header: tuple[list[str], FileNames],
     dialect: Dialect,
     remarks: list[str],
 ) -> str:
     terms, lines = rules
-    comments, names = said
+    comments, names = header
     is_weighted = system.outputs[0].defuzzifier.is_weighted
     head = {
         "Name": f"'{names.system[system.name]}'",
@@ -325,13 +325,13 @@ def _text(
     }
     blocks = [[f"# {comment}" for comment in comments], _section("System", head)]
     for number, one in enumerate(system.inputs, 1):
-        found = [term_of(label.curve, dialect) for label in terms.labels[one.name]]
+        result = [term_of(label.curve, dialect) for label in terms.labels[one.name]]
         blocks.append(
-            _variable(f"Input{number}", one, (terms.labels[one.name], found), names)
+            _variable(f"Input{number}", one, (terms.labels[one.name], result), names)
         )
     for number, output in enumerate(system.outputs, 1):
-        found = [_term(output, label, dialect) for label in output.labels]
-        block = _variable(f"Output{number}", output, (output.labels, found), names)
+        result = [_term(output, label, dialect) for label in output.labels]
+        block = _variable(f"Output{number}", output, (output.labels, result), names)
         if dialect == "fuzzylite" and output.default is not None:
             block.insert(3, f"Default={output.default!r}")
         blocks.append(block)
@@ -356,14 +356,14 @@ def _variable(
     about: tuple[Sequence[Label], Sequence[tuple[str, str] | None]],
     names: FileNames,
 ) -> list[str]:
-    labels, found = about
-    low, high = _range(one, found)
+    labels, result = about
+    low, high = _range(one, result)
     entries = {
         "Name": f"'{names.variables[one.name]}'",
         "Range": f"[{low!r} {high!r}]",
         "NumMFs": str(len(labels)),
     }
-    for number, (label, term) in enumerate(zip(labels, found, strict=True), 1):
+    for number, (label, term) in enumerate(zip(labels, result, strict=True), 1):
         assert term is not None  # `_lines` and `with_known_curves` have seen to it
         name = names.labels[one.name][label.name]
         entries[f"MF{number}"] = f"'{name}':'{term[0]}',[{term[1]}]"
@@ -384,8 +384,8 @@ def _range(
     for kind, text in (term for term in terms if term is not None):
         if kind == "function" or kind == "linear":
             continue
-        found = [*map(float, text.split())]
-        numbers += found[::2] if kind == "discretemf" else found
+        result = [*map(float, text.split())]
+        numbers += result[::2] if kind == "discretemf" else result
     near = [number for number in numbers if abs(number) < 1e290]
     if isinstance(one, SystemInput):
         near = [-FAR, FAR]

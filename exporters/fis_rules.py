@@ -131,10 +131,10 @@ class FisTerms:
                 lines, bound = self._lines(part)
                 return pointwise.negated(lines), bound
             case And(parts=parts) | Or(parts=parts):
-                found = [self._lines(part) for part in parts]
-                total, bound = found[0]
+                result = [self._lines(part) for part in parts]
+                total, bound = result[0]
                 join = self._join(is_or=isinstance(condition, Or))
-                for lines, error in found[1:]:
+                for lines, error in result[1:]:
                     total, more = join(total, lines)
                     # Errors of a product add; least and greatest pass one on.
                     bound = bound + error + more
@@ -200,12 +200,12 @@ def lines_of(
 def _lines(rule: SystemRule, terms: FisTerms) -> list[FisRule]:
     is_or = isinstance(rule.when, Or)
     codes = _codes(rule.when, terms)
-    found: list[dict[str, str]] = []
+    result: list[dict[str, str]] = []
     for name, code in _conclusions(rule, terms):
-        if not found or name in found[-1]:
-            found.append({})
-        found[-1][name] = code
-    return [FisRule(codes, concluded, rule.weight, is_or) for concluded in found]
+        if not result or name in result[-1]:
+            result.append({})
+        result[-1][name] = code
+    return [FisRule(codes, concluded, rule.weight, is_or) for concluded in result]
 
 
 def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
@@ -262,7 +262,7 @@ def _conclusions(rule: SystemRule, terms: FisTerms) -> list[tuple[str, str]]:
     if terms.dialect == "octave":
         table = CONCLUDING_HEDGES
     so_far: tuple[Hedge, ...] = ()
-    found: list[tuple[str, str]] = []
+    result: list[tuple[str, str]] = []
     for one in rule.then:
         output = outputs[one.output]
         place = [label.name for label in output.labels].index(one.label) + 1
@@ -278,8 +278,8 @@ def _conclusions(rule: SystemRule, terms: FisTerms) -> list[tuple[str, str]]:
         ):
             text = " ".join(hedges)
             raise LossError(f"{terms.dialect} cannot conclude {text!r} {one.label!r}")
-        found.append((one.output, _code(place, hundredths, is_negated=is_negated)))
-    return found
+        result.append((one.output, _code(place, hundredths, is_negated=is_negated)))
+    return result
 
 
 def _code(place: int, hundredths: int, *, is_negated: bool) -> str:

@@ -95,8 +95,8 @@ def term_of(curve: Curve, dialect: Dialect) -> Term | None:
                 return _trapezoid(exact)
             return "discretemf", _text(number for pair in pairs for number in pair)
         case Trapezoid() | Singleton() | Binary():
-            found = _corners(curve)
-            return None if found is None else _trapezoid(found)
+            result = _corners(curve)
+            return None if result is None else _trapezoid(result)
         case Formula(expression=expression):
             is_known = dialect == "fuzzylite"
             return ("function", fuzzylite_text_of(expression)) if is_known else None
@@ -198,8 +198,8 @@ def _corners_of(points: Points) -> _Corners | None:
     if left[1] > right[0]:
         return None
     corners = (*left, *right)
-    found = curve_of("trapmf", corners)
-    is_same = not isinstance(found, str) and shape_of(found) == points
+    result = curve_of("trapmf", corners)
+    is_same = not isinstance(result, str) and shape_of(result) == points
     return corners if is_same else None
 
 

@@ -159,10 +159,10 @@ def _with_pointed_numbers(
         shapes = tuple(one for one in output.labels if isinstance(one.curve, Band | LR))
         if shapes:
             representation = (SystemInput("of it", shapes),)
-            found, lost = pointed(
+            result, lost = pointed(
                 FuzzySystem(system.name, representation, (_ONE,), (_ALWAYS,)), tolerance
             )
-            known = {one.name: one for one in found.inputs[0].labels}
+            known = {one.name: one for one in result.inputs[0].labels}
             labels = tuple(known.get(one.name, one) for one in output.labels)
             output = replace(output, labels=labels)
             losses += [

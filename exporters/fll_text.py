@@ -56,7 +56,7 @@ _WORDS: Mapping[Hedge, str] = MappingProxyType(
     {**{hedge: word for word, hedge in HEDGES.items()}, "very very": "very very"}
 )
 
-Speak = Callable[[str, str | None], tuple[str, str]]
+WordsOf = Callable[[str, str | None], tuple[str, str]]
 """Gives the words for a variable and one of its labels."""
 
 
@@ -120,42 +120,42 @@ def _pushed(condition: Condition, nots: int) -> Condition:
             return kind(tuple(_pushed(part, nots) for part in parts))
 
 
-def rule_text(rule: SystemRule, speak: Speak, always: str) -> str:
+def rule_text(rule: SystemRule, words_of: WordsOf, always: str) -> str:
     """Return a rule as fuzzylite reads it."""
-    when = always if rule.when is None else _condition_text(rule.when, speak, 0)
+    when = always if rule.when is None else _condition_text(rule.when, words_of, 0)
     then = " and ".join(
-        _statement(one.output, one.label, one.hedges, speak) for one in rule.then
+        _statement(one.output, one.label, one.hedges, words_of) for one in rule.then
     )
     weight = "" if rule.weight == 1.0 else f" with {float(rule.weight)!r}"
     return f"if {when} then {then}{weight}"
 
 
-def _condition_text(condition: Condition, speak: Speak, level: int) -> str:
+def _condition_text(condition: Condition, words_of: WordsOf, level: int) -> str:
     """Return a condition; at level 1 an OR needs parentheses, at level 2 an AND too."""
     match condition:
         case Is(variable=variable, label=label, hedges=hedges):
             if "any" in hedges:  # whatever stands behind it makes no difference
                 label, hedges = None, hedges[: hedges.index("any") + 1]
-            return _statement(variable, label, hedges, speak)
+            return _statement(variable, label, hedges, words_of)
         case Not(part=Is() as part):
-            return _condition_text(_pushed(part, 1), speak, level)
+            return _condition_text(_pushed(part, 1), words_of, level)
         case Not():
             raise TypeError("a NOT of several conditions in a block that has been said")
         case And(parts=parts):
-            text = " and ".join(_condition_text(part, speak, 2) for part in parts)
+            text = " and ".join(_condition_text(part, words_of, 2) for part in parts)
             return f"({text})" if level > 1 and len(parts) > 1 else text
         case Or(parts=parts):
             text = " or ".join(
-                _condition_text(part, speak, 2 if isinstance(part, Or) else 1)
+                _condition_text(part, words_of, 2 if isinstance(part, Or) else 1)
                 for part in parts
             )
             return f"({text})" if level > 0 and len(parts) > 1 else text
 
 
 def _statement(
-    variable: str, label: str | None, hedges: Sequence[Hedge], speak: Speak
+    variable: str, label: str | None, hedges: Sequence[Hedge], words_of: WordsOf
 ) -> str:
-    name, term = speak(variable, label)
+    name, term = words_of(variable, label)
     words = [_WORDS[hedge] for hedge in hedges if hedge in _WORDS]
     return " ".join([name, "is", *words, *([term] if label is not None else [])])
 

@@ -107,13 +107,13 @@ def write(
     losses += lost
     system, lost = _with_known_curves(system, tolerance)
     losses += [*lost, *_losses(system)]
-    found = rules_of(system)
-    losses += found.losses
+    result = rules_of(system)
+    losses += result.losses
     if losses and not allow_loss:
         raise refusal(model.name, "fml", losses)
-    names = _naming(system, found)
+    names = _naming(system, result)
     remarks += names.remarks(system)
-    lines = _lines(system, found, names, facts)
+    lines = _lines(system, result, names, facts)
     content = ("\n".join(lines) + "\n").encode("utf-8")
     return Written(content, tuple(losses), tuple(remarks), names.changed())
 
@@ -342,13 +342,13 @@ def _tsk_term(variable: str, label: Label, names: _Ids) -> Iterator[str]:
 
 def _term(kind: str, variable: str, label: Label, names: _Ids) -> Iterator[str]:
     yield f'      <{kind} name="{names.term(variable, label.name)}">'
-    found = _shape(label.curve)
-    if found is not None:
-        name, numbers = found
-        given = " ".join(
+    result = _shape(label.curve)
+    if result is not None:
+        name, numbers = result
+        attribute = " ".join(
             f'param{k}="{_float(number)}"' for k, number in enumerate(numbers, 1)
         )
-        yield f"        <{name} {given}/>"
+        yield f"        <{name} {attribute}/>"
     else:
         points = shape_of(label.curve)
         assert isinstance(points, Points)  # others are refused or became points
@@ -397,8 +397,8 @@ def _rule(
     )
     yield "      <antecedent>"
     for variable, label, modifier in rule.clauses:
-        given = f' modifier="{modifier}"' if modifier else ""
-        yield from _clause("clause", given, (variable, label), names, 8)
+        attribute = f' modifier="{modifier}"' if modifier else ""
+        yield from _clause("clause", attribute, (variable, label), names, 8)
     yield "      </antecedent>"
     start, then, clause = "consequent", "then", "clause"
     if is_tsk:
@@ -413,10 +413,10 @@ def _rule(
 
 
 def _clause(
-    tag: str, given: str, named: tuple[str, str], names: _Ids, indent: int
+    tag: str, attribute: str, named: tuple[str, str], names: _Ids, indent: int
 ) -> Iterable[str]:
     pad = " " * indent
-    yield f"{pad}<{tag}{given}>"
+    yield f"{pad}<{tag}{attribute}>"
     yield f"{pad}  <variable>{escape(names.variables[named[0]])}</variable>"
     yield f"{pad}  <term>{escape(names.term(*named))}</term>"
     yield f"{pad}</{tag}>"

@@ -63,8 +63,8 @@ class CircularTerm(msgspec.Struct, frozen=True):
         for _ in self.parts[1:]:
             yield f'{pad}<{self.word} {key}="{self.norm}">'
         for place, (label, is_negated) in enumerate(self.parts):
-            given = ' complement="true"' if is_negated else ""
-            yield f"{pad}  <termName{given}>{term(variable, label)}</termName>"
+            attribute = ' complement="true"' if is_negated else ""
+            yield f"{pad}  <termName{attribute}>{term(variable, label)}</termName>"
             if place:
                 yield f"{pad}</{self.word}>"
 
@@ -103,7 +103,7 @@ def rules_of(system: FuzzySystem) -> FmlRules:
     reasons: list[str] = []
     number = 0
     for block in system.blocks:
-        found: dict[str, list[FmlRule]] = {}
+        result: dict[str, list[FmlRule]] = {}
         for rule in block.rules:
             number += 1
             try:
@@ -116,8 +116,8 @@ def rules_of(system: FuzzySystem) -> FmlRules:
                 what = f"it is {count} rules, joined by maximum: that is equivalent"
                 rules.losses.append(Loss(f"rule {number}", what, 0.0))
             for kind, one in several:
-                found.setdefault(kind, []).append(one)
-        bases += [(kind, block, tuple(several)) for kind, several in found.items()]
+                result.setdefault(kind, []).append(one)
+        bases += [(kind, block, tuple(several)) for kind, several in result.items()]
     reasons += [
         f"output {name!r}: its terms are of several kinds, and FML has one for each"
         for name, kind in kinds.items()

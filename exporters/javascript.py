@@ -205,12 +205,12 @@ def _examples(model: Model) -> Iterator[str]:
     for row in few_probes(model, max(most, _FEWEST_EXAMPLES)):
         values = [row[name] for name in model.inputs]
         if isinstance(model, RuleBase):
-            given = evaluate(model, row)
-            more = [digest_of(given.strengths)]
+            prediction = evaluate(model, row)
+            more = [digest_of(prediction.strengths)]
         else:
-            given = descend(model, row)
+            prediction = descend(model, row)
             more = []
-        expected = [given.label, given.rule, int(given.status), *more]
+        expected = [prediction.label, prediction.rule, int(prediction.status), *more]
         yield f"{literal([values, *expected])},"
 
 

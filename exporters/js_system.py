@@ -81,9 +81,9 @@ def _named(one: SystemInput | SystemOutput) -> str:
 def _examples(system: FuzzySystem) -> Iterator[str]:
     rows = system_probes(system, limit=_EXAMPLES)
     for row, bounds in zip(rows, _bounds(system, rows), strict=True):
-        found = infer(system, row)
-        given = [row[name] for name in system.columns]
-        yield f"{literal((given, found.outputs, bounds, int(found.status)))},"
+        result = infer(system, row)
+        operands = [row[name] for name in system.columns]
+        yield f"{literal((operands, result.outputs, bounds, int(result.status)))},"
 
 
 def _bounds(system: FuzzySystem, rows: Sequence[Row]) -> list[list[float]]:
@@ -91,8 +91,8 @@ def _bounds(system: FuzzySystem, rows: Sequence[Row]) -> list[list[float]]:
     program = from_system(system)
     lines = np.array([[row[name] for row in rows] for name in program.inputs])
     values = lines.reshape(len(program.inputs), len(rows)).astype(np.float64)
-    found: list[list[float]] = error_bounds(program, values).T.tolist()
-    return [bounds[: len(system.outputs)] for bounds in found]
+    result: list[list[float]] = error_bounds(program, values).T.tolist()
+    return [bounds[: len(system.outputs)] for bounds in result]
 
 
 _SIGNS: Mapping[str, str] = {
@@ -256,19 +256,19 @@ class JsSteps:
         """Yield a statement for each step that an input enters."""
         for place, step in enumerate(self.program.steps):
             if self.still[place] is None:
-                yield f"  const v{place} = {self._made(step)};\n"
+                yield f"  const v{place} = {self._step_text(step)};\n"
 
     def value(self, place: int) -> str:
         """Return a step's result as an expression; of samples, the i-th."""
-        found = self.still[place]
-        if found is None:
+        result = self.still[place]
+        if result is None:
             name = f"v{place}"
-        elif isinstance(found, list):
-            name = self._table([float(one) for one in found])
-        elif isinstance(found, bool):
-            return literal(found)
+        elif isinstance(result, list):
+            name = self._table([float(one) for one in result])
+        elif isinstance(result, bool):
+            return literal(result)
         else:
-            text = number_text(found)
+            text = number_text(result)
             return f"({text})" if text.startswith("-") else text
         return f"{name}[i]" if self.program.steps[place].samples else name
 
@@ -280,33 +280,33 @@ class JsSteps:
     def _table(self, numbers: list[float]) -> str:
         return self.tables.setdefault(literal(numbers), f"TABLE_{len(self.tables)}")
 
-    def _made(self, step: Step) -> str:
+    def _step_text(self, step: Step) -> str:
         if step.operation in OVER_SAMPLES or step.operation == "running":
             (argument,) = step.arguments
             self.needs.add(step.operation)
             return f"{step.operation}(v{argument})"
-        made = self._expression(step)
+        text = self._expression(step)
         if not step.samples:
-            return made
+            return text
         self.needs.add("samples")
-        return f"samples({step.samples}, (i) => {made})"
+        return f"samples({step.samples}, (i) => {text})"
 
     def _expression(self, step: Step) -> str:
         operation = step.operation
-        given = [self.value(argument) for argument in step.arguments]
+        operands = [self.value(argument) for argument in step.arguments]
         if operation == "input":
             return f"x[{self.program.inputs.index(step.name)}]"
         if operation in _SIGNS:
-            return f"{given[0]} {_SIGNS[operation]} {given[1]}"
+            return f"{operands[0]} {_SIGNS[operation]} {operands[1]}"
         if operation == "where":
-            return f"{given[0]} ? {given[1]} : {given[2]}"
+            return f"{operands[0]} ? {operands[1]} : {operands[2]}"
         if operation in ("not", "negate"):
-            return f"{'!' if operation == 'not' else '-'}{given[0]}"
+            return f"{'!' if operation == 'not' else '-'}{operands[0]}"
         if operation in _LIBRARY:
-            return f"{_LIBRARY[operation]}({given[0]}" + (
-                f", {given[1]})" if len(given) > 1 else ")"
+            return f"{_LIBRARY[operation]}({operands[0]}" + (
+                f", {operands[1]})" if len(operands) > 1 else ")"
             )
         self.needs.add(operation)
         if step.table:
-            return f"{operation}({self._table(list(step.table))}, {given[0]})"
-        return f"{operation}({', '.join(given)})"
+            return f"{operation}({self._table(list(step.table))}, {operands[0]})"
+        return f"{operation}({', '.join(operands)})"

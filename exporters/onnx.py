@@ -137,10 +137,10 @@ def write(
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, f"onnx {dtype}", lost)
-    made = _model_proto(
+    proto = _model_proto(
         model, dtype, opset, ir, signature, outputs, readable=readable, plain=plain
     )
-    content: bytes = made.SerializeToString(deterministic=True)
+    content: bytes = proto.SerializeToString(deterministic=True)
     if verify:
         from fuzzytree.exporters.onnx_session import prove
 

@@ -52,9 +52,9 @@ def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
     """Return how a file differs from one that is written of a model now."""
     import onnx
 
-    found = onnx.load_model_from_string(content)
-    facts = {p.key.removeprefix("fuzzytree."): p.value for p in found.metadata_props}
-    versions = {entry.domain: entry.version for entry in found.opset_import}
+    result = onnx.load_model_from_string(content)
+    facts = {p.key.removeprefix("fuzzytree."): p.value for p in result.metadata_props}
+    versions = {entry.domain: entry.version for entry in result.opset_import}
     columns = json.loads(facts["columns"])
     needed = model.columns if isinstance(model, FuzzySystem) else model.inputs
     try:
@@ -63,7 +63,7 @@ def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
             allow_loss=True,
             dtype=facts["dtype"],  # pyright: ignore[reportArgumentType]  # write checks it
             opset=versions.get("", 0),
-            ir=found.ir_version,
+            ir=result.ir_version,
             signature="needed" if columns == list(needed) else "all",
             outputs=json.loads(facts["outputs"]),
             readable=DOMAIN in versions,
@@ -74,22 +74,22 @@ def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
         stated, right = facts["fingerprint"], fingerprint(model)
         faults = [] if stated == right else [_stated(_FINGERPRINT, stated, right)]
         return Differences((str(error),), tuple(faults))
-    return proto_differences(onnx.load_model_from_string(fresh.content), found)
+    return proto_differences(onnx.load_model_from_string(fresh.content), result)
 
 
-def proto_differences(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Differences:
+def proto_differences(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Differences:
     """Return how a file differs from a fresh one in graph and metadata."""
-    return Differences(tuple(_graph(fresh, found)), tuple(_metadata(fresh, found)))
+    return Differences(tuple(_graph(fresh, result)), tuple(_metadata(fresh, result)))
 
 
-def _graph(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
-    faults = [*_operators(fresh, found), *_constants(fresh, found)]
-    faults += _parts(fresh, found, ("graph", "metadata_props", "producer_version"))
+def _graph(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Iterator[str]:
+    faults = [*_operators(fresh, result), *_constants(fresh, result)]
+    faults += _parts(fresh, result, ("graph", "metadata_props", "producer_version"))
     lists = tuple(field for field, _ in _NUMBERED)
-    faults += _parts(fresh.graph, found.graph, lists)
+    faults += _parts(fresh.graph, result.graph, lists)
     yield from faults
     for field, what in () if faults else _NUMBERED:
-        one, two = getattr(fresh.graph, field), getattr(found.graph, field)
+        one, two = getattr(fresh.graph, field), getattr(result.graph, field)
         if len(one) != len(two):
             yield f"{len(two)} {what}s where {len(one)} are right"
         for number, (right, entry) in enumerate(zip(one, two, strict=False), 1):
@@ -99,12 +99,12 @@ def _graph(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
                 break
 
 
-def _operators(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
+def _operators(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Iterator[str]:
     """Yield the operators that do not occur as often as in a fresh graph.
 
     Those that occur more often are listed with the results of the nodes that are new.
     """
-    right, stated = _nodes(fresh), _nodes(found)
+    right, stated = _nodes(fresh), _nodes(result)
     for name in sorted(right.keys() | stated.keys()):
         one, two = right.get(name, []), stated.get(name, [])
         if len(one) == len(two):
@@ -126,12 +126,12 @@ def _nodes(proto: onnx.ModelProto) -> dict[str, list[onnx.NodeProto]]:
     return nodes
 
 
-def _constants(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
+def _constants(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Iterator[str]:
     """Yield the constants whose numbers no constant of a fresh graph has left over."""
     from onnx import numpy_helper
 
     left = Counter(_bytes(_unnamed(one)) for one in fresh.graph.initializer)
-    for tensor in found.graph.initializer:
+    for tensor in result.graph.initializer:
         key = _bytes(_unnamed(tensor))
         left[key] -= 1
         if left[key] < 0:
@@ -156,21 +156,21 @@ def _unnamed(tensor: onnx.TensorProto) -> onnx.TensorProto:
 
 def _parts(
     fresh: onnx.ModelProto | onnx.GraphProto,
-    found: onnx.ModelProto | onnx.GraphProto,
+    result: onnx.ModelProto | onnx.GraphProto,
     without: tuple[str, ...],
 ) -> Iterator[str]:
     """Yield the fields that differ, of those without which a graph could lie."""
     for field in fresh.DESCRIPTOR.fields:
         if field.name not in without:
-            one, two = getattr(fresh, field.name), getattr(found, field.name)
+            one, two = getattr(fresh, field.name), getattr(result, field.name)
             if one != two:
                 yield f"its {field.name} differs from the one that would be written"
 
 
-def _metadata(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
+def _metadata(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Iterator[str]:
     right = {entry.key: entry.value for entry in fresh.metadata_props}
     stated: dict[str, str] = {}
-    for entry in found.metadata_props:
+    for entry in result.metadata_props:
         if entry.key in stated:
             yield f"it states {entry.key!r} twice"
         stated[entry.key] = entry.value

@@ -150,14 +150,14 @@ def _degrees(
     kept = [[c for c in rule.when if c not in true] for rule in rules.rules]
     live = [[c for c in when if c not in constant] for when in kept]
     wanted = {NOTHING: None} if all(kept) else {NOTHING: None, ALWAYS: None}
-    found: dict[Part, None] = dict.fromkeys(
+    result: dict[Part, None] = dict.fromkeys(
         part
         for clause in clauses
         if clause not in constant
         for term in clause.terms
         for part in parts[clause.variable, term]
     )
-    row = _primitives(graph, table, [*wanted, *found], numbers, frame)
+    row = _primitives(graph, table, [*wanted, *result], numbers, frame)
     with graph.about("terms"):
         rows_of = _clauses(graph, table, live, parts, row, numbers)
     rows_of |= dict.fromkeys(constant - true, (row[NOTHING],))
@@ -248,10 +248,10 @@ def _edges(
         degree = inner.node("Clip", degree, zero, below_one)
         return inner.node("Where", beyond, degree, one, named=named)
 
-    given = {"beyond": beyond, "position": _cast(graph, position, numbers)}
+    arguments = {"beyond": beyond, "position": _cast(graph, position, numbers)}
     if any(curve != (1.0,) for curve in curves):  # 1 * q is q
-        given |= coefficients
-    return graph.block(f"Edges{len(given) - 2}", body, given)
+        arguments |= coefficients
+    return graph.block(f"Edges{len(arguments) - 2}", body, arguments)
 
 
 def _bounds(edges: Sequence[EdgePart], numbers: Precision) -> RealArray:
@@ -290,17 +290,17 @@ def _slopes(
     reaches = rounded([side.reach for side in sides], numbers.degree)
     rooms = [side.reach - 1.0 for side in sides]
     room = rounded(rooms, numbers.degree, is_divisor=True)
-    given = {
+    arguments = {
         "u": _cast(graph, u, numbers),
         "reach": column(graph, reaches, "reaches"),
         "room": column(graph, room, "rooms"),
     }
-    given |= _coefficients(graph, [side.curve for side in sides], numbers)
+    arguments |= _coefficients(graph, [side.curve for side in sides], numbers)
 
     def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
         return _slope_body(inner, inputs, named, numbers)
 
-    return graph.block(f"Slopes{len(given) - 3}", body, given)
+    return graph.block(f"Slopes{len(arguments) - 3}", body, arguments)
 
 
 def _slope_body(
@@ -367,11 +367,11 @@ def _clauses(
     terms = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
     of_term = {key: row[parts[key][0]] for key in terms}
     pairs = {
-        c: (row[found[0]], row[found[1]])
+        c: (row[result[0]], row[result[1]])
         for c in clauses
         if len(c.terms) == 1 and not c.negated
-        for found in [parts[c.variable, c.terms[0]]]
-        if len(found) == 2
+        for result in [parts[c.variable, c.terms[0]]]
+        if len(result) == 2
     }
     flat = [[part for c in when for part in pairs.get(c, (c,))] for when in rules]
     if _cost(flat) > _cost(rules) + 3 * len(pairs) + 20:
@@ -402,7 +402,7 @@ def _clauses(
         block = graph.node("Sub", one, degrees, hint="negations")
         first = table.append(block, len(negated))
         of_clause |= {clause: first + number for number, clause in enumerate(negated)}
-    return pairs | {clause: (found,) for clause, found in of_clause.items()}
+    return pairs | {clause: (result,) for clause, result in of_clause.items()}
 
 
 def _largest(

@@ -59,8 +59,8 @@ def named(bare: Bare) -> Session:
     """Return a session that gives its outputs by name."""
 
     def run(names: Sequence[str], inputs: Array) -> dict[str, Array]:
-        found = bare(list(names), {"inputs": inputs})
-        return {name: np.asarray(f) for name, f in zip(names, found, strict=True)}
+        result = bare(list(names), {"inputs": inputs})
+        return {name: np.asarray(f) for name, f in zip(names, result, strict=True)}
 
     return run
 
@@ -82,8 +82,8 @@ def open_bare(content: bytes, threads: int = 1) -> Bare:
     quiet.log_severity_level = _SILENT
 
     def bare(names: list[str], feeds: dict[str, Array]) -> Sequence[object]:
-        found: Sequence[object] = session.run(names, feeds, quiet)
-        return found
+        result: Sequence[object] = session.run(names, feeds, quiet)
+        return result
 
     return bare
 
@@ -120,12 +120,12 @@ def prove(
     with np.errstate(over="ignore"):  # beyond float32 is missing in float32
         values = np.array(table, np.float64).astype(kind)
     values = values.reshape(len(rows), len(columns))
-    found = proved_run(content, model.name, names, values)
+    result = proved_run(content, model.name, names, values)
     for number, row in enumerate(rows):
         is_missing = not all(map(math.isfinite, row.values()))
         if is_exact or is_missing:
-            given = {name: array[number] for name, array in found.items()}
-            _compare(model, row, given)
+            outputs = {name: array[number] for name, array in result.items()}
+            _compare(model, row, outputs)
 
 
 def proved_run(
@@ -165,21 +165,21 @@ def sample_rows(model: Model, limit: int) -> Iterator[dict[str, float]]:
 
 
 def _landmarks(terms: Sequence[Term]) -> set[float]:
-    found: set[float] = set()
+    result: set[float] = set()
     for term in terms:
         match term.shape:
             case Band(low=low, high=high, left=left, right=right):
                 ends = [flank.end for flank in (left, right) if flank is not None]
-                found.update(ends, (v for v in (low, high) if v is not None))
+                result.update(ends, (v for v in (low, high) if v is not None))
             case LR(mean=mean, left=left, right=right):
-                found.update((mean, mean - left.spread / 2, mean + right.spread / 2))
+                result.update((mean, mean - left.spread / 2, mean + right.spread / 2))
             case Points(values=values):
-                found.update(values)
-                found.update(a + (b - a) / 2 for a, b in itertools.pairwise(values))
-    return found
+                result.update(values)
+                result.update(a + (b - a) / 2 for a, b in itertools.pairwise(values))
+    return result
 
 
-def _compare(model: Model, row: dict[str, float], given: dict[str, object]) -> None:
+def _compare(model: Model, row: dict[str, float], outputs: dict[str, object]) -> None:
     if isinstance(model, RuleBase):
         answer = evaluate(model, row)
     else:
@@ -189,7 +189,7 @@ def _compare(model: Model, row: dict[str, float], given: dict[str, object]) -> N
         "label": answer.label or "",
         "status": int(answer.status),
     }
-    for name, value in given.items():
+    for name, value in outputs.items():
         if name == "strengths":
             same = np.array_equal(
                 np.asarray(value, np.float64), answer.strengths, equal_nan=True

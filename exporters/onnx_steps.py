@@ -116,17 +116,17 @@ def add_steps(graph: OnnxGraph, program: Program, columns: Sequence[str]) -> lis
             names[place] = graph.node("Gather", source, row, hint=graph.topic)
             continue
         first = step.arguments[0]
-        given = [
+        operands = [
             named(argument) for argument in step.arguments if argument not in links
         ]
-        given = links.get(first, []) + given
+        operands = links.get(first, []) + operands
         if place in links:
-            links[place] = given
-        elif len(given) > 2 and step.operation in CHAINS:
+            links[place] = operands
+        elif len(operands) > 2 and step.operation in CHAINS:
             chain = CHAINS[step.operation]
-            names[place] = graph.node(chain, *given, hint=graph.topic)
+            names[place] = graph.node(chain, *operands, hint=graph.topic)
         else:
-            names[place] = add_step(graph, step, given, program)
+            names[place] = add_step(graph, step, operands, program)
     graph.topic = ""
     places = [result.step for result in program.results]
     return [
@@ -160,14 +160,14 @@ def chain_links(
     }
 
 
-def number_constant(graph: OnnxGraph, found: Found) -> str:
+def number_constant(graph: OnnxGraph, known_value: Found) -> str:
     """Return the name of what no input enters: a number, a truth, or samples."""
     kind: npt.DTypeLike = np.float64
-    first = found[0] if isinstance(found, list) else found
+    first = known_value[0] if isinstance(known_value, list) else known_value
     if isinstance(first, bool):
         kind = np.bool_
-    value = np.array(found, kind)
-    if isinstance(found, list):
+    value = np.array(known_value, kind)
+    if isinstance(known_value, list):
         value = value.reshape(-1, 1)
     return graph.constant(value, "number")
 
@@ -187,35 +187,35 @@ def _whole(graph: OnnxGraph, value: int) -> str:
 
 
 def add_step(
-    graph: OnnxGraph, step: Step, given: Sequence[str], program: Program
+    graph: OnnxGraph, step: Step, operands: Sequence[str], program: Program
 ) -> str:
     """Add the nodes of a step, given its arguments, and return the result's name."""
     if step.operation in NODES:
-        return graph.node(NODES[step.operation], *given, hint=graph.topic)
+        return graph.node(NODES[step.operation], *operands, hint=graph.topic)
     match step.operation:
         case "is_finite":
-            size = graph.node("Abs", *given)
+            size = graph.node("Abs", *operands)
             return graph.node("Less", size, _number(graph, np.inf))
         case "cosine":
-            return _cosine(graph, given[0])
+            return _cosine(graph, operands[0])
         case "remainder":
-            return graph.node("Mod", *given, fmod=1)
+            return graph.node("Mod", *operands, fmod=1)
         case "below":
-            return _below(graph, step, given[0])
+            return _below(graph, step, operands[0])
         case "pick":
-            return _pick(graph, step, given[0])
+            return _pick(graph, step, operands[0])
         case "running":
-            return graph.node("CumSum", *given, _whole(graph, 0))
+            return graph.node("CumSum", *operands, _whole(graph, 0))
         case "total":
             count = program.steps[step.arguments[0]].samples
-            return _total(graph, given[0], count)
+            return _total(graph, operands[0], count)
         case "last":
             count = program.steps[step.arguments[0]].samples
-            return graph.node("Gather", given[0], _whole(graph, count - 1))
+            return graph.node("Gather", operands[0], _whole(graph, count - 1))
         case "highest":
-            return reduced(graph, "ReduceMax", given[0])
+            return reduced(graph, "ReduceMax", operands[0])
         case "lowest":
-            return reduced(graph, "ReduceMin", given[0])
+            return reduced(graph, "ReduceMin", operands[0])
         case _:
             raise ValueError(f"no operator computes {step.operation} in double")
 
@@ -341,9 +341,9 @@ class Blocks:
     def single(self, place: int) -> str:
         """Return the name of a result, of shape (rows,) or of a constant."""
         if place not in self._names:
-            found = self._still[place]
-            if found is not None:
-                self._names[place] = number_constant(self.graph, found)
+            known_value = self._still[place]
+            if known_value is not None:
+                self._names[place] = number_constant(self.graph, known_value)
             else:
                 block, row = self._rows[place]
                 at = self.graph.constant(np.array(row, np.int64), "whole")
@@ -402,27 +402,27 @@ class Blocks:
         for place, step in enumerate(self.program.steps):
             if still[place] is not None or place in inner:
                 continue
-            given, _ = chains.get(place, (step.arguments, ()))
-            depth[place] = 1 + max((depth.get(one, 0) for one in given), default=0)
-            unit = _Unit(place, step.operation, tuple(given), place in chains)
+            operands, _ = chains.get(place, (step.arguments, ()))
+            depth[place] = 1 + max((depth.get(one, 0) for one in operands), default=0)
+            unit = _Unit(place, step.operation, tuple(operands), place in chains)
             levels.setdefault(depth[place], []).append(unit)
         return [levels[number] for number in sorted(levels)]
 
     def _chains(self) -> dict[int, tuple[list[int], list[int]]]:
         """Return the operands of each long chain by its last step, and its others."""
         links = chain_links(self.program, self._still, {*CHAINS, *_TRUTHS})
-        found: dict[int, tuple[list[int], list[int]]] = {}
+        known_value: dict[int, tuple[list[int], list[int]]] = {}
         for place, step in enumerate(self.program.steps):
             if step.arguments and step.arguments[0] in links:
                 first, *rest = step.arguments
                 start = [*self.program.steps[first].arguments]
-                operands, inner = found.pop(first, (start, []))
+                operands, inner = known_value.pop(first, (start, []))
                 operands += rest
                 inner.append(first)
-                found[place] = (operands, inner)
+                known_value[place] = (operands, inner)
         return {
             place: chain
-            for place, chain in found.items()
+            for place, chain in known_value.items()
             if len(chain[0]) >= _SHORTEST_CHAIN
             and not self.program.steps[place].samples
         }
@@ -445,11 +445,11 @@ class Blocks:
         graph, unit = self.graph, group[0]
         graph.topic = self._title(group)
         if len(group) > 1:
-            given = [
+            operands = [
                 self.single(places[0]) if len({*places}) == 1 else self.stacked(places)
                 for places in zip(*(one.arguments for one in group), strict=True)
             ]
-            block = graph.node(NODES[unit.operation], *given, hint=graph.topic)
+            block = graph.node(NODES[unit.operation], *operands, hint=graph.topic)
             self._sizes[block] = len(group)
             self._rows |= {one.place: (block, row) for row, one in enumerate(group)}
         elif unit.is_chain:

@@ -214,8 +214,8 @@ def _prove(content: bytes, system: FuzzySystem, outputs: Sequence[Output]) -> No
     rows = system_probes(system, limit=limit)
     table = np.array([[row[name] for name in system.columns] for row in rows])
     table = table.reshape(len(rows), len(system.columns))
-    found = proved_run(content, system.name, outputs, table)
-    for text in _differences(system, program, rows, table, found):
+    results = proved_run(content, system.name, outputs, table)
+    for text in _differences(system, program, rows, table, results):
         raise DisagreementError(text)
 
 
@@ -224,7 +224,7 @@ def _differences(
     program: Program,
     rows: Sequence[Mapping[str, float]],
     table: npt.NDArray[np.float64],
-    found: Mapping[str, npt.NDArray[np.generic]],
+    results: Mapping[str, npt.NDArray[np.generic]],
 ) -> Iterator[str]:
     """Yield where a file's numbers are further from the inference's than they may."""
     import numpy as np
@@ -245,14 +245,14 @@ def _differences(
         "activations": bounds[:, first:last],
         "status": bounds[:, last:],
     }
-    for name, array in found.items():
-        given = array.astype(np.float64).reshape(expected[name].shape)
+    for name, array in results.items():
+        answers = array.astype(np.float64).reshape(expected[name].shape)
         one = expected[name]
-        is_same = (given == one) | (np.isnan(given) & np.isnan(one))
+        is_same = (answers == one) | (np.isnan(answers) & np.isnan(one))
         with np.errstate(invalid="ignore"):  # of two infinities
-            is_near = is_same | (np.abs(given - one) <= allowed[name])
+            is_near = is_same | (np.abs(answers - one) <= allowed[name])
         for row, place in np.argwhere(~(is_near | np.isinf(allowed[name]))).tolist():
             yield (
                 f"the onnx file of {system.name} gives other {name} than the model "
-                f"where {dict(rows[row])}: {given[row, place]}, not {one[row, place]}"
+                f"where {dict(rows[row])}: {answers[row, place]}, not {one[row, place]}"
             )

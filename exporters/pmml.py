@@ -191,9 +191,9 @@ class _Names(NamedTuple):
 
     def new(self, name: str) -> str:
         """Return a name for one more field."""
-        found = unlike(name, self.taken)
-        self.taken.add(found)
-        return found
+        result = unlike(name, self.taken)
+        self.taken.add(result)
+        return result
 
 
 def _header(model: Model) -> PmmlElement:
@@ -362,9 +362,9 @@ def _winner(strengths: Sequence[str], usable: str, best: str) -> PmmlElement:
         for k, name in enumerate(strengths, 1)
     ]
     fired = apply("greaterThan", ref(best), constant(0.0))
-    found = apply("if", fired, joined("min", candidates), constant(_UNCOVERED))
+    result = apply("if", fired, joined("min", candidates), constant(_UNCOVERED))
     is_usable = apply("equal", ref(usable), constant(1.0))
-    return apply("if", is_usable, found, constant(_MISSING))
+    return apply("if", is_usable, result, constant(_MISSING))
 
 
 def _outputs(
@@ -406,9 +406,9 @@ def _rule_nodes(rules: RuleBase, winner: str, names: _Names) -> Iterator[PmmlEle
         )
 
     for k, rule in enumerate(rules.rules, 1):
-        found = node(float(k), rule.then, str(k), rule.support)
+        result = node(float(k), rule.then, str(k), rule.support)
         text = _extension("rule", sentence(rule))
-        yield found._replace(children=(text, *found.children))
+        yield result._replace(children=(text, *result.children))
     if rules.semantics.uncovered is not None:
         yield node(_UNCOVERED, rules.semantics.uncovered, "uncovered")
     if rules.semantics.missing is not None:

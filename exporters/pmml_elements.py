@@ -44,8 +44,8 @@ def element(tag: str, *children: PmmlElement, **attributes: str | None) -> PmmlE
           <True/>
         </Node>
     """
-    given = {name: text for name, text in attributes.items() if text is not None}
-    return PmmlElement(tag, given, children)
+    coefficients = {name: text for name, text in attributes.items() if text is not None}
+    return PmmlElement(tag, coefficients, children)
 
 
 def text_of(root: PmmlElement) -> str:
@@ -121,14 +121,14 @@ class Functions:
         x = ref(field)
         match shape:
             case Band(low=low, high=high, left=left, right=right):
-                found = constant(1.0)
+                result = constant(1.0)
                 if high is not None:
                     beyond = self._flank(right, x)
-                    found = apply("if", _above(x, high), beyond, found)
+                    result = apply("if", _above(x, high), beyond, result)
                 if low is not None:
                     below = self._flank(left, x)
-                    found = apply("if", _up_to(x, low), below, found)
-                return found
+                    result = apply("if", _up_to(x, low), below, result)
+                return result
             case LR(mean=mean, left=left, right=right):
                 below = self._side(left, apply("-", constant(mean), x))
                 above = self._side(right, apply("-", x, constant(mean)))
@@ -199,10 +199,10 @@ class Functions:
     def _side(self, side: Side, distance: PmmlElement) -> PmmlElement:
         names = _names(len(side.curve))
         count = len(names)
-        given = tuple(map(ref, names))
+        coefficients = tuple(map(ref, names))
         v = apply("-", apply("*", constant(2.0), ref("t")), constant(1.0))
         horner = self._define(f"horner{count}", ("v", *names), _horner(names, ref("v")))
-        fall = apply("*", ref("t"), apply(horner, v, *given))
+        fall = apply("*", ref("t"), apply(horner, v, *coefficients))
         kept = self._clipped(apply("-", constant(1.0), fall), constant(1.0))
         body = self._define(f"body{count}", ("t", *names), kept)
         square = self._define("square", ("w",), apply("*", ref("w"), ref("w")))
@@ -210,7 +210,7 @@ class Functions:
         w = self._clipped(left, constant(1.0))
         whole = apply(
             "*",
-            apply(body, apply("min", ref("u"), constant(1.0)), *given),
+            apply(body, apply("min", ref("u"), constant(1.0)), *coefficients),
             apply(square, apply(square, w)),
         )
         parameters = ("u", "reach", "length", *names)
@@ -280,19 +280,19 @@ def norm_continuous(points: Points, field: str) -> PmmlElement:
         if runs[-1] and runs[-1][-1][0] == point[0]:
             runs.append([])
         runs[-1].append(point)
-    found = _run(runs[-1], field)
+    result = _run(runs[-1], field)
     for run in reversed(runs[:-1]):
-        found = apply("if", _up_to(ref(field), run[-1][0]), _run(run, field), found)
-    return found
+        result = apply("if", _up_to(ref(field), run[-1][0]), _run(run, field), result)
+    return result
 
 
 def _run(run: list[tuple[float, float]], field: str) -> PmmlElement:
     if len({degree for _, degree in run}) == 1:
         return constant(run[0][1])
     norms = [element("LinearNorm", orig=repr(x), norm=repr(d)) for x, d in run]
-    found = element("NormContinuous", *norms, field=field, outliers="asExtremeValues")
+    result = element("NormContinuous", *norms, field=field, outliers="asExtremeValues")
     highest = max(degree for _, degree in run)
-    return found if highest == 1.0 else apply("min", found, constant(highest))
+    return result if highest == 1.0 else apply("min", result, constant(highest))
 
 
 def _names(count: int) -> tuple[str, ...]:

@@ -111,12 +111,12 @@ class SystemFields:
             values.append(self._values(place, step, values))
         self.outputs: list[PmmlElement] = []
         for place in program.of("output"):
-            (found,) = values[place]
-            self.outputs.append(_expression(found))
+            (result,) = values[place]
+            self.outputs.append(_expression(result))
 
     def _values(self, place: int, step: Step, values: list[list[Value]]) -> list[Value]:
         """Return the value of a step, or one for each of its samples."""
-        given = [values[argument] for argument in step.arguments]
+        operands = [values[argument] for argument in step.arguments]
         match step.operation:
             case "constant":
                 return [step.number]
@@ -125,16 +125,16 @@ class SystemFields:
             case "index":
                 return [float(k) for k in range(step.samples)]
             case "total":
-                return [self._total(place, given[0])]
+                return [self._total(place, operands[0])]
             case "running":
-                return self._running(place, given[0])
+                return self._running(place, operands[0])
             case "last":
-                return given[0][-1:]
+                return operands[0][-1:]
             case "highest" | "lowest":
                 operation = "maximum" if step.operation == "highest" else "minimum"
-                return [self._carried(place, operation, given[0])]
+                return [self._carried(place, operation, operands[0])]
             case "below" | "pick":
-                one = given[0]
+                one = operands[0]
                 return [
                     self._field(f"{place} {k}", _table(step, value), "number")
                     for k, value in enumerate(one)
@@ -144,25 +144,25 @@ class SystemFields:
                     self._one(
                         f"{place} {k}" if step.samples else f"{place}",
                         step.operation,
-                        [one[k] if len(one) > 1 else one[0] for one in given],
+                        [one[k] if len(one) > 1 else one[0] for one in operands],
                     )
                     for k in range(step.samples or 1)
                 ]
 
-    def _one(self, name: str, operation: str, given: list[Value]) -> Value:
+    def _one(self, name: str, operation: str, operands: list[Value]) -> Value:
         """Return an operation on some values, as a field unless it is known now."""
-        if not any(isinstance(one, PmmlElement) for one in given):
+        if not any(isinstance(one, PmmlElement) for one in operands):
             known = NUMERIC.get(operation) or LOGICAL[operation]
-            return known(*given)
+            return known(*operands)
         kind = OPERATIONS[operation].gives
         if operation == "where":
-            condition, *others = given
+            condition, *others = operands
             if not isinstance(condition, PmmlElement):
                 return others[0] if condition else others[1]
             expression = apply("if", condition, *map(_expression, others))
         else:
             self._define(operation)
-            expression = apply(_own(operation), *map(_expression, given))
+            expression = apply(_own(operation), *map(_expression, operands))
         return self._field(name, expression, kind)
 
     def _field(self, name: str, expression: PmmlElement, kind: str) -> PmmlElement:
@@ -194,16 +194,16 @@ class SystemFields:
         return level[0]
 
     def _running(self, place: int, samples: list[Value]) -> list[Value]:
-        found = samples[:1]
+        result = samples[:1]
         for k, one in enumerate(samples[1:]):
-            found.append(self._one(f"{place} {k}", "add", [found[-1], one]))
-        return found
+            result.append(self._one(f"{place} {k}", "add", [result[-1], one]))
+        return result
 
     def _carried(self, place: int, operation: str, samples: list[Value]) -> Value:
-        found = samples[0]
+        result = samples[0]
         for k, one in enumerate(samples[1:]):
-            found = self._one(f"{place} {k}", operation, [found, one])
-        return found
+            result = self._one(f"{place} {k}", operation, [result, one])
+        return result
 
     def _define(self, operation: str) -> None:
         """Define an operation, for numbers that may be missing."""
@@ -249,20 +249,22 @@ def _own(operation: str) -> str:
 
 def _prefix(taken: set[str]) -> str:
     """Return how the names of fields start: as no other name does."""
-    found = "step"
-    while any(name.startswith(f"{found} ") for name in taken):
-        found = unlike(found, {found, *taken})
-    return f"{found} "
+    result = "step"
+    while any(name.startswith(f"{result} ") for name in taken):
+        result = unlike(result, {result, *taken})
+    return f"{result} "
 
 
 def _body(operation: str, names: tuple[str, ...]) -> PmmlElement:
-    given = [ref(name) for name in names]
+    operands = [ref(name) for name in names]
     if operation in _LOGIC:
-        return apply(_LOGIC[operation], *given)
-    is_missing = [apply("isMissing", one) for one in given]
-    nothing = apply("or", *is_missing) if len(given) > 1 else is_missing[0]
+        return apply(_LOGIC[operation], *operands)
+    is_missing = [apply("isMissing", one) for one in operands]
+    nothing = apply("or", *is_missing) if len(operands) > 1 else is_missing[0]
     if operation in _COMPARED:
-        return apply("if", nothing, _truth(False), apply(_COMPARED[operation], *given))
+        return apply(
+            "if", nothing, _truth(False), apply(_COMPARED[operation], *operands)
+        )
     if operation == "is_finite":
         largest = constant(sys.float_info.max)
         is_small = apply("lessOrEqual", apply("abs", _A), largest)
@@ -272,7 +274,7 @@ def _body(operation: str, names: tuple[str, ...]) -> PmmlElement:
         return apply("if", nothing, _MISSING, apply("if", none, _MISSING, result))
     if operation == "negate":
         return apply("if", nothing, _MISSING, apply("-", _ZERO, _A))
-    return apply("if", nothing, _MISSING, apply(_PLAIN[operation], *given))
+    return apply("if", nothing, _MISSING, apply(_PLAIN[operation], *operands))
 
 
 def _truth(value: bool) -> PmmlElement:

@@ -311,7 +311,7 @@ def parameters(names: Sequence[str]) -> tuple[str, ...]:
         ('grip_force', 'grip_force_2', 'class_', 'x_1st')
     """
     taken = {"answer"}
-    found: list[str] = []
+    result: list[str] = []
     for name in names:
         plain = re.sub(r"\W", "_", name, flags=re.ASCII)
         if not plain or plain[0].isdigit():
@@ -323,8 +323,8 @@ def parameters(names: Sequence[str]) -> tuple[str, ...]:
             count += 1
             unique = f"{plain}_{count}"
         taken.add(unique)
-        found.append(unique)
-    return tuple(found)
+        result.append(unique)
+    return tuple(result)
 
 
 def _doors(inputs: Sequence[Variable], *, has_strengths: bool) -> Iterator[str]:
@@ -336,10 +336,10 @@ def _doors(inputs: Sequence[Variable], *, has_strengths: bool) -> Iterator[str]:
 
 def _door(name: str, what: str, part: str, names: Sequence[str]) -> Iterator[str]:
     takes = ", ".join(["*", *names]) if names else ""
-    given = "".join(f"{n}, " for n in names).strip()
+    prediction = "".join(f"{n}, " for n in names).strip()
     yield f"\n\ndef {name}({takes}):\n"
     yield f'    """Return {what}; each input is given by name."""\n'
-    yield f"    return answer(({given})){part}\n"
+    yield f"    return answer(({prediction})){part}\n"
 
 
 def _examples(model: Model) -> Iterator[str]:
@@ -349,11 +349,11 @@ def _examples(model: Model) -> Iterator[str]:
         rows.append(dict.fromkeys(model.inputs, math.nan))
     for row in rows:
         if isinstance(model, RuleBase):
-            given = evaluate(model, row)
+            prediction = evaluate(model, row)
         else:
-            given = descend(model, row)
+            prediction = descend(model, row)
         values = tuple(row[name] for name in model.inputs)
-        expected = (given.label, given.rule, int(given.status))
+        expected = (prediction.label, prediction.rule, int(prediction.status))
         yield f"({_literal(values)}, {_literal(expected)}),"
 
 

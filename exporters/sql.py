@@ -212,9 +212,9 @@ def _comment(text: str) -> str:
 
 def _last(query: Query, label: str, rule: str, status: str) -> Iterator[str]:
     kept = [f"kept_{k} AS {query.name(n)}" for k, n in enumerate(query.keep, 1)]
-    found = [f"{label} AS {query.name('class')}"]
-    found += [f"{rule} AS {query.name('rule')}", f"{status} AS {query.name('status')}"]
-    yield f"SELECT\n{_listed([*kept, *found])}\nFROM answers"
+    result = [f"{label} AS {query.name('class')}"]
+    result += [f"{rule} AS {query.name('rule')}", f"{status} AS {query.name('status')}"]
+    yield f"SELECT\n{_listed([*kept, *result])}\nFROM answers"
 
 
 def _rule_steps(
@@ -240,8 +240,8 @@ def _rule_steps(
     yield query.step("terms", is_heavy=True)
     yield _commented(["parts.*", *texts]) + "\n  FROM parts\n),"
     yield query.step("clauses", is_heavy=True)
-    found = [f"{_clause(query, c, degrees)} AS {place[c]}" for c in clauses]
-    yield f"  SELECT\n{_listed(['terms.*', *found])}\n  FROM terms\n),"
+    result = [f"{_clause(query, c, degrees)} AS {place[c]}" for c in clauses]
+    yield f"  SELECT\n{_listed(['terms.*', *result])}\n  FROM terms\n),"
     yield query.step("fired", is_heavy=True)
     fired = [
         f"{_strength(query, rules, [place[c] for c in rule.when])} AS s_{number}"

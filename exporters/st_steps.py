@@ -72,12 +72,12 @@ class SystemSteps:
         """Return what the program needs and the language has not."""
         moving = [
             step
-            for step, found in zip(self.program.steps, self.still, strict=True)
-            if found is None
+            for step, result in zip(self.program.steps, self.still, strict=True)
+            if result is None
         ]
         missing = sorted({step.operation for step in moving} - KNOWN)
-        for place, found in enumerate(self.still):
-            numbers = found if isinstance(found, list) else [found]
+        for place, result in enumerate(self.still):
+            numbers = result if isinstance(result, list) else [result]
             is_infinite = any(one is not None and math.isinf(one) for one in numbers)
             if is_infinite and not self._is_outside(place):
                 return [*missing, "infinite numbers"]
@@ -114,13 +114,13 @@ class SystemSteps:
 
     def value(self, place: int) -> str:
         """Return a step's result; of samples, the one of number k."""
-        found = self.still[place]
-        if isinstance(found, list):
-            return f"{self._table(found)}[k]"
-        if isinstance(found, bool):
-            return "TRUE" if found else "FALSE"
-        if found is not None:
-            number = 0.0 if math.isnan(found) else self.numbers.nearest(found)
+        result = self.still[place]
+        if isinstance(result, list):
+            return f"{self._table(result)}[k]"
+        if isinstance(result, bool):
+            return "TRUE" if result else "FALSE"
+        if result is not None:
+            number = 0.0 if math.isnan(result) else self.numbers.nearest(result)
             return self.numbers.literal(number)
         step = self.program.steps[place]
         if step.operation == "input":
@@ -130,16 +130,16 @@ class SystemSteps:
 
     def is_odd(self, place: int) -> str:
         """Return whether a step's result is NaN, as an expression."""
-        found = self.still[place]
-        if isinstance(found, float):
-            return "TRUE" if math.isnan(found) else "FALSE"
+        result = self.still[place]
+        if isinstance(result, float):
+            return "TRUE" if math.isnan(result) else "FALSE"
         if place not in self.odd:
             return "FALSE"
         return f"o{place}[k]" if self.program.steps[place].samples else f"o{place}"
 
     def _odd_steps(self) -> set[int]:
         """Return the steps that can be NaN where every input is a number."""
-        found: set[int] = set()
+        result: set[int] = set()
         for place, step in enumerate(self.program.steps):
             still = self.still[place]
             if still is not None:
@@ -148,14 +148,14 @@ class SystemSteps:
             elif step.kind == "truth":
                 is_odd = False
             else:
-                is_odd = any(argument in found for argument in step.arguments)
+                is_odd = any(argument in result for argument in step.arguments)
                 is_odd = is_odd or step.operation == "square_root"
                 is_odd = is_odd or (
                     step.operation == "divide" and not self._is_safe(step.arguments[1])
                 )
             if is_odd:
-                found.add(place)
-        return found
+                result.add(place)
+        return result
 
     def _is_safe(self, divisor: int) -> bool:
         """Return whether a divisor is a constant, and not 0."""
@@ -192,10 +192,10 @@ class SystemSteps:
     def _one(self, place: int, step: Step) -> Iterator[str]:
         """Yield what sets one result."""
         name, operation = self.value(place), step.operation
-        given = [self.value(argument) for argument in step.arguments]
+        operands = [self.value(argument) for argument in step.arguments]
         odd = self.is_odd(place)
         if operation == "where":
-            test, one, two = given
+            test, one, two = operands
             yield f"IF {test} THEN {name} := {one}; ELSE {name} := {two}; END_IF;"
             if place in self.odd:
                 one, two = map(self.is_odd, step.arguments[1:])
@@ -204,72 +204,72 @@ class SystemSteps:
         flags = [self.is_odd(a) for a in step.arguments if a in self.odd]
         odds = list(dict.fromkeys(flags))
         if step.kind == "truth":
-            yield f"{name} := {self._truth(step, given)};"
+            yield f"{name} := {self._truth(step, operands)};"
             for one in odds:  # NaN is neither less than a number nor equal to one
                 yield f"IF {one} THEN {name} := FALSE; END_IF;"
             return
         if place not in self.odd:
-            yield from self._number(name, operation, given)
+            yield from self._number(name, operation, operands)
             return
         tests = list(odds)
         if operation == "divide" and not self._is_safe(step.arguments[1]):
-            tests.append(f"({given[1]} = {self.numbers.literal(0.0)})")
+            tests.append(f"({operands[1]} = {self.numbers.literal(0.0)})")
         elif operation == "square_root":
-            tests.append(f"({given[0]} < {self.numbers.literal(0.0)})")
+            tests.append(f"({operands[0]} < {self.numbers.literal(0.0)})")
         yield f"{odd} := {' OR '.join(tests)};"
         yield f"IF {odd} THEN"
         yield f"    {name} := {self.numbers.literal(0.0)};"
         yield "ELSE"
-        for line in self._number(name, operation, given):
+        for line in self._number(name, operation, operands):
             yield f"    {line}"
         yield "END_IF;"
 
-    def _truth(self, step: Step, given: list[str]) -> str:
+    def _truth(self, step: Step, operands: list[str]) -> str:
         if step.operation == "not":
-            return f"NOT {given[0]}"
+            return f"NOT {operands[0]}"
         if step.operation == "is_finite":
-            return f"ABS({given[0]}) <= {self.numbers.literal(self.numbers.largest)}"
-        return f"{given[0]} {_SIGNS[step.operation]} {given[1]}"
+            return f"ABS({operands[0]}) <= {self.numbers.literal(self.numbers.largest)}"
+        return f"{operands[0]} {_SIGNS[step.operation]} {operands[1]}"
 
-    def _number(self, name: str, operation: str, given: list[str]) -> Iterator[str]:
+    def _number(self, name: str, operation: str, operands: list[str]) -> Iterator[str]:
         """Yield what computes a number of numbers."""
         if operation in _COMPARED:
-            a, b = given
+            a, b = operands
             test = f"{a} {_COMPARED[operation]} {b}"
             yield f"IF {test} THEN {name} := {a}; ELSE {name} := {b}; END_IF;"
         elif operation in _FUNCTIONS:
-            yield f"{name} := {_FUNCTIONS[operation]}({', '.join(given)});"
+            yield f"{name} := {_FUNCTIONS[operation]}({', '.join(operands)});"
         elif operation == "square_root":
-            yield f"{name} := SQRT({given[0]});"
+            yield f"{name} := SQRT({operands[0]});"
         elif operation == "negate":
-            yield f"{name} := -{given[0]};"
+            yield f"{name} := -{operands[0]};"
         else:
-            yield f"{name} := {given[0]} {_SIGNS[operation]} {given[1]};"
+            yield f"{name} := {operands[0]} {_SIGNS[operation]} {operands[1]};"
 
     def _over_samples(self, place: int, step: Step) -> Iterator[str]:
         """Yield what makes one number of many samples, or sums up to each."""
         (argument,) = step.arguments
         count = self.program.steps[argument].samples
-        given, name = self.value(argument), self.value(place)
-        first, plain = given.replace("[k]", "[0]"), name.removesuffix("[k]")
+        operands, name = self.value(argument), self.value(place)
+        first, plain = operands.replace("[k]", "[0]"), name.removesuffix("[k]")
         if argument in self.odd:
             odd, one = self.is_odd(place), self.is_odd(argument)
             yield from self._any_odd(odd, one, count, is_running=step.samples > 0)
         if step.operation == "last":
-            yield f"{plain} := {given.replace('[k]', f'[{count - 1}]')};"
+            yield f"{plain} := {operands.replace('[k]', f'[{count - 1}]')};"
         elif step.operation == "total":
-            yield from self._total(plain, given, count)
+            yield from self._total(plain, operands, count)
         elif step.operation == "running":
             yield f"{plain}[0] := {first};"
             yield f"FOR k := 1 TO {count - 1} DO"
-            yield f"    {name} := {plain}[k - 1] + {given};"
+            yield f"    {name} := {plain}[k - 1] + {operands};"
             yield "END_FOR;"
         else:
             sign = _COMPARED[step.operation]
             yield f"{plain} := {first};"
             yield f"FOR k := 1 TO {count - 1} DO"
-            test = f"NOT ({plain} {sign} {given})"
-            yield f"    IF {test} THEN {plain} := {given}; END_IF;"
+            test = f"NOT ({plain} {sign} {operands})"
+            yield f"    IF {test} THEN {plain} := {operands}; END_IF;"
             yield "END_FOR;"
 
     def _any_odd(
@@ -286,14 +286,14 @@ class SystemSteps:
             yield f"    {odd} := {odd} OR {one};"
         yield "END_FOR;"
 
-    def _total(self, plain: str, given: str, count: int) -> Iterator[str]:
+    def _total(self, plain: str, operands: str, count: int) -> Iterator[str]:
         """Yield the sum by halves: the second half is added to the first."""
         size = 1 << (count - 1).bit_length()
         known = self.declared.get("halves", "[0..0]")
         widest = max(size, int(known[known.index("..") + 2 : known.index("]")]) + 1)
         self.declared["halves"] = f"ARRAY [0..{widest - 1}] OF {self.numbers.name}"
         yield f"FOR k := 0 TO {count - 1} DO"
-        yield f"    halves[k] := {given};"
+        yield f"    halves[k] := {operands};"
         yield "END_FOR;"
         if size > count:
             yield f"FOR k := {count} TO {size - 1} DO"
@@ -360,23 +360,23 @@ class RuleSteps:
 
     def _needed(self, place: int, done: set[int]) -> list[int]:
         """Return the steps that a step needs and that are not done, in order."""
-        found: set[int] = set()
+        result: set[int] = set()
         todo = [place]
         while todo:
             one = todo.pop()
             if one not in done and self.still[one] is None:
                 done.add(one)
-                found.add(one)
+                result.add(one)
                 todo += self.program.steps[one].arguments
-        return sorted(found)
+        return sorted(result)
 
     def _value(self, place: int) -> str:
-        found = self.still[place]
+        result = self.still[place]
         step = self.program.steps[place]
-        if isinstance(found, bool):
-            return "TRUE" if found else "FALSE"
-        if isinstance(found, float):
-            return self.numbers.literal(self._number(found))
+        if isinstance(result, bool):
+            return "TRUE" if result else "FALSE"
+        if isinstance(result, float):
+            return self.numbers.literal(self._number(result))
         if step.operation == "input":
             return self.values[step.name]
         number = self._numbers.setdefault(place, len(self._numbers) + 1)
@@ -401,26 +401,26 @@ class RuleSteps:
         name = self._value(place)
         kinds = {"n": "DINT", "b": "BOOL", "v": self.numbers.name}
         self.declared[name] = kinds[name[0]]
-        given = [self._value(argument) for argument in step.arguments]
+        operands = [self._value(argument) for argument in step.arguments]
         if operation in _SIGNS:
-            yield f"{name} := {given[0]} {_SIGNS[operation]} {given[1]};"
+            yield f"{name} := {operands[0]} {_SIGNS[operation]} {operands[1]};"
         elif operation in _COMPARED:
-            a, b = given  # a if they are equal, as in the reference: -0 or 0
+            a, b = operands  # a if they are equal, as in the reference: -0 or 0
             test = f"{b} {_COMPARED[operation]} {a}"
             yield f"IF {test} THEN {name} := {b}; ELSE {name} := {a}; END_IF;"
         elif operation == "where":
-            test, a, b = given
+            test, a, b = operands
             yield f"IF {test} THEN {name} := {a}; ELSE {name} := {b}; END_IF;"
         elif operation == "negate":
-            yield f"{name} := -{given[0]};"
+            yield f"{name} := -{operands[0]};"
         elif operation == "below":
             places, last = self._table(step), len(step.table) - 1
             yield f"{name} := 0;"
             yield f"FOR k := 0 TO {last} DO"
-            yield f"    IF {places}[k] < {given[0]} THEN {name} := k + 1; END_IF;"
+            yield f"    IF {places}[k] < {operands[0]} THEN {name} := k + 1; END_IF;"
             yield "END_FOR;"
-        elif operation == "pick" and given[0].startswith("n"):
-            yield f"{name} := {self._table(step)}[{given[0]}];"
+        elif operation == "pick" and operands[0].startswith("n"):
+            yield f"{name} := {self._table(step)}[{operands[0]}];"
         else:  # what else there is answers which rule wins, and that is done below
             raise AssertionError(operation)
 

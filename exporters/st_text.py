@@ -58,8 +58,8 @@ class StNumbers:
     def nearest(self, value: float) -> float:
         """Return the nearest number of the type: finite, and 0 only for 0."""
         clamped = max(-self.largest, min(value, self.largest))
-        (found,) = rounded([clamped], self.kind, is_divisor=value != 0.0).tolist()
-        return float(found)
+        (result,) = rounded([clamped], self.kind, is_divisor=value != 0.0).tolist()
+        return float(result)
 
     def at_most(self, value: float) -> float:
         """Return the largest finite number of the type up to a value.
@@ -68,10 +68,10 @@ class StNumbers:
             >>> SINGLE.at_most(0.1) <= 0.1 < SINGLE.at_most(0.1) * 1.0000002
             True
         """
-        found = self.kind(self.nearest(value))
-        if float(found) > value and float(found) > -self.largest:
-            found = np.nextafter(found, self.kind(-np.inf))
-        return float(found)
+        result = self.kind(self.nearest(value))
+        if float(result) > value and float(result) > -self.largest:
+            result = np.nextafter(result, self.kind(-np.inf))
+        return float(result)
 
     def digits(self, value: float) -> str:
         """Return a number of the type with the fewest digits that give it back.

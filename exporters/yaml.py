@@ -67,8 +67,8 @@ def write(model: Document, /, *, allow_loss: bool = False) -> Written:
         >>> print(write(random_tree(1, leaves=1)).content.decode().splitlines()[0])
         # A fuzzy decision tree of fuzzytree: node 1 is the root.
     """
-    found = losses_of(model) if isinstance(model, FuzzySystem) else _losses(model)
-    losses = [*found]
+    result = losses_of(model) if isinstance(model, FuzzySystem) else _losses(model)
+    losses = [*result]
     if losses:
         text = "\n".join(f"{loss.where}: {loss.what}" for loss in losses)
         raise LossError(f"cannot write {model.name[:100]} as yaml: {text}")
