@@ -34,7 +34,7 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.errors import WriteError, install_hint
 from fuzzytree.files import write_atomically
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 
 _FRAMES_SHOWN = 7
 _TIMES = (1, 3, 5, 7)
@@ -204,7 +204,9 @@ def _real(
     return file_task(task, test=test, label=label, full=full, threshold=threshold)
 
 
-def _changed(settings: Settings, given: Mapping[str, object]) -> Settings:
+def _changed(
+    settings: LearningSettings, given: Mapping[str, object]
+) -> LearningSettings:
     """Return the task's settings with those of the options in them.
 
     Another mode begins from its own defaults.
@@ -213,7 +215,11 @@ def _changed(settings: Settings, given: Mapping[str, object]) -> Settings:
         ValueError: If one is out of its range.
     """
     asked = {name: value for name, value in given.items() if value is not None}
-    base = Settings() if asked.get("mode", settings.mode) != settings.mode else settings
+    base = (
+        LearningSettings()
+        if asked.get("mode", settings.mode) != settings.mode
+        else settings
+    )
     return msgspec.structs.replace(base, **asked)
 
 

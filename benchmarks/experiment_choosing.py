@@ -1,4 +1,4 @@
-"""Settings chosen by the people that are learnt from, without those that are tested.
+"""Settings chosen by the people that are learnt from, without those tested.
 
 Frames of one person are nearly alike, so that folds of single frames would always
 choose what remembers most. Here a fold is a group of whole subjects.
@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from experiment_splits import in_groups
 
-from fuzzytree.learning import Settings, learn_arrays
+from fuzzytree.learning import LearningSettings, learn_arrays
 from fuzzytree.model.rulebase import Value
 from fuzzytree.runtimes.native import load
 
@@ -26,7 +26,7 @@ GROUPS = 4
 
 
 class Candidate(Value, frozen=True):
-    """Settings that may be chosen.
+    """LearningSettings that may be chosen.
 
     Attributes:
         patterns: For each class.
@@ -47,7 +47,7 @@ class Candidate(Value, frozen=True):
             f"entry {self.entry:g}"
         )
 
-    def applied(self, settings: Settings) -> Settings:
+    def applied(self, settings: LearningSettings) -> LearningSettings:
         """Return settings with these in them."""
         return msgspec.structs.replace(
             settings,
@@ -69,7 +69,7 @@ def chosen(
     values: FloatArray,
     codes: IntArray,
     subject: IntArray,
-    settings: Settings,
+    settings: LearningSettings,
     candidates: Sequence[Candidate] = CANDIDATES,
 ) -> Candidate:
     """Return the settings that answer the most frames of subjects left out.
@@ -97,7 +97,11 @@ def chosen(
 
 
 def _right(
-    values: FloatArray, codes: IntArray, train: IntArray, test: IntArray, how: Settings
+    values: FloatArray,
+    codes: IntArray,
+    train: IntArray,
+    test: IntArray,
+    how: LearningSettings,
 ) -> int:
     known, learnt = np.unique(codes[train], return_inverse=True)
     columns = [str(k) for k in range(len(values))]

@@ -11,7 +11,7 @@ from experiment_splits import Split
 from experiment_tables import EFFECTS
 from experiment_tasks import Task
 
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER, press
 from fuzzytree.tactile.simulation.physics import Settings as Physics
@@ -94,7 +94,7 @@ def paper_task(
         np.zeros(0, np.int64),
         splits,
         "paper",
-        Settings(patterns_per_class=1),
+        LearningSettings(patterns_per_class=1),
         conditions=_text(physics),
         is_whole=False,
     )

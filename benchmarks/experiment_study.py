@@ -15,7 +15,7 @@ from experiment_splits import Split
 from experiment_tasks import Task
 
 from fuzzytree.errors import LearningError, TableError
-from fuzzytree.learning import Learnt, Settings, learn_arrays
+from fuzzytree.learning import LearningSettings, Learnt, learn_arrays
 from fuzzytree.model.rulebase import Value
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.features import costs
@@ -143,7 +143,7 @@ def experiment(
     task: Task,
     *,
     features: str | None = None,
-    settings: Settings | None = None,
+    settings: LearningSettings | None = None,
     choose: Sequence[Candidate] = (),
     peers: Sequence[str] = (),
     seed: int = 0,
@@ -159,8 +159,8 @@ def experiment(
         features: Sets of features (`fuzzytree.tactile.features.names`); the task's
             unless given.
         settings: How to learn; the task's unless given.
-        choose: Settings to choose from in each division, by the subjects that are
-            learnt from alone; `experiment_choosing.CANDIDATES`, say.
+        choose: LearningSettings to choose from in each division, by the subjects that
+            are learnt from alone; `experiment_choosing.CANDIDATES`, say.
         peers: Which of `experiment_peers.PEERS` to compare with.
         seed: Of the peers that draw numbers.
         progress: Told what is done and which share of it.
@@ -266,7 +266,7 @@ class _Learner:
         self,
         task: Task,
         found: Features,
-        settings: Settings,
+        settings: LearningSettings,
         choose: Sequence[Candidate],
     ) -> None:
         self.task, self.found = task, found
@@ -380,11 +380,11 @@ def _sensor_text(task: Task) -> str:
     return f"{text}; {task.conditions}" if task.conditions else text
 
 
-def settings_text(settings: Settings) -> str:
+def settings_text(settings: LearningSettings) -> str:
     """Return the settings that matter, in words.
 
     Example:
-        >>> settings_text(Settings(patterns_per_class=2))
+        >>> settings_text(LearningSettings(patterns_per_class=2))
         'default mode, 2 patterns a class, L_MAX 10, shrinkage 0.001, entry 2'
     """
     patterns = settings.patterns_per_class

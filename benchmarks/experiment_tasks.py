@@ -15,7 +15,7 @@ from experiment_splits import Split, check_apart, leave_one_out
 
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 from fuzzytree.tactile.presses import LIMIT, Presses, read_presses
 from fuzzytree.tactile.sensor import Cells, Sensor
 
@@ -58,7 +58,7 @@ class Task:
     subject: IntArray
     splits: tuple[Split, ...]
     features: str = SHAPES
-    settings: Settings = field(default_factory=Settings)
+    settings: LearningSettings = field(default_factory=LearningSettings)
     chosen_on: tuple[int, ...] = ()
     conditions: str = ""
     is_whole: bool = True
@@ -87,7 +87,7 @@ class Known:
     full: int
     threshold: int
     features: str
-    settings: Settings
+    settings: LearningSettings
     others: str = ""
 
 
@@ -109,7 +109,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=1000,
             threshold=0,
             features="blocks:16x8 / force",
-            settings=Settings(patterns_per_class=3, shrinkage=0.9, entry=0.0),
+            settings=LearningSettings(patterns_per_class=3, shrinkage=0.9, entry=0.0),
         ),
         "postures-17": Known(
             "13 people on a mat of 64 x 32 cells: 17 postures",
@@ -118,7 +118,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=1000,
             threshold=10,
             features=f"{SHAPES}, blocks:16x8 / force",
-            settings=Settings(patterns_per_class=1, shrinkage=0.5, entry=0.0),
+            settings=LearningSettings(patterns_per_class=1, shrinkage=0.5, entry=0.0),
         ),
         "touch": Known(
             "17 people on a touch screen of 27 x 15 cells: the thumb or another finger",
@@ -127,7 +127,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=255,
             threshold=40,
             features=SHAPES,
-            settings=Settings(patterns_per_class=1, shrinkage=0.9),
+            settings=LearningSettings(patterns_per_class=1, shrinkage=0.9),
             others="other finger",
         ),
         "touch-fingers": Known(
@@ -137,7 +137,7 @@ KNOWN: Mapping[str, Known] = MappingProxyType(
             full=255,
             threshold=40,
             features=SHAPES,
-            settings=Settings(patterns_per_class=2, shrinkage=0.1),
+            settings=LearningSettings(patterns_per_class=2, shrinkage=0.1),
         ),
     }
 )
@@ -204,7 +204,7 @@ def by_subject(
     sensor: Sensor,
     about: str,
     features: str = SHAPES,
-    settings: Settings | None = None,
+    settings: LearningSettings | None = None,
 ) -> Task:
     """Return a task that leaves each subject out in turn.
 
@@ -230,7 +230,7 @@ def by_subject(
         presses.subject,
         leave_one_out(presses.subject),
         features,
-        settings or Settings(),
+        settings or LearningSettings(),
     )
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from sklearn.naive_bayes import GaussianNB
 
-from fuzzytree.learning import Learner, Settings, learn_arrays
+from fuzzytree.learning import Learner, LearningSettings, learn_arrays
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -48,11 +48,11 @@ def ratios(values: FloatArray, labels: IntArray) -> list[str]:
     """Return the time of each way to learn, as a ratio to GaussianNB's fit."""
     ways: dict[str, Callable[[], object]] = {
         "GaussianNB": lambda: GaussianNB().fit(values, labels),
-        "default": lambda: learn(values, labels, Settings()),
+        "default": lambda: learn(values, labels, LearningSettings()),
         "one pattern a class": lambda: learn(
-            values, labels, Settings(patterns_per_class=1)
+            values, labels, LearningSettings(patterns_per_class=1)
         ),
-        "paper": lambda: learn(values, labels, Settings(mode="paper")),
+        "paper": lambda: learn(values, labels, LearningSettings(mode="paper")),
         "partial_fit, 100 chunks": lambda: learn_in_chunks(values, labels, 100),
     }
     taken: dict[str, list[float]] = {name: [] for name in ways}
@@ -74,7 +74,7 @@ def names(letter: str, count: int) -> list[str]:
     return [f"{letter}{k}" for k in range(1, count + 1)]
 
 
-def learn(values: FloatArray, labels: IntArray, settings: Settings) -> int:
+def learn(values: FloatArray, labels: IntArray, settings: LearningSettings) -> int:
     """Learn at once and return the number of leaves."""
     columns = names("x", values.shape[1])
     classes = names("c", int(labels.max()) + 1)
@@ -109,11 +109,11 @@ def memory_of_large() -> float:
     """Return the largest memory that learning allocates beyond the table, in MB."""
     values, labels = gaussian_classes(ROWS, COLUMNS, CLASSES, 0.5)
     tracemalloc.start()
-    learn(values, labels, Settings())
+    learn(values, labels, LearningSettings())
     return tracemalloc.get_traced_memory()[1] / 2**20
 
 
-def many(settings: Settings) -> tuple[str, float, float]:
+def many(settings: LearningSettings) -> tuple[str, float, float]:
     """Return mode, seconds and peak GB of learning very many classes."""
     rng = np.random.default_rng(0)
     centres = rng.normal(size=(MANY, MANY_COLUMNS))
@@ -128,12 +128,12 @@ def many(settings: Settings) -> tuple[str, float, float]:
 
 def many_default() -> tuple[str, float, float]:
     """Return the cost of very many classes in default mode."""
-    return many(Settings())
+    return many(LearningSettings())
 
 
 def many_paper() -> tuple[str, float, float]:
     """Return the cost of very many classes in paper mode."""
-    return many(Settings(mode="paper"))
+    return many(LearningSettings(mode="paper"))
 
 
 def in_a_process(task: Callable[[], T]) -> T:

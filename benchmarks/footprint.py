@@ -157,7 +157,9 @@ def child(code: str, folder: str) -> list[str]:
 
 def wine() -> FuzzyTree:
     """Return the tree of the README."""
-    return ft.learn(WINE, target="cultivar", entry=25.0, name="wine")
+    return ft.learn(
+        WINE, target="cultivar", name="wine", settings=ft.LearningSettings(entry=25.0)
+    )
 
 
 def digits() -> FuzzyTree:
@@ -168,7 +170,10 @@ def digits() -> FuzzyTree:
     names = [f"pixel {number}" for number in range(1, 65)]
     labels = [str(label) for label in table.target]
     return ft.learn(
-        table.data, target=labels, columns=names, mode="paper", name="digits"
+        ft.table(table.data, columns=names),
+        target=labels,
+        name="digits",
+        settings=ft.LearningSettings(mode="paper"),
     )
 
 

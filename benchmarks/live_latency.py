@@ -25,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.boards import Board, Marker, Port
@@ -77,7 +78,7 @@ def paper_tree() -> FuzzyTree:
         frames = press(name, 50, seed=1).frames
         rows.append(features_of(PAPER_BOARD.sensor, frames, FEATURES).values.T)
         labels += [name] * len(frames)
-    return learn(np.concatenate(rows), target=labels, columns=FEATURES)
+    return learn(table(np.concatenate(rows), columns=FEATURES), target=labels)
 
 
 def latencies(

@@ -183,7 +183,9 @@ def _text(x: float, y: float, text: str, style: str = "", anchor: str = "start")
 def drawn() -> str:
     """Learn on the wine table and return its picture."""
     table = HERE / "wine" / "wine.csv"
-    tree = ft.learn(table, target="cultivar", name="wine", entry=25)
+    tree = ft.learn(
+        table, target="cultivar", name="wine", settings=ft.LearningSettings(entry=25)
+    )
     return picture(tree, ft.rules_from_tree(tree))
 
 

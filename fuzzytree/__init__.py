@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         export,
         learn,
         load,
+        material,
         needs,
         read,
         recheck,
@@ -30,27 +31,38 @@ if TYPE_CHECKING:
         save,
         stability,
     )
+    from fuzzytree.auditing.findings.domains import AuditDomain
+    from fuzzytree.auditing.findings.records import AuditSelection, AuditSettings
+    from fuzzytree.benchmarking.study import BenchSettings
     from fuzzytree.errors import FuzzyTreeError
     from fuzzytree.estimator import FuzzyTreeClassifier
     from fuzzytree.formats.simpful import from_simpful
     from fuzzytree.formats.skfuzzy import from_skfuzzy
     from fuzzytree.formats.sklearn import from_sklearn
-    from fuzzytree.model.agreement import Agreement
+    from fuzzytree.learning.settings import LearningSettings
+    from fuzzytree.model.agreement import Agreement, CheckSettings
     from fuzzytree.model.rulebase import RuleBase
     from fuzzytree.model.system import FuzzySystem
     from fuzzytree.model.tree import FuzzyTree
     from fuzzytree.runtimes.answers import Answers
     from fuzzytree.runtimes.outputs import Outputs
+    from fuzzytree.tables import table
 
     __version__: str
 
 __all__ = [
     "Agreement",
     "Answers",
+    "AuditDomain",
+    "AuditSelection",
+    "AuditSettings",
+    "BenchSettings",
+    "CheckSettings",
     "FuzzySystem",
     "FuzzyTree",
     "FuzzyTreeClassifier",
     "FuzzyTreeError",
+    "LearningSettings",
     "Outputs",
     "RuleBase",
     "__version__",
@@ -68,6 +80,7 @@ __all__ = [
     "from_sklearn",
     "learn",
     "load",
+    "material",
     "needs",
     "read",
     "recheck",
@@ -75,15 +88,22 @@ __all__ = [
     "run",
     "save",
     "stability",
+    "table",
 ]
 
 _HOMES = {
     "Agreement": "fuzzytree.model.agreement",
     "Answers": "fuzzytree.runtimes.answers",
+    "AuditDomain": "fuzzytree.auditing.findings.domains",
+    "AuditSelection": "fuzzytree.auditing.findings.records",
+    "AuditSettings": "fuzzytree.auditing.findings.records",
+    "BenchSettings": "fuzzytree.benchmarking.study",
+    "CheckSettings": "fuzzytree.model.agreement",
     "FuzzySystem": "fuzzytree.model.system",
     "FuzzyTree": "fuzzytree.model.tree",
     "FuzzyTreeClassifier": "fuzzytree.estimator",
     "FuzzyTreeError": "fuzzytree.errors",
+    "LearningSettings": "fuzzytree.learning.settings",
     "Outputs": "fuzzytree.runtimes.outputs",
     "RuleBase": "fuzzytree.model.rulebase",
     "audit": "fuzzytree.api.verbs",
@@ -100,6 +120,7 @@ _HOMES = {
     "from_sklearn": "fuzzytree.formats.sklearn",
     "learn": "fuzzytree.api.verbs",
     "load": "fuzzytree.api.verbs",
+    "material": "fuzzytree.api.verbs",
     "needs": "fuzzytree.api.verbs",
     "read": "fuzzytree.api.verbs",
     "recheck": "fuzzytree.api.verbs",
@@ -107,6 +128,7 @@ _HOMES = {
     "run": "fuzzytree.api.verbs",
     "save": "fuzzytree.api.verbs",
     "stability": "fuzzytree.api.verbs",
+    "table": "fuzzytree.tables",
 }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import MissingExtraError, install_hint
-from fuzzytree.learning import Learner, LearningReport, Settings
+from fuzzytree.learning import Learner, LearningReport, LearningSettings
 from fuzzytree.model.rulebase import label_type_of
 from fuzzytree.model.tree import FuzzyTree, with_label_type
 from fuzzytree.runtimes import baseline
@@ -75,7 +75,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         costs: The cost of a column, by its name in the tree; 1 unless given.
         choices: What inner validation may choose beside `patterns_per_class`.
         seed: Moves the folds of inner validation. The same seed and table give the
-            same tree. `fuzzytree.learning.Settings` says more about each.
+            same tree. `fuzzytree.learning.LearningSettings` says more about each.
 
     Attributes:
         tree_: The tree, as every other part of fuzzytree takes it.
@@ -273,8 +273,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         if "tree_" in state:
             self._run = _prepared(self.tree_)
 
-    def _settings(self) -> Settings:
-        return Settings(
+    def _settings(self) -> LearningSettings:
+        return LearningSettings(
             mode=self.mode,
             alpha=self.alpha,
             l_max=self.l_max,

@@ -133,6 +133,53 @@ class Batch(msgspec.Struct, frozen=True, eq=False):
     piece: Piece
 
 
+class TableSource(msgspec.Struct, frozen=True, eq=False):
+    """A table, with what cannot be seen from it; `table` makes one.
+
+    Attributes:
+        source: The table itself, or its path.
+        columns: The names of an array's columns; x1, x2, ... if None.
+        delimiter: Of a CSV file; found in its first line if None.
+    """
+
+    source: object
+    columns: Sequence[str] | None = None
+    delimiter: str | None = None
+
+
+def table(
+    source: object,
+    *,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+) -> TableSource:
+    """Return a table for the functions that take one, with its columns or delimiter.
+
+    Args:
+        source: A path, an open file, a pandas, polars or arrow table, or an array of
+            shape (rows, columns).
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file: `,`, `;` or a tab.
+
+    Example:
+        >>> table(np.array([[1.5], [2.5]]), columns=["force"]).columns
+        ['force']
+    """
+    return TableSource(source, columns, delimiter)
+
+
+def path_of(source: object) -> str | None:
+    """Return the path of a table that is a file, None of another.
+
+    Example:
+        >>> path_of(table("rows.csv", delimiter=";"))
+        'rows.csv'
+    """
+    if isinstance(source, TableSource):
+        source = source.source
+    return os.fspath(source) if isinstance(source, str | os.PathLike) else None
+
+
 def read_table(
     source: object,
     *,
@@ -285,6 +332,16 @@ def pieces(
         TypeError: If the source is no table.
     """
     match source:
+        case TableSource():
+            columns = source.columns if columns is None else columns
+            delimiter = delimiter or source.delimiter
+            return pieces(
+                source.source,
+                columns=columns,
+                delimiter=delimiter,
+                name=name,
+                only=only,
+            )
         case str() | os.PathLike():
             path = cast("str | os.PathLike[str]", source)
             return _file_pieces(path, delimiter, name, only)

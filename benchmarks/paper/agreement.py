@@ -11,7 +11,7 @@ import numpy.typing as npt
 from sklearn import datasets
 from sklearn.model_selection import StratifiedKFold
 
-from fuzzytree.learning import Settings, learn_arrays
+from fuzzytree.learning import LearningSettings, learn_arrays
 from fuzzytree.model.rulebase import Conjunction
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.native import load
@@ -118,7 +118,7 @@ def _cross_validated(
             labels[learn],
             columns=columns,
             classes=classes,
-            settings=Settings(mode=mode),
+            settings=LearningSettings(mode=mode),
         ).tree
         leaves.append(len(tree.leaves))
         needed = [columns.index(name) for name in tree.inputs]

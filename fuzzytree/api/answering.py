@@ -154,7 +154,6 @@ class Answering(msgspec.Struct, frozen=True):
         table: object,
         *,
         columns: Sequence[str] | None = None,
-        delimiter: str | None = None,
         name: str | None = None,
         with_others: bool = False,
     ) -> Iterator[tuple[Batch, Answers | Outputs]]:
@@ -170,7 +169,6 @@ class Answering(msgspec.Struct, frozen=True):
             self.inputs,
             trained=self.trained,
             columns=columns,
-            delimiter=delimiter,
             name=name,
             with_others=with_others,
         ):

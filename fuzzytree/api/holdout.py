@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.learning import LearningReport, Settings, learn_arrays
+from fuzzytree.learning import LearningReport, LearningSettings, learn_arrays
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes import baseline
 from fuzzytree.tables import Table
@@ -114,7 +114,7 @@ def majority(table: Table) -> float:
 
 def accuracy(
     table: Table,
-    settings: Settings,
+    settings: LearningSettings,
     report: LearningReport,
     *,
     folds: int = FOLDS,
@@ -167,8 +167,8 @@ def accuracy(
 
 
 def _of_fold(
-    settings: Settings, report: LearningReport | None, classes: Sequence[str]
-) -> Settings:
+    settings: LearningSettings, report: LearningReport | None, classes: Sequence[str]
+) -> LearningSettings:
     """Return settings for the classes of a fold, as a report says they were chosen."""
     chosen = dict(report.chosen) if report else {}
     patterns = settings.patterns_per_class

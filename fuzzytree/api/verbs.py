@@ -32,7 +32,7 @@ from fuzzytree.checking.converting import (
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import check_stream, read_bounded, reason, write_atomically
-from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.agreement import Agreement, CheckSettings
 from fuzzytree.model.contracts import (
     Document,
     Dtype,
@@ -50,7 +50,15 @@ from fuzzytree.runtimes import chosen_runtimes
 from fuzzytree.runtimes.onnxruntime import OnnxModel
 from fuzzytree.semantics import lowering
 from fuzzytree.semantics.conversion import as_rules, as_system
-from fuzzytree.tables import Batch, Table, batches, class_names, read_table
+from fuzzytree.tables import (
+    Batch,
+    Table,
+    TableSource,
+    batches,
+    class_names,
+    path_of,
+    read_table,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -58,15 +66,21 @@ if TYPE_CHECKING:
 
     from fuzzytree.auditing.diff.difference_records import Difference
     from fuzzytree.auditing.findings.codes import Code
-    from fuzzytree.auditing.findings.domains import Within
-    from fuzzytree.auditing.findings.records import Audit, AuditSettings, SourceFile
+    from fuzzytree.auditing.findings.domains import AuditDomain
+    from fuzzytree.auditing.findings.records import (
+        Audit,
+        AuditSelection,
+        AuditSettings,
+        SourceFile,
+    )
     from fuzzytree.auditing.findings.subject import AuditRows, Material
     from fuzzytree.auditing.recheck import Report as RecheckReport
     from fuzzytree.benchmarking.records import Study
     from fuzzytree.benchmarking.savings import Report
+    from fuzzytree.benchmarking.study import BenchSettings
     from fuzzytree.checking.programs import ProgramFile
     from fuzzytree.checking.stability.results import Stability
-    from fuzzytree.learning import Learnt, Settings
+    from fuzzytree.learning import LearningSettings, Learnt
     from fuzzytree.model.contracts import FloatArray
     from fuzzytree.model.tree import Use
     from fuzzytree.numerics.bounds import Certificate
@@ -106,59 +120,28 @@ def learn(
     table: object,
     *,
     target: str | Sequence[object] | npt.NDArray[np.generic],
-    name: str | None = None,
     ignore: Sequence[str] = (),
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
+    name: str | None = None,
     units: Mapping[str, str] | None = None,
+    settings: LearningSettings | None = None,
     progress: Progress | None = None,
-    mode: Literal["default", "paper"] = "default",
-    alpha: float = 0.9,
-    l_max: float | None = None,
-    points: int = 3,
-    separate_sides: bool = False,
-    patterns_per_class: int | Literal["auto"] | Mapping[str, int] | None = None,
-    shrinkage: float = 1e-3,
-    entry: float = 2.0,
-    costs: Mapping[str, float] | None = None,
-    choices: tuple[Literal["alpha", "l_max", "shrinkage", "entry"], ...] = (),
-    rows_per_class: int = 5_000,
-    seed: int = 0,
-    keep_reversals: bool = False,
-    missing: Literal["drop", "refuse"] = "drop",
 ) -> FuzzyTree:
     """Learn a fuzzy tree from a table with a class for each row.
 
     Args:
-        table: A path, a pandas, polars or arrow table, or an array of shape
-            (rows, columns).
+        table: A path, a pandas, polars or arrow table, an array of shape
+            (rows, columns), or what `fuzzytree.table` returns.
         target: The column of the classes, or the classes themselves.
-        name: Of the tree; the file's, or `tree`, unless given.
         ignore: Columns to leave out.
-        columns: The names of an array's columns; x1, x2, ... unless given.
-        delimiter: Of a CSV file, if its first line does not tell.
+        name: Of the tree; the file's, or `tree`, unless given.
         units: The units of columns, by name.
-        progress: Told what is done and which share of it.
-        mode: This and all below as in `fuzzytree.learning.Settings`.
-        alpha: Weight of the difference of means in the distance.
-        l_max: The paper's L_MAX.
-        points: n of the paper's 2n + 1 points on a fuzzy set.
-        separate_sides: Whether a set's two sides are fitted apart.
-        patterns_per_class: How many patterns a class has.
-        shrinkage: How far the off-diagonal of a scatter is shrunk.
-        entry: How much a further input must help a combination.
-        costs: Cost of a column by name.
-        choices: What inner validation may choose beside the patterns.
-        rows_per_class: How many rows of a class are kept for clusters and validation.
-        seed: Moves the folds of inner validation.
-        keep_reversals: Whether a wide set gets the far tails back.
-        missing: Whether rows with missing values are dropped or refused.
+        settings: How to learn; the defaults of `LearningSettings` unless given.
+        progress: Called with the current step and the share that is done.
 
     Raises:
         TableError: If a column is absent or holds text, or if there are no rows.
         LearningError: If nothing can be learnt from the table, or its target is
             continuous.
-        ValueError: If a setting is out of its range.
 
     Warns:
         UserWarning: If a column looks like an identifier, or there are many classes
@@ -172,35 +155,17 @@ def learn(
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
-    from fuzzytree.learning import Settings
+    from fuzzytree.learning import LearningSettings
     from fuzzytree.learning.suitability import remarks
 
-    settings = Settings(
-        mode=mode,
-        alpha=alpha,
-        l_max=l_max,
-        points=points,
-        separate_sides=separate_sides,
-        patterns_per_class=patterns_per_class,
-        shrinkage=shrinkage,
-        entry=entry,
-        costs=costs or {},
-        choices=choices,
-        rows_per_class=rows_per_class,
-        seed=seed,
-        keep_reversals=keep_reversals,
-        missing=missing,
-    )
-    found = read_table(
-        table, target=target, ignore=ignore, columns=columns, delimiter=delimiter
-    )
+    found = read_table(table, target=target, ignore=ignore)
     for column, text in remarks(found, lambda column: f"ignore=[{column!r}]"):
         warnings.warn(f"{found.name}: {column} has {text}", stacklevel=2)
     return learn_table(
         found,
         name=name or _name_of(table),
         units=units or {},
-        settings=settings,
+        settings=settings or LearningSettings(),
         progress=progress,
     ).tree
 
@@ -210,7 +175,7 @@ def learn_table(
     *,
     name: str,
     units: Mapping[str, str],
-    settings: Settings,
+    settings: LearningSettings,
     progress: Progress | None = None,
 ) -> Learnt:
     """Learn from a table that was read, and return the report beside the tree.
@@ -242,9 +207,8 @@ def learn_table(
 
 
 def _name_of(table: object) -> str:
-    if isinstance(table, str | os.PathLike):
-        return printable(Path(table).stem) or "tree"
-    return "tree"
+    path = path_of(table)
+    return (printable(Path(path).stem) if path else "") or "tree"
 
 
 def rules_from_tree(
@@ -302,36 +266,25 @@ def save(
     return written
 
 
-def rows_of(
-    data: object,
-    model: Document,
-    *,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
-) -> FloatArray | None:
+def rows_of(data: object, model: Document) -> FloatArray | None:
     """Return the rows of a table for a model, of shape (inputs, rows).
 
     Args:
         data: A table; see `fuzzytree.tables`. Without one (None) there are no rows.
         model: Whose inputs they are for.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
 
     Raises:
         TableError: If a column is absent or holds text, or the table has no row.
     """
     if data is None:
         return None
-    values, _ = _rows(data, model, columns=columns, delimiter=delimiter)
-    return values
+    return _rows(data, model)[0]
 
 
 def _rows(
     data: object,
     model: Document,
     *,
-    columns: Sequence[str] | None,
-    delimiter: str | None,
     name: str | None = None,
     with_others: bool = False,
 ) -> tuple[FloatArray, list[Batch]]:
@@ -342,8 +295,6 @@ def _rows(
             data,
             model.columns if isinstance(model, FuzzySystem) else model.inputs,
             trained=() if is_system else model.columns,
-            columns=columns,
-            delimiter=delimiter,
             name=name,
             with_others=with_others,
         )
@@ -358,13 +309,9 @@ def check(
     model: ModelSource,
     *others: Carried,
     data: object = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
-    limit: int | None = None,
-    rows_only: bool = False,
-    run_code: bool = False,
+    settings: CheckSettings | None = None,
     allow_loss: bool = False,
     progress: Progress | None = None,
 ) -> Agreement:
@@ -375,15 +322,9 @@ def check(
         others: What was shipped beside it: models, ONNX files opened or as bytes, or
             paths.
         data: A table with rows of one's own, beside the probes.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
         names: What to call each of the others; its path unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
-        limit: The most probes; 20,000 unless given, and 2,000 for a system.
-        rows_only: Whether files whose rows agree are accepted with other content: a
-            graph that this version would not write, or a system with other numbers.
-        run_code: Whether a program (C, Python, JavaScript, SQL, PMML) is run even if
-            its text is not what this version writes of the model.
+        settings: How many probes, and what is accepted; see `CheckSettings`.
         allow_loss: As in `load`, for every file.
         progress: Called with what is compared next and the share that is done.
 
@@ -396,9 +337,10 @@ def check(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> check(random_tree(1), runtimes=["native"], limit=100).ok
+        >>> check(random_tree(1), runtimes=["native"]).ok
         True
     """
+    chosen = settings or CheckSettings()
     first = as_model(model, allow_loss=allow_loss)
     names = as_names(names)
     titles = [
@@ -406,10 +348,10 @@ def check(
         for k, other in enumerate(others)
     ]
     rest = [
-        _program(other, run_code) or opened(other, allow_loss=allow_loss)
+        _program(other, chosen.run_code) or opened(other, allow_loss=allow_loss)
         for other in others
     ]
-    values = rows_of(data, first, columns=columns, delimiter=delimiter)
+    values = rows_of(data, first)
     if isinstance(first, FuzzySystem):
         from fuzzytree.checking.systems import check_system
 
@@ -419,8 +361,8 @@ def check(
             data=values,
             names=titles,
             runtimes=runtimes,
-            limit=limit or 2_000,
-            rows_only=rows_only,
+            limit=chosen.limit or 2_000,
+            rows_only=chosen.rows_only,
             progress=progress,
         )
     from fuzzytree.checking import models as checking
@@ -431,8 +373,8 @@ def check(
         data=values,
         names=titles,
         runtimes=runtimes,
-        limit=limit or 20_000,
-        rows_only=rows_only,
+        limit=chosen.limit or 20_000,
+        rows_only=chosen.rows_only,
         progress=progress,
     )
 
@@ -488,7 +430,6 @@ def certify(
     dtype: Dtype = "float64",
     *,
     data: object = None,
-    columns: Sequence[str] | None = None,
 ) -> Certificate:
     """Return how far a number type can take a model from its exact answers, at most.
 
@@ -497,7 +438,6 @@ def certify(
         dtype: `float64`, `mixed` or `float32`.
         data: A table with the rows for which it shall hold; all values in the declared
             ranges of the inputs unless given.
-        columns: The names of an array's columns.
 
     Raises:
         ReadError: If a file cannot be read.
@@ -515,22 +455,16 @@ def certify(
         known = ", ".join(get_args(Dtype))
         raise ValueError(f"there is no number type {dtype!r}; there are {known}")
     first = _model_of(model, "certify")
-    return bounds.certify(first, dtype, rows_of(data, first, columns=columns))
+    return bounds.certify(first, dtype, rows_of(data, first))
 
 
 def bench(
     model: ModelSource,
     *,
     data: object = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
-    rows: Sequence[int] = (1, 1_000, 1_000_000),
-    threads: Sequence[int] = (1, 2),
     only: Sequence[str] = (),
     skip: Sequence[str] = (),
-    error: float | None = None,
-    budget_s: float = 300.0,
-    seed: int = 0,
+    settings: BenchSettings | None = None,
     progress: Progress | None = None,
 ) -> Study:
     """Measure error against run time for every way of running a model.
@@ -539,18 +473,12 @@ def bench(
         model: A tree or a rule base, or the path of one.
         data: A table with rows to time and to judge on, repeated where there are too
             few; rows are made of the model's declared ranges if None.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
-        rows: Rows in a call: each of them is measured.
-        threads: Threads that a candidate is allowed: each of them is measured.
         only: Names of candidates, such as `native`, questions, such as `raw rules`,
             or kinds, such as `peer`: the others are left out.
         skip: The same, for what is left out.
-        error: The largest error of a strength that is allowed; the advice keeps it.
-        budget_s: About how long it may take, in seconds; half of it at least goes to
-            the timed calls.
-        seed: Of the made rows, and of the order of the rounds.
-        progress: Told what is done and which share of it.
+        settings: Rows in a call, threads, the largest error allowed, and about how many
+            seconds it may take; the defaults of `BenchSettings` unless given.
+        progress: Called with the current step and the share that is done.
 
     Returns:
         The study. After Ctrl-C it holds what was measured by then.
@@ -561,22 +489,23 @@ def bench(
         ValueError: If a number is out of its range, or a name is unknown.
 
     Example:
+        >>> from fuzzytree import BenchSettings
         >>> from fuzzytree.testing import random_tree
-        >>> study = bench(random_tree(1), rows=[9], only=["native"], budget_s=9)
-        >>> [point.question for point in study.points]
-        ['tree', 'relative rules', 'raw rules']
+        >>> study = bench(
+        ...     random_tree(1), only=["native"], settings=BenchSettings(rows=(9,),
+        budget_s=9) ... ) >>> [point.question for point in study.points] ['tree',
+        'relative rules', 'raw rules']
     """
     from fuzzytree.benchmarking import study
 
-    plan = study.Plan(tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed)
     first = _model_of(model, "bench")
     return study.bench(
         first,
-        values=rows_of(data, first, columns=columns, delimiter=delimiter),
+        values=rows_of(data, first),
         data=_data_name(data),
         only=only,
         skip=skip,
-        plan=plan,
+        plan=settings,
         tell=progress,
     )
 
@@ -594,9 +523,8 @@ def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
 
 
 def _data_name(data: object) -> str:
-    if isinstance(data, str | os.PathLike):
-        return Path(data).name
-    return "the table"
+    path = path_of(data)
+    return Path(path).name if path else "the table"
 
 
 def audit(
@@ -604,104 +532,80 @@ def audit(
     *,
     data: object = None,
     target: str | None = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
-    results: Sequence[str | os.PathLike[str]] = (),
-    within: Within = "model",
-    spreads: float | None = None,
-    limits: Mapping[str, tuple[float, float]] | None = None,
-    row: Mapping[str, float] | None = None,
-    select: Sequence[str] = (),
-    ignore: Sequence[str] = (),
+    domain: AuditDomain | None = None,
+    selection: AuditSelection | None = None,
     settings: AuditSettings | None = None,
-    accepted: Collection[str] = (),
-    allow_loss: bool = False,
     repeat: str = "",
     progress: Progress | None = None,
 ) -> Audit:
-    """Ask what is odd in a rule base: dead rules, gaps, conflicts, and more.
+    """Search a rule base for dead rules, gaps, conflicts and other findings.
 
     Ctrl-C ends it early and keeps what is proved; see `Audit.was_interrupted`.
 
     Args:
-        model: A tree, a rule base or a fuzzy system, or the path of one; or all that
-            `material` has read, and then nothing of the next five besides.
+        model: A tree, a rule base or a fuzzy system, or the path of one; or what
+            `material` has read, and then neither data nor target.
         data: A table with rows of one's own.
         target: The column of the classes, if the table has one.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
-        results: Paths of what `Agreement.to_json` and `Stability.to_json` told of the
-            same model; the audit names them.
-        within: Where everything is asked: the ranges of the `model`, or of the `data`.
-        spreads: Instead, so many spreads around the fitted sets of each input.
-        limits: The ends of some variables, which go before the others.
-        row: A row whose nearest other decision is looked for besides.
-        select: Beginnings of codes that are asked, such as `FT1`; all if none.
-        ignore: Beginnings of codes that are left out.
-        settings: What is taken for small, and the budget.
-        accepted: Ids of findings that a baseline accepts.
-        allow_loss: As in `load`.
-        repeat: The command that asks the same, for the answers.
-        progress: Told what is done and which share of it.
+        domain: Where the model is audited; the ranges that it declares unless given.
+        selection: Which findings are looked for; all unless given.
+        settings: What counts as small, and the budget of time.
+        repeat: The command that repeats the audit, for the answers.
+        progress: Called with the current step and the share that is done.
 
     Raises:
-        ReadError: If the file cannot be read, or a result is not of this model.
+        ReadError: If the file cannot be read.
         LossError: As `load`.
         TableError: If a column is absent or holds text, or the table has no row.
-        ValueError: If a limit, a code or a setting is none, or an input has no limits.
+        ValueError: If a limit, a code or a setting is invalid, or an input has no
+            limits.
 
     Example:
+        >>> from fuzzytree import AuditSelection
         >>> from fuzzytree.testing import random_tree
-        >>> audit(random_tree(1), select=["FT501"]).is_complete
+        >>> wanted = AuditSelection(select=["FT501"])
+        >>> audit(random_tree(1), selection=wanted).is_complete
         True
     """
     from fuzzytree.auditing.engine.clock import Clock
     from fuzzytree.auditing.engine.domain import limited
     from fuzzytree.auditing.findings import audit as auditing
     from fuzzytree.auditing.findings.configuration import check_settings
-    from fuzzytree.auditing.findings.domains import domain_of
-    from fuzzytree.auditing.findings.records import AuditSettings
+    from fuzzytree.auditing.findings.domains import AuditDomain, domain_of
+    from fuzzytree.auditing.findings.records import AuditSelection, AuditSettings
     from fuzzytree.auditing.findings.results import with_results
     from fuzzytree.auditing.findings.subject import Material
 
     chosen = settings or AuditSettings()
     check_settings(chosen)
+    where, wanted = domain or AuditDomain(), selection or AuditSelection()
     if not isinstance(model, Material):
-        model = material(
-            model,
-            data=data,
-            target=target,
-            columns=columns,
-            delimiter=delimiter,
-            results=results,
-            allow_loss=allow_loss,
-        )
-    elif results or allow_loss or any((data is not None, target, columns, delimiter)):
-        raise ValueError("a material is read already: give what it holds to material()")
-    read, ends = model, limits or {}
+        model = material(model, data=data, target=target)
+    elif data is not None or target:
+        raise ValueError("a material is read already: pass its data to material()")
     box = domain_of(
-        read.model,
-        within=within,
-        spreads=spreads,
-        rows=read.rows,
-        limited=ends,
-        row=row,
+        model.model,
+        within=where.within,
+        spreads=where.spreads,
+        rows=model.rows,
+        limited=where.limits,
+        row=where.row,
     )
     found = auditing.audit(
-        read.model,
-        rows=read.rows,
-        domain=limited(box, ends, read.model),
+        model.model,
+        rows=model.rows,
+        domain=limited(box, where.limits, model.model),
         settings=chosen,
-        select=select,
-        ignore=ignore,
+        select=wanted.select,
+        ignore=wanted.ignore,
         clock=Clock(chosen.budget_s, report=progress),
-        file=read.file,
-        data=read.data,
-        row=row,
-        accepted=accepted,
+        file=model.file,
+        data=model.data,
+        row=where.row,
+        accepted=wanted.accepted,
         repeat=repeat,
     )
-    return with_results(found, read.given) if read.given else found
+    return with_results(found, model.given) if model.given else found
 
 
 def material(
@@ -709,8 +613,6 @@ def material(
     *,
     data: object = None,
     target: str | None = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     results: Sequence[str | os.PathLike[str]] = (),
     allow_loss: bool = False,
 ) -> Material:
@@ -720,8 +622,6 @@ def material(
         model: As in `audit`, as all others.
         data: A table.
         target: The column of the classes.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file.
         results: Paths of results.
         allow_loss: As in `load`.
 
@@ -744,9 +644,7 @@ def material(
     given = read_results(results, model)
     data, name = _readable_twice(data)
     source = _source_of(data, name)
-    rows = audited_rows(
-        data, model, target=target, columns=columns, delimiter=delimiter, name=name
-    )
+    rows = audited_rows(data, model, target=target, name=name)
     if _source_of(data, name) != source:
         raise TableError(f"{name}: was changed while it was read")
     return Material(model, file, rows, source, given)
@@ -759,15 +657,20 @@ def _readable_twice(data: object) -> tuple[object, str | None]:
         TableError: If it is a path that is not there, or of a folder or a device.
         ReadError: If it is a pipe of more bytes than fit.
     """
-    if not isinstance(data, str | os.PathLike):
+    name = path_of(data)
+    if name is None:
         return data, None
-    name = os.fspath(data)
     try:
         check_stream(name)
         is_pipe = stat.S_ISFIFO(Path(name).stat().st_mode)
     except (OSError, ValueError) as error:
         raise TableError(f"{name}: cannot be read: {reason(error)}") from error
-    return (io.BytesIO(read_bounded(name)) if is_pipe else name), name
+    if not is_pipe:
+        return data, name
+    content = io.BytesIO(read_bounded(name))
+    if isinstance(data, TableSource):
+        return msgspec.structs.replace(data, source=content), name
+    return content, name
 
 
 def _bytes_of(path: str | os.PathLike[str]) -> bytes:
@@ -786,18 +689,18 @@ def _source_of(data: object, name: str | None = None) -> SourceFile | None:
     from fuzzytree.auditing.findings.locations import writable
     from fuzzytree.auditing.findings.records import SourceFile
 
-    if isinstance(data, io.BytesIO):
-        return source_of(name or "standard input", data.getvalue())
-    if isinstance(data, str | os.PathLike):
-        try:
-            with Path(data).open("rb") as file:
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
-        except OSError as error:
-            raise TableError(
-                f"{os.fspath(data)}: cannot be read: {reason(error)}"
-            ) from error
-        return SourceFile(writable(os.fspath(data)), digest)
-    return None
+    table = data.source if isinstance(data, TableSource) else data
+    if isinstance(table, io.BytesIO):
+        return source_of(name or "standard input", table.getvalue())
+    path = path_of(table)
+    if path is None:
+        return None
+    try:
+        with Path(path).open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise TableError(f"{path}: cannot be read: {reason(error)}") from error
+    return SourceFile(writable(path), digest)
 
 
 def audited_rows(
@@ -805,8 +708,6 @@ def audited_rows(
     model: Document,
     *,
     target: str | None = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     name: str | None = None,
 ) -> AuditRows | None:
     """Return the rows of a table for an audit, with their classes; None without one.
@@ -815,8 +716,6 @@ def audited_rows(
         data: A table; see `fuzzytree.tables`.
         model: Whose inputs they are for.
         target: The column of the classes. A class that the model does not know is -1.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
         name: What messages call the table; its path unless given.
 
     Raises:
@@ -830,8 +729,6 @@ def audited_rows(
     values, found = _rows(
         data,
         model,
-        columns=columns,
-        delimiter=delimiter,
         name=name,
         with_others=target is not None,
     )
@@ -861,8 +758,6 @@ def diff(
     new: ModelSource,
     *,
     data: object = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     limits: Mapping[str, tuple[float, float]] | None = None,
     budget_s: float = 60.0,
     settings: AuditSettings | None = None,
@@ -875,8 +770,6 @@ def diff(
         old: A tree, a rule base or a fuzzy system, or the path of one.
         new: Another one, in any format.
         data: A table with rows of one's own, which both answer.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
         limits: The ends of inputs, which go before the ranges of the models.
         budget_s: After so many seconds what is not decided stays open.
         settings: How many points are drawn from the domain, and their seed.
@@ -930,8 +823,6 @@ def diff(
             *batches(
                 data,
                 all_inputs(first, second),
-                columns=columns,
-                delimiter=delimiter,
                 name=name,
             )
         ]
@@ -956,8 +847,6 @@ def needs(
     model: ModelSource,
     *,
     data: object = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     uses: Sequence[Use] = ("tree", "relative"),
     drop: Collection[Literal["inputs", "rules"]] = (),
     seconds: float = 0.0,
@@ -968,8 +857,6 @@ def needs(
     Args:
         model: A tree or a rule base; see `as_model`.
         data: A table with rows of one's own, for the proof.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
         uses: What a tree serves: its path, its `relative` rules, its `raw` rules.
         drop: Leave out `inputs` that nothing uses, or `rules` that never fire, too.
         seconds: How long to measure run times; 0 measures none.
@@ -992,9 +879,8 @@ def needs(
         first,
         pruned(first, uses=uses, inputs="inputs" in drop, rules="rules" in drop),
         uses=uses,
-        data=rows_of(data, first, columns=columns, delimiter=delimiter),
-        table=os.fspath(data) if isinstance(data, str | os.PathLike) else None,
-        delimiter=delimiter,
+        data=rows_of(data, first),
+        table=data if path_of(data) else None,
         seconds=seconds,
         tell=progress,
     )
@@ -1069,8 +955,6 @@ def stability(
     model: ModelSource,
     *,
     data: object = None,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     only: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     progress: Progress | None = None,
@@ -1080,8 +964,6 @@ def stability(
     Args:
         model: A tree or a rule base, or the path of one.
         data: A table with rows of one's own, beside the probes.
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file, if its first line does not tell.
         only: The codes of criteria, such as `N3`; all unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
         progress: Told what is done and which share of it.
@@ -1104,7 +986,7 @@ def stability(
         first,
         runtimes=chosen,
         formats=all_formats(),
-        data=rows_of(data, first, columns=columns, delimiter=delimiter),
+        data=rows_of(data, first),
         only=only,
         tell=progress or (lambda _text, _share: None),
     )

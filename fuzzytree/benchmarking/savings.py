@@ -29,7 +29,7 @@ from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.semantics.simplification import Pruned, Removed
-from fuzzytree.tables import batches
+from fuzzytree.tables import batches, path_of
 
 if TYPE_CHECKING:
     from fuzzytree.benchmarking.clock import Call, Tell
@@ -143,8 +143,7 @@ def report(
     *,
     uses: Collection[Use] = ("tree", "relative"),
     data: FloatArray | None = None,
-    table: str | None = None,
-    delimiter: str | None = None,
+    table: object = None,
     seconds: float = 0.0,
     tell: Tell | None = None,
 ) -> Report:
@@ -156,7 +155,6 @@ def report(
         uses: What a tree serves, as when it was pruned.
         data: Rows of one's own for the proof, in the order of the model's inputs.
         table: The path of a table; reading it is timed.
-        delimiter: Of a CSV file, if its first line does not tell.
         seconds: For all timings together; 0 for none.
         tell: Told how far the timings are.
     """
@@ -165,9 +163,7 @@ def report(
     timed, untimed = (
         ((), ())
         if seconds <= 0
-        else costs(
-            made, uses, table=table, delimiter=delimiter, seconds=seconds, tell=tell
-        )
+        else costs(made, uses, table=table, seconds=seconds, tell=tell)
     )
     return Report(
         needs(model, uses=uses),
@@ -262,8 +258,7 @@ def costs(
     made: Mapping[str, Model],
     uses: Collection[Use],
     *,
-    table: str | None = None,
-    delimiter: str | None = None,
+    table: object = None,
     seconds: float = 20.0,
     rounds: int = 15,
     tell: Tell | None = None,
@@ -277,7 +272,6 @@ def costs(
         made: The stages.
         uses: What a tree serves.
         table: The path of a table to read; none is read if None.
-        delimiter: Of a CSV file, if its first line does not tell.
         seconds: For all of it.
         rounds: The most samples of each call.
         tell: Told how far it is.
@@ -295,11 +289,11 @@ def costs(
             ):
                 groups[rows_of][key] = call
         if table is not None:
-            reading = _reading(table, model, delimiter)
+            reading = _reading(table, model)
             try:
                 reading()
             except FuzzyTreeError as error:
-                omissions.append(f"reading {table}, {stage}: {error}")
+                omissions.append(f"reading {path_of(table)}, {stage}: {error}")
             else:
                 groups[1][stage, "", "", "read the table"] = reading
     found: list[Cost] = []
@@ -346,9 +340,9 @@ def _bound(run: Callable[[FloatArray], object], values: FloatArray) -> Call:
     return lambda: run(values)
 
 
-def _reading(table: str, model: Model, delimiter: str | None) -> Call:
+def _reading(table: object, model: Model) -> Call:
     def read() -> int:
-        found = batches(table, model.inputs, trained=model.columns, delimiter=delimiter)
+        found = batches(table, model.inputs, trained=model.columns)
         return sum(batch.values.shape[1] for batch in found)
 
     return read

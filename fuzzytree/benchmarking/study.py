@@ -58,7 +58,7 @@ _PACKAGES = (
 )
 
 
-class Plan(msgspec.Struct, frozen=True):
+class BenchSettings(msgspec.Struct, frozen=True):
     """What a study shall do.
 
     Attributes:
@@ -112,7 +112,7 @@ def bench(
     data: str = "",
     only: Sequence[str] = (),
     skip: Sequence[str] = (),
-    plan: Plan | None = None,
+    plan: BenchSettings | None = None,
     tell: Tell | None = None,
 ) -> Study:
     """Measure error against run time for every way of running a model.
@@ -137,12 +137,12 @@ def bench(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> few = Plan(rows=(10,), threads=(1,), rounds=6, budget_s=5.0)
+        >>> few = BenchSettings(rows=(10,), threads=(1,), rounds=6, budget_s=5.0)
         >>> study = bench(random_tree(1), only=["native"], plan=few)
         >>> [point.name for point in study.points]
         ['native: tree', 'native: relative rules', 'native: raw rules']
     """
-    plan = plan or Plan()
+    plan = plan or BenchSettings()
     if values is None:
         count = min(max(plan.rows), _MADE)
         values, made = made_rows(model, count, seed=plan.seed)
@@ -176,7 +176,7 @@ def _rows(count: int) -> str:
     return f"{count:,} row{'' if count == 1 else 's'}"
 
 
-def _data_text(text: str, count: int, plan: Plan) -> str:
+def _data_text(text: str, count: int, plan: BenchSettings) -> str:
     more = [f"{rows:,}" for rows in sorted(plan.rows) if rows > count]
     return f"{text}, repeated to make {' and '.join(more)}" if more else text
 
@@ -188,7 +188,7 @@ def run_study(
     values: FloatArray,
     data: str,
     omissions: Sequence[Omission] = (),
-    plan: Plan | None = None,
+    plan: BenchSettings | None = None,
     tell: Tell | None = None,
     clock: Clock | None = None,
     maker: str = "fuzzytree.benchmarking.gather:foreign",
@@ -213,7 +213,9 @@ def run_study(
             if tell:
                 tell(text, share)
 
-        run = _Run(model, values, plan or Plan(), step, clock or system_clock())
+        run = _Run(
+            model, values, plan or BenchSettings(), step, clock or system_clock()
+        )
         run.omissions += omissions
         before = machine(_PACKAGES)
         try:
@@ -244,7 +246,12 @@ class _Run:
     """A study while it runs: it must keep what it has when it is interrupted."""
 
     def __init__(
-        self, model: Model, values: FloatArray, plan: Plan, tell: Tell, clock: Clock
+        self,
+        model: Model,
+        values: FloatArray,
+        plan: BenchSettings,
+        tell: Tell,
+        clock: Clock,
     ) -> None:
         self.model, self.values, self.plan = model, values, plan
         self.tell, self.clock = tell, clock

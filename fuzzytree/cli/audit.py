@@ -154,6 +154,8 @@ def command(
         read_baseline,
         resolved_ids,
     )
+    from fuzzytree.auditing.findings.domains import AuditDomain
+    from fuzzytree.auditing.findings.records import AuditSelection
     from fuzzytree.report.audit import audit_lines, verdict_text
 
     if target is not None and data is None:
@@ -172,22 +174,25 @@ def command(
     with wrong_options(), progress_bar(quiet=quiet) as show:
         material = verbs.material(
             model,
-            data=table_of(data),
+            data=table_of(data, delimiter),
             target=target,
-            delimiter=delimiter,
             results=results,
             allow_loss=allow_loss,
         )
         found = verbs.audit(
             material,
-            within=within,
-            spreads=spreads,
-            limits={**{n: (a, b) for n, a, b in known.limits}, **limits_of(limits)},
-            row=row_of(row),
-            select=codes_of(select) or known.select,
-            ignore=codes_of(ignore) or known.ignore,
+            domain=AuditDomain(
+                within=within,
+                spreads=spreads,
+                limits={n: (a, b) for n, a, b in known.limits} | limits_of(limits),
+                row=row_of(row),
+            ),
+            selection=AuditSelection(
+                select=codes_of(select) or known.select,
+                ignore=codes_of(ignore) or known.ignore,
+                accepted=accepted,
+            ),
             settings=settings_of(settings, budget, known),
-            accepted=accepted,
             repeat=repeating(click.get_current_context()),
             progress=show,
         )

@@ -168,11 +168,14 @@ def settings_of(
     return found
 
 
-def table_of(data: str | None) -> str | io.BytesIO | None:
+def table_of(data: str | None, delimiter: str | None) -> object:
     """Return a table by its path; standard input is read whole, to name its bytes."""
-    if data != "-":
-        return data
-    return io.BytesIO(standard_input().read())
+    if data is None:
+        return None
+    from fuzzytree.tables import table
+
+    found = io.BytesIO(standard_input().read()) if data == "-" else data
+    return table(found, delimiter=delimiter)
 
 
 _REPEATED = (

@@ -131,6 +131,7 @@ def command(
     larger than its certified bound.
     """
     from fuzzytree.api import verbs
+    from fuzzytree.benchmarking.study import BenchSettings
     from fuzzytree.report.bench import study_lines
 
     _check_places(output, plots)
@@ -141,15 +142,12 @@ def command(
     ):
         found = verbs.bench(
             model,
-            data=table_source(data),
-            delimiter=delimiter,
-            rows=rows,
-            threads=threads,
+            data=table_source(data, delimiter),
             only=only,
             skip=skip,
-            error=error,
-            budget_s=budget,
-            seed=seed,
+            settings=BenchSettings(
+                tuple(rows), tuple(threads), error, budget_s=budget, seed=seed
+            ),
             progress=show,
         )
     lines = study_lines(found, is_verbose=verbose, is_full=is_full)

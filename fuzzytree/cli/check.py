@@ -73,18 +73,16 @@ def command(
     Python, JavaScript, SQL, PMML) runs only if its text equals a new export.
     """
     from fuzzytree.api import verbs
+    from fuzzytree.model.agreement import CheckSettings
     from fuzzytree.report import text
 
     with wrong_options(), progress_bar(quiet=quiet) as show:
         found = verbs.check(
             model,
             *files,
-            data=table_source(data),
-            delimiter=delimiter,
+            data=table_source(data, delimiter),
             runtimes=runtimes or None,
-            limit=limit,
-            rows_only=rows_only,
-            run_code=run_code,
+            settings=CheckSettings(limit=limit, rows_only=rows_only, run_code=run_code),
             allow_loss=allow_loss,
             progress=show,
         )

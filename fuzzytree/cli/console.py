@@ -133,9 +133,14 @@ def answer_bytes(content: bytes) -> None:
     sys.stdout.buffer.flush()
 
 
-def table_source(name: Name) -> Name | BinaryIO:
+def table_source(name: str | None, delimiter: str | None = None) -> object:
     """Return where to read a table: behind `-` is standard input."""
-    return standard_input() if name == "-" else name
+    found = standard_input() if name == "-" else name
+    if delimiter is None:
+        return found
+    from fuzzytree.tables import table
+
+    return table(found, delimiter=delimiter)
 
 
 def standard_input() -> BinaryIO:

@@ -72,8 +72,7 @@ def command(
         found = verbs.diff(
             old,
             new,
-            data=table_source(data),
-            delimiter=delimiter,
+            data=table_source(data, delimiter),
             limits=limits_of(limits),
             budget_s=budget,
             allow_loss=allow_loss,

@@ -37,7 +37,7 @@ from fuzzytree.model.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
     from fuzzytree.api.holdout import Accuracy, Summary
-    from fuzzytree.learning import Learnt, Settings
+    from fuzzytree.learning import LearningSettings, Learnt
     from fuzzytree.learning.findings import LearningReport
     from fuzzytree.tables import Table
 
@@ -119,7 +119,7 @@ _SETTINGS = (
         help="Rows with missing values: drop them, or refuse the table.",
     ),
 )
-"""An option for each field of `fuzzytree.learning.Settings`."""
+"""An option for each field of `fuzzytree.learning.LearningSettings`."""
 
 
 def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
@@ -211,10 +211,9 @@ def command(
     settings, units_of = _settings(chosen), dict(_pairs("--unit", units))
     begin = time.perf_counter()
     found = read_table(
-        table_source(table),
+        table_source(table, delimiter),
         target=target,
         ignore=ignore,
-        delimiter=delimiter,
         name="standard input" if table == "-" else None,
     )
     is_silent = quiet or output == "-"
@@ -285,9 +284,9 @@ def _written_rows(
     yield "wrote", beside, f"the model; next: {after}"
 
 
-def _settings(chosen: Mapping[str, object]) -> Settings:
+def _settings(chosen: Mapping[str, object]) -> LearningSettings:
     """Return the settings of the options on the command line."""
-    from fuzzytree.learning import Settings
+    from fuzzytree.learning import LearningSettings
 
     given = {name: value for name, value in chosen.items() if value is not None}
     given["costs"] = {
@@ -299,7 +298,7 @@ def _settings(chosen: Mapping[str, object]) -> Settings:
         number = _parsed("--patterns", "NUMBER|auto", patterns, int)
         given["patterns_per_class"] = number
     with wrong_options():
-        return Settings(**given)  # type: ignore[arg-type] # options have its types
+        return LearningSettings(**given)  # type: ignore[arg-type] # options have its types
 
 
 def _pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:

@@ -96,15 +96,14 @@ def command(
         )
     if output is not None:
         check_place(output)
-    rows = verbs.rows_of(table_source(data), first, delimiter=delimiter)
+    rows = verbs.rows_of(table_source(data, delimiter), first)
     with progress_bar(quiet=quiet) as show:
         report = savings.report(
             first,
             found,
             uses=wanted,
             data=rows,
-            table=None if data == "-" else data,
-            delimiter=delimiter,
+            table=None if data == "-" else table_source(data, delimiter),
             seconds=seconds or 0.0,
             tell=show,
         )

@@ -117,11 +117,11 @@ def command(
     is_weighed = strengths is not None or (why and isinstance(found, FuzzySystem))
     with wrong_options():
         answer = verbs.answering(found, runtime, with_strengths=is_weighed)
-    source = table_source(table)
+    source = table_source(table, delimiter)
     name = "standard input" if table == "-" else table
     tally = _Tally(_has_status(found))
     with _opened(output) as stream:
-        batches = answer(source, delimiter=delimiter, name=name, with_others=keep)
+        batches = answer(source, name=name, with_others=keep)
         write = _json_writer(stream) if as_json else _csv_writer(stream, safe_csv)
         for batch, answers in batches:
             columns = _kept(batch) if keep else {}

@@ -58,8 +58,7 @@ def command(
     with wrong_options(), progress_bar(quiet=quiet) as show:
         found = verbs.stability(
             model,
-            data=table_source(data),
-            delimiter=delimiter,
+            data=table_source(data, delimiter),
             only=only,
             runtimes=runtimes or None,
             progress=show,

@@ -16,7 +16,7 @@ from fuzzytree.learning.findings import LearningReport
 from fuzzytree.learning.growing import Grown
 from fuzzytree.learning.patterns import usable_features
 from fuzzytree.learning.sampling import Sample
-from fuzzytree.learning.settings import Settings
+from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.validation import Choice, chosen_tree
 from fuzzytree.model.rulebase import text_fault
@@ -41,7 +41,7 @@ def learn_arrays(
     classes: Sequence[str],
     units: Mapping[str, str] | None = None,
     name: str = "tree",
-    settings: Settings | None = None,
+    settings: LearningSettings | None = None,
     progress: Progress | None = None,
 ) -> Learnt:
     """Learn a fuzzy decision tree from a table of numbers.
@@ -73,7 +73,7 @@ def learn_arrays(
         classes=classes,
         units=units or {},
         name=name,
-        settings=settings or Settings(),
+        settings=settings or LearningSettings(),
     )
     learner.partial_fit(values, labels, progress=progress)
     return learner.finish(progress=progress)
@@ -102,7 +102,7 @@ class Learner:
     classes: Sequence[str]
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     name: str = "tree"
-    settings: Settings = field(default_factory=Settings)
+    settings: LearningSettings = field(default_factory=LearningSettings)
     _statistics: Statistics = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -236,7 +236,7 @@ def _features_per_node(grown: Grown) -> tuple[int, ...]:
 
 
 def _check_names(
-    columns: Sequence[str], classes: Sequence[str], settings: Settings
+    columns: Sequence[str], classes: Sequence[str], settings: LearningSettings
 ) -> None:
     for kind, found in (("column", columns), ("class", classes)):
         seen: set[str] = set()

@@ -25,7 +25,7 @@ from fuzzytree.learning.patterns import (
 )
 from fuzzytree.learning.refinement import refined
 from fuzzytree.learning.sampling import Sample, hashed
-from fuzzytree.learning.settings import Settings
+from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, grouped_moments
 
 LADDER = (1, 2, 3, 5, 8, 12, 16)
@@ -70,7 +70,7 @@ class Choice:
 def chosen_tree(
     moments: Moments,
     sample: Sample,
-    settings: Settings,
+    settings: LearningSettings,
     classes: Sequence[str],
     costs: FloatArray,
     progress: Progress | None,
@@ -107,7 +107,7 @@ def _silent(_: str, __: float) -> None:
     """Tell nobody."""
 
 
-def _rules(settings: Settings, costs: FloatArray) -> GrowthRules:
+def _rules(settings: LearningSettings, costs: FloatArray) -> GrowthRules:
     return GrowthRules(
         is_literal=settings.mode == "paper",
         alpha=settings.alpha,
@@ -119,7 +119,7 @@ def _rules(settings: Settings, costs: FloatArray) -> GrowthRules:
     )
 
 
-def _asked(settings: Settings, classes: Sequence[str]) -> Numbers:
+def _asked(settings: LearningSettings, classes: Sequence[str]) -> Numbers:
     """Return how many patterns each class is asked to have; 1 where that is open."""
     wanted = settings.patterns_per_class
     if isinstance(wanted, int):
@@ -129,7 +129,7 @@ def _asked(settings: Settings, classes: Sequence[str]) -> Numbers:
     return (1,) * len(classes)
 
 
-def _is_open(settings: Settings, moments: Moments) -> bool:
+def _is_open(settings: LearningSettings, moments: Moments) -> bool:
     """Return whether the numbers of patterns are to be chosen, and can be."""
     is_auto = settings.patterns_per_class == "auto" or (
         settings.patterns_per_class is None and settings.mode == "default"

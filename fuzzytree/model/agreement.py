@@ -153,6 +153,22 @@ class Coverage(msgspec.Struct, frozen=True):
         return tuple(found)
 
 
+class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """How far a check goes.
+
+    Attributes:
+        limit: The most probes; None is 20,000, and 2,000 for a fuzzy system.
+        rows_only: Whether files whose rows agree are accepted with other content: a
+            graph that this version would not write, or a system with other numbers.
+        run_code: Whether a program (C, Python, JavaScript, SQL, PMML) is run even if
+            its text is not what this version writes of the model.
+    """
+
+    limit: int | None = None
+    rows_only: bool = False
+    run_code: bool = False
+
+
 class Agreement(msgspec.Struct, frozen=True):
     """The result of a check.
 

@@ -10,7 +10,7 @@ import pytest
 from fuzzytree.api import holdout
 from fuzzytree.api.holdout import Accuracy, accuracy, folds_of, majority, sampled
 from fuzzytree.api.verbs import learn_table
-from fuzzytree.learning import Learnt, Settings, learn_arrays
+from fuzzytree.learning import LearningSettings, Learnt, learn_arrays
 from fuzzytree.tables import Table, read_table
 
 
@@ -21,8 +21,10 @@ def _table(rows: int, *, classes: int = 2) -> Table:
     return read_table(values, target=codes)
 
 
-def _accuracy(table: Table, settings: Settings | None = None) -> Accuracy | None:
-    wanted = settings or Settings()
+def _accuracy(
+    table: Table, settings: LearningSettings | None = None
+) -> Accuracy | None:
+    wanted = settings or LearningSettings()
     report = learn_table(table, name="t", units={}, settings=wanted).report
     return accuracy(table, wanted, report)
 
@@ -62,7 +64,7 @@ def test_a_large_table_is_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_at_most_20_000_rows_are_tested() -> None:
-    found = _accuracy(_table(50_000), Settings(mode="paper"))
+    found = _accuracy(_table(50_000), LearningSettings(mode="paper"))
     assert found is not None
     assert (found.rows, found.of) == (20_000, 50_000)
 
@@ -72,9 +74,9 @@ def test_at_most_20_000_rows_are_tested() -> None:
 def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
     monkeypatch: pytest.MonkeyPatch, cells: int
 ) -> None:
-    used: list[Settings] = []
+    used: list[LearningSettings] = []
 
-    def learn(*args: Any, settings: Settings, **more: Any) -> Learnt:
+    def learn(*args: Any, settings: LearningSettings, **more: Any) -> Learnt:
         used.append(settings)
         return learn_arrays(*args, settings=settings, **more)
 
@@ -82,14 +84,14 @@ def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
         np.random.default_rng(0).normal(size=(60, 2)) ** 2,
         target=np.random.default_rng(1).integers(0, 2, 60),
     )
-    wanted = Settings(choices=("alpha", "entry"))
+    wanted = LearningSettings(choices=("alpha", "entry"))
     report = learn_table(table, name="t", units={}, settings=wanted).report
     monkeypatch.setattr(holdout, "CHOOSING_CELLS", cells)
     monkeypatch.setattr(holdout, "learn_arrays", learn)
     found = accuracy(table, wanted, report)
     assert found is not None
     assert found.is_nested == (cells == 120)
-    chosen = Settings(
+    chosen = LearningSettings(
         patterns_per_class=report.patterns,
         alpha=float(report.chosen["alpha"]),
         entry=float(report.chosen["entry"]),
@@ -99,7 +101,7 @@ def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
 
 def test_patterns_of_a_class_that_a_fold_lacks_are_no_error() -> None:
     table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
-    found = _accuracy(table, Settings(patterns_per_class={"a": 2, "c": 1}))
+    found = _accuracy(table, LearningSettings(patterns_per_class={"a": 2, "c": 1}))
     assert found is not None
 
 
@@ -122,8 +124,10 @@ def test_a_class_of_one_row_is_answered_wrong_and_not_an_error() -> None:
 def test_progress_is_told_fold_by_fold() -> None:
     told: list[str] = []
     table = _table(20)
-    report = learn_table(table, name="t", units={}, settings=Settings()).report
-    accuracy(table, Settings(), report, progress=lambda text, _: told.append(text))
+    report = learn_table(table, name="t", units={}, settings=LearningSettings()).report
+    accuracy(
+        table, LearningSettings(), report, progress=lambda text, _: told.append(text)
+    )
     assert told == [f"testing fold {k} of 5" for k in range(1, 6)]
 
 
@@ -143,7 +147,7 @@ def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
     columns = tuple(f"x{number}" for number in range(100_000))
     codes = np.repeat([0, 1], 10)
     table = Table("wide", columns, values, ("a", "b"), codes)
-    settings = Settings()
+    settings = LearningSettings()
     report = learn_arrays(
         values.T, codes, columns=columns, classes=["a", "b"], settings=settings
     ).report

@@ -22,7 +22,7 @@ import fuzzytree as ft
 from fuzzytree.api import answering
 from fuzzytree.errors import LossError, ReadError, TableError
 from fuzzytree.exporters import TABLE
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.onnxruntime import open_onnx
@@ -63,22 +63,42 @@ def test_the_lines_of_the_readme_run(
     assert answers.class_strengths is not None
     assert answers.class_strengths.shape == (3, 178)
     onnx = ft.export(rules, "onnx").content
-    found = ft.check(tree, rules, onnx, data=table, runtimes=["native"], limit=500)
+    found = ft.check(
+        tree,
+        rules,
+        onnx,
+        data=table,
+        runtimes=["native"],
+        settings=ft.CheckSettings(limit=500),
+    )
     found.raise_if_not_ok()
 
 
 FITTED = ft.FuzzyTreeClassifier().fit(FEW, KINDS)
 VERBS: dict[str, Callable[[Any], object]] = {
-    "audit": lambda model: ft.audit(model, select=["FT501"]).model,
+    "audit": lambda model: (
+        ft.audit(model, selection=ft.AuditSelection(select=["FT501"])).model
+    ),
     "bench": lambda model: (
-        ft.bench(model, rows=[9], only=["native"], budget_s=1).fingerprint
+        ft.bench(
+            model,
+            only=["native"],
+            settings=ft.BenchSettings(rows=(9,), budget_s=1),
+        ).fingerprint
     ),
     "certify": lambda model: ft.certify(model).sentence,
     "check": lambda model: (
-        ft.check(FITTED.tree_, model, runtimes=["native"], limit=99).comparisons
+        ft.check(
+            FITTED.tree_,
+            model,
+            runtimes=["native"],
+            settings=ft.CheckSettings(limit=99),
+        ).comparisons
     ),
     "check first": lambda model: (
-        ft.check(model, runtimes=["native"], limit=99).comparisons
+        ft.check(
+            model, runtimes=["native"], settings=ft.CheckSettings(limit=99)
+        ).comparisons
     ),
     "convert": lambda model: ft.convert(model, "fcl", allow_loss=True).written,
     "diff": lambda model: ft.diff(model, model).verdict,
@@ -156,7 +176,10 @@ def test_explain_knows_a_code_and_the_id_of_a_finding() -> None:
 
 def test_recheck_takes_an_audit_and_its_model(tmp_path: Path) -> None:
     model, audit = EXAMPLES / "grip.yaml", tmp_path / "audit.json"
-    audit.write_text(ft.audit(model, select=["FT101"]).to_json(), "utf-8")
+    audit.write_text(
+        ft.audit(model, selection=ft.AuditSelection(select=["FT101"])).to_json(),
+        "utf-8",
+    )
     assert not ft.recheck(audit, model).wrong
     other = tmp_path / "other.yaml"
     ft.save(random_tree(4, inputs=3), other)
@@ -170,7 +193,9 @@ def test_recheck_takes_an_audit_and_its_model(tmp_path: Path) -> None:
 def test_what_python_shows_of_a_value_is_one_short_line() -> None:
     rules = ft.rules_from_tree(TREE)
     system = random_system(3)
-    found = ft.check(TREE, rules, runtimes=["native"], limit=99)
+    found = ft.check(
+        TREE, rules, runtimes=["native"], settings=ft.CheckSettings(limit=99)
+    )
     written = ft.export(TREE, "yaml")
     shown = [
         repr(one)
@@ -181,7 +206,7 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
             ft.run(rules, ROWS),
             ft.run(system, np.zeros((4, len(system.columns)))),
             found,
-            ft.audit(TREE, select=["FT501"]),
+            ft.audit(TREE, selection=ft.AuditSelection(select=["FT501"])),
             written,
             ft.needs(TREE, uses=["tree"]),
             ft.diff(TREE, TREE),
@@ -203,8 +228,8 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
 
 def test_learn_offers_every_setting_with_its_default() -> None:
     offered = inspect.signature(ft.learn).parameters
-    for field in msgspec.structs.fields(Settings):
-        default = getattr(Settings(), field.name)
+    for field in msgspec.structs.fields(LearningSettings):
+        default = getattr(LearningSettings(), field.name)
         assert offered[field.name].default in (default, default or None)
 
 
@@ -228,10 +253,12 @@ def test_a_tree_has_the_name_of_its_file(tmp_path: Path) -> None:
 
 
 def test_units_are_kept_and_must_belong_to_a_column() -> None:
-    tree = ft.learn(FEW, target=KINDS, columns=["force"], units={"force": "N"})
+    tree = ft.learn(
+        ft.table(FEW, columns=["force"]), target=KINDS, units={"force": "N"}
+    )
     assert tree.variables[0].unit == "N"
     with pytest.raises(TableError) as caught:
-        ft.learn(FEW, target=KINDS, columns=["force"], units={"slip": "mm"})
+        ft.learn(ft.table(FEW, columns=["force"]), target=KINDS, units={"slip": "mm"})
     message = "a unit for 'slip', which is no column; it has force"
     assert str(caught.value) == message
 
@@ -322,14 +349,18 @@ def test_check_takes_files_and_names_them(tmp_path: Path) -> None:
     yaml, onnx = tmp_path / "tree.yaml", tmp_path / "tree.onnx"
     ft.save(TREE, yaml)
     ft.save(TREE, onnx)
-    found = ft.check(yaml, onnx, data=ROWS, runtimes=["native"], limit=300)
+    found = ft.check(
+        yaml, onnx, data=ROWS, runtimes=["native"], settings=ft.CheckSettings(limit=300)
+    )
     assert found.ok
     assert str(onnx) in {comparison.representation for comparison in found.comparisons}
 
 
 def test_check_finds_a_file_of_another_model() -> None:
     other = random_tree(4, inputs=3)
-    found = ft.check(TREE, other, runtimes=["native"], limit=300)
+    found = ft.check(
+        TREE, other, runtimes=["native"], settings=ft.CheckSettings(limit=300)
+    )
     assert not found.ok
 
 
@@ -357,6 +388,6 @@ def test_a_number_type_that_does_not_exist_is_refused() -> None:
 
 def test_a_text_is_one_name_in_every_argument_that_takes_names() -> None:
     tree = random_tree(1)
-    assert ft.check(tree, runtimes="native", limit=100).ok
+    assert ft.check(tree, runtimes="native", settings=ft.CheckSettings(limit=100)).ok
     assert ft.stability(tree, runtimes="native", only="N3").ok
-    assert ft.audit(tree, select="FT501").is_complete
+    assert ft.audit(tree, selection=ft.AuditSelection(select="FT501")).is_complete

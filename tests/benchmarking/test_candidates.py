@@ -21,7 +21,7 @@ from fuzzytree.benchmarking.gather import gather
 from fuzzytree.benchmarking.machine import after, machine, noise
 from fuzzytree.benchmarking.records import Candidate, Machine
 from fuzzytree.benchmarking.rows import made_rows
-from fuzzytree.benchmarking.study import Plan, bench, faults
+from fuzzytree.benchmarking.study import BenchSettings, bench, faults
 from fuzzytree.benchmarking.variants import variants
 from fuzzytree.errors import install_hint
 from fuzzytree.model.contracts import Dtype, Outcome, Run, Runtime
@@ -234,7 +234,7 @@ def test_packages_that_are_not_installed_have_no_version() -> None:
 def test_no_candidate_is_beyond_its_certified_bound(seed: int) -> None:
     tree = random_tree(seed)
     model = tree if seed == 1 else rules_from_tree(tree, "raw", conjunction="product")
-    study = bench(model, plan=Plan(rows=(1, 200), rounds=6, budget_s=30.0))
+    study = bench(model, plan=BenchSettings(rows=(1, 200), rounds=6, budget_s=30.0))
     assert [*faults(study.points)] == []
     assert len(study.points) > 20
     for one in study.points:

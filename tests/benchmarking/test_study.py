@@ -22,7 +22,13 @@ from fuzzytree.benchmarking.clock import Clock, Tell
 from fuzzytree.benchmarking.gather import chosen, gather
 from fuzzytree.benchmarking.records import Candidate, Found, Loaded, Omission, Study
 from fuzzytree.benchmarking.rows import made_rows, repeated
-from fuzzytree.benchmarking.study import Plan, bench, faults, fitting, run_study
+from fuzzytree.benchmarking.study import (
+    BenchSettings,
+    bench,
+    faults,
+    fitting,
+    run_study,
+)
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.native import load
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -35,7 +41,7 @@ pytestmark = pytest.mark.usefixtures("few_objects")
 
 ROOT = Path(__file__).resolve().parents[2]
 RULES = rules_from_tree(random_tree(3), "raw")
-SMALL = Plan(rows=(4,), threads=(1,), rounds=6, budget_s=10.0)
+SMALL = BenchSettings(rows=(4,), threads=(1,), rounds=6, budget_s=10.0)
 MS = 1_000_000
 
 
@@ -96,7 +102,7 @@ def candidate(
 
 def studied(
     *candidates: Candidate,
-    plan: Plan = SMALL,
+    plan: BenchSettings = SMALL,
     time: FakeTime | None = None,
     tell: Tell | None = None,
 ) -> Study:
@@ -184,7 +190,7 @@ def test_what_ends_its_process_is_an_omission() -> None:
 
 def test_an_interrupted_study_keeps_what_was_measured() -> None:
     time = FakeTime()
-    plan = Plan(rows=(1, 50), threads=(1,), rounds=6, budget_s=60.0)
+    plan = BenchSettings(rows=(1, 50), threads=(1,), rounds=6, budget_s=60.0)
     stop = counting(13, KeyboardInterrupt())  # in the second number of rows
     study = studied(
         candidate("nervous", time=time, before=stop, ms=5.0),
@@ -228,7 +234,7 @@ def test_an_interruption_that_a_library_swallows_is_noticed(at: int) -> None:
 
 def test_the_budget_is_kept_and_slow_ones_are_left_out() -> None:
     time = FakeTime()
-    plan = Plan(rows=(1, 1000), threads=(1,), rounds=15, budget_s=4.0)
+    plan = BenchSettings(rows=(1, 1000), threads=(1,), rounds=15, budget_s=4.0)
     study = studied(
         candidate("slow", time=time, ms_a_row=10.0),
         candidate("fast", time=time, ms_a_row=0.01),
@@ -246,7 +252,7 @@ def test_the_budget_is_kept_and_slow_ones_are_left_out() -> None:
 
 def test_half_of_the_budget_is_for_timing() -> None:
     time = FakeTime()
-    plan = Plan(rows=(1,), threads=(1,), rounds=6, budget_s=2.0)
+    plan = BenchSettings(rows=(1,), threads=(1,), rounds=6, budget_s=2.0)
     study = studied(
         candidate("b", time=time, ms=1200.0),
         candidate("c", time=time),
@@ -283,7 +289,7 @@ def test_what_others_are_compared_with_comes_first() -> None:
 @pytest.mark.heavy
 def test_two_threads_are_for_those_who_can_use_them() -> None:
     loads: dict[str, list[int]] = {"one": [], "both": []}
-    plan = Plan(rows=(2, 3), threads=(1, 2), rounds=6, budget_s=5.0)
+    plan = BenchSettings(rows=(2, 3), threads=(1, 2), rounds=6, budget_s=5.0)
     study = studied(
         candidate("one", loads=loads["one"]),
         candidate("both", loads=loads["both"], is_parallel=True),
@@ -302,7 +308,7 @@ def test_what_takes_longer_to_load_again_than_there_is_time_is_an_omission() -> 
         time.now += 3000 * MS
         return made.load(threads)
 
-    plan = Plan(rows=(2,), threads=(1, 2), rounds=6, budget_s=5.0)
+    plan = BenchSettings(rows=(2,), threads=(1, 2), rounds=6, budget_s=5.0)
     heavy = msgspec.structs.replace(made, load=slowly)
     study = studied(heavy, plan=plan, time=time)
     why = "loading it again for 2 threads takes too long for the budget"
@@ -311,13 +317,13 @@ def test_what_takes_longer_to_load_again_than_there_is_time_is_an_omission() -> 
 
 
 def test_nobody_waits_for_a_second_thread_that_nobody_uses() -> None:
-    plan = Plan(rows=(2,), threads=(1, 2), rounds=6, budget_s=5.0)
+    plan = BenchSettings(rows=(2,), threads=(1, 2), rounds=6, budget_s=5.0)
     study = studied(candidate("native"), plan=plan)
     assert [timing.threads for timing in study.points[0].timings] == [1]
 
 
 def test_rows_that_memory_does_not_hold_are_an_omission() -> None:
-    plan = Plan(rows=(2, 10**9), threads=(1,), rounds=6, budget_s=5.0)
+    plan = BenchSettings(rows=(2, 10**9), threads=(1,), rounds=6, budget_s=5.0)
     (why,) = omitted(studied(candidate(), plan=plan)).values()
     pattern = (
         r"1,000,000,000 rows: their layouts take about \d+ GiB, and 6 are the most"
@@ -448,7 +454,7 @@ def test_a_plan_that_cannot_be_is_refused(
     wrong: dict[str, float], message: str
 ) -> None:
     with pytest.raises(ValueError, match=f"^{message}$"):
-        Plan(**wrong)  # type: ignore[arg-type] # the point of the test
+        BenchSettings(**wrong)  # type: ignore[arg-type] # the point of the test
 
 
 def test_values_that_do_not_fit_are_refused() -> None:
@@ -463,7 +469,7 @@ def test_values_that_do_not_fit_are_refused() -> None:
 @pytest.mark.heavy
 def test_a_study_of_a_real_model_agrees_with_itself() -> None:
     only = ["native", "native float32", "best-first", "python", "floor"]
-    plan = Plan(rows=(1, 300), threads=(1,), rounds=6, budget_s=6.0)
+    plan = BenchSettings(rows=(1, 300), threads=(1,), rounds=6, budget_s=6.0)
     study = bench(random_tree(5), only=only, plan=plan)
     assert study.is_complete
     assert [*faults(study.points)] == []
@@ -483,7 +489,7 @@ def test_a_study_of_a_real_model_agrees_with_itself() -> None:
 def test_rows_of_a_table_are_named_and_counted() -> None:
     tree = random_tree(1)
     values = made_rows(tree, 7)[0]
-    plan = Plan(rows=(5, 20), threads=(1,), rounds=6, budget_s=3.0)
+    plan = BenchSettings(rows=(5, 20), threads=(1,), rounds=6, budget_s=3.0)
     study = bench(tree, values=values, data="t.csv", only=["native: tree"], plan=plan)
     assert study.data == "t.csv, 7 rows, repeated to make 20"
     assert study.points[0].error is not None

@@ -11,7 +11,7 @@ from experiment_simulated import IDEAL, paper_task
 from experiment_study import Study, experiment
 from experiment_tasks import known_task
 
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.runtimes.frames import features_of
 
@@ -27,8 +27,14 @@ def is_within(study: Study, stated: float) -> bool:
 @pytest.mark.parametrize(
     ("name", "features", "settings", "stated", "floor"),
     [
-        ("postures", "log paper", Settings(patterns_per_class=1), 0.689, 0.6),
-        ("postures", "log orientation", Settings(patterns_per_class=1), 0.789, 0.7),
+        ("postures", "log paper", LearningSettings(patterns_per_class=1), 0.689, 0.6),
+        (
+            "postures",
+            "log orientation",
+            LearningSettings(patterns_per_class=1),
+            0.789,
+            0.7,
+        ),
         ("postures-17", None, None, 0.792, 0.6),
         ("touch", None, None, 0.852, 0.8),
     ],
@@ -36,7 +42,7 @@ def is_within(study: Study, stated: float) -> bool:
 def test_people_who_were_left_out_are_recognised(
     name: str,
     features: str | None,
-    settings: Settings | None,
+    settings: LearningSettings | None,
     stated: float,
     floor: float,
 ) -> None:
@@ -83,7 +89,7 @@ def test_on_an_even_sensor_invariants_tell_shapes_and_scatter_tells_some_angles(
 
 
 def test_the_learner_of_the_paper_comes_to_the_papers_rate() -> None:
-    study = experiment(paper_task(), settings=Settings(mode="paper")).study
+    study = experiment(paper_task(), settings=LearningSettings(mode="paper")).study
     assert is_within(study, 0.899), study.accuracy
     assert all(trial.features <= 3 for trial in study.trials)
 

@@ -15,7 +15,7 @@ from experiment_study import experiment
 from experiment_tasks import Task, known_task
 
 from fuzzytree.errors import LearningError, MissingExtraError, TableError
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 from fuzzytree.tactile.sensor import Sensor
 
 has_sklearn = pytest.mark.skipif(
@@ -97,7 +97,9 @@ def test_the_cheaper_of_equal_features_is_asked() -> None:
     loud = np.where(task.frames > 0, 60 + 90 * task.codes[:, None, None], 0)
     task = dataclasses.replace(task, frames=loud)
     for text in ("log peak, peak", "peak, log peak"):
-        tree = experiment(task, features=text, settings=Settings(mode="paper")).tree
+        tree = experiment(
+            task, features=text, settings=LearningSettings(mode="paper")
+        ).tree
         assert tree.inputs == ("peak",)
 
 
@@ -131,7 +133,7 @@ def test_the_settings_that_carry_over_to_other_people_are_chosen() -> None:
     values = np.array([places + random.normal(0.0, 0.5, 120)])
     subject = np.repeat(np.arange(6), 20)
     few = (Candidate(1, 0.1, 2.0), Candidate(3, 0.1, 2.0))
-    assert chosen(values, codes, subject, Settings(), few) == few[1]
+    assert chosen(values, codes, subject, LearningSettings(), few) == few[1]
 
 
 def test_frames_without_pressure_are_told_with_the_division() -> None:

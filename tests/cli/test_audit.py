@@ -332,7 +332,11 @@ def test_a_ctrl_c_keeps_what_is_answered_and_reports_the_rest() -> None:
         if len(said) == 3:
             signal.raise_signal(signal.SIGINT)
 
-    found = ft.audit("grip.yaml", limits={"force": (3.0, 5.0)}, progress=interrupt)
+    found = ft.audit(
+        "grip.yaml",
+        progress=interrupt,
+        domain=ft.AuditDomain(limits={"force": (3.0, 5.0)}),
+    )
     assert found.was_interrupted
     assert not found.is_complete
     assert any(text.endswith(": not asked: interrupted") for text in found.unasked)

@@ -59,7 +59,10 @@ def test_results_are_reported_in_the_text_the_json_and_on_the_page(call: Call) -
     jsonschema.Draft202012Validator(schema).validate(found)
     said = [(r["verb"], r["parts"], r["wrong"]) for r in found["results"]]
     assert said == [("check", 2, 1), ("stability", 2, 0)]
-    audit = ft.audit("grip.yaml", select=["FT501"], results=["check.json"])
+    audit = ft.audit(
+        ft.material("grip.yaml", results=["check.json"]),
+        selection=ft.AuditSelection(select=["FT501"]),
+    )
     assert digest_of(audit) == audit.digest
 
 

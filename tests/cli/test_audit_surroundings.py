@@ -14,6 +14,7 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
+from fuzzytree import AuditSelection
 from fuzzytree.api import verbs
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.report.audit_page import page
@@ -104,10 +105,18 @@ def test_a_model_and_a_table_may_be_pipes_for_each_is_read_once(call: Call) -> N
 
 def test_a_model_that_changes_meanwhile_is_reported_as_it_was_read() -> None:
     material = verbs.material("grip.yaml", data="grasps.csv")
-    before = page(verbs.audit(material, select=["FT5"]), material.model)
+    before = page(
+        verbs.audit(material, selection=AuditSelection(select=["FT5"])), material.model
+    )
     ft.save(hostile("new"), "grip.yaml")
     Path("grasps.csv").unlink()
-    assert page(verbs.audit(material, select=["FT5"]), material.model) == before
+    assert (
+        page(
+            verbs.audit(material, selection=AuditSelection(select=["FT5"])),
+            material.model,
+        )
+        == before
+    )
 
 
 def test_a_table_that_changes_while_it_is_read_is_refused(

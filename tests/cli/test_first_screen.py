@@ -47,7 +47,9 @@ FIRST_LINES = {
 def wine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the wine table, its tree, an audit and a damaged tree."""
     folder = tmp_path_factory.mktemp("wine")
-    tree = ft.learn(str(WINE), target="cultivar", entry=25.0)
+    tree = ft.learn(
+        str(WINE), target="cultivar", settings=ft.LearningSettings(entry=25.0)
+    )
     shutil.copy(WINE, folder / "t.csv")
     ft.save(tree, folder / "wine.yaml")
     text = (folder / "wine.yaml").read_text("utf-8")

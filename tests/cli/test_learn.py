@@ -13,7 +13,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.cli.learn import command
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from tests.cli.conftest import Call
@@ -162,7 +162,7 @@ def test_rules_can_be_written_in_place_of_the_tree(call: Call, kind: str) -> Non
 
 def test_every_setting_has_its_option() -> None:
     offered = {parameter.name for parameter in command.params}
-    assert {field.name for field in msgspec.structs.fields(Settings)} <= offered
+    assert {field.name for field in msgspec.structs.fields(LearningSettings)} <= offered
 
 
 def test_the_options_reach_the_learner(call: Call) -> None:
@@ -175,10 +175,21 @@ def test_the_options_reach_the_learner(call: Call) -> None:
     assert code == 0
     assert json.loads(out)["report"]["mode"] == "paper"
     tree = ft.learn(
-        WINE, target="cultivar", mode="paper", l_max=3.0, alpha=0.5, points=2,
-        separate_sides=True, patterns_per_class=1, seed=3, costs={"ash": 2.0},
-        units={"ash": "g/l"}, ignore=["proline"],
-    )  # fmt: skip
+        WINE,
+        target="cultivar",
+        units={"ash": "g/l"},
+        ignore=["proline"],
+        settings=ft.LearningSettings(
+            mode="paper",
+            l_max=3.0,
+            alpha=0.5,
+            points=2,
+            separate_sides=True,
+            patterns_per_class=1,
+            seed=3,
+            costs={"ash": 2.0},
+        ),
+    )
     assert ft.load("wine.yaml") == tree
 
 

@@ -42,7 +42,9 @@ def test_predictions_equal_the_labels_wherever_the_model_is(
     kind: str, tmp_path: Path
 ) -> None:
     y = LABELS[kind]
-    tree = ft.learn(VALUES, target=y, patterns_per_class=2)
+    tree = ft.learn(
+        VALUES, target=y, settings=ft.LearningSettings(patterns_per_class=2)
+    )
     rules = ft.rules_from_tree(tree)
     ft.save(tree, tmp_path / "tree.yaml")
     ft.save(rules, tmp_path / "rules.fcl", allow_loss=True)
@@ -101,7 +103,9 @@ def test_numbers_of_a_csv_file_are_numbers_where_python_writes_them_so(
         writer.writerow(["a", "y"])
         names = np.repeat(labels, 8).tolist()
         writer.writerows(zip(VALUES[:, 0], names, strict=True))
-    tree = ft.learn(path, target="y", patterns_per_class=2)
+    tree = ft.learn(
+        path, target="y", settings=ft.LearningSettings(patterns_per_class=2)
+    )
     found = ft.run(tree, path)
     assert found.classes == np.repeat(np.array(expected, object), 8).tolist()
     assert [*map(type, found.classes)] == [type(e) for e in expected for _ in range(8)]

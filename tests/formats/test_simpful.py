@@ -167,7 +167,9 @@ def test_a_system_of_simpful_goes_wherever_a_model_goes() -> None:
     ours = ft.from_simpful(theirs)
     assert ft.export(theirs, "fll") == ft.export(ours, "fll")
     assert ft.run(theirs, rows)["o"] == ft.run(ours, rows)["o"]
-    ft.check(theirs, runtimes=["native"], limit=50).raise_if_not_ok()
+    ft.check(
+        theirs, runtimes=["native"], settings=ft.CheckSettings(limit=50)
+    ).raise_if_not_ok()
 
 
 def test_no_rule_that_fires_answers_0_as_in_simpful() -> None:

@@ -153,7 +153,7 @@ def test_the_tipper_gives_the_number_of_its_documentation() -> None:
 
 
 def test_every_runtime_has_the_bits_of_the_reference_on_a_curve_of_lines() -> None:
-    found = ft.check(tipper(), limit=300)
+    found = ft.check(tipper(), settings=ft.CheckSettings(limit=300))
     found.raise_if_not_ok()
     assert {one.allowed for one in found.comparisons} == {0.0}
 

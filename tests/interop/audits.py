@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from fuzzytree import learn
+from fuzzytree import LearningSettings, learn
 from fuzzytree.api.verbs import audited_rows
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
@@ -65,7 +65,10 @@ class Case(NamedTuple):
 def wines() -> Iterator[Case]:
     """Yield the audits of trees that are learnt from the wines, with their rows."""
     for name, tree in (
-        ("plain", learn(WINE, target="cultivar", mode="paper")),
+        (
+            "plain",
+            learn(WINE, target="cultivar", settings=LearningSettings(mode="paper")),
+        ),
         ("combined", learn(WINE, target="cultivar")),
     ):
         rows = audited_rows(WINE, tree, target="cultivar")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree import learn
+from fuzzytree import LearningSettings, learn
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import write
 from fuzzytree.exporters.fcl_dialects import Dialect
@@ -72,7 +72,7 @@ def test_the_wine_rules_decide_alike_on_every_row(
     kind: Kind,
     dialect: Dialect,
 ) -> None:
-    tree = learn(WINE, target="cultivar", entry=entry)
+    tree = learn(WINE, target="cultivar", settings=LearningSettings(entry=entry))
     assert any(v.parts for v in tree.variables) == is_mixed
     rules = rules_from_tree(tree, kind)
     rows = _wine_rows(rules.inputs)

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from fuzzytree import learn
+from fuzzytree import LearningSettings, learn
 from fuzzytree.exporters.fml import write
 from fuzzytree.formats.fml.fml_reader import reading
 from fuzzytree.formats.fml.fml_words import NAMESPACE
@@ -65,7 +65,9 @@ def test_rules_of_random_trees_are_valid(lxml: Any, seed: int, kind: Kind) -> No
 def test_the_wine_rules_are_valid_and_whole(
     lxml: Any, kind: Kind, entry: float
 ) -> None:
-    rules = rules_from_tree(learn(WINE, target="cultivar", entry=entry), kind)
+    rules = rules_from_tree(
+        learn(WINE, target="cultivar", settings=LearningSettings(entry=entry)), kind
+    )
     root = validated(lxml, write(rules, allow_loss=True, tolerance=1e-4).content)
     assert len(root.findall(f".//{{{NAMESPACE}}}tskRule")) == len(rules.rules) + 1
     flat, _ = pointed(rules, 1e-4)

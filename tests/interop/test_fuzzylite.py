@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree import learn
+from fuzzytree import LearningSettings, learn
 from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read
 from fuzzytree.model.rulebase import (
@@ -98,7 +98,7 @@ def assert_decided_alike(
 def test_the_wine_rules_decide_alike_on_every_row(
     engine: Engine, entry: float, is_mixed: bool, kind: Kind, scores: Scores
 ) -> None:
-    tree = learn(WINE, target="cultivar", entry=entry)
+    tree = learn(WINE, target="cultivar", settings=LearningSettings(entry=entry))
     assert any(v.parts for v in tree.variables) == is_mixed
     rules = rules_from_tree(tree, kind)
     rows = wine_rows(rules.inputs)

@@ -304,7 +304,7 @@ def test_compiled_c_answers_the_wine_table_as_native(
     program: Need, entry: float
 ) -> None:
     program("gcc")
-    tree = ft.learn(WINE, target="cultivar", entry=entry)
+    tree = ft.learn(WINE, target="cultivar", settings=ft.LearningSettings(entry=entry))
     found = ft.check(tree, data=None, runtimes=["native", "c", "c best-first"])
     assert found.ok
     representations = {
@@ -319,7 +319,7 @@ def test_compiled_c_has_the_strengths_of_every_rule_on_every_wine(
     program: Need, entry: float
 ) -> None:
     program("gcc")
-    tree = ft.learn(WINE, target="cultivar", entry=entry)
+    tree = ft.learn(WINE, target="cultivar", settings=ft.LearningSettings(entry=entry))
     assert any(v.parts for v in tree.variables) == (entry == 25.0)
     relative, raw = rules_from_tree(tree), rules_from_tree(tree, "raw")
     product = rules_from_tree(tree, "raw", conjunction="product")

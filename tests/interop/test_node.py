@@ -132,7 +132,7 @@ def test_node_answers_the_wine_table_as_the_reference(
     program: Need, entry: float
 ) -> None:
     program("node")
-    tree = ft.learn(WINE, target="cultivar", entry=entry)
+    tree = ft.learn(WINE, target="cultivar", settings=ft.LearningSettings(entry=entry))
     lines = WINE.read_text("utf-8").splitlines()
     header = lines[0].split(",")[:-1]  # without the class
     table = [

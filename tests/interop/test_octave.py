@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sklearn import datasets
 
-from fuzzytree import learn
+from fuzzytree import LearningSettings, learn
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis import write
 from fuzzytree.formats.fis.fis_reader import reading
@@ -65,7 +65,7 @@ def test_the_wine_rules_have_the_same_scores_in_octave_and_decide_alike(
     files: dict[str, tuple[bytes, list[list[float]]]] = {}
     told: dict[str, tuple[RuleBase, list[dict[str, float]]]] = {}
     for entry in (25.0, 1e9):
-        tree = learn(WINE, target="cultivar", entry=entry)
+        tree = learn(WINE, target="cultivar", settings=LearningSettings(entry=entry))
         assert any(v.parts for v in tree.variables) == (entry == 25.0)
         kinds: tuple[Kind, ...] = ("relative", "raw")
         for kind in kinds:
@@ -118,7 +118,7 @@ def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
     program: Need, tmp_path: Path, kind: Kind, entry: float, is_mixed: bool
 ) -> None:
     fuzzylite = program("fuzzylite")
-    tree = learn(WINE, target="cultivar", entry=entry)
+    tree = learn(WINE, target="cultivar", settings=LearningSettings(entry=entry))
     assert any(v.parts for v in tree.variables) == is_mixed
     rules = rules_from_tree(tree, kind)
     with WINE.open(newline="", encoding="utf-8") as file:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fuzzytree import learn
+from fuzzytree import LearningSettings, learn
 from fuzzytree.exporters.pmml import write
 from fuzzytree.model.rulebase import Kind, RuleBase, Semantics
 from fuzzytree.model.system import FuzzySystem
@@ -70,7 +70,7 @@ def test_the_wine_tree_and_its_rules_answer_alike_on_every_row(
     library: Any, entry: float, is_mixed: bool
 ) -> None:
     library("jpmml_evaluator")
-    tree = learn(WINE, target="cultivar", entry=entry)
+    tree = learn(WINE, target="cultivar", settings=LearningSettings(entry=entry))
     assert any(v.parts for v in tree.variables) == is_mixed
     models: list[FuzzyTree | RuleBase] = [tree]
     models += [rules_from_tree(tree, kind) for kind in KINDS]

@@ -45,14 +45,21 @@ def test_every_state_is_sarif_with_and_without_a_baseline(
 
 
 def test_an_audit_of_a_model_is_sarif(validate: Callable[[str], None]) -> None:
-    found = ft.audit(random_tree(2), select=["FT1", "FT4", "FT5"])
+    found = ft.audit(
+        random_tree(2), selection=ft.AuditSelection(select=["FT1", "FT4", "FT5"])
+    )
     validate(sarif(found, {}))
 
 
 def test_hostile_names_are_sarif(validate: Callable[[str], None]) -> None:
     for name in NAMES.values():
         validate(
-            sarif(ft.audit(hostile(name), select=["FT1", "FT4"]), {"FT101-0": name})
+            sarif(
+                ft.audit(
+                    hostile(name), selection=ft.AuditSelection(select=["FT1", "FT4"])
+                ),
+                {"FT101-0": name},
+            )
         )
 
 

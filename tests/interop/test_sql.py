@@ -35,7 +35,9 @@ WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
 
 def _models() -> Iterator[tuple[str, Model]]:
     for name, entry in (("plain", 2.0), ("combined", 25.0)):
-        tree = ft.learn(WINE, target="cultivar", entry=entry)
+        tree = ft.learn(
+            WINE, target="cultivar", settings=ft.LearningSettings(entry=entry)
+        )
         yield f"{name} tree", tree
         yield f"{name} relative rules", rules_from_tree(tree)
         yield f"{name} raw rules", rules_from_tree(tree, "raw")

@@ -135,7 +135,7 @@ def test_our_evaluator_answers_the_wine_table_as_the_reference(
     library: Need, entry: float
 ) -> None:
     library(GRAMMAR)
-    tree = ft.learn(WINE, target="cultivar", entry=entry)
+    tree = ft.learn(WINE, target="cultivar", settings=ft.LearningSettings(entry=entry))
     header, *lines = WINE.read_text("utf-8").splitlines()
     names = header.split(",")[:-1]
     table = [

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LearningError
-from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
+from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
 from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.combination import fisher_direction, node_view
 from fuzzytree.learning.patterns import Patterns, make_patterns
@@ -34,7 +34,7 @@ def learn(values: FloatArray, labels: list[int], mode: Mode) -> Learnt:
         np.array(labels, np.int64),
         columns=[f"x{k}" for k in range(values.shape[1])],
         classes=[f"c{k}" for k in range(max(labels) + 1)],
-        settings=Settings(mode=mode),
+        settings=LearningSettings(mode=mode),
     )
 
 
@@ -153,7 +153,7 @@ def assert_a_strange_table_is_learnt(seed: int) -> None:
     rows, width = int(rng.integers(2, 40)), int(rng.integers(1, 5))
     values = np.column_stack([strange_column(rng, rows) for _ in range(width)])
     labels, order = rng.integers(0, 4, rows), rng.permutation(rows)
-    settings = Settings(
+    settings = LearningSettings(
         mode=MODES[seed % 2], rows_per_class=[1, 3, 10, 5000][int(rng.integers(4))]
     )
     columns, classes = [f"x{k}" for k in range(width)], [f"c{k}" for k in range(4)]

@@ -14,7 +14,7 @@ import pytest
 from sklearn import datasets
 
 from fuzzytree.exporters import yaml
-from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
+from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
 from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.reference import descend
@@ -47,14 +47,14 @@ ROWS_PER_CLASS = 100
 """Fewer than the rows of a class in the tables that are sampled."""
 
 
-def learner(table: Table, settings: Settings | None = None) -> Learner:
+def learner(table: Table, settings: LearningSettings | None = None) -> Learner:
     values, labels = table
     columns = [f"x{k}" for k in range(values.shape[1])]
     classes = [f"c{k}" for k in range(int(labels.max()) + 1)]
-    return Learner(columns, classes, settings=settings or Settings())
+    return Learner(columns, classes, settings=settings or LearningSettings())
 
 
-def learn(table: Table, settings: Settings | None = None) -> Learnt:
+def learn(table: Table, settings: LearningSettings | None = None) -> Learnt:
     empty = learner(table, settings)
     return learn_arrays(
         *table,
@@ -141,7 +141,7 @@ def test_a_column_times_a_power_of_two_gives_the_tree_in_that_unit(
     name: str, mode: Mode
 ) -> None:
     values, labels = TABLES[name]()
-    settings = Settings(mode=mode, rows_per_class=ROWS_PER_CLASS)
+    settings = LearningSettings(mode=mode, rows_per_class=ROWS_PER_CLASS)
     base = learn((values, labels), settings)
     chance = random.Random(1)
     exponents = [chance.randint(-200, 200) for _ in base.tree.columns]
@@ -158,7 +158,7 @@ def test_a_unit_near_the_ends_of_the_floats_keeps_the_questions_of_one_column(
     exponent: int,
 ) -> None:
     values, labels = public("iris")
-    settings = Settings(mode="paper")
+    settings = LearningSettings(mode="paper")
     base = learn((values, labels), settings).tree
     found = learn((np.ldexp(values, exponent), labels), settings).tree
     units = {column: Unit(exponent) for column in base.columns}
@@ -172,7 +172,7 @@ def test_neither_order_nor_chunks_nor_merging_change_a_bit(
     name: str, mode: Mode
 ) -> None:
     values, labels = TABLES[name]()
-    settings = Settings(mode=mode, rows_per_class=ROWS_PER_CLASS)
+    settings = LearningSettings(mode=mode, rows_per_class=ROWS_PER_CLASS)
     base = written(learn((values, labels), settings))
     rng = np.random.default_rng(2)
     order = rng.permutation(len(labels))
@@ -229,7 +229,7 @@ def assert_an_offset_moves_the_tree(table: Table, power: int, mode: Mode) -> Non
     """Learn a table at an offset; only what is stored there is rounded there."""
     values, labels = table
     offset = 2.0**power
-    settings = Settings(mode=mode)
+    settings = LearningSettings(mode=mode)
     base = learn((values, labels), settings).tree
     moved = values + offset
     assert (moved - offset == values).all()
@@ -259,7 +259,7 @@ def test_any_offset_without_rounding_keeps_every_answer(
     values, labels = blobs(300, step=2.0**-10)
     moved = values + offset
     assert (moved - offset == values).all()
-    settings = Settings(mode=mode)
+    settings = LearningSettings(mode=mode)
     base, found = (learn((v, labels), settings).tree for v in (values, moved))
     # A cut is rounded in the table's unit, to another place between the same rows.
     assert [n.owners for n in found.nodes] == [n.owners for n in base.nodes]
@@ -291,7 +291,7 @@ def test_columns_twenty_decades_apart_are_combined_as_if_they_were_alike() -> No
 
 def test_a_table_taken_twice_counts_twice_and_keeps_means_and_ends() -> None:
     values, labels = public("iris")
-    settings = Settings(mode="paper")
+    settings = LearningSettings(mode="paper")
     base = learn((values, labels), settings).tree
     twice = learn((np.tile(values, (2, 1)), np.tile(labels, 2)), settings).tree
     assert [leaf.support for leaf in twice.leaves] == [

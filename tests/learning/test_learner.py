@@ -13,7 +13,7 @@ from sklearn import datasets
 from sklearn.model_selection import StratifiedKFold
 
 from fuzzytree.errors import LearningError
-from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
+from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
 from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.crisp_regions import grid
@@ -27,7 +27,7 @@ MODES: tuple[Mode, ...] = ("default", "paper")
 def learn(
     values: npt.NDArray[np.generic],
     labels: npt.NDArray[np.generic],
-    settings: Settings | None = None,
+    settings: LearningSettings | None = None,
     **others: Any,
 ) -> Learnt:
     columns = [f"x{k}" for k in range(values.shape[1])]
@@ -60,7 +60,7 @@ def blobs(rows: int = 100, gap: float = 3.0) -> tuple[FloatArray, IntArray]:
 @pytest.mark.parametrize("mode", MODES)
 def test_relative_rules_answer_like_the_tree_and_raw_rules_exist(mode: Mode) -> None:
     values, labels = datasets.load_wine(return_X_y=True)
-    tree = learn(values, labels, Settings(mode=mode)).tree
+    tree = learn(values, labels, LearningSettings(mode=mode)).tree
     relative = rules_from_tree(tree)
     assert len(rules_from_tree(tree, "raw").rules) == len(tree.leaves)
     for row in values[::5].tolist():
@@ -71,8 +71,8 @@ def test_relative_rules_answer_like_the_tree_and_raw_rules_exist(mode: Mode) -> 
 @pytest.mark.parametrize("mode", MODES)
 def test_the_same_table_gives_the_same_tree(mode: Mode) -> None:
     values, labels = datasets.load_iris(return_X_y=True)
-    first = learn(values, labels, Settings(mode=mode))
-    second = learn(np.asfortranarray(values), labels, Settings(mode=mode))
+    first = learn(values, labels, LearningSettings(mode=mode))
+    second = learn(np.asfortranarray(values), labels, LearningSettings(mode=mode))
     assert msgspec.json.encode(first) == msgspec.json.encode(second)
 
 
@@ -101,7 +101,7 @@ def test_merged_learners_have_seen_both_tables() -> None:
 
 def test_paper_mode_asks_one_feature_a_node() -> None:
     values, labels = datasets.load_digits(return_X_y=True)
-    report = learn(values, labels, Settings(mode="paper")).report
+    report = learn(values, labels, LearningSettings(mode="paper")).report
     assert set(report.features_per_node) == {1}
     assert report.leaves == sum(report.patterns.values()) == 10
 
@@ -110,21 +110,23 @@ def test_a_combination_asks_no_feature_that_does_not_help() -> None:
     rng = np.random.default_rng(1)
     values = rng.normal(size=(400, 10))
     labels = (values[:, 3] + values[:, 7] > 0).astype(np.int64)
-    found = learn(values, labels, Settings(patterns_per_class=1, entry=12.0))
+    found = learn(values, labels, LearningSettings(patterns_per_class=1, entry=12.0))
     assert found.report.features_per_node == (2,)
     assert set(found.tree.inputs) == {"x3", "x7"}
 
 
 def test_a_dear_feature_is_left_out_if_a_cheap_one_does_it() -> None:
     values, labels = blobs(gap=5.0)
-    cheap = learn(values[:, [0, 0]], labels, Settings(costs={"x0": 5.0}))
+    cheap = learn(values[:, [0, 0]], labels, LearningSettings(costs={"x0": 5.0}))
     assert cheap.tree.inputs == ("x1",)
 
 
 def test_a_feature_that_costs_nothing_ends_no_combination() -> None:
     values = np.random.default_rng(1).normal(size=(400, 3))
     labels = (values.sum(axis=1) > 0).astype(np.int64)
-    free = learn(values, labels, Settings(patterns_per_class=1, costs={"x0": 0.0}))
+    free = learn(
+        values, labels, LearningSettings(patterns_per_class=1, costs={"x0": 0.0})
+    )
     assert free.report.features_per_node == (3,)
 
 
@@ -153,7 +155,9 @@ def test_a_narrow_class_within_a_wide_one_takes_two_cuts_and_two_branches() -> N
     values = np.concatenate([rng.normal(0, 1, 300), rng.normal(0, 8, 300)])[:, None]
     labels = np.repeat([0, 1], 300)
     for mode in MODES:
-        tree = learn(values, labels, Settings(mode=mode, patterns_per_class=1)).tree
+        tree = learn(
+            values, labels, LearningSettings(mode=mode, patterns_per_class=1)
+        ).tree
         (node,) = tree.nodes
         assert len(node.cuts) == 2
         assert node.owners[0] == node.owners[2] != node.owners[1]
@@ -164,7 +168,7 @@ def test_a_cut_lies_between_the_values_of_a_discrete_column() -> None:
     values = np.repeat([[0.0], [1.0], [2.0], [3.0]], 20, axis=0)
     labels = np.repeat([0, 0, 1, 1], 20)
     for mode in MODES:
-        (node,) = learn(values, labels, Settings(mode=mode)).tree.nodes
+        (node,) = learn(values, labels, LearningSettings(mode=mode)).tree.nodes
         assert all(1.0 < cut < 2.0 for cut in node.cuts)
 
 
@@ -205,7 +209,7 @@ def test_every_departure_is_reported() -> None:
 
 def test_patterns_without_rows_are_refused_and_counted() -> None:
     values, labels = blobs(2)
-    report = learn(values, labels, Settings(patterns_per_class=3)).report
+    report = learn(values, labels, LearningSettings(patterns_per_class=3)).report
     assert report.patterns_refused == 2
 
 
@@ -218,14 +222,14 @@ def test_a_class_with_one_row_has_a_leaf() -> None:
 
 def test_patterns_that_nothing_tells_apart_share_a_leaf() -> None:
     values = np.tile(np.arange(10.0)[:, None], (2, 1))
-    report = learn(values, np.repeat([0, 1], 10), Settings(mode="paper")).report
+    report = learn(values, np.repeat([0, 1], 10), LearningSettings(mode="paper")).report
     assert report.inseparable == 2
     assert report.leaves == 1
 
 
 def test_settings_are_chosen_on_request() -> None:
     values, labels = datasets.load_wine(return_X_y=True)
-    settings = Settings(choices=("alpha", "l_max", "shrinkage", "entry"))
+    settings = LearningSettings(choices=("alpha", "l_max", "shrinkage", "entry"))
     report = learn(values, labels, settings).report
     assert set(report.chosen) == {
         "patterns_per_class",
@@ -240,7 +244,7 @@ def test_settings_are_chosen_on_request() -> None:
 
 def test_patterns_can_be_given_by_class() -> None:
     values, labels = blobs()
-    found = learn(values, labels, Settings(patterns_per_class={"c1": 3}))
+    found = learn(values, labels, LearningSettings(patterns_per_class={"c1": 3}))
     assert found.report.patterns == {"c0": 1, "c1": 3}
     names = [term.name for group in found.tree.sets for term in group.terms]
     assert names == ["c0", "c1 #1", "c1 #2", "c1 #3"]
@@ -287,7 +291,7 @@ def test_a_class_named_like_a_pattern_keeps_its_name() -> None:
     found = learn(
         values,
         labels,
-        Settings(patterns_per_class={"a": 2}),
+        LearningSettings(patterns_per_class={"a": 2}),
         classes=["a", "a #1"],
     )
     names = {term.name for group in found.tree.sets for term in group.terms}
@@ -360,7 +364,7 @@ def test_missing_values_can_be_refused() -> None:
     values, labels = blobs()
     values[0, 0] = np.nan
     with pytest.raises(LearningError) as caught:
-        learn(values, labels, Settings(missing="refuse"))
+        learn(values, labels, LearningSettings(missing="refuse"))
     assert str(caught.value) == (
         "1 of 200 rows hold a missing or infinite value or no class\n"
         "  pass missing='drop' to leave them out"
@@ -374,9 +378,12 @@ def test_missing_values_can_be_refused() -> None:
         ({"classes": ["a", "a"]}, "the class 'a' is named twice"),
         ({"columns": ["a"]}, "values have 3 columns, but 1 are named"),
         ({"classes": ["a"]}, "label 1 has no name among the classes"),
-        ({"settings": Settings(costs={"z": 1.0})}, "costs: there is no column 'z'"),
         (
-            {"settings": Settings(patterns_per_class={"z": 2})},
+            {"settings": LearningSettings(costs={"z": 1.0})},
+            "costs: there is no column 'z'",
+        ),
+        (
+            {"settings": LearningSettings(patterns_per_class={"z": 2})},
             "patterns_per_class: there is no class 'z'",
         ),
         ({"labels": np.zeros(7, np.int64)}, "200 rows, but 7 labels"),
@@ -425,7 +432,7 @@ def test_accuracy_is_what_is_promised(
     folds = StratifiedKFold(10, shuffle=True, random_state=0)
     found: list[float] = []
     for fit, answer in folds.split(values, labels):
-        learnt = learn(values[fit], labels[fit], Settings(mode=mode))
+        learnt = learn(values[fit], labels[fit], LearningSettings(mode=mode))
         assert learnt.report.leaves <= sum(learnt.report.patterns.values())
         found.append(100 * accuracy(learnt.tree, values[answer], labels[answer]))
     assert least <= np.mean(found) <= most
@@ -437,14 +444,14 @@ def test_a_thousand_classes_are_learnt(mode: Mode) -> None:
     rng = np.random.default_rng(6)
     labels = np.repeat(np.arange(1000), 5)
     values = rng.normal(size=(1000, 8))[labels] + 0.01 * rng.normal(size=(5000, 8))
-    found = learn(values, labels, Settings(mode=mode))
+    found = learn(values, labels, LearningSettings(mode=mode))
     assert found.report.leaves == 1000
     assert accuracy(found.tree, values[::97], labels[::97]) > 0.85
 
 
 def test_rules_equal_the_tree_on_the_cells_of_a_learnt_tree() -> None:
     values, labels = datasets.load_iris(return_X_y=True)
-    tree = learn(values, labels, Settings(mode="paper")).tree
+    tree = learn(values, labels, LearningSettings(mode="paper")).tree
     rules = rules_from_tree(tree)
     for points in itertools.islice(grid(tree), 1):
         for row in points.T[:200].tolist():

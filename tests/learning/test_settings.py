@@ -1,4 +1,4 @@
-"""Settings out of their range, in sentences."""
+"""LearningSettings out of their range, in sentences."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from fuzzytree.learning import Settings
+from fuzzytree.learning import LearningSettings
 
 
 @pytest.mark.parametrize(
@@ -49,5 +49,5 @@ def test_a_setting_out_of_its_range_is_refused(
     wrong: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
-        Settings(**wrong)
+        LearningSettings(**wrong)
     assert str(caught.value) == message

@@ -110,7 +110,9 @@ def test_a_measured_column_is_not_remarked_on(name: str, values: list[float]) ->
 def test_learn_warns_of_an_identifier_and_uses_it() -> None:
     values = np.arange(40.0)[:, None]
     with pytest.warns(UserWarning, match="identifier") as caught:
-        tree = ft.learn(values, target=["a"] * 20 + ["b"] * 20, columns=["row"])
+        tree = ft.learn(
+            ft.table(values, columns=["row"]), target=["a"] * 20 + ["b"] * 20
+        )
     assert [str(one.message) for one in caught] == [
         "the array: row has a different whole number in each row, as an identifier "
         "has; ignore=['row'] leaves it out"

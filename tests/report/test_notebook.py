@@ -22,8 +22,8 @@ NAMED = replace(TREE, name=HOSTILE)
         NAMED,
         ft.rules_from_tree(NAMED),
         replace(random_system(3), name=HOSTILE),
-        ft.check(NAMED, runtimes=["native"], limit=99),
-        ft.audit(NAMED, select=["FT501"]),
+        ft.check(NAMED, runtimes=["native"], settings=ft.CheckSettings(limit=99)),
+        ft.audit(NAMED, selection=ft.AuditSelection(select=["FT501"])),
     ],
     ids=lambda value: type(value).__name__,
 )
@@ -43,6 +43,8 @@ def test_a_tree_shows_its_outline_and_its_terms() -> None:
 
 def test_rules_and_comparisons_are_tables() -> None:
     rules = ft.rules_from_tree(TREE)
-    found = ft.check(TREE, rules, runtimes=["native"], limit=99)
+    found = ft.check(
+        TREE, rules, runtimes=["native"], settings=ft.CheckSettings(limit=99)
+    )
     assert rules._repr_html_().count("<tr>") == 1 + len(rules.rules)
     assert "<table" in found._repr_html_()

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
@@ -34,7 +35,7 @@ def learnt_tree(sensor: Sensor, names: tuple[str, ...], classes: int = 3) -> Fuz
     force = frames.astype(np.int64).sum(axis=(1, 2))
     ends = np.quantile(force, np.arange(1, classes) / classes)
     target = [f"class {place}" for place in np.digitize(force, ends)]
-    return learn(values.T, target=target, columns=list(names))
+    return learn(table(values.T, columns=list(names)), target=target)
 
 
 def raw_rules(tree: FuzzyTree) -> RuleBase:

@@ -71,7 +71,7 @@ def learnt(classes: int, **settings: Any) -> FuzzyTree:
     table[:, 1] += 9.0 * (label // 5)
     target = [f"class {k}" for k in label]
     return ft.learn(
-        table, target=target, columns=["a", "b", "c"], name="grid", **settings
+        ft.table(table, columns=["a", "b", "c"]), target=target, name="grid", **settings
     )
 
 
@@ -99,7 +99,7 @@ def slanted() -> FuzzyTree:
     across[40:] += 4.0
     target = ["one"] * 40 + ["two"] * 40
     table = np.column_stack([along + across, along - across])
-    return ft.learn(table, target=target, columns=["a", "b"])
+    return ft.learn(ft.table(table, columns=["a", "b"]), target=target)
 
 
 def test_every_dot_of_a_frame_has_the_colour_of_its_cell() -> None:
@@ -256,9 +256,9 @@ def test_combinations_are_written_below_the_tree() -> None:
 def test_names_with_signs_of_formulas_or_many_letters_do_no_harm() -> None:
     name = "$\\frac{1}{" + "x" * 1000
     tree = ft.learn(
-        np.array([[0.0], [0.1], [5.0], [5.1]]), target=["$a", "$a", name, name],
-        columns=["$x_1$"],
-    )  # fmt: skip
+        ft.table(np.array([[0.0], [0.1], [5.0], [5.1]]), columns=["$x_1$"]),
+        target=["$a", "$a", name, name],
+    )
     figure = plots.draw_tree(tree)
     drawn(figure, ".png")
     assert "$x_1$?" in said(figure)

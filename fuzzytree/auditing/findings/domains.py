@@ -42,6 +42,23 @@ if TYPE_CHECKING:
 
 Within = Literal["model", "data"]
 
+
+class AuditDomain(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a model is audited.
+
+    Attributes:
+        within: The ranges that the `model` declares, or those of the `data`.
+        spreads: Instead, so many spreads around the fitted sets of each input.
+        limits: The ends of some inputs; they take precedence.
+        row: A row whose nearest different decision is searched for.
+    """
+
+    within: Within = "model"
+    spreads: float | None = None
+    limits: Mapping[str, tuple[float, float]] = {}
+    row: Mapping[str, float] | None = None
+
+
 _MOST_FAULTS = 10
 _STEEP = 5.0  # a sigmoid is within 0.7 % of its ends so many times 1 / slope away
 

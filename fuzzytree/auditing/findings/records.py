@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
+from collections.abc import Collection, Sequence
 from typing import Final, Literal
 
 import msgspec
@@ -86,6 +87,20 @@ class Answer(Value, frozen=True):
     places: tuple[FileLocation, ...] = ()
     repeat: str = ""
     id: str = ""
+
+
+class AuditSelection(msgspec.Struct, frozen=True, kw_only=True):
+    """Which findings an audit looks for.
+
+    Attributes:
+        select: Beginnings of the codes to examine, such as `FT1`; all if empty.
+        ignore: Beginnings of the codes to leave out.
+        accepted: Ids of findings that a baseline accepts.
+    """
+
+    select: Sequence[str] = ()
+    ignore: Sequence[str] = ()
+    accepted: Collection[str] = ()
 
 
 class AuditSettings(Value, frozen=True):

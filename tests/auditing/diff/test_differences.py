@@ -264,7 +264,10 @@ def test_another_answer_to_missing_values_breaks_though_all_others_are_equal() -
 def test_rows_of_data_are_answered_by_both() -> None:
     table = np.array([[1.0, 0.9], [2.5, 0.5], [math.nan, 0.5]])
     found = ft.diff(
-        grip(2.0), grip(3.0), data=table, columns=["force", "slip"], settings=FEW
+        grip(2.0),
+        grip(3.0),
+        data=ft.table(table, columns=["force", "slip"]),
+        settings=FEW,
     )
     assert found.rows == 3
     state = next(a.state for a in found.answers if a.subject == "rows")
@@ -278,8 +281,7 @@ def test_a_row_beyond_the_domain_counts_too() -> None:
     found = ft.diff(
         grip(8.0),
         grip(10.0),
-        data=table,
-        columns=["force", "slip"],
+        data=ft.table(table, columns=["force", "slip"]),
         settings=FEW,
         limits={"force": (0.0, 5.0)},
     )
@@ -444,7 +446,9 @@ def test_wrong_limits_and_tables_are_refused() -> None:
         ft.diff(grip(), grip(), budget_s=0.0)
     assert str(caught.value) == "the budget must be above 0 seconds, not 0.0"
     with pytest.raises(TableError) as missing:
-        ft.diff(grip(), grip(), data=np.zeros((0, 2)), columns=["force", "slip"])
+        ft.diff(
+            grip(), grip(), data=ft.table(np.zeros((0, 2)), columns=["force", "slip"])
+        )
     assert str(missing.value).endswith("has no rows")
 
 

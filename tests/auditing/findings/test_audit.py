@@ -179,9 +179,9 @@ def test_accepted_findings_are_no_longer_open() -> None:
 def test_answers_know_their_places_and_how_to_ask_again(folder: Path) -> None:
     found = ft.audit(
         folder / "grip.yaml",
-        limits={"force": (3.0, 5.0)},
-        select=["FT101"],
         repeat="fuzzytree audit grip.yaml",
+        domain=ft.AuditDomain(limits={"force": (3.0, 5.0)}),
+        selection=ft.AuditSelection(select=["FT101"]),
     )
     lines = (folder / "grip.yaml").read_text("utf-8").splitlines()
     place = found.findings[0].places[0]

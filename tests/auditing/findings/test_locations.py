@@ -223,7 +223,7 @@ def test_both_ways_of_a_rule_stand_where_it_does_and_have_its_number(
 ) -> None:
     path = tmp_path / "tip.fll"
     path.write_text(WAYS)
-    audit = ft.audit(path, select=["FT201"])
+    audit = ft.audit(path, selection=ft.AuditSelection(select=["FT201"]))
     assert audit.numbers == (1, 1, 2)
     for answer in audit.answers:
         lines = {17 + audit.numbers[number - 1] for number in answer.rules}
@@ -233,7 +233,7 @@ def test_both_ways_of_a_rule_stand_where_it_does_and_have_its_number(
     assert "rules 2, 3" not in shown
     plain = WAYS.replace("food is good or service is good", "food is good")
     path.write_text(plain)
-    assert ft.audit(path, select=["FT201"]).numbers == ()
+    assert ft.audit(path, selection=ft.AuditSelection(select=["FT201"])).numbers == ()
 
 
 def test_a_rule_that_is_left_out_has_its_line() -> None:

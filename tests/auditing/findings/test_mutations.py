@@ -250,7 +250,12 @@ def answers(model: Document) -> tuple[Answer, ...]:
             limits = dict.fromkeys(inputs, (0.0, 1.0))
         case FuzzySystem():
             pass
-    found = ft.audit(model, data=data, columns=columns, limits=limits, ignore=["FT6"])
+    found = ft.audit(
+        model,
+        data=ft.table(data, columns=columns),
+        domain=ft.AuditDomain(limits=limits),
+        selection=ft.AuditSelection(ignore=["FT6"]),
+    )
     assert found.is_complete
     return found.answers
 
@@ -292,9 +297,10 @@ def test_the_nearest_other_decision_and_the_regions_move_with_a_cut() -> None:
     for cut in (0.625, 0.75):
         found = ft.audit(
             two_cuts(cut),
-            limits={"x": (0.0, 1.0), "y": (0.0, 1.0)},
-            row={"x": 0.6, "y": 0.5},
-            select=["FT204", "FT205"],
+            domain=ft.AuditDomain(
+                limits={"x": (0.0, 1.0), "y": (0.0, 1.0)}, row={"x": 0.6, "y": 0.5}
+            ),
+            selection=ft.AuditSelection(select=["FT204", "FT205"]),
         )
         assert not found.findings
         radius = next(one for one in found.answers if one.measures)
@@ -316,6 +322,10 @@ def test_a_planted_row_is_found_and_gone_without_it(
     rows: list[list[float]], text: str
 ) -> None:
     for data, count in ((rows, 1), ([[0.5], [3.5]], 0)):
-        found = ft.audit(CLEAN, data=np.array(data), columns=["force"], select=["FT7"])
+        found = ft.audit(
+            CLEAN,
+            data=ft.table(np.array(data), columns=["force"]),
+            selection=ft.AuditSelection(select=["FT7"]),
+        )
         told = [one.sentence for one in found.findings]
         assert told.count(text) == count

@@ -48,7 +48,9 @@ FAST = [find_runtime(name) for name in ("native", "native float32", "best-first"
 @cache
 def wine() -> FuzzyTree:
     table = ROOT / "examples" / "wine" / "wine.csv"
-    return ft.learn(str(table), target="cultivar", entry=25)
+    return ft.learn(
+        str(table), target="cultivar", settings=ft.LearningSettings(entry=25)
+    )
 
 
 @cache

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzytree import export, learn, save
+from fuzzytree import export, learn, save, table
 from fuzzytree.cli import main
 from fuzzytree.model.tree import FuzzyTree
 
@@ -17,8 +17,10 @@ from fuzzytree.model.tree import FuzzyTree
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     for name, values in (("one", [1.0, 2.0, 8.0, 9.0]), ("two", [1.0, 6.0, 8.0, 9.0])):
-        table = np.array(values)[:, np.newaxis]
-        tree = learn(table, target=["s", "s", "l", "l"], columns=["area"], name=name)
+        areas = np.array(values)[:, np.newaxis]
+        tree = learn(
+            table(areas, columns=["area"]), target=["s", "s", "l", "l"], name=name
+        )
         save(tree, f"{name}.yaml")
     words = ["tactile", "export", "one.yaml", "one.onnx", "--sensor", "4x4", "--quiet"]
     assert main(words) == 0
@@ -61,5 +63,5 @@ def test_what_is_no_file_of_frames_ends_with_2(
 
 
 def learn_area() -> FuzzyTree:
-    table = np.array([[1.0], [9.0]])
-    return learn(table, target=["s", "l"], columns=["area"])
+    areas = np.array([[1.0], [9.0]])
+    return learn(table(areas, columns=["area"]), target=["s", "l"])

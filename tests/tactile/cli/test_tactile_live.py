@@ -58,7 +58,7 @@ def call(
     areas = np.array([[4.0], [5.0], [16.0], [15.0]])
     for name in ("area", "pressure_kpa"):
         tree = ft.learn(
-            areas, target=["s", "s", "l", "l"], columns=[name], name="sizes"
+            ft.table(areas, columns=[name]), target=["s", "s", "l", "l"], name="sizes"
         )
         ft.save(tree, f"{name}.yaml")
     Path("mat.yaml").write_text(board_text(BOARD), "utf-8")

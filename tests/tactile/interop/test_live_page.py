@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.recognition.live import Answer, Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser
@@ -120,7 +121,7 @@ class Seen:
 def seen(browser: Any) -> Iterator[Seen]:
     areas = np.array([[3.0], [4.0], [5.0], [15.0], [16.0], [17.0]])
     labels = ["s", "s", "s", EVIL, EVIL, EVIL]
-    tree = learn(areas, target=labels, columns=["area"], name="sizes")
+    tree = learn(table(areas, columns=["area"]), target=labels, name="sizes")
     source = Shown()
     live = Live(Recogniser(tree, Sensor(4, 4), 0.05), source, "a board")
     with Page(live) as page:

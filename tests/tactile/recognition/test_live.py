@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import pytest
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.link.recording import Record
 from fuzzytree.tactile.recognition.frame_sources import Paced, simulated
@@ -25,7 +26,7 @@ AREAS = np.array([[4.0], [5.0], [16.0], [15.0]])
 
 
 def recogniser(reject: float = 0.0) -> Recogniser:
-    tree = learn(AREAS, target=["s", "s", "l", "l"], columns=["area"])
+    tree = learn(table(AREAS, columns=["area"]), target=["s", "s", "l", "l"])
     return Recogniser(tree, SENSOR, reject)
 
 

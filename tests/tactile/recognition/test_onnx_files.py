@@ -9,6 +9,7 @@ import onnx
 import pytest
 from onnx import numpy_helper
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters.onnx import write
@@ -24,7 +25,7 @@ AREAS = np.array([[4.0, 1.0], [5.0, 1.5], [16.0, 3.0], [15.0, 3.5]])
 
 def tree(name: str = "pad") -> FuzzyTree:
     labels = ["s", "s", "l", "l"]
-    return learn(AREAS, target=labels, columns=["area", "S1"], name=name)
+    return learn(table(AREAS, columns=["area", "S1"]), target=labels, name=name)
 
 
 def verdicts(content: bytes, model: FuzzyTree) -> list[str]:
@@ -64,7 +65,7 @@ def test_a_changed_constant_is_found_by_the_graph_and_by_the_answers() -> None:
 
 
 def test_a_file_of_another_model_is_told() -> None:
-    other = learn(AREAS[:, :1], target=["s", "s", "l", "l"], columns=["peak"])
+    other = learn(table(AREAS[:, :1], columns=["peak"]), target=["s", "s", "l", "l"])
     content = write_frames(other, SENSOR).content
     found = check_shipped(tree(), {"pad.onnx": content})
     assert [one.detail for one in found.comparisons] == [

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree import LearningSettings, table
 from fuzzytree.api.verbs import learn
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
@@ -97,7 +98,11 @@ def test_every_way_from_frame_to_class_is_one(seed: int) -> None:
     target = [f"class {number}" for number in draw.integers(0, 4, len(frames))]
     mode = MODES[int(draw.random() < 0.3)]
     if np.ptp(found.values, axis=1).any():  # else there is nothing to learn
-        tree = learn(found.values.T, target=target, columns=names, mode=mode)
+        tree = learn(
+            table(found.values.T, columns=names),
+            target=target,
+            settings=LearningSettings(mode=mode),
+        )
         model, reject = random_model(draw, tree)
         agreement = check_frames_carriers(model, sensor, frames, reject=reject)
         assert agreement.ok, agreement

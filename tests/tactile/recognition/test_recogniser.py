@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.errors import TableError
 from fuzzytree.model.tree import FuzzyTree
@@ -30,7 +31,7 @@ def tree() -> FuzzyTree:
     frames = np.concatenate([squares(20, 2, 0), squares(20, 5, 1)])
     values = features_of(SENSOR, frames, NAMES).values.T
     labels = ["small"] * 20 + ["large"] * 20
-    return learn(values, target=labels, columns=NAMES)
+    return learn(table(values, columns=NAMES), target=labels)
 
 
 def test_a_tree_recognises_what_it_has_learnt() -> None:
@@ -89,8 +90,8 @@ def test_a_floor_outside_0_to_1_is_refused(reject: float) -> None:
 
 def test_a_model_for_other_features_is_refused() -> None:
     wine = learn(
-        np.array([[1.0], [2.0]]), target=["a", "b"], columns=["flavanoids"]
-    )  # fmt: skip
+        table(np.array([[1.0], [2.0]]), columns=["flavanoids"]), target=["a", "b"]
+    )
     with pytest.raises(TableError) as caught:
         check_inputs(wine)
     assert str(caught.value).startswith(

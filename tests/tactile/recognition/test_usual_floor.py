@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State, usual_floor
@@ -21,7 +22,7 @@ def test_the_usual_floor_tells_blobs_from_presses_of_known_objects() -> None:
     names = names_of("paper,orientation")
     values = features_of(sensor, frames, names).values.T
     labels = [name for name in OBJECTS for _ in range(60)]
-    tree = learn(values, target=labels, columns=names)
+    tree = learn(table(values, columns=names), target=labels)
     recognise = Recogniser(tree, sensor, usual_floor(tree))
 
     new = np.concatenate([press(name, 100, seed=7).frames for name in OBJECTS])

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.errors import PortError
 from fuzzytree.tactile.link.recording import Record
@@ -30,7 +31,7 @@ EVIL = "<img src=x onerror=alert(1)>"
 
 
 def shown(frames: int | None = None) -> Live:
-    tree = learn(AREAS, target=["s", "s", EVIL, EVIL], columns=["area"])
+    tree = learn(table(AREAS, columns=["area"]), target=["s", "s", EVIL, EVIL])
     records = (
         Record(Frame(LARGE, number / 100, number), Counters(frames=number + 1))
         for number in (itertools.count() if frames is None else range(frames))
