@@ -491,10 +491,10 @@ def bench(
     Example:
         >>> from fuzzytree import BenchSettings
         >>> from fuzzytree.testing import random_tree
-        >>> study = bench(
-        ...     random_tree(1), only=["native"], settings=BenchSettings(rows=(9,),
-        budget_s=9) ... ) >>> [point.question for point in study.points] ['tree',
-        'relative rules', 'raw rules']
+        >>> few = BenchSettings(rows=(9,), budget_s=9)
+        >>> study = bench(random_tree(1), only=["native"], settings=few)
+        >>> [point.question for point in study.points]
+        ['tree', 'relative rules', 'raw rules']
     """
     from fuzzytree.benchmarking import study
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +21,6 @@ import fuzzytree as ft
 from fuzzytree.api import answering
 from fuzzytree.errors import LossError, ReadError, TableError
 from fuzzytree.exporters import TABLE
-from fuzzytree.learning import LearningSettings
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.onnxruntime import open_onnx
@@ -224,13 +222,6 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
         "Report(3 inputs, 16 removed)",
         "Difference(0 changes, decisions equal)",
     ]
-
-
-def test_learn_offers_every_setting_with_its_default() -> None:
-    offered = inspect.signature(ft.learn).parameters
-    for field in msgspec.structs.fields(LearningSettings):
-        default = getattr(LearningSettings(), field.name)
-        assert offered[field.name].default in (default, default or None)
 
 
 def test_every_kind_of_table_gives_the_same_tree() -> None:

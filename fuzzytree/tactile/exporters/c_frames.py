@@ -141,9 +141,9 @@ def write_frames_c(
 
     Example:
         >>> import numpy as np
-        >>> from fuzzytree.api.verbs import learn
+        >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
-        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> text = write_frames_c(tree, Sensor(4, 4), name="grip").content.decode()
         >>> "grip_recognition grip_recognise(const grip_cell *frame)" in text
         True

@@ -81,9 +81,9 @@ def write_frames(
         ValueError: If an option is not one of those above.
 
     Example:
-        >>> from fuzzytree.api.verbs import learn
+        >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
-        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> write_frames(tree, Sensor(4, 4)).losses
         ()
     """

@@ -254,9 +254,9 @@ def check_frames_carriers(
         ValueError: If the model has no strengths to reject by.
 
     Example:
-        >>> from fuzzytree.api.verbs import learn
+        >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
-        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> check_frames_carriers(tree, Sensor(4, 4)).ok
         True
     """

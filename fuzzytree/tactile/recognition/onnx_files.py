@@ -118,9 +118,9 @@ def check_shipped(
         MissingExtraError: If onnx or onnxruntime is not installed.
 
     Example:
-        >>> from fuzzytree.api.verbs import learn
+        >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
-        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> content = write_frames(tree, Sensor(4, 4)).content
         >>> check_shipped(tree, {"tree.onnx": content}).ok
         True

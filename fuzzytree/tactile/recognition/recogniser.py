@@ -78,11 +78,11 @@ class Recogniser:
             one of them always has the strength 1.
 
     Example:
-        >>> from fuzzytree.api.verbs import learn
+        >>> from fuzzytree import learn, table
         >>> small, large = np.eye(4, dtype=np.uint8), np.full((4, 4), 9, np.uint8)
         >>> sensor = Sensor(4, 4)
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
-        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> found = Recogniser(tree, sensor)(np.array([small, large, 0 * small]))
         >>> [found.label(frame) for frame in range(3)]
         ['s', 'l', 'nothing']
@@ -150,9 +150,9 @@ def usual_floor(model: Model) -> float:
     nearest means nothing. Relative rules have no such strength: their floor is 0.
 
     Example:
-        >>> from fuzzytree.api.verbs import learn
+        >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
-        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> usual_floor(tree), usual_floor(rules_from_tree(tree))
         (0.001, 0.0)
     """
