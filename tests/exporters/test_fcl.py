@@ -251,7 +251,7 @@ def test_a_portable_file_refuses_curves_of_outputs_with_the_reason() -> None:
 
 
 def test_another_number_of_samples_is_a_loss() -> None:
-    with pytest.raises(LossError, match="777 values of its range are looked at"):
+    with pytest.raises(LossError, match="777 values of its range are sampled"):
         write(_sample("number of samples"), dialect="fuzzylite")
 
 
@@ -377,7 +377,7 @@ def test_facts_that_belong_to_other_rules_change_nothing() -> None:
     assert any("belong to other rules" in one for one in reading.remarks)
 
 
-def test_the_check_list_tells_the_class_of_conformance() -> None:
+def test_the_check_list_reports_the_class_of_conformance() -> None:
     basic = _with_default(_sample("Sugeno, numbers"))
     outputs = tuple(replace(one, aggregation="maximum") for one in basic.outputs)
     edge = Points((0.0, 1.0), (0.0, 1.0))
@@ -395,7 +395,7 @@ def test_the_check_list_tells_the_class_of_conformance() -> None:
     assert re.search("class: (Extension|Open), for ", check_list(mamdani))
 
 
-def test_the_check_list_stands_in_a_comment_if_asked_for() -> None:
+def test_the_check_list_stands_in_a_comment_on_request() -> None:
     system = _with_default(_sample("Sugeno, numbers"))
     text = write(system, checklist=True).content.decode()
     assert "// data check list (IEC 61131-7)\n// inputs: 2\n" in text

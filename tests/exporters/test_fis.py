@@ -165,7 +165,7 @@ def _random_rule(
     return SystemRule(when, then, chance.choice((1.0, 0.3)))
 
 
-def test_any_asks_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
+def test_any_tests_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
     system = random_fis(2, "fuzzylite")
     question = Is("x0", "t1", ("not", "any"))
     then = (Conclusion("y0", "t0"),)
@@ -196,7 +196,7 @@ def test_a_system_is_read_back_alike(seed: int, dialect: Dialect) -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("kind", ["relative", "raw"])
-def test_rules_of_points_are_read_back_equal_where_no_input_is_asked_twice(
+def test_rules_of_points_are_read_back_equal_where_no_input_is_tested_twice(
     seed: int, kind: str
 ) -> None:
     tree = random_tree(seed, leaves=3, combinations=0.0)
@@ -333,7 +333,7 @@ def test_a_condition_is_a_number_for_each_input(when: Condition, line: str) -> N
     assert rows(write(_sugeno(SystemRule(when, (_small(),))))) == [line]
 
 
-def test_a_rule_without_a_condition_asks_a_term_that_always_holds() -> None:
+def test_a_rule_without_a_condition_tests_a_term_that_always_holds() -> None:
     system = _sugeno(SystemRule(None, (_small(),)))
     written = write(system)
     assert "MF3='always':'trapmf',[-2e+300 -1e+300 1e+300 2e+300]" in (
@@ -344,10 +344,10 @@ def test_a_rule_without_a_condition_asks_a_term_that_always_holds() -> None:
     assert rows(write(system, dialect="fuzzylite")) == ["0.99 0, 1 (1.0) : 1"]
 
 
-def test_an_input_that_is_asked_twice_becomes_a_term_with_a_bound() -> None:
+def test_an_input_that_is_tested_twice_becomes_a_term_with_a_bound() -> None:
     both = And((Is("a", "low"), Is("b", "low"), Is("a", "high")))
     system = _sugeno(SystemRule(both, (_small(),)))
-    with pytest.raises(LossError, match="low and high of 'a': the rules ask it"):
+    with pytest.raises(LossError, match="low and high of 'a': the rules test it"):
         write(system)
     written = write(system, allow_loss=True)
     assert rows(written) == ["3 1, 1 (1.0) : 1"]
@@ -472,7 +472,7 @@ def test_combinations_become_inputs_and_linear_conclusions_give_them_no_weight()
         assert len(again.columns) == len(flat.columns)
 
 
-def test_points_are_a_loss_where_standard_curves_are_asked_for() -> None:
+def test_points_are_a_loss_where_standard_curves_are_required() -> None:
     curve = Points((0.0, 1.0, 2.0), (0.0, 0.5, 1.0))
     system = FuzzySystem(
         "s",

@@ -305,9 +305,7 @@ def test_a_not_that_has_no_words_is_refused_for_good(
         write(replace(TANK, blocks=(block,)), allow_loss=True)
 
 
-def test_a_not_of_several_conditions_is_said_of_each_under_minimum_and_maximum() -> (
-    None
-):
+def test_a_not_of_several_conditions_moves_to_each_under_minimum_and_maximum() -> None:
     low, big, high = (
         Is("water level", "low"),
         Is("is", "big"),

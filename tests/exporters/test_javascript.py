@@ -95,7 +95,7 @@ def test_what_is_no_literal_is_refused() -> None:
         literal({})
 
 
-def test_a_digest_tells_every_bit() -> None:
+def test_a_digest_reports_every_bit() -> None:
     assert digest_of([0.5, 1.0]) != digest_of([0.5, 1.0 - 2.0**-53])
     assert digest_of([0.0]) != digest_of([-0.0])
 

@@ -195,7 +195,7 @@ def _answers(
     return dict(zip(names, found, strict=True))
 
 
-def test_outputs_stand_in_the_order_asked_for() -> None:
+def test_outputs_stand_in_the_requested_order() -> None:
     rules = lr_rules()
     values = np.array([[10.0], [22.0], [1e3], [np.nan]])
     outputs: tuple[Output, ...] = ("strengths", "status", "rule", "label")
@@ -228,7 +228,7 @@ def test_a_model_without_inputs_answers_every_row() -> None:
 
 @pytest.mark.parametrize("opset", [OPSETS[0], 13, 17, 18, 21, OPSETS[-1]])
 @pytest.mark.parametrize("ir", [IRS[0], 8, IRS[-1]])
-def test_every_opset_and_ir_that_can_be_asked_for_runs(opset: int, ir: int) -> None:
+def test_every_supported_opset_and_ir_runs(opset: int, ir: int) -> None:
     tree = random_tree(3, leaves=9, inputs=3)
     models: tuple[Model, ...] = (tree, rules_from_tree(tree, "raw"), lr_rules())
     for model in models:

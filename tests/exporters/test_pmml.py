@@ -230,7 +230,7 @@ KINDS: tuple[Kind, ...] = ("relative", "raw")
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_tree_answers_as_the_reference(seed: int) -> None:
+def test_a_tree_predicts_as_the_reference(seed: int) -> None:
     missing = "class 2" if seed % 2 else None
     assert_alike(random_tree(seed, semantics=Semantics(missing=missing)))
 
@@ -268,7 +268,7 @@ def test_rules_written_as_points_are_as_near_as_they_say(kind: Kind) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_points_are_pmmls_own_lists_where_asked(seed: int) -> None:
+def test_points_are_pmmls_own_lists_on_request(seed: int) -> None:
     rules = with_points(rules_from_tree(random_tree(seed)), seed, share=1.0)
     assert write(rules, curves="points").losses == ()
     assert_alike(rules, curves="points", room=1e-12)

@@ -138,7 +138,7 @@ def test_a_tree_of_any_depth_can_be_written_and_run() -> None:
     assert run(np.array([[0.0, 700.5, 1e9]])).rule.tolist() == [1, 701, 1501]
 
 
-def test_the_file_tests_itself_and_tells_a_changed_number(tmp_path: Path) -> None:
+def test_the_file_tests_itself_and_reports_a_changed_number(tmp_path: Path) -> None:
     file = tmp_path / "rules.py"
     content = write(rules_from_tree(random_tree(3))).content
     file.write_bytes(content)

@@ -191,7 +191,7 @@ def test_nothing_is_lost_and_the_same_model_gives_the_same_bytes() -> None:
     assert b"LREAL" not in write(rules, dtype="float32").content
 
 
-def test_a_system_has_its_outputs_and_tells_whether_they_are_numbers() -> None:
+def test_a_system_has_its_outputs_and_reports_whether_they_are_numbers() -> None:
     system = samples()["Sugeno, numbers"]
     written = write(system)
     text = written.content.decode("ascii")

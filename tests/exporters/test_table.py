@@ -51,7 +51,7 @@ def test_a_suffix_loads_its_own_format_alone() -> None:
         (".yalm", " (did you mean '.yaml'?)"),
     ],
 )
-def test_an_unknown_format_is_told_with_the_nearest(wanted: str, hint: str) -> None:
+def test_an_unknown_format_is_reported_with_the_nearest(wanted: str, hint: str) -> None:
     with pytest.raises(ValueError, match="no format") as caught:
         find_format(wanted)
     known = ", ".join(TABLE)

@@ -268,7 +268,10 @@ def test_a_changed_constant_changes_an_answer(library: Need) -> None:
     tree = models()["tree"]
     text = write(tree).content
     rows = probes(tree, limit=500)
-    block, changed = Block(text), Block(text.replace(b"asked > cut", b"asked >= cut"))
+    block, changed = (
+        Block(text),
+        Block(text.replace(b"value_of_node > cut", b"value_of_node >= cut")),
+    )
     names = block.sections["VAR_INPUT"]
     given = [dict(zip(names, row.values(), strict=True)) for row in rows]
     answers = [(block(**one)["rule"], changed(**one)["rule"]) for one in given]
