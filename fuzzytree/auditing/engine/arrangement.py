@@ -53,8 +53,8 @@ class RuleAxis(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     Attributes:
         variable: The variable.
-        elements: The distinct curves; the first is that of a rule that asks nothing.
-        asked: For each rule its clauses here, each as the elements of which it takes
+        elements: The distinct curves; the first is 1 everywhere: no clause.
+        clauses: For each rule its clauses here, each as the elements of which it takes
             the largest; the rule takes the least of its clauses.
     """
 
@@ -87,7 +87,7 @@ class AxisGrid(NamedTuple):
         after: The same, of the limit from above.
         is_zero: Shape (elements, cells): whether an element is 0 throughout.
         is_zero_at: Shape (elements, zones): whether it is 0 there, for sure.
-        may_be_zero_at: The same, as far as it can be told.
+        may_be_zero_at: Shape (elements, zones): whether it may be 0 there.
     """
 
     axis: RuleAxis
@@ -211,7 +211,7 @@ class Arrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
         return self.ends is None
 
 
-@functools.lru_cache(maxsize=4)  # many questions are asked of the same
+@functools.lru_cache(maxsize=4)  # many questions share one arrangement
 def arrange(rules: RuleBase, domain: Domain) -> Arrangement:
     """Return a rule base made ready for questions on a box.
 
@@ -279,7 +279,7 @@ def _clauses_on(
     shapes: Mapping[tuple[str, str], object],
     elements: dict[RuleCurve, int],
 ) -> tuple[tuple[int, ...], ...]:
-    """Return what a rule asks of a variable: the least of the largest of elements."""
+    """Return a rule's clauses on a variable: the least of the largest of elements."""
     checkpoint()
     groups: list[tuple[int, ...]] = []
     for clause in when:

@@ -5,7 +5,7 @@ An *element* is a curve that rules use on a variable: a term's, or 1 minus a ter
 meets 0 or its cap, and where two curves cross. Each is a rational number, or an
 irrational one within known bounds. Between two neighbouring places, in a *cell*, every
 element is monotone and any two of them are in strict order or equal throughout. So one
-point of a cell, compared exactly, tells the order in all of it, and a curve's values in
+point of a cell, compared exactly, gives the order in all of it, and a curve's values in
 it lie between its limits at the two ends.
 
 This is complete because nothing is sampled: a polynomial's sign changes only at its

@@ -379,9 +379,9 @@ def below_by_boxes(
     epsilon: float | Fraction,
     clock: Clock | None = None,
 ) -> State:
-    """Return whether all rules are somewhere weaker than a level; 0 asks for none.
+    """Return whether all rules are somewhere weaker than a level.
 
-    `epsilon`: the level, in [0, 1]. For 0 it is asked whether no rule fires.
+    `epsilon`: the level, in [0, 1]; 0 stands for "no rule fires".
 
     Returns:
         `Proved`: some rule reaches the level everywhere. `Witness`: none does here.

@@ -175,7 +175,7 @@ def common_axes(
 ) -> tuple[tuple[SharedAxis, ...], list[list[tuple[ClauseNumber, ...]]]]:
     """Lay models on common axes.
 
-    `ends`: for each axis that one of them asks, the stretch that is asked about.
+    `ends`: the part of each axis that the models use.
 
     Returns:
         The axes; and for each model the clauses of each of its rules.

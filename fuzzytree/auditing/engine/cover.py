@@ -79,8 +79,8 @@ def least_cover(base: Arrangement, clock: Clock | None = None) -> Bracket:
         from fuzzytree.auditing.engine.bounding import least_cover_by_boxes
 
         return least_cover_by_boxes(base.rules, base.domain, clock)
-    contest = Duel(base, (), tuple(range(len(base.rules.rules))))
-    bands = contest.bands
+    duel = Duel(base, (), tuple(range(len(base.rules.rules))))
+    bands = duel.bands
     if not base.is_fine and len(bands.low) < _MOST_FINE:
         return least_cover(base.fine, clock)
     low, high = -1, len(bands.low) - 1  # open at the lower one, closed at the upper
@@ -88,8 +88,8 @@ def least_cover(base: Arrangement, clock: Clock | None = None) -> Bracket:
     try:
         while high - low > 1:
             middle = (low + high) // 2
-            families = [options.at_gap(middle) for options in contest.options]
-            if cover(families, contest.full, clock) is None:
+            families = [options.at_gap(middle) for options in duel.options]
+            if cover(families, duel.full, clock) is None:
                 low = middle
             else:
                 high = middle
@@ -122,7 +122,7 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
 
         return below_by_boxes(base.rules, base.domain, 0, clock)
     every = tuple(range(len(base.rules.rules)))
-    contest = Duel(base, (), every)
+    duel = Duel(base, (), every)
     sure = [
         [*_bare(grid, every, is_open=base.opens(grid.axis.variable.name))]
         for grid in base.grids
@@ -131,16 +131,16 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
     how = f"{cells} parts of {len(sure)} axes where rules are 0 visited"
     point_of = _shared_point if coupled(base) else _bare_point
     try:
-        if cover([maximal(m for m, _ in of) for of in sure], contest.full, clock):
-            point = point_of(base, sure, contest.full, clock)
+        if cover([maximal(m for m, _ in of) for of in sure], duel.full, clock):
+            point = point_of(base, sure, duel.full, clock)
             if point is not None:
                 return _bare_witness(base, point)
         vague = [
             [*of, *_maybe_bare(grid)] for of, grid in zip(sure, base.grids, strict=True)
         ]
         if (
-            cover([maximal(m for m, _ in of) for of in vague], contest.full, clock)
-            and point_of(base, vague, contest.full, clock) is not None
+            cover([maximal(m for m, _ in of) for of in vague], duel.full, clock)
+            and point_of(base, vague, duel.full, clock) is not None
         ):
             why = "a curve may touch 0 where it is not known exactly"
             return Bracket("how many rules fire at least", 0.0, 1.0, why)

@@ -100,7 +100,7 @@ class _Search:
         if not self.base.axes:
             point = point_with(self.base, {})
             result = None if point is None else self._checked(self.base, point)
-            return result or Proved("no rule asks anything")
+            return result or Proved("no rule has a clause")
         try:
             result = self._sought() if self.groups else None
             if result is not None:
@@ -134,23 +134,23 @@ class _Search:
         plain = plainer(self.base, point, ours, rivals)
         return self._checked(self.base, plain) or result
 
-    def _contest(self, base: Arrangement) -> Duel:
+    def _duel(self, base: Arrangement) -> Duel:
         ours, rivals, _, _ = self.question
         return Duel(base, tuple(n - 1 for n in ours), tuple(n - 1 for n in rivals))
 
-    def _levels(self, contest: Duel) -> Iterator[tuple[int, Fraction]]:
+    def _levels(self, duel: Duel) -> Iterator[tuple[int, Fraction]]:
         """Yield bands from which up to another level nothing changes, and that level.
 
         With a ceiling, what is left below only grows with the level: the highest do.
         """
-        bands, ceiling = contest.bands, self.question.ceiling
-        events = contest.all_events if self.groups else contest.events
+        bands, ceiling = duel.bands, self.question.ceiling
+        events = duel.all_events if self.groups else duel.events
         if ceiling is not None:
             below = [n for n, high in enumerate(bands.high) if high < ceiling]
             if below:
                 yield below[-1], min(ceiling, bands.low_after(below[-1]))
             return
-        lows, highs = contest.base.near_levels
+        lows, highs = duel.base.near_levels
         result: list[tuple[float, int, int]] = []
         above = len(lows) - 1
         for band in events:
@@ -161,9 +161,9 @@ class _Search:
         for _, band, above in sorted(result):
             yield -band, bands.low[above]
 
-    def _doubtful(self, contest: Duel) -> Iterator[int]:
+    def _doubtful(self, duel: Duel) -> Iterator[int]:
         """Yield bands within which the order of levels is not known and matters."""
-        bands, ceiling = contest.bands, self.question.ceiling
+        bands, ceiling = duel.bands, self.question.ceiling
         if ceiling is not None:
             yield from (
                 n
@@ -171,13 +171,13 @@ class _Search:
                 if low < ceiling <= high
             )
             return
-        for band in contest.events:
+        for band in duel.events:
             if not bands.is_sharp[band] and bands.high[band]:
                 yield band
 
     def _how(self) -> str:
-        contest = self._contest(self.base)
-        cells = sum(len(options.where) for options in contest.all_options)
+        duel = self._duel(self.base)
+        cells = sum(len(options.where) for options in duel.all_options)
         axes = len(self.base.axes)
         levels, parts = counted(self.levels, "level"), counted(cells, "cell")
         text = f"{levels} with {parts} on {counted(axes, 'axis', 'axes')} visited"
@@ -194,35 +194,35 @@ class _Search:
         return outwards(widest)[1]
 
     def _at_levels(self, base: Arrangement) -> Witness | None:
-        contest = self._contest(base)
+        duel = self._duel(base)
         known: dict[tuple[tuple[int, ...], ...], tuple[int, ...] | None] = {}
-        for band, above in self._levels(contest):
+        for band, above in self._levels(duel):
             self.levels += 1
-            families = tuple(options.at_gap(band) for options in contest.options)
+            families = tuple(options.at_gap(band) for options in duel.options)
             if families not in known:
-                known[families] = cover(families, contest.full, self.clock)
+                known[families] = cover(families, duel.full, self.clock)
             chosen = known[families]
             result = None
             if chosen is not None:
-                levels = contest.bands.high[band], above
+                levels = duel.bands.high[band], above
                 result = (
-                    self._among_inputs(contest, band, levels)
+                    self._among_inputs(duel, band, levels)
                     if self.groups
-                    else self._witness(contest, band, levels, chosen)
+                    else self._witness(duel, band, levels, chosen)
                 )
             if result is not None:
                 return result
         return None
 
     def _may_hide_in_bands(self, base: Arrangement) -> bool:
-        """Return whether what is asked may happen within a band."""
-        contest = self._contest(base)
+        """Return whether a lead may be within a band."""
+        duel = self._duel(base)
         known: dict[tuple[tuple[int, ...], ...], bool] = {}
-        for band in self._doubtful(contest):
+        for band in self._doubtful(duel):
             self.levels += 1
-            families = tuple(options.at_band(band) for options in contest.options)
+            families = tuple(options.at_band(band) for options in duel.options)
             if families not in known:
-                known[families] = cover(families, contest.full, self.clock) is not None
+                known[families] = cover(families, duel.full, self.clock) is not None
             if known[families]:
                 return True
         return False
@@ -231,25 +231,25 @@ class _Search:
 
     def _witness(
         self,
-        contest: Duel,
+        duel: Duel,
         band: int,
         levels: tuple[Fraction, Fraction],
         chosen: Sequence[int],
     ) -> Witness | None:
         level = between(*levels)
         wanted: dict[int, AxisStretch] = {}
-        missing = contest.full
+        missing = duel.full
         # Axes that leave many rivals below come first: few axes then matter.
         order = sorted(range(len(chosen)), key=lambda a: -chosen[a].bit_count())
         for axis in order:
-            part = self._part(contest, axis, band, level, chosen[axis] & missing)
+            part = self._part(duel, axis, band, level, chosen[axis] & missing)
             if part is None:
                 self._lost()
                 return None
             wanted[axis] = part
             missing &= ~chosen[axis]
-        point = point_with(contest.base, wanted)
-        result = None if point is None else self._checked(contest.base, point)
+        point = point_with(duel.base, wanted)
+        result = None if point is None else self._checked(duel.base, point)
         if result is None:
             self._lost()
         return result
@@ -259,23 +259,23 @@ class _Search:
         self.is_open = True
 
     def _part(
-        self, contest: Duel, axis: int, band: int, level: Fraction, mask: int
+        self, duel: Duel, axis: int, band: int, level: Fraction, mask: int
     ) -> AxisStretch | None:
         """Return values of an axis that leave some rivals below a level."""
-        options, grid = contest.options[axis], contest.base.grids[axis]
-        bits = [n for n in range(len(contest.rivals)) if mask >> n & 1]
+        options, grid = duel.options[axis], duel.base.grids[axis]
+        bits = [n for n in range(len(duel.rivals)) if mask >> n & 1]
         fits = (options.top > band) & (options.where >= START)
         fits &= (options.floor[:, bits] <= band).all(axis=1)
         # Of the options that fit, the one where the rule is strongest.
         order = sorted(fits.nonzero()[0], key=lambda n: -int(options.top[n]))
         for number in order[:4]:
             cell = int(options.where[number])
-            rivals = [contest.rivals[n] for n in bits]
+            rivals = [duel.rivals[n] for n in bits]
             part = stretch(
                 grid,
                 cell,
                 level,
-                [weakest(grid, contest.ours, cell)],
+                [weakest(grid, duel.ours, cell)],
                 {weakest(grid, [rival], cell) for rival in rivals},
             )
             if part is not None:
@@ -307,7 +307,7 @@ class _Search:
     # --- axes that share inputs
 
     def _among_inputs(
-        self, contest: Duel, band: int, levels: tuple[Fraction, Fraction]
+        self, duel: Duel, band: int, levels: tuple[Fraction, Fraction]
     ) -> Witness | None:
         """Return a witness at levels between two, where options do not change.
 
@@ -317,14 +317,12 @@ class _Search:
         todo = [(levels, 0)]
         while todo:
             (low, high), depth = todo.pop()
-            if not any(self._choices(contest, band, (low, high), is_outer=True)):
+            if not any(self._choices(duel, band, (low, high), is_outer=True)):
                 continue
             middle = (low + high) / 2
-            for wanted in self._choices(
-                contest, band, (middle, middle), is_outer=False
-            ):
-                point = point_with(contest.base, wanted)
-                result = None if point is None else self._checked(contest.base, point)
+            for wanted in self._choices(duel, band, (middle, middle), is_outer=False):
+                point = point_with(duel.base, wanted)
+                result = None if point is None else self._checked(duel.base, point)
                 if result is not None:
                     return result
             if depth == _DEEPEST:
@@ -342,7 +340,7 @@ class _Search:
 
     def _choices(
         self,
-        contest: Duel,
+        duel: Duel,
         band: int,
         levels: tuple[Fraction, Fraction],
         *,
@@ -352,16 +350,16 @@ class _Search:
 
         `levels`: the rule must reach the lower one, the rivals stay below the upper;
         `is_outer`: whether what may suffice at some level between counts; the free axes
-        are then not told.
+        are then left out.
         """
         joined = sorted({axis for group in self.groups for axis in group})
-        free = [a for a in range(len(contest.options)) if a not in joined]
-        families = [contest.options[axis].at_gap(band) for axis in free]
+        free = [a for a in range(len(duel.options)) if a not in joined]
+        families = [duel.options[axis].at_gap(band) for axis in free]
         parts = {
             axis: [
                 *parts_of(
-                    contest,
-                    contest.all_options[axis],
+                    duel,
+                    duel.all_options[axis],
                     axis,
                     band,
                     levels,
@@ -372,9 +370,9 @@ class _Search:
         }
         rest = union(mask for family in families for mask in family)
         for wanted, covered in choices(
-            contest.base, parts, contest.full, rest, {}, self._tell
+            duel.base, parts, duel.full, rest, {}, self._tell
         ):
-            missing = contest.full & ~covered
+            missing = duel.full & ~covered
             chosen = cover(families, missing, self.clock)
             if chosen is None:
                 continue
@@ -382,7 +380,7 @@ class _Search:
                 yield wanted
                 continue
             result = {
-                axis: self._part(contest, axis, band, levels[0], mask & missing)
+                axis: self._part(duel, axis, band, levels[0], mask & missing)
                 for axis, mask in zip(free, chosen, strict=True)
             }
             whole = {axis: part for axis, part in result.items() if part is not None}
@@ -445,7 +443,7 @@ def largest_lead(
 
     Under the minimum a lead of d somewhere means that a choice of cells has the rule
     reach a level d above one below which every rival has values. The places within the
-    cells are not asked for, so this bounds the lead from above. From below it is the
+    cells are not determined, so this bounds the lead from above. From below it is the
     best point that floats led to, evaluated in fractions.
 
     `won`: A point at which the rule wins; `enough`: once a lead of this much is found,
@@ -507,7 +505,7 @@ def _bound(
     base: Arrangement, rule: int, rivals: tuple[int, ...], low: Fraction, clock: Clock
 ) -> tuple[Fraction, str]:
     """Return what the lead does not exceed, and how that is known."""
-    contest = Duel(base, (rule - 1,), tuple(number - 1 for number in rivals))
+    duel = Duel(base, (rule - 1,), tuple(number - 1 for number in rivals))
     high = Fraction(1)
     try:
         for step in range(_STEPS):
@@ -515,23 +513,21 @@ def _bound(
             middle = low + (high - low) / (64 if step == 0 else 2)
             if middle <= low:
                 break
-            if _may_reach(contest, middle, clock):
+            if _may_reach(duel, middle, clock):
                 low = middle
             else:
                 high = middle
     except OutOfTimeError:
         return high, "the budget was spent"
-    return high, "the places within the cells are not asked for"
+    return high, "the places within the cells are not determined"
 
 
-def _may_reach(contest: Duel, lead: Fraction, clock: Clock) -> bool:
+def _may_reach(duel: Duel, lead: Fraction, clock: Clock) -> bool:
     """Return whether a lead cannot be excluded."""
-    bands = contest.bands
-    for band in contest.events:
+    bands = duel.bands
+    for band in duel.events:
         top = bisect_left(bands.high, bands.low[band] + lead)
-        families = [
-            options.masks(options.top >= top, band) for options in contest.options
-        ]
-        if cover(families, contest.full, clock) is not None:
+        families = [options.masks(options.top >= top, band) for options in duel.options]
+        if cover(families, duel.full, clock) is not None:
             return True
     return False

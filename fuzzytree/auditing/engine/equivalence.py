@@ -418,7 +418,7 @@ def _cut_at(axis: SharedAxis, part: AxisPart) -> Fraction:
 
 
 def _variables_of(old: RuleBase, new: RuleBase) -> dict[AxisKey, Variable]:
-    """Return the variables that some rule of either model asks, by their keys."""
+    """Return the variables that some rule of either model uses, by their keys."""
     result: dict[AxisKey, Variable] = {}
     for model in (old, new):
         clauses = {clause.variable for rule in model.rules for clause in rule.when}
@@ -445,7 +445,7 @@ def difference_region(
     `point`: where they answer otherwise.
 
     Returns:
-        Nothing where a combination is asked, or the point is not on the domain.
+        Nothing where a rule uses a combination, or the point is not on the domain.
     """
     search = _Search(old, new, domain)
     if search.places.has_sums or search.places.in_doubles(point) != point:

@@ -271,7 +271,7 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
     lows, highs = of.at_zones[axis]
     for number, (a, b) in enumerate(zones):
         if a == b:
-            continue  # continuous from the left: the cell before told its value
+            continue  # continuous from the left: the cell before gave its value
         beside = below[max(number - 1, 0) : number + 1]
         most, least = Fraction(highs[weak, number]), Fraction(lows[strong, number])
         if not most:

@@ -54,7 +54,7 @@ _MOST_CHOICES = 1000  # of parts of axes that share inputs
 _HALVINGS = 12  # of what a level may be raised by
 _WEIGHTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.0, 1.0)
 _CLOSE = Fraction(1, 1000)  # how well a level is known under the product
-_CLOSER = 1e-9  # the same, where the level asked for is that near
+_CLOSER = 1e-9  # the same, where the wanted level is that near
 _NEARLY = Fraction(1, 2**30)  # of a level, by which a point may fall short of it
 
 
@@ -64,7 +64,7 @@ class JointMaximum(NamedTuple):
     Attributes:
         level: The highest level that both reach.
         state: A witness, or a bracket of the level; `Proved` where no fractions are a
-            point at which both reach the level that is asked for.
+            point at which both reach the wanted level.
         is_touch: Whether both reach that level at irrational values alone.
     """
 

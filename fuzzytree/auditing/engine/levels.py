@@ -1,4 +1,4 @@
-"""Critical levels that coincide without being rational, told from near ones exactly.
+"""Irrational critical levels, compared exactly.
 
 At an irrational place, the one root of q in an interval, a curve has the value of its
 polynomial p there: an algebraic number. It is a zero of the first linear relation among
@@ -204,7 +204,7 @@ def parted(levels: Sequence[AlgebraicLevel | Fraction]) -> list[LevelSpan] | Non
     unlike: list[AlgebraicLevel | Fraction] = []
     member: list[int] = []
     known: dict[AlgebraicLevel | Fraction, int] = {}
-    # Rational ones first: what equals them is told by them.
+    # Rational levels first: they represent those that equal them.
     order = sorted(
         range(len(levels)), key=lambda n: isinstance(levels[n], AlgebraicLevel)
     )

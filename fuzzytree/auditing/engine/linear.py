@@ -15,7 +15,7 @@ from fuzzytree.model.interrupts import checkpoint
 
 ZERO, ONE = Fraction(0), Fraction(1)
 
-_MOST_DIGITS = 17  # every double is told from its neighbours by so many
+_MOST_DIGITS = 17  # these distinguish every double from its neighbours
 
 
 class Row(NamedTuple):
@@ -68,7 +68,7 @@ def solved(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | Row
         As `feasible`; but where the rows have nothing in common with the ranges, even
         with their ends, a sum of multiples of rows that no point of the ranges
         satisfies (Farkas), as a lower bound. It holds wherever the rows hold, so it
-        tells how much wider the ranges must be, at least.
+        gives how much wider the ranges must be, at least.
 
     Example:
         >>> unit = (Fraction(0), Fraction(1))

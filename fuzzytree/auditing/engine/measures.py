@@ -246,7 +246,7 @@ def value_at_place(
 # --- overlap of two curves
 
 
-_CELLS = 256  # on which degrees are enclosed before areas are asked exactly
+_CELLS = 256  # on which degrees are enclosed before areas are exact
 
 
 class Overlap(NamedTuple):
@@ -517,7 +517,7 @@ def _gaps(
 ) -> Iterator[tuple[Fraction, Bounds]]:
     """Yield places with how far two curves are apart there; the largest is among them.
 
-    What is reached only from above is told of the place that it is approached at.
+    A limit from above is yielded with the place where it is approached.
     """
     axis = separate_axis([one, other], low, high)
     first, second = axis.elements

@@ -74,7 +74,7 @@ class Nearest(Value, frozen=True):
 
     @property
     def is_narrow(self) -> bool:
-        """Whether the distance is known as well as it was asked for."""
+        """Whether the bounds are as narrow as `NARROW` requires."""
         if self.high is None:
             return self.is_none
         return self.high - self.low <= max(2 * NARROW * self.high, 2 * LEAST)
@@ -363,7 +363,7 @@ def polytope_of(
 
 
 class Polytopes:
-    """Some polytopes of a domain, of which the nearest is asked for.
+    """Some polytopes of a domain, to find the nearest of them.
 
     `domain`: in whose widths distance is measured; `parts`: the polytopes; those
     without a point may be among them.

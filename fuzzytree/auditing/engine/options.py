@@ -61,7 +61,7 @@ def cover(
 ) -> tuple[int, ...] | None:
     """Return an option of each family that together cover `full`, or None.
 
-    `full`: what must be covered; `clock`: asked between two axes.
+    `full`: what must be covered; `clock`: checked between two axes.
 
     Raises:
         OutOfTimeError: If the clock is over.
@@ -169,7 +169,7 @@ class Duel(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     Attributes:
         base: Where.
-        ours: The positions of the rules; without any it is a rule that asks nothing.
+        ours: The positions of the rules; without any, a rule without clauses.
         rivals: The positions of the rivals.
     """
 
@@ -238,14 +238,14 @@ def weakest(grid: AxisGrid, rules: Sequence[int], cell: int) -> int:
     return min(chosen, key=lambda one: int(rank[one]))
 
 
-def _options(contest: Duel, grid: AxisGrid) -> AxisOptions:
+def _options(duel: Duel, grid: AxisGrid) -> AxisOptions:
     checkpoint()
     cells = grid.cells
     count = len(cells.rank)
     columns = np.arange(count)
-    rivals = np.array(contest.rivals, dtype=np.int64)
+    rivals = np.array(duel.rivals, dtype=np.int64)
     mine = np.zeros(count, dtype=np.int64)  # the curve that is always 1
-    for rule in contest.ours:
+    for rule in duel.ours:
         other = grid.of[rule]
         mine = np.where(
             cells.rank[columns, other] < cells.rank[columns, mine], other, mine
@@ -255,25 +255,25 @@ def _options(contest: Duel, grid: AxisGrid) -> AxisOptions:
     floor = np.where(is_below, grid.least[theirs, columns], NEVER).T
     top = grid.most[mine, columns]
     parts = [(columns, top, floor)]
-    if not contest.base.opens(grid.axis.variable.name):
-        parts.append(_start(contest, grid, rivals))
-    parts.append(_zones(contest, grid))
+    if not duel.base.opens(grid.axis.variable.name):
+        parts.append(_start(duel, grid, rivals))
+    parts.append(_zones(duel, grid))
     where, tops, floors = (np.concatenate(part) for part in zip(*parts, strict=True))
     return AxisOptions(where, tops, floors)
 
 
 def _start(
-    contest: Duel, grid: AxisGrid, rivals: IntArray
+    duel: Duel, grid: AxisGrid, rivals: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return the option of the axis's lower end, which no cell holds."""
-    mine = weakest(grid, contest.ours, START)
+    mine = weakest(grid, duel.ours, START)
     theirs = grid.of_start[rivals]
     rank = grid.cells.start_rank
     floor = np.where(rank[theirs] < rank[mine], grid.at[theirs, 0], NEVER)
     return np.array([START]), grid.at[mine, :1], floor[np.newaxis]
 
 
-def _zones(contest: Duel, grid: AxisGrid) -> tuple[IntArray, IntArray, IntArray]:
+def _zones(duel: Duel, grid: AxisGrid) -> tuple[IntArray, IntArray, IntArray]:
     """Return options of places with more than one in them: whatever may be there."""
     vague = np.flatnonzero(grid.cells.is_vague)
 
@@ -288,10 +288,10 @@ def _zones(contest: Duel, grid: AxisGrid) -> tuple[IntArray, IntArray, IntArray]
             high = np.minimum(high, at[list(group)].max(axis=0))
         return low, high
 
-    tops = [grid.at[0, vague], *(bands_of(rule)[1] for rule in contest.ours)]
+    tops = [grid.at[0, vague], *(bands_of(rule)[1] for rule in duel.ours)]
     top = np.min(tops, axis=0)
-    floor = np.array([bands_of(rule)[0] for rule in contest.rivals], dtype=np.int64)
-    floor = floor.reshape(len(contest.rivals), len(vague)).T
+    floor = np.array([bands_of(rule)[0] for rule in duel.rivals], dtype=np.int64)
+    floor = floor.reshape(len(duel.rivals), len(vague)).T
     return -2 - vague, top, floor
 
 
@@ -395,7 +395,7 @@ def choices(
 
 
 def parts_of(
-    contest: Duel,
+    duel: Duel,
     options: AxisOptions,
     axis: int,
     band: int,
@@ -408,13 +408,13 @@ def parts_of(
     `levels`: the rule must reach the lower one, the rivals stay below the upper;
     `is_outer`: whether what may suffice at some level between counts.
     """
-    grid = contest.base.grids[axis]
+    grid = duel.base.grids[axis]
     for number in ((options.top > band) & (options.where >= START)).nonzero()[0]:
         cell = int(options.where[number])
-        mine = weakest(grid, contest.ours, cell)
+        mine = weakest(grid, duel.ours, cell)
         floors = options.floor[number]
         theirs = {
-            n: weakest(grid, [contest.rivals[n]], cell)
+            n: weakest(grid, [duel.rivals[n]], cell)
             for n in range(len(floors))
             if floors[n] <= band
         }

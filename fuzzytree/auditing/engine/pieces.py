@@ -201,7 +201,7 @@ def degree_after(parts: tuple[PolynomialPiece, ...], x: Fraction) -> Fraction:
 _ENDS = ((ZERO,), (ONE,))
 
 ALWAYS = Band()
-"""The curve of a rule that asks nothing of a variable."""
+"""The curve of a rule without a clause on a variable."""
 
 
 class RuleCurve(NamedTuple):
@@ -288,7 +288,7 @@ def places(elements: Sequence[RuleCurve]) -> tuple[ChangePoint, ...]:
 def _apart(result: Iterable[ChangePoint]) -> list[ChangePoint]:
     """Return places apart from each other: one place that was met twice stands once.
 
-    Two that cannot be told apart are left to touch.
+    Two places that cannot be separated still touch.
     """
     kept: list[ChangePoint] = []
     todo = sorted(result, key=lambda one: (one.low, one.high), reverse=True)

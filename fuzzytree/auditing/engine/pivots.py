@@ -148,7 +148,7 @@ def is_constant(grid: AxisGrid, element: int, cell: int) -> bool:
 def _flat(grid: AxisGrid, is_sharp: BoolArray) -> BoolArray:
     """Return which rules' degrees are constant in a cell, and not 0: (rules, cells)."""
     flat = (grid.least == grid.most) & ~grid.is_zero
-    # Within a band that is not one level, the curve itself tells.
+    # Within a band that is not one level, the curve itself decides.
     for row, cell in np.argwhere(flat & ~is_sharp[grid.least]).tolist():
         flat[row, cell] = is_constant(grid, row, cell)
     return np.asarray(flat[grid.of, np.arange(grid.of.shape[1])])
@@ -264,30 +264,30 @@ def ends_of(grid: AxisGrid, element: int, cell: int) -> tuple[int, int]:
     return int(grid.least[element, cell]), int(grid.most[element, cell])
 
 
-def levels_of(contest: Duel, least: int, most: int, *, is_each: bool) -> list[int]:
+def levels_of(duel: Duel, least: int, most: int, *, is_each: bool) -> list[int]:
     """Return bands from which on, up to the next one, nothing changes.
 
     Where axes share inputs every level matters: at another one other values are free.
     """
     if is_each:
         return [*range(least, most)] or [least]
-    inner = {band for band in contest.inner_events if least < band < most}
+    inner = {band for band in duel.inner_events if least < band < most}
     return sorted({least, *inner})
 
 
 def pivots(
-    contest: Duel, question: TieQuestion, axis: int, *, is_each: bool
+    duel: Duel, question: TieQuestion, axis: int, *, is_each: bool
 ) -> list[Pivot]:
     """Return the cells of an axis in which all of ours are the same curve, not 0.
 
-    Of cells between the same levels one will do, unless each is asked for.
+    Of cells between the same levels one suffices, unless `is_each`.
     """
-    grid = contest.base.grids[axis]
+    grid = duel.base.grids[axis]
     degrees = _cell_degrees(grid)
-    ours = degrees.height[np.array(contest.ours)]
-    rivals = degrees.height[np.array(contest.rivals, dtype=np.int64)]
-    mine = degrees.of[contest.ours[0]]
-    fits = (ours == ours[0]).all(axis=0) & ~degrees.is_zero[contest.ours[0]]
+    ours = degrees.height[np.array(duel.ours)]
+    rivals = degrees.height[np.array(duel.rivals, dtype=np.int64)]
+    mine = degrees.of[duel.ours[0]]
+    fits = (ours == ours[0]).all(axis=0) & ~degrees.is_zero[duel.ours[0]]
     is_below = rivals < ours[0] + _limits(question)
     result: dict[tuple[int, ...], Pivot] = {}
     for column in np.flatnonzero(fits).tolist():
@@ -298,13 +298,11 @@ def pivots(
     return list(result.values())
 
 
-def constant_pairs(
-    contest: Duel, question: TieQuestion, *, is_each: bool
-) -> list[Pivot]:
+def constant_pairs(duel: Duel, question: TieQuestion, *, is_each: bool) -> list[Pivot]:
     """Return pairs of constants of one level, on two axes, that hold two rules."""
     if len(question.ours) < 2:
         return []
-    one, other = ([*_constants_of(contest, question, rule)] for rule in contest.ours)
+    one, other = ([*_constants_of(duel, question, rule)] for rule in duel.ours)
     result: dict[tuple[int, ...], Pivot] = {}
     key: tuple[int, ...]
     for first, level in one:
@@ -318,15 +316,15 @@ def constant_pairs(
 
 
 def _constants_of(
-    contest: Duel, question: TieQuestion, rule: int
+    duel: Duel, question: TieQuestion, rule: int
 ) -> Iterator[tuple[Pivot, int]]:
     """Yield where a rule, the least of ours, is constant and not 0, with the band."""
-    for axis, grid in enumerate(contest.base.grids):
+    for axis, grid in enumerate(duel.base.grids):
         degrees = _cell_degrees(grid)
         height, mine = degrees.height[rule], degrees.of[rule]
-        fits = (height <= degrees.height[np.array(contest.ours)]).all(axis=0)
+        fits = (height <= degrees.height[np.array(duel.ours)]).all(axis=0)
         fits &= ~degrees.is_zero[rule]
-        rivals = degrees.height[np.array(contest.rivals, dtype=np.int64)]
+        rivals = degrees.height[np.array(duel.rivals, dtype=np.int64)]
         is_behind = rivals < height + _limits(question)
         for column in np.flatnonzero(fits).tolist():
             element, cell = int(mine[column]), degrees.cells[column]
@@ -346,7 +344,7 @@ def _limits(question: TieQuestion) -> IntArray:
 
 
 def flat_family(
-    contest: Duel,
+    duel: Duel,
     question: TieQuestion,
     axis: int,
     band: int,
@@ -357,62 +355,59 @@ def flat_family(
 
     Rivals are left strictly below it, or stay at it as curves that are constant.
 
-    `asked`: which of these must be weaker; `is_within`: of a band that is not: what may
-    hold somewhere in it, never too little.
+    `is_within`: of a band that is not sharp, what is possible somewhere in it.
     """
-    options, grid = contest.all_inner[axis], contest.base.grids[axis]
+    options, grid = duel.all_inner[axis], duel.base.grids[axis]
     masks: list[int] = []
     limit = band + 1 if is_within else band  # below which rivals are left
     least = -np.iinfo(np.int64).max if is_within else START
     for number in np.flatnonzero(options.where >= least).tolist():
         cell, top = int(options.where[number]), int(options.top[number])
         if top > band or (
-            top == band and (is_within or _least(contest, grid, cell) == band)
+            top == band and (is_within or _least(duel, grid, cell) == band)
         ):
             behind = options.floor[number] < limit
             for place in range(len(question.strict), len(behind)):
-                behind[place] |= cell >= START and stays(
-                    contest, grid, cell, place, band
-                )
+                behind[place] |= cell >= START and stays(duel, grid, cell, place, band)
             masks.append(sum(1 << n for n in np.flatnonzero(behind).tolist()))
     return maximal(masks)
 
 
-def _least(contest: Duel, grid: AxisGrid, cell: int) -> int:
+def _least(duel: Duel, grid: AxisGrid, cell: int) -> int:
     """Return the band of the least value of our weakest rule in a cell."""
-    return ends_of(grid, weakest(grid, contest.ours, cell), cell)[0]
+    return ends_of(grid, weakest(grid, duel.ours, cell), cell)[0]
 
 
-def stays(contest: Duel, grid: AxisGrid, cell: int, rival: int, band: int) -> bool:
+def stays(duel: Duel, grid: AxisGrid, cell: int, rival: int, band: int) -> bool:
     """Return whether a rival's curve is constant in a cell, in a band."""
     if cell == START:
-        return bool(grid.at[grid.of_start[contest.rivals[rival]], 0] == band)
-    element = grid.of[contest.rivals[rival], cell]
+        return bool(grid.at[grid.of_start[duel.rivals[rival]], 0] == band)
+    element = grid.of[duel.rivals[rival], cell]
     return bool(grid.least[element, cell] == band == grid.most[element, cell])
 
 
 def part_at(
-    contest: Duel, axis: int, level: Fraction, mask: int, flat: int | None
+    duel: Duel, axis: int, level: Fraction, mask: int, flat: int | None
 ) -> AxisStretch | None:
     """Return where on an axis ours reach a level and some rivals stay below it.
 
     Where the level is a band, `flat`, rivals may also stay in it.
     """
-    options, grid = contest.all_inner[axis], contest.base.grids[axis]
-    every = [n for n in range(len(contest.rivals)) if mask >> n & 1]
+    options, grid = duel.all_inner[axis], duel.base.grids[axis]
+    every = [n for n in range(len(duel.rivals)) if mask >> n & 1]
     order = np.argsort(-options.top, kind="stable")
     for number in order[options.where[order] >= START].tolist():
         rivals = [
             n
             for n in every
             if flat is None
-            or not stays(contest, grid, int(options.where[number]), n, flat)
+            or not stays(duel, grid, int(options.where[number]), n, flat)
         ]
         if (options.floor[number, rivals] > options.top[number]).any():
             continue
         cell = int(options.where[number])
-        mine = weakest(grid, contest.ours, cell)
-        below = {weakest(grid, [contest.rivals[n]], cell) for n in rivals}
+        mine = weakest(grid, duel.ours, cell)
+        below = {weakest(grid, [duel.rivals[n]], cell) for n in rivals}
         result = stretch(grid, cell, level, [mine], below)
         if result is not None:
             return result

@@ -245,7 +245,7 @@ def _unit_roots(numbers: list[int]) -> list[tuple[Fraction, Fraction, bool]]:
 def _apart(
     result: list[tuple[Fraction, Fraction, bool]],
 ) -> list[tuple[Fraction, Fraction, bool]]:
-    """Join places that touch; two roots there are no longer told apart."""
+    """Join places that touch; two roots there become one place."""
     kept: list[tuple[Fraction, Fraction, bool]] = []
     for low, high, is_sure in result:
         if kept and low <= kept[-1][1]:

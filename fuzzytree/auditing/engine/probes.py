@@ -284,7 +284,7 @@ def strength_above(
 ) -> Fraction | None:
     """Return a rule's exact strength if it is above that of each of some others.
 
-    Of a rival only as many clauses are asked as it takes to see that it is weaker.
+    The clauses of a rival are evaluated until it is known to be weaker.
     """
     rules = base.rules
     is_product = rules.semantics.conjunction == "product"

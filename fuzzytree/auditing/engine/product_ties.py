@@ -276,9 +276,9 @@ class _Search:
 
     Attributes:
         of: The rules.
-        asked: Which of them.
+        question: Which of them.
         clock: How much time there is.
-        seen: The boxes that were asked about.
+        visited: The boxes of the search so far.
         why: What left a box open, if any was.
     """
 

@@ -40,7 +40,7 @@ class Region(Value, frozen=True):
     Attributes:
         leaf: The leaf's number, from 1.
         label: Its class.
-        sides: The variables that its path asks, in that order, each with the values
+        sides: The variables of its path, in that order, each with the values
             that lead on; none if no value does.
     """
 

@@ -416,7 +416,7 @@ class Space:
     Attributes:
         names: The inputs.
         lines: One for each.
-        mixes: The combinations that are asked or limited.
+        mixes: The combinations with clauses or limits.
         is_product: Whether AND is the product.
     """
 

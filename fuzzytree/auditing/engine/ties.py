@@ -65,15 +65,15 @@ _Levels = tuple[Fraction, Fraction]
 class SharedInputs:
     """One question, on axes some of which share inputs."""
 
-    def __init__(self, contest: Duel, question: TieQuestion, clock: Clock) -> None:
-        self.contest, self.question, self.clock = contest, question, clock
-        base = contest.base
+    def __init__(self, duel: Duel, question: TieQuestion, clock: Clock) -> None:
+        self.duel, self.question, self.clock = duel, question, clock
+        base = duel.base
         self.joined = sorted({axis for group in coupled(base) for axis in group})
         self.count = at_most(_MOST_CHOICES, clock)
 
     def leader(self) -> Witness | None:
         """Return a point at which a single rule leads, if floats lead to one."""
-        base, question = self.contest.base, self.question
+        base, question = self.duel.base, self.question
         if len(question.ours) > 1:
             return None
         point = leader(base, question.ours, question.rivals)
@@ -91,7 +91,7 @@ class SharedInputs:
 
         `pivot`: what holds ours.
         """
-        bands = self.contest.bands
+        bands = self.duel.bands
         first, last = bands.high[band], bands.low_after(band)
         if is_flat:
             first = last = bands.low[band]
@@ -102,9 +102,9 @@ class SharedInputs:
             if not any(self._fitting(pivot, band, levels, is_flat, is_outer=True)):
                 continue
             for wanted in self._fitting(pivot, band, levels, is_flat, is_outer=False):
-                point = point_with(self.contest.base, wanted)
+                point = point_with(self.duel.base, wanted)
                 if point is not None:
-                    result = tie_witness(self.contest.base, self.question, point)
+                    result = tie_witness(self.duel.base, self.question, point)
                     if result is not None:
                         return result, False
             if is_flat or depth == _DEEPEST:
@@ -128,8 +128,8 @@ class SharedInputs:
         fixed = self._pivot_stretches(pivot, levels, is_flat=is_flat, is_outer=is_outer)
         if fixed is None:
             return
-        contest, grid = self.contest, self.contest.base.grids[pivot.axis]
-        goal = contest.full & ~union(part.mask for part in pivot.all)
+        duel, grid = self.duel, self.duel.base.grids[pivot.axis]
+        goal = duel.full & ~union(part.mask for part in pivot.all)
         if not is_outer and not is_flat:
             level = grid.axis.elements[pivot.element].degree(fixed[pivot.axis].low)
             levels = level, level
@@ -140,17 +140,17 @@ class SharedInputs:
         }
         free = [
             axis
-            for axis in range(len(contest.inner_options))
+            for axis in range(len(duel.inner_options))
             if axis not in fixed and axis not in parts
         ]
         families = [
-            flat_family(contest, self.question, axis, band)
+            flat_family(duel, self.question, axis, band)
             if is_flat
-            else contest.inner_options[axis].at_gap(band)
+            else duel.inner_options[axis].at_gap(band)
             for axis in free
         ]
         rest = union(mask for family in families for mask in family)
-        base = contest.base
+        base = duel.base
         for wanted, covered in choices(base, parts, goal, rest, fixed, self.count):
             missing = goal & ~covered
             chosen = cover(families, missing, self.clock)
@@ -161,7 +161,7 @@ class SharedInputs:
                 continue
             flat = band if is_flat else None
             result = {
-                axis: part_at(contest, axis, levels[0], mask & missing, flat)
+                axis: part_at(duel, axis, levels[0], mask & missing, flat)
                 for axis, mask in zip(free, chosen, strict=True)
             }
             whole_of = {axis: part for axis, part in result.items() if part is not None}
@@ -172,7 +172,7 @@ class SharedInputs:
         self, pivot: Pivot, levels: _Levels, *, is_flat: bool, is_outer: bool
     ) -> dict[int, AxisStretch] | None:
         """Return where the pivot is at some of the levels: one value if not outer."""
-        every = self.contest.base.grids
+        every = self.duel.base.grids
         if is_flat:
             return {part.axis: whole(every[part.axis], part.cell) for part in pivot.all}
         grid = every[pivot.axis]
@@ -192,24 +192,24 @@ class SharedInputs:
         is_outer: bool,
     ) -> Iterator[Part]:
         """Yield where ours reach a level on an axis, with the rivals left below."""
-        contest = self.contest
-        options = contest.all_inner[axis]
+        duel = self.duel
+        options = duel.all_inner[axis]
         if not is_flat:
-            yield from parts_of(contest, options, axis, band, levels, is_outer=is_outer)
+            yield from parts_of(duel, options, axis, band, levels, is_outer=is_outer)
             return
-        grid = contest.base.grids[axis]
+        grid = duel.base.grids[axis]
         first_weak = len(self.question.strict)
         for number in (options.where >= START).nonzero()[0].tolist():
             cell = int(options.where[number])
-            mine = weakest(grid, contest.ours, cell)
+            mine = weakest(grid, duel.ours, cell)
             equal = {
                 n
-                for n in range(first_weak, len(contest.rivals))
-                if stays(contest, grid, cell, n, band)
+                for n in range(first_weak, len(duel.rivals))
+                if stays(duel, grid, cell, n, band)
             }
             below = {
-                n: weakest(grid, [contest.rivals[n]], cell)
-                for n in range(len(contest.rivals))
+                n: weakest(grid, [duel.rivals[n]], cell)
+                for n in range(len(duel.rivals))
                 if n not in equal and options.floor[number, n] < band
             }
             fixed = union(1 << n for n in equal)
@@ -254,7 +254,7 @@ def _result(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
     if not base.axes:
         point = point_with(base, {})
         result = None if point is None else tie_witness(base, question, point)
-        return result or Proved("no rule asks anything")
+        return result or Proved("no rule has a clause")
     try:
         if base.rules.semantics.conjunction == "product":
             return tie_of_products(base, question, clock)
@@ -266,12 +266,12 @@ def _result(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
 
 
 def _searched(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
-    contest = Duel(
+    duel = Duel(
         base,
         tuple(n - 1 for n in question.ours),
         tuple(n - 1 for n in question.rivals),
     )
-    sharing = SharedInputs(contest, question, clock) if coupled(base) else None
+    sharing = SharedInputs(duel, question, clock) if coupled(base) else None
     led = None if sharing is None else sharing.leader()
     if led is not None:
         return led
@@ -279,12 +279,12 @@ def _searched(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
     candidates = [
         pivot
         for axis in range(len(base.grids))
-        for pivot in pivots(contest, question, axis, is_each=is_each)
+        for pivot in pivots(duel, question, axis, is_each=is_each)
     ]
-    candidates += constant_pairs(contest, question, is_each=is_each)
-    bands, levels = contest.bands, 0
+    candidates += constant_pairs(duel, question, is_each=is_each)
+    bands, levels = duel.bands, 0
     is_vague = is_open = False
-    floors = [options.at_gap for options in contest.inner_options]
+    floors = [options.at_gap for options in duel.inner_options]
     for pivot in candidates:
         fixed = {part.axis: part.mask for part in pivot.all}
         masks = [(mask,) for mask in fixed.values()]
@@ -293,26 +293,26 @@ def _searched(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
         if is_flat and not bands.is_sharp[least]:
             clock.check()
             vague = [
-                flat_family(contest, question, axis, least, is_within=True)
+                flat_family(duel, question, axis, least, is_within=True)
                 for axis in range(len(floors))
                 if axis not in fixed
             ]
-            if cover([*masks, *vague], contest.full, clock) is None:
+            if cover([*masks, *vague], duel.full, clock) is None:
                 continue
             # What may be there is looked for as at a level that is known exactly.
             is_vague = True
-        tried = [least] if is_flat else levels_of(contest, least, most, is_each=is_each)
+        tried = [least] if is_flat else levels_of(duel, least, most, is_each=is_each)
         for band in tried:
             clock.check()
             levels += 1
             families = [
-                flat_family(contest, question, axis, band)
+                flat_family(duel, question, axis, band)
                 if is_flat
                 else floors[axis](band)
                 for axis in range(len(floors))
                 if axis not in fixed
             ]
-            chosen = cover([*masks, *families], contest.full, clock)
+            chosen = cover([*masks, *families], duel.full, clock)
             if chosen is None:
                 continue
             if sharing is not None:
@@ -320,7 +320,7 @@ def _searched(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
                 is_open |= is_left
             else:
                 rest = chosen[len(fixed) :]
-                result = _witness(contest, question, pivot, band, rest, is_flat=is_flat)
+                result = _witness(duel, question, pivot, band, rest, is_flat=is_flat)
                 is_vague |= result is None
             if result is not None:
                 return result
@@ -335,7 +335,7 @@ def _searched(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
 
 
 def _witness(
-    contest: Duel,
+    duel: Duel,
     question: TieQuestion,
     pivot: Pivot,
     band: int,
@@ -344,18 +344,18 @@ def _witness(
     is_flat: bool,
 ) -> Witness | None:
     """Return a point at which ours tie, if one is found."""
-    base = contest.base
+    base = duel.base
     grid = base.grids[pivot.axis]
     if is_flat:
         at: Fraction | None = simple(*whole(grid, pivot.cell)[:2])
     else:
-        levels = contest.bands.high[band], contest.bands.low_after(band)
+        levels = duel.bands.high[band], duel.bands.low_after(band)
         at = value_of(grid, pivot, levels)
     if at is None:
         return None
     level = grid.axis.elements[pivot.element].degree(at)
     wanted = {pivot.axis: AxisStretch(at, at, is_open=False)}
-    missing = contest.full
+    missing = duel.full
     for fixed in pivot.all:
         if is_flat:
             wanted[fixed.axis] = whole(base.grids[fixed.axis], fixed.cell)
@@ -363,7 +363,7 @@ def _witness(
     others = [axis for axis in range(len(base.grids)) if axis not in wanted]
     for axis, mask in zip(others, chosen, strict=True):
         flat = band if is_flat else None
-        result = part_at(contest, axis, level, mask & missing, flat)
+        result = part_at(duel, axis, level, mask & missing, flat)
         if result is None:
             return None
         wanted[axis] = result

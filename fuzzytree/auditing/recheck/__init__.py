@@ -41,10 +41,7 @@ __all__ = ["CannotRunError", "Report", "recheck", "recheck_files"]
 def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     """Check an audit against the model that it is of.
 
-    Args:
-        audit: The audit's file: JSON.
-        model: The model's file: YAML.
-        names: What messages call the two.
+    `names`: what messages call the two.
 
     Raises:
         CannotRunError: If one of them cannot be read.
