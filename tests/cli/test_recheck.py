@@ -36,7 +36,7 @@ def test_an_audit_that_is_right_is_reported_with_what_was_checked(
         "claims evaluated again                   3",
         "facts about the audit                    12",
         "points of regions                        39",
-        "sentences held against facts             4",
+        "sentences compared with facts            4",
     ]
     assert nothing.startswith(
         "read, and compared with nothing: the version, the table, "

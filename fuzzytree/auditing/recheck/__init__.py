@@ -47,14 +47,14 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
         CannotRunError: If one of them cannot be read.
     """
     facts = read_json(audit, names[0])
-    found = built(Audit, facts, names[0])
+    result = built(Audit, facts, names[0])
     whole, places = read_file(model, names[1])
-    if isinstance(whole, System) and found.policy.decision == "strongest":
+    if isinstance(whole, System) and result.policy.decision == "strongest":
         text = "a system that stands for rules is not checked again; audit these"
         raise CannotRunError(f"{names[0]}: {text}")
     report = Report()
     try:
-        case = Case(found, whole, places)
+        case = Case(result, whole, places)
         check_files(case, report, facts, model, names[1])
         check_head(case, report)
         for number, answer in enumerate(case.audit.answers, 1):

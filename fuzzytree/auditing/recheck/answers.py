@@ -18,7 +18,7 @@ from fuzzytree.auditing.recheck.audit_records import (
 from fuzzytree.auditing.recheck.cases import NEAR, Case
 from fuzzytree.auditing.recheck.claims import check_point, check_spans, corners, holds
 from fuzzytree.auditing.recheck.deciding import decide, highest, lead, shows
-from fuzzytree.auditing.recheck.forms import is_as_told
+from fuzzytree.auditing.recheck.forms import matches_facts
 from fuzzytree.auditing.recheck.head import SEVERITIES
 from fuzzytree.auditing.recheck.meaning import value_of
 from fuzzytree.auditing.recheck.outcomes import (
@@ -55,14 +55,14 @@ def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     """Check what an answer names: rules, terms, measures, units, places."""
     expect = report.expect
     try:
-        is_told = is_as_told(case, answer)
+        is_stated = matches_facts(case, answer)
     except IndexError:
-        is_told = False  # a rule that there is not
-    if is_told is None:
+        is_stated = False  # a rule that there is not
+    if is_stated is None:
         text = "sentences of a form that is not known here"
         report.undecided["SENTENCE", text].append(answer.code)
-    expect(is_told is not False, f"{where}: its sentence says other than its facts")
-    report.counts["sentences held against facts"] += bool(is_told)
+    expect(is_stated is not False, f"{where}: its sentence says other than its facts")
+    report.counts["sentences compared with facts"] += bool(is_stated)
     count = len(case.rules.rules)
     for number in answer.rules:
         expect(1 <= number <= count, f"{where}: there is no rule {number}")
@@ -84,11 +84,11 @@ def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     for place in answer.places:
         is_file = case.audit.file is not None and place.file == case.audit.file.name
         expect(is_file, f"{where}: a place that is not in the audited file")
-    told = [(place.line, place.column) for place in answer.places]
+    entries = [(place.line, place.column) for place in answer.places]
     try:
-        is_there = not case.has_places or told == case.placed(answer)
+        is_there = not case.has_places or entries == case.placed(answer)
     except LookupError:
-        is_there = not told
+        is_there = not entries
     expect(is_there, f"{where}: its rules and terms stand elsewhere")
 
 
@@ -107,7 +107,7 @@ def _measure(report: Report, measure: Measure, where: str) -> None:
 def _state(case: Case, report: Report, answer: Answer) -> None:
     state = answer.state
     if isinstance(state, Proved):
-        require(bool(state.how), "it is proved, and not told how")
+        require(bool(state.how), "it is proved, without how")
         decide(case, answer)
         report.counts["answers PROVED, decided again"] += 1
     elif isinstance(state, Witness):
@@ -130,10 +130,10 @@ def _bracket(case: Case, report: Report, answer: Answer, state: Bracket) -> None
     is_far = answer.code == "FT102" and state.high < case.audit.settings.lead
     may_be = is_far or answer.code in ("FT401", "FT403", "FT203", "FT204", "FT601")
     require(may_be or not answer.is_finding, "what is open is no finding")
-    told = {measure.name: measure.value for measure in answer.measures}
+    entries = {measure.name: measure.value for measure in answer.measures}
     is_min = case.rules.semantics.conjunction == "min"
     is_same = answer.code == "FT102" or (answer.code == "FT201" and is_min)
-    for name, end in told.items() if is_same else ():
+    for name, end in entries.items() if is_same else ():
         wanted = state.high if name.endswith("at most") else state.low
         is_one = math.isclose(end, wanted, abs_tol=float(NEAR))
         require(is_one, f"the {name} is not the bracket's end")

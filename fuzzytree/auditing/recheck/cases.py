@@ -16,7 +16,7 @@ from fuzzytree.auditing.recheck.audit_records import (
 )
 from fuzzytree.auditing.recheck.cells import Line, height, shared
 from fuzzytree.auditing.recheck.enclosing import Between
-from fuzzytree.auditing.recheck.grid import Asked, Grid, Ties
+from fuzzytree.auditing.recheck.grid import Grid, RuleBits, Ties
 from fuzzytree.auditing.recheck.meaning import Point, Steps, paths, rules_of, strengths
 from fuzzytree.auditing.recheck.model_records import (
     Model,
@@ -35,7 +35,7 @@ from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
 from fuzzytree.auditing.recheck.views import View
 
 NEAR = Fraction(1, 10**6)
-"""How far a highest common level that is told as one number may be above it."""
+"""How far a highest common level that is one number may be above it."""
 
 LEVELS = (
     *("highest common level", "highest common level at most"),
@@ -63,7 +63,7 @@ class Case:
             ways of its conditions.
         view: A system as it is audited; None for what is none.
         weights: What the strength of each rule is multiplied by.
-        terms: The terms that are asked about.
+        terms: The terms of the audit.
         representations: Everything that a claim can be of, by name.
         variables: The variables of the model by name.
         sides: The sides of the domain by name.
@@ -136,9 +136,9 @@ class Case:
         settings = self.audit.settings
         lines = {v.name: self.line(v) for v in self.rules.variables}
         levels = [Fraction(settings.epsilon), Fraction(settings.level)]
-        asked = (*self.coded("FT201"), *self.coded("FT301"))
-        told = (one for answer in asked for one in answer.measures)
-        levels += [end_of(m) for m in told if m.name in LEVELS and 0 <= m.value <= 1]
+        used = (*self.coded("FT201"), *self.coded("FT301"))
+        entries = (one for answer in used for one in answer.measures)
+        levels += [end_of(m) for m in entries if m.name in LEVELS and 0 <= m.value <= 1]
         return Grid(self.rules, lines, levels, self.weights)
 
     @cached_property
@@ -213,16 +213,16 @@ class Case:
         numbers = [owners[n - 1].number if owners else n - 1 for n in answer.rules]
         if self.view and not numbers:
             numbers = self.view.absent(answer.subject)
-        found = [self.places.rules[number] for number in numbers]
-        found += [self.places.terms[label] for label in answer.terms]
-        return [*dict.fromkeys(found)]
+        result = [self.places.rules[number] for number in numbers]
+        result += [self.places.terms[label] for label in answer.terms]
+        return [*dict.fromkeys(result)]
 
     def name(self, number: int) -> str:
         """Return what answers call a rule."""
         return self.view.names[number - 1] if self.view else f"rule {number}"
 
-    def asked(self, number: int) -> Asked:
-        """Return what a rule asks of each axis."""
+    def bits_of(self, number: int) -> RuleBits:
+        """Return the functions that a rule uses on each axis, as bits."""
         return self.grid.of[number - 1]
 
     def differ(self, numbers: Sequence[int]) -> None:
@@ -233,8 +233,8 @@ class Case:
     def pairs(self, *, alike: bool) -> list[tuple[int, int]]:
         """Return the pairs of rules of one class, or of two."""
         every = itertools.combinations(self.numbers, 2)
-        found = [p for p in every if (self.then(p[0]) == self.then(p[1])) is alike]
-        return [p for p in found if not self.is_one(*p)]
+        result = [p for p in every if (self.then(p[0]) == self.then(p[1])) is alike]
+        return [p for p in result if not self.is_one(*p)]
 
     def is_one(self, one: int, other: int) -> bool:
         """Return whether two rules are ways of one rule of a system."""
@@ -249,18 +249,18 @@ class Case:
             return self.view.strengths(point, numbers)
         known = [*dict.fromkeys(numbers)]
         some = tuple(rules.rules[number - 1] for number in known)
-        found = strengths(rules._replace(rules=some), point)
-        return {n: (one, one) for n, one in zip(known, found, strict=True)}
+        result = strengths(rules._replace(rules=some), point)
+        return {n: (one, one) for n, one in zip(known, result, strict=True)}
 
     def fire(self, *numbers: int) -> bool:
         """Return whether each of some rules fires somewhere."""
-        return all(self.grid.fires(self.asked(n)) for n in numbers)
+        return all(self.grid.fires(self.bits_of(n)) for n in numbers)
 
-    def beats(self, mine: Asked, rivals: Sequence[Asked]) -> bool:
+    def beats(self, mine: RuleBits, rivals: Sequence[RuleBits]) -> bool:
         """Return whether a rule is somewhere stronger than each rival.
 
         Raises:
-            UndecidedError: If that cannot be told here.
+            UndecidedError: If that cannot be decided here.
         """
         if self.rules.semantics.conjunction == "min":
             return self.grid.wins(mine, rivals)
@@ -271,8 +271,8 @@ class Case:
 
     def tie(self, one: int, other: int) -> bool:
         """Return whether two rules tie as the strongest, on more than a surface."""
-        rivals = [self.asked(n) for n in self.numbers if n not in (one, other)]
-        return self.ties.tie(self.asked(one), self.asked(other), rivals)
+        rivals = [self.bits_of(n) for n in self.numbers if n not in (one, other)]
+        return self.ties.tie(self.bits_of(one), self.bits_of(other), rivals)
 
     def never(self, is_so: bool, otherwise: str) -> None:
         """Refuse what was found although it should never happen, if inputs are free."""
@@ -284,7 +284,7 @@ class Case:
 
 def counted(answer: Answer, counts: Mapping[str, float], number: int) -> None:
     """Refuse an answer that counts otherwise, or not so many things."""
-    told = {m.name: m.value for m in answer.measures if m.name in counts}
-    require(len(told) == number, "a count is missing")
-    wrong = [name for name, value in told.items() if value != counts[name]]
+    entries = {m.name: m.value for m in answer.measures if m.name in counts}
+    require(len(entries) == number, "a count is missing")
+    wrong = [name for name, value in entries.items() if value != counts[name]]
     require(not wrong, f"counted otherwise here: {', '.join(wrong)}")

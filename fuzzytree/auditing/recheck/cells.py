@@ -50,7 +50,7 @@ class Cell(NamedTuple):
 
 
 class Line(NamedTuple):
-    """The values of a variable that are asked about."""
+    """The values of a variable in the domain."""
 
     low: Fraction
     high: Fraction
@@ -80,7 +80,7 @@ class Levels:
         return number
 
     def sort(self) -> None:
-        """Give every level its band: levels that cannot be told apart share one."""
+        """Give every level its band: levels that cannot be distinguished share one."""
         order = sorted((*self._bounds(n), n) for n in range(len(self.known)))
         self.band = [0] * len(order)
         for low, high, number in order:
@@ -105,16 +105,16 @@ class Levels:
 
 def cells(functions: Sequence[Function], line: Line, levels: Levels) -> list[Cell]:
     """Return the cells of a line, and its lower end as a cell of its own."""
-    found: list[Cell] = []
+    result: list[Cell] = []
     is_wide = line.low < line.high
     for left, right, polys in stretches(functions, line) if is_wide else ():
         inside = between(left, right)
         ends = [[levels.add(poly, end) for poly in polys] for end in (left, right)]
-        found.append(Cell(_ranks([at(poly, inside) for poly in polys]), *ends))
+        result.append(Cell(_ranks([at(poly, inside) for poly in polys]), *ends))
     here = {s: piece_at(s, line.low) for group, *_ in functions for s in group}
     values = [at(_chosen(f, here, line.low), line.low) for f in functions]
     lowest = [levels.add((value,), ZERO) for value in values]
-    return [*found, Cell(_ranks(values), lowest, lowest)]
+    return [*result, Cell(_ranks(values), lowest, lowest)]
 
 
 def _ranks(values: Sequence[Fraction]) -> list[int]:
@@ -153,32 +153,32 @@ def _chosen(function: Function, here: Mapping[Shape, Piece], x: Fraction) -> Pol
         value = at(piece.poly, x)
         part = () if value <= 0 else piece.poly if value < piece.cap else (piece.cap,)
         best = max(best, (at(part, x), part), key=lambda pair: pair[0])
-    found = plus((ONE,), best[1], -1) if function[1] else best[1]
-    return found if function[2] == 1 else times(found, (function[2],))
+    result = plus((ONE,), best[1], -1) if function[1] else best[1]
+    return result if function[2] == 1 else times(result, (function[2],))
 
 
 def _curves(functions: Sequence[Function], here: Mapping[Shape, Piece]) -> list[Poly]:
     """Return every polynomial that a function can be in a part of the axis."""
-    found: dict[Poly, None] = {}
+    result: dict[Poly, None] = {}
     for group, negated, weight in functions:
         for shape in group:
             for part in (here[shape].poly, (here[shape].cap,), ()):
                 one = plus((ONE,), part, -1) if negated else part
-                found[one if weight == 1 else times(one, (weight,))] = None
-    return list(found)
+                result[one if weight == 1 else times(one, (weight,))] = None
+    return list(result)
 
 
 def crossings(curves: Sequence[Poly], a: Fraction, b: Fraction) -> list[Root]:
     """Return where two of some polynomials cross or one turns, in order."""
-    asked = dict.fromkeys(derivative(poly) for poly in curves)
+    polynomials = dict.fromkeys(derivative(poly) for poly in curves)
     pairs = itertools.combinations(curves, 2)
-    asked |= dict.fromkeys(plus(one, other, -1) for one, other in pairs)
-    if len(asked) > MOST_ROOTS:
+    polynomials |= dict.fromkeys(plus(one, other, -1) for one, other in pairs)
+    if len(polynomials) > MOST_ROOTS:
         raise UndecidedError(
             f"more than {MOST_ROOTS} crossings to look for in one place"
         )
     met: list[Root] = []
-    for poly in asked:
+    for poly in polynomials:
         for root in roots(poly, a, b):
             while root.low <= a or root.high >= b:
                 root.halve()
@@ -194,12 +194,12 @@ def height(shape: Shape, line: Line, level: Fraction) -> Fraction:
     """Return the largest degree on a line, from below; exactly at or below a level."""
     levels = Levels()
     mark = levels.add((level,), ZERO)
-    found = cells([((shape,), False, ONE)], line, levels)
+    result = cells([((shape,), False, ONE)], line, levels)
     levels.sort()
-    most = max(levels.band[end] for cell in found for end in (*cell.left, *cell.right))
+    most = max(levels.band[end] for cell in result for end in (*cell.left, *cell.right))
     bounds = levels.bands[most]
     if most == levels.band[mark] and bounds[0] < bounds[1]:
-        raise UndecidedError("a height is too near to the level to tell")
+        raise UndecidedError("a height is too near to the level to decide")
     return bounds[0] if most <= levels.band[mark] else max(bounds[0], level)
 
 

@@ -32,10 +32,10 @@ FIELDS = {
 """What each kind of claim is about."""
 
 
-def point_of(given: Sequence[Coordinate]) -> dict[str, Fraction]:
+def point_of(coordinates: Sequence[Coordinate]) -> dict[str, Fraction]:
     """Return a point whose decimal, hexadecimal and exact digits are one number."""
     point: dict[str, Fraction] = {}
-    for one in given:
+    for one in coordinates:
         value = fraction(one.exact)
         near = float(value)
         hexed = near.hex() if Fraction(near) == value else None
@@ -47,17 +47,20 @@ def point_of(given: Sequence[Coordinate]) -> dict[str, Fraction]:
 
 
 def check_point(
-    case: Case, report: Report, given: Sequence[Coordinate], claims: Sequence[Claim]
+    case: Case,
+    report: Report,
+    coordinates: Sequence[Coordinate],
+    claims: Sequence[Claim],
 ) -> Point:
     """Return a point of the domain at which the claims hold."""
-    point = point_of(given)
+    point = point_of(coordinates)
     inputs = {v.name for v in case.model.variables if not v.parts}
     is_whole = point.keys() == inputs
     require(is_whole, "the point does not have a value of every input")
     require(_is_within(case, point), "the point lies outside the domain")
     for claim in claims:
-        told = zip(claim._fields, claim, strict=True)
-        text = ", ".join(f"{name} {value}" for name, value in told if value)
+        entries = zip(claim._fields, claim, strict=True)
+        text = ", ".join(f"{name} {value}" for name, value in entries if value)
         require(holds(case, claim, point), f"not so: {text}")
         report.counts["claims evaluated again"] += 1
     return point
@@ -90,9 +93,9 @@ def corners(case: Case, region: Sequence[Span], point: Point) -> Iterator[Point]
     chosen = [*itertools.islice(ways, 32), (2,) * len(spans)]
     for way, other in itertools.product(chosen, range(3)):
         places = dict.fromkeys(ends, other) | dict(zip(spans, way, strict=True))
-        found = {name: ends[name][place] for name, place in places.items()}
-        if _is_within(case, found):
-            yield found
+        result = {name: ends[name][place] for name, place in places.items()}
+        if _is_within(case, result):
+            yield result
 
 
 def _is_within(case: Case, point: Point) -> bool:
@@ -109,8 +112,8 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
     model = case.carriers.get(claim.of)
     if model is None:
         raise DoesNotHoldError(f"there are no {claim.of} to claim something of")
-    given = {n for n, one in zip(claim._fields, claim, strict=True) if one}
-    alien = given - {"kind", "of", *FIELDS[claim.kind].split(" ")}
+    coordinates = {n for n, one in zip(claim._fields, claim, strict=True) if one}
+    alien = coordinates - {"kind", "of", *FIELDS[claim.kind].split(" ")}
     require(not alien, f"a claim of kind {claim.kind} has no {', '.join(alien)}")
     if claim.kind == "decides":
         return answer_of(model, point) == claim.label
@@ -152,14 +155,14 @@ def _certain(small: Between | Fraction, large: Between | Fraction) -> bool:
     """Return whether one number is below another one, each between two ends.
 
     Raises:
-        UndecidedError: If the ends do not tell.
+        UndecidedError: If the ends leave it open.
     """
     one = small if isinstance(small, tuple) else (small, small)
     other = large if isinstance(large, tuple) else (large, large)
     if one[1] < other[0]:
         return True
     if one[0] < other[1]:
-        raise UndecidedError("two strengths are too near to tell apart")
+        raise UndecidedError("two strengths are too near to distinguish")
     return False
 
 

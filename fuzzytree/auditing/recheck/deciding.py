@@ -23,7 +23,7 @@ from fuzzytree.auditing.recheck.cases import (
 )
 from fuzzytree.auditing.recheck.cells import FINE
 from fuzzytree.auditing.recheck.claims import point_of
-from fuzzytree.auditing.recheck.grid import Asked
+from fuzzytree.auditing.recheck.grid import RuleBits
 from fuzzytree.auditing.recheck.meaning import Point, answer_of, leaf_of, strengths
 from fuzzytree.auditing.recheck.model_records import Clause, Rules, Tree, Variable
 from fuzzytree.auditing.recheck.outcomes import (
@@ -38,15 +38,15 @@ Interval = tuple[Fraction, Fraction, bool]  # True opens the low end
 
 
 def dead_leaf(case: Case, tree: Tree, answer: Answer) -> None:
-    """Ask of a leaf whether it is reached, or of all whether those told are all."""
+    """Check that a leaf is not reached, or that the audit has all such leaves."""
     reached = {n for n in case.numbers if _is_reached(case, tree, n)}
     if answer.is_finding:
         case.never(not reached.isdisjoint(answer.rules), "the leaf is reached")
     elif not answer.rules:
-        told = {one.rules for one in case.coded("FT101") if one.is_finding}
+        entries = {one.rules for one in case.coded("FT101") if one.is_finding}
         hidden = [n for n in case.numbers if n not in reached]
-        missing = [n for n in hidden if (n,) not in told]
-        require(not missing, f"leaves that are not reached are not told: {missing}")
+        missing = [n for n in hidden if (n,) not in entries]
+        require(not missing, f"leaves that are not reached are missing: {missing}")
 
 
 def shows_region(case: Case, answer: Answer, state: Witness) -> None:
@@ -59,8 +59,8 @@ def shows_region(case: Case, answer: Answer, state: Witness) -> None:
     require(is_there, "the witness reaches another leaf")
     label = tree.leaves[number - 1].label
     require([c.label for c in state.claims] == [label], "it is not the leaf's class")
-    asked = {node.variable for node, _ in case.paths[number]}
-    require({s.variable for s in state.region} == asked, "not what its path asks")
+    used = {node.variable for node, _ in case.paths[number]}
+    require({s.variable for s in state.region} == used, "not the variables of its path")
     for span in state.region:
         is_one = any(
             math.isclose(span.low or 0.0, low, rel_tol=2.0**-50)
@@ -71,7 +71,7 @@ def shows_region(case: Case, answer: Answer, state: Witness) -> None:
 
 
 def shows_difference(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that the tree and its raw rules are claimed to answer differently."""
+    """Check the claim that the tree and its raw rules predict two classes."""
     said = {claim.of: claim.label for claim in state.claims if claim.kind == "decides"}
     require(said.keys() == {"tree", "raw rules"}, "it is not claimed what both answer")
     is_near = not answer.rules  # the nearest to a row is no finding
@@ -109,54 +109,56 @@ def _met(one: Interval, low: float | None, high: float | None) -> Interval:
 
 
 def hidden(case: Case, answer: Answer) -> None:
-    """Ask each rule that is told to hide another; or all pairs that are not told."""
+    """Check the rules that hide another; or all pairs without a finding."""
     if answer.rules:
-        _told_to_hide(case, answer)
+        _check_hidden(case, answer)
     else:
-        _not_told_to_hide(case, answer)
+        _check_not_hidden(case, answer)
 
 
-def _told_to_hide(case: Case, answer: Answer) -> None:
+def _check_hidden(case: Case, answer: Answer) -> None:
     weak, *strong = answer.rules
     for number in strong:
         is_one = case.then(number) == case.then(weak)
         require(is_one == (answer.code == "FT104"), "the classes are not so")
-        beats = case.beats(case.asked(weak), [case.asked(number)])
+        beats = case.beats(case.bits_of(weak), [case.bits_of(number)])
         case.never(beats, f"rule {weak} is somewhere stronger than rule {number}")
         if answer.code == "FT105" and number > weak:
-            raise UndecidedError("that it is always strictly weaker is not asked here")
+            raise UndecidedError(
+                "that it is always strictly weaker is not checked here"
+            )
     counted(answer, {"rules that subsume it": len(strong)}, answer.code == "FT104")
     counted(answer, {"rules that mask it": len(strong)}, answer.code == "FT105")
 
 
-def _not_told_to_hide(case: Case, answer: Answer) -> None:
+def _check_not_hidden(case: Case, answer: Answer) -> None:
     is_alike = answer.code == "FT104"
     pairs = [pair for pair in case.pairs(alike=is_alike) if case.fire(*pair)]
     silent = sum(not case.fire(number) for number in case.numbers)
     counts = {"pairs": len(pairs), "pairs too near to tell": 0}
     counts["rules that never fire"] = silent
     counted(answer, counts, 3)
-    told = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
+    entries = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
     for first, second in pairs:
-        if (first, second) in told or (second, first) in told:
+        if (first, second) in entries or (second, first) in entries:
             continue
-        one, other = case.asked(first), case.asked(second)
+        one, other = case.bits_of(first), case.bits_of(second)
         require(case.beats(other, [one]), f"rule {second} hides behind {first}")
         if is_alike:
             require(case.beats(one, [other]), f"rule {first} hides behind {second}")
 
 
 def _is_copy(answer: Answer) -> bool:
-    """Return whether two rules are told to be at no distance of each other."""
+    """Return whether a distance of 0 is among the measures of two rules."""
     return any(measure.exact == "0" for measure in answer.measures)
 
 
 def copied(case: Case, answer: Answer) -> None:
-    """Ask whether one of two rules that are told to be alike is ever stronger."""
+    """Check that neither of two equal rules is ever stronger."""
     if not answer.rules:
         pairs = case.pairs(alike=True) + case.pairs(alike=False)
         counted(answer, {"pairs": len(pairs)}, 1)
-        text = "that no other two rules are nearly alike is not asked here"
+        text = "that no other two rules are nearly alike is not checked here"
         raise UndecidedError(text)
     first, second = answer.rules
     is_one = case.then(first) == case.then(second)
@@ -165,28 +167,28 @@ def copied(case: Case, answer: Answer) -> None:
     require(answer.severity == severity, "the classes are not so")
     if not _is_copy(answer):
         raise UndecidedError("the distance of curves that differ is not measured here")
-    one, other = case.asked(first), case.asked(second)
+    one, other = case.bits_of(first), case.bits_of(second)
     if one != other:
         is_more = case.beats(one, [other]) or case.beats(other, [one])
         require(not is_more, "the two rules are not alike")
 
 
 def apart(case: Case, answer: Answer) -> None:
-    """Ask of each pair that is not told whether both rules can reach the level."""
+    """Check that no pair without a finding can reach the level together."""
     if case.rules.semantics.conjunction != "min":
         raise UndecidedError("conflicts under product are not decided again here")
-    told = {one.rules for one in case.coded("FT201")}
+    entries = {one.rules for one in case.coded("FT201")}
     level, grid = Fraction(case.audit.settings.level), case.grid
-    rest = [pair for pair in case.pairs(alike=False) if pair not in told]
+    rest = [pair for pair in case.pairs(alike=False) if pair not in entries]
     if case.view is not None:
         rest = [pair for pair in rest if case.view.may_conflict(*pair)]
-    untold = next((m.value for m in answer.measures if "not told" in m.name), 0)
-    require(answer.is_finding == (untold > 0), "a finding that is none")
-    counted(answer, {"pairs that never do": len(rest) - untold}, 1)
-    if untold:
-        raise UndecidedError("which pairs are not told is not known")
+    omitted = next((m.value for m in answer.measures if "not told" in m.name), 0)
+    require(answer.is_finding == (omitted > 0), "a finding that is none")
+    counted(answer, {"pairs that never do": len(rest) - omitted}, 1)
+    if omitted:
+        raise UndecidedError("which pairs are left out is not known")
     for one, other in rest:
-        both = _union(case.asked(one), case.asked(other))
+        both = _union(case.bits_of(one), case.bits_of(other))
         if not grid.leaves(both, (), grid.gap(level, is_above=False)):
             continue
         is_met = level < 1 and grid.leaves(both, (), grid.gap(level, is_above=True))
@@ -195,17 +197,17 @@ def apart(case: Case, answer: Answer) -> None:
 
 
 def highest(case: Case, answer: Answer) -> None:
-    """Ask whether two rules reach a level together above the one that is told.
+    """Check that two rules reach no higher level together than the reported one.
 
     Raises:
-        UndecidedError: If that cannot be told here.
+        UndecidedError: If that cannot be decided here.
     """
     if case.rules.semantics.conjunction != "min":
         raise UndecidedError("conflicts under product are not decided again here")
     tops = [one for one in answer.measures if one.name in LEVELS]
-    require(len(tops) == 1 and len(answer.rules) == 2, "it tells no highest level")
+    require(len(tops) == 1 and len(answer.rules) == 2, "it has no highest level")
     top, grid = end_of(tops[0]), case.grid
-    both = _union(*map(case.asked, answer.rules))
+    both = _union(*map(case.bits_of, answer.rules))
     require(0 <= top <= 1 + NEAR, "a level outside 0 to 1")
     if 0 < top <= 1 and case.is_free and tops[0].exact is not None:
         is_near = grid.leaves(both, (), grid.gap(top, is_above=False))
@@ -216,11 +218,11 @@ def highest(case: Case, answer: Answer) -> None:
     case.never(grid.leaves(both, (), band), "both reach a higher level together")
     low, high = grid.levels.bands[band]
     if low < high and grid.leaves(both, (), band, is_gap=False):
-        raise UndecidedError("two critical levels are too near to tell apart")
+        raise UndecidedError("two critical levels are too near to distinguish")
 
 
 def needless(case: Case, answer: Answer) -> None:
-    """Ask whether a rule without a clause is anywhere stronger than with it."""
+    """Check that a rule without a clause is nowhere stronger than with it."""
     if not answer.rules:
         raise UndecidedError("which other clauses matter is not known")
     require(len(answer.rules) == 1, "it is of no rule")
@@ -228,23 +230,23 @@ def needless(case: Case, answer: Answer) -> None:
         require(not answer.is_finding, "it is of no clause of the rule")
         require(not case.fire(*answer.rules), "the rule fires somewhere")
         return
-    rest, number = case.grid.asked(_without(case, answer)), answer.rules[0]
-    if case.beats(rest, [case.asked(number)]):
+    rest, number = case.grid.bits_of(_without(case, answer)), answer.rules[0]
+    if case.beats(rest, [case.bits_of(number)]):
         _decides_alike(case, number, rest)
 
 
-def _decides_alike(case: Case, number: int, rest: Asked) -> None:
-    """Ask whether a rule that becomes stronger decides what was decided otherwise.
+def _decides_alike(case: Case, number: int, rest: RuleBits) -> None:
+    """Check that a rule that becomes stronger changes no decision.
 
-    It does if it wins where a rule of another class was above all of its own class; or
-    where no rule fired; or it may if it ties with a later rule of another class.
+    It does where it wins and a rule of another class was above all of its own class;
+    or where no rule fired; it may where it ties with a later rule of another class.
     """
     grid, then = case.grid, case.then(number)
-    own = [case.asked(n) for n in case.numbers if case.then(n) == then]
+    own = [case.bits_of(n) for n in case.numbers if case.then(n) == then]
     others = [n for n in case.numbers if case.then(n) != then]
     is_more = any(
-        case.beats(_union(rest, case.asked(n)), own)
-        or (n > number and case.ties.tie(rest, case.asked(n), own))
+        case.beats(_union(rest, case.bits_of(n)), own)
+        or (n > number and case.ties.tie(rest, case.bits_of(n), own))
         for n in others
     )
     if case.rules.semantics.uncovered != then:
@@ -253,20 +255,20 @@ def _decides_alike(case: Case, number: int, rest: Asked) -> None:
         raise UndecidedError("the rule is stronger without it, if not in its answers")
 
 
-def _union(one: Asked, other: Asked) -> Asked:
-    """Return what two rules ask together."""
+def _union(one: RuleBits, other: RuleBits) -> RuleBits:
+    """Return the functions that either of two rules uses."""
     return tuple(a | b for a, b in zip(one, other, strict=True))
 
 
 def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:
     """Return a rule's clauses without the one that an answer is about."""
     when = case.rules.rules[answer.rules[0] - 1].when
-    asked = {c: tuple(Label(c.variable, term) for term in c.terms) for c in when}
-    found = {clause for clause, labels in asked.items() if labels == answer.terms}
-    if len(found) > 1:  # one of them is negated: only the subject says which
-        found = {c for c in found if answer.subject.endswith(repr(_text(c)))}
-    require(len(found) == 1, "it is of no clause of the rule")
-    place = when.index(found.pop())
+    used = {c: tuple(Label(c.variable, term) for term in c.terms) for c in when}
+    result = {clause for clause, labels in used.items() if labels == answer.terms}
+    if len(result) > 1:  # one of them is negated: only the subject says which
+        result = {c for c in result if answer.subject.endswith(repr(_text(c)))}
+    require(len(result) == 1, "it is of no clause of the rule")
+    place = when.index(result.pop())
     return (*when[:place], *when[place + 1 :])
 
 
@@ -276,7 +278,7 @@ def _text(clause: Clause) -> str:
 
 
 def shows_need(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that the answer at the witness is another one without the clause."""
+    """Check that the prediction at the witness differs without the clause."""
     rest, point = _without(case, answer), point_of(state.point)
     every, place = list(case.rules.rules), answer.rules[0] - 1
     every[place] = every[place]._replace(when=rest)
@@ -286,7 +288,7 @@ def shows_need(case: Case, answer: Answer, state: Witness) -> None:
 
 
 def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that two rules of two classes are claimed to reach the level together."""
+    """Check the claim that two rules of two classes reach the level together."""
     level = Fraction(case.audit.settings.level)
     met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
     is_high = any(fraction(claim.level or "0") >= level for claim in met)
@@ -301,12 +303,12 @@ def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
 
 
 def heights(case: Case, answer: Answer) -> None:
-    """Compare the terms that do not reach the level with what is told."""
+    """Compare the terms that do not reach the level with the findings."""
     level = case.audit.settings.level
     low = {label: height for label, height in case.heights.items() if height < level}
-    told = [one.terms[0] for one in case.coded("FT401") if one.terms]
-    told = [label for label in told if label in case.heights]
-    require(told == list(low), "other terms are too low")
+    entries = [one.terms[0] for one in case.coded("FT401") if one.terms]
+    entries = [label for label in entries if label in case.heights]
+    require(entries == list(low), "other terms are too low")
     if any(label not in case.heights for label in answer.terms):
         raise UndecidedError("the height of a curve that is no polynomial")
     for label in answer.terms:
@@ -317,19 +319,23 @@ def heights(case: Case, answer: Answer) -> None:
 
 
 def overlaps(case: Case, answer: Answer) -> None:
-    """Compare the shared areas of pairs of terms with what is told of them."""
+    """Compare the shared areas of pairs of terms with the findings."""
     limit = Fraction(case.audit.settings.overlap)
     known = {labels: share for labels, share in case.shares.items() if share}
     near = {labels: share for labels, share in known.items() if share[1] >= limit}
     if any(low < limit for low, _ in near.values()):
-        raise UndecidedError("a shared area is too near to the limit to tell")
-    told = [one for one in case.coded("FT403") if one.terms]
-    told = [one for one in told if not isinstance(one.state, Declined)]
-    require({a.terms for a in told} <= near.keys(), "two terms are easy to tell apart")
+        raise UndecidedError("a shared area is too near to the limit to decide")
+    entries = [one for one in case.coded("FT403") if one.terms]
+    entries = [one for one in entries if not isinstance(one.state, Declined)]
+    require(
+        {a.terms for a in entries} <= near.keys(), "two terms are easy to distinguish"
+    )
     if not answer.terms:
-        require(answer.is_finding == (len(near) > len(told)), "a finding that is none")
+        require(
+            answer.is_finding == (len(near) > len(entries)), "a finding that is none"
+        )
         counts = {
-            "pairs not told one by one": len(near) - len(told),
+            "pairs not told one by one": len(near) - len(entries),
             "pairs apart": len(known) - len(near),
             "pairs without area": len(case.shares) - len(known),
         }
@@ -341,16 +347,16 @@ def overlaps(case: Case, answer: Answer) -> None:
 
 
 def unused(case: Case, answer: Answer) -> None:
-    """Compare the terms and variables that no rule asks with what is told."""
-    every, asked = case.terms, _asked(case.rules)
+    """Compare the terms and variables that no rule uses with the findings."""
+    every, used = case.terms, _used_terms(case.rules)
     if case.view is not None:  # the system itself is read, rules left out or not
         every = [
             Label(v.name, label.name)
             for v in case.view.system.inputs
             for label in v.labels
         ]
-        asked = case.view.questions()
-    needed = {variable for variable, _ in asked}
+        used = case.view.questions()
+    needed = {variable for variable, _ in used}
     names = [v.name for v in case.rules.variables]
     for variable in case.rules.variables:
         if variable.name in needed:
@@ -359,25 +365,25 @@ def unused(case: Case, answer: Answer) -> None:
     idle += [
         f"term {term!r} of {name!r}"
         for name, term in every
-        if name in needed and (name, term) not in asked
+        if name in needed and (name, term) not in used
     ]
-    needed, asked = needed.intersection(names), asked.intersection(every)
-    told = [one.subject for one in case.coded("FT404") if one.is_finding]
-    require(told == idle, "other terms or variables are unused")
-    counts = {"variables in use": len(needed), "terms in use": len(asked)}
+    needed, used = needed.intersection(names), used.intersection(every)
+    entries = [one.subject for one in case.coded("FT404") if one.is_finding]
+    require(entries == idle, "other terms or variables are unused")
+    counts = {"variables in use": len(needed), "terms in use": len(used)}
     counted(answer, counts, 0 if answer.is_finding else 2)
 
 
 def complexity(case: Case, answer: Answer) -> None:
     """Count rules, clauses, terms and variables."""
-    lengths, asked = [len(r.when) for r in case.rules.rules], _asked(case.rules)
+    lengths, used = [len(r.when) for r in case.rules.rules], _used_terms(case.rules)
     counts: dict[str, float] = {
         "rules": len(lengths),
         "clauses": sum(lengths),
         "most clauses of a rule": max(lengths),
         "clauses per rule": sum(lengths) / len(lengths),
-        "distinct terms in use": len(asked),
-        "variables in use": len({variable for variable, _ in asked}),
+        "distinct terms in use": len(used),
+        "variables in use": len({variable for variable, _ in used}),
     }
     if isinstance(case.model, Tree):
         counts["depth of the tree"] = max(map(len, case.paths.values()))
@@ -386,8 +392,8 @@ def complexity(case: Case, answer: Answer) -> None:
     raise UndecidedError(text)
 
 
-def _asked(rules: Rules) -> set[tuple[str, str]]:
-    """Return the variable and term of everything that a rule asks."""
+def _used_terms(rules: Rules) -> set[tuple[str, str]]:
+    """Return the variable and term of every proposition of the rules."""
     clauses = [clause for rule in rules.rules for clause in rule.when]
     return {(clause.variable, term) for clause in clauses for term in clause.terms}
 
@@ -396,7 +402,7 @@ def _asked(rules: Rules) -> set[tuple[str, str]]:
 
 
 def dead(case: Case, answer: Answer) -> None:
-    """Ask whether a rule is anywhere stronger than those of other classes."""
+    """Check that a rule is nowhere stronger than those of other classes."""
     if isinstance(case.model, Tree):
         dead_leaf(case, case.model, answer)
         return
@@ -405,13 +411,15 @@ def dead(case: Case, answer: Answer) -> None:
         return
     require(len(answer.rules) > 0, "no rule is named")
     number = answer.rules[0]
-    rivals = [case.asked(n) for n in case.numbers if case.then(n) != case.then(number)]
-    wins = case.beats(case.asked(number), rivals)
+    rivals = [
+        case.bits_of(n) for n in case.numbers if case.then(n) != case.then(number)
+    ]
+    wins = case.beats(case.bits_of(number), rivals)
     case.never(wins, "the rule wins somewhere")
 
 
 def silent(case: Case, view: View, answer: Answer) -> None:
-    """Ask whether a rule of a system fires, in any of its ways."""
+    """Check that a rule of a system never fires, in any of its ways."""
     require(answer.is_finding, "a finding that is none")
     if not answer.rules:
         require(answer.subject in view.silent, "its text lets it fire")
@@ -420,33 +428,35 @@ def silent(case: Case, view: View, answer: Answer) -> None:
 
 
 def superfluous(case: Case, answer: Answer) -> None:
-    """Ask whether a rule is anywhere stronger than all, or first of the strongest."""
+    """Check that a rule is nowhere stronger than all, or first of the strongest."""
     require(len(answer.rules) == 1 and answer.is_finding, "it is of no rule")
     number = answer.rules[0]
-    mine, then = case.asked(number), case.then(number)
+    mine, then = case.bits_of(number), case.then(number)
     others = [n for n in case.numbers if n != number]
-    wins = case.beats(mine, [case.asked(n) for n in others])
+    wins = case.beats(mine, [case.bits_of(n) for n in others])
     case.never(wins, "it is stronger than all somewhere")
     later = [n for n in others if n > number and case.then(n) != then]
     for other in (n for n in others if case.then(n) == then):
         # one that hides it, with no other class between the two
         is_between = any(n < other for n in later)
-        if not is_between and not case.beats(mine, [case.asked(other)]):
+        if not is_between and not case.beats(mine, [case.bits_of(other)]):
             return
     if any(case.tie(number, other) for other in later):
         raise UndecidedError("it ties with a later rule, and its place may decide")
 
 
 def tied(case: Case, answer: Answer) -> None:
-    """Count the pairs of rules of two classes, and those that are told."""
+    """Count the pairs of rules of two classes, and those with a finding."""
     pairs = len(case.pairs(alike=False))
-    told = sum(bool(one.rules) for one in case.coded("FT202"))
-    counted(answer, {"pairs": pairs, "pairs told one by one": told}, 2)
+    entries = sum(bool(one.rules) for one in case.coded("FT202"))
+    counted(answer, {"pairs": pairs, "pairs told one by one": entries}, 2)
     require(not answer.is_finding, "that others do not tie is no finding")
     known = {one.rules for one in case.coded("FT202") if one.rules}
-    total = next((m.value for m in answer.measures if m.name == "pairs that tie"), told)
-    if total != told:
-        raise UndecidedError("which pairs are not told is not known")
+    total = next(
+        (m.value for m in answer.measures if m.name == "pairs that tie"), entries
+    )
+    if total != entries:
+        raise UndecidedError("which pairs are left out is not known")
     for pair in case.pairs(alike=False):
         if pair not in known:
             text = f"rules {pair[0]} and {pair[1]} tie as the strongest"
@@ -454,7 +464,7 @@ def tied(case: Case, answer: Answer) -> None:
 
 
 def covered(case: Case, answer: Answer) -> None:
-    """Ask whether some rule fires everywhere, or reaches epsilon everywhere."""
+    """Check that some rule fires everywhere, or reaches epsilon everywhere."""
     grid = case.grid
     if answer.subject == "cover":
         is_gap = grid.is_bare(grid.of)
@@ -471,19 +481,24 @@ def covered(case: Case, answer: Answer) -> None:
 
 
 def least_cover(case: Case, answer: Answer) -> None:
-    """Ask whether the strength where it is least lies between those that are told."""
-    grid, told = case.grid, [level_of(m) for m in answer.measures if m.name in LEVELS]
-    require(len(told) == 2 and 0 <= told[0] <= told[1] <= 1, "no least strength")
-    if told[0] > 0:
-        is_less = grid.leaves(None, grid.of, grid.gap(told[0], is_above=False))
-        case.never(is_less, "somewhere every rule is weaker than is told")
-    if told[1] < 1 and case.is_free:
-        is_seen = grid.leaves(None, grid.of, grid.gap(told[1], is_above=True))
-        require(is_seen, "everywhere some rule is stronger than is told")
+    """Check that the strength where it is least lies between the reported bounds."""
+    grid, entries = (
+        case.grid,
+        [level_of(m) for m in answer.measures if m.name in LEVELS],
+    )
+    require(
+        len(entries) == 2 and 0 <= entries[0] <= entries[1] <= 1, "no least strength"
+    )
+    if entries[0] > 0:
+        is_less = grid.leaves(None, grid.of, grid.gap(entries[0], is_above=False))
+        case.never(is_less, "somewhere every rule is weaker than reported")
+    if entries[1] < 1 and case.is_free:
+        is_seen = grid.leaves(None, grid.of, grid.gap(entries[1], is_above=True))
+        require(is_seen, "everywhere some rule is stronger than reported")
 
 
 def shows_win(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that a claim compares the rule with every rule that it is about."""
+    """Check that a claim compares the rule with all of its rivals."""
     require(len(answer.rules) == 1, "it is of no rule")
     number = answer.rules[0]
     if case.view is not None:
@@ -512,17 +527,19 @@ def lead(case: Case, number: int, point: Point) -> Fraction:
 
 
 def shows_lead(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that the rule leads at the witness by as much as is told."""
+    """Check that the rule leads at the witness by the reported lead."""
     require(len(answer.rules) == 1 and not answer.is_finding, "it is of no rule")
-    found = lead(case, answer.rules[0], point_of(state.point))
-    told = [m.value for m in answer.measures if m.name == "largest lead, at least"]
-    is_so = len(told) == 1 and found >= Fraction(told[0]) >= case.audit.settings.lead
+    result = lead(case, answer.rules[0], point_of(state.point))
+    entries = [m.value for m in answer.measures if m.name == "largest lead, at least"]
+    is_so = (
+        len(entries) == 1 and result >= Fraction(entries[0]) >= case.audit.settings.lead
+    )
     require(is_so, "the rule does not lead by so much there")
     shows_win(case, answer, state)
 
 
 def shows_tie(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that a claim compares two rules of two classes with every other rule."""
+    """Check that a claim compares two rules of two classes with all others."""
     ties = [c for c in state.claims if c.kind == "ties"]
     met = [c for c in ties if {*answer.rules} <= {*c.rules}]
     is_all = any({*c.rules, *c.rivals} == {*case.numbers} for c in met)
@@ -531,7 +548,7 @@ def shows_tie(case: Case, answer: Answer, state: Witness) -> None:
 
 
 def shows_gap(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that every rule is claimed to be low enough."""
+    """Check the claim that every rule is low enough."""
     is_gap = answer.subject.startswith("gap ")
     level = ZERO if is_gap else Fraction(case.audit.settings.epsilon)
     below = [c for c in state.claims if c.kind == "below"]
@@ -583,7 +600,7 @@ def decide(case: Case, answer: Answer) -> None:
 
     Raises:
         DoesNotHoldError: If it is not so.
-        UndecidedError: If that cannot be told here.
+        UndecidedError: If that cannot be decided here.
     """
     again = AGAIN.get(answer.code)
     if again is None:
@@ -593,7 +610,7 @@ def decide(case: Case, answer: Answer) -> None:
 
 
 def shows(case: Case, answer: Answer, state: Witness) -> None:
-    """Ask that the claims of a witness are those that its code is about.
+    """Check that the claims of a witness are those of its code.
 
     Raises:
         DoesNotHoldError: If they are others.

@@ -111,16 +111,16 @@ def _cosine(angle: Fraction) -> Between:
 def root(x: Fraction, power: int) -> Between:
     """Return between which numbers the root of x >= 0 lies."""
     whole = (x.numerator << (power * BITS)) // x.denominator
-    found = 1 << -(-whole.bit_length() // power)
-    while found and (better := _newton(whole, found, power)) < found:
-        found = better
-    low = Fraction(found, 1 << BITS)
+    result = 1 << -(-whole.bit_length() // power)
+    while result and (better := _newton(whole, result, power)) < result:
+        result = better
+    low = Fraction(result, 1 << BITS)
     return low, low if low**power == x else low + Fraction(1, 1 << BITS)
 
 
-def _newton(whole: int, found: int, power: int) -> int:
-    other: int = whole // found ** (power - 1)
-    return ((power - 1) * found + other) // power
+def _newton(whole: int, result: int, power: int) -> int:
+    other: int = whole // result ** (power - 1)
+    return ((power - 1) * result + other) // power
 
 
 def bounds(shape: Shape, x: Fraction) -> Between:
@@ -142,8 +142,8 @@ def bounds(shape: Shape, x: Fraction) -> Between:
     return max(low, ZERO), min(high, ONE)
 
 
-def _curve(kind: str, given: dict[str, Any], x: Fraction) -> Between:
-    number = {k: Fraction(v) for k, v in given.items() if isinstance(v, float)}
+def _curve(kind: str, data: dict[str, Any], x: Fraction) -> Between:
+    number = {k: Fraction(v) for k, v in data.items() if isinstance(v, float)}
     match kind:
         case "gaussian":
             return _gaussian(x - number["mean"], number["deviation"])
@@ -160,7 +160,7 @@ def _curve(kind: str, given: dict[str, Any], x: Fraction) -> Between:
         case "sigmoid":
             return _sigmoid(number, x)
         case "sigmoid difference" | "sigmoid product":
-            return _sigmoids(kind, given, x)
+            return _sigmoids(kind, data, x)
         case "cosine":
             turns = abs(x - number["center"]) / number["width"]
             if turns > Fraction(1, 2):
@@ -198,8 +198,8 @@ def _sigmoid(number: dict[str, Fraction], x: Fraction) -> Between:
     return logistic(z, z)
 
 
-def _sigmoids(kind: str, given: dict[str, Any], x: Fraction) -> Between:
-    a, b = (bounds(given[name], x) for name in ("first", "second"))
+def _sigmoids(kind: str, data: dict[str, Any], x: Fraction) -> Between:
+    a, b = (bounds(data[name], x) for name in ("first", "second"))
     if kind == "sigmoid product":
         return a[0] * b[0], a[1] * b[1]
     low, high = a[0] - b[1], a[1] - b[0]

@@ -69,10 +69,10 @@ def read_json(content: bytes, name: str) -> dict[str, Any]:
     """
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
+        result = dict(pairs)
+        if len(result) < len(pairs):
             raise CannotRunError(f"{name}: a key stands twice in one object")
-        return found
+        return result
 
     def refuse(text: str) -> Any:
         raise CannotRunError(f"{name}: {text} is no number that JSON knows")
@@ -94,19 +94,19 @@ def read_json(content: bytes, name: str) -> dict[str, Any]:
 # --- variables and terms
 
 
-def keys_of(found: Any, needed: str, allowed: str = "") -> dict[str, Any]:
+def keys_of(result: Any, needed: str, allowed: str = "") -> dict[str, Any]:
     """Return a mapping that has some keys, may have others, and no more."""
     must, may = set(needed.split(", ")), set(allowed.split(", "))
-    wrong = must - found.keys() | found.keys() - must - may
+    wrong = must - result.keys() | result.keys() - must - may
     if wrong - {""}:
         shown = ", ".join(sorted(wrong))
         raise CannotRunError(f"missing or unknown keys: {shown:.200}")
-    return dict(found)
+    return dict(result)
 
 
-def variable_facts(found: Any) -> dict[str, Any]:
+def variable_facts(result: Any) -> dict[str, Any]:
     """Return the facts of a variable."""
-    one = keys_of(found, "name", "unit, range, sum of, terms")
+    one = keys_of(result, "name", "unit, range, sum of, terms")
     ends = keys_of(one.get("range", {}), "", "from, to")
     parts = [keys_of(p, "input, weight", "centre") for p in one.get("sum of", [])]
     return {
@@ -119,26 +119,26 @@ def variable_facts(found: Any) -> dict[str, Any]:
     }
 
 
-def term_facts(found: Any) -> dict[str, Any]:
+def term_facts(result: Any) -> dict[str, Any]:
     """Return the facts of a term and its shape."""
     shape: dict[str, Any]
-    if "points" in found:
-        one = keys_of(found, "name, points")
+    if "points" in result:
+        one = keys_of(result, "name, points")
         values, degrees = zip(*one["points"], strict=True)
         shape = {"type": "points", "values": values, "degrees": degrees}
-    elif "left" in found:
-        one = keys_of(found, "name, mean, left, right")
+    elif "left" in result:
+        one = keys_of(result, "name, mean, left, right")
         sides = {
             side: keys_of(one[side], "spread, curve, reach")
             for side in ("left", "right")
         }
         shape = {"type": "lr", "mean": one["mean"], **sides}
-    elif "mean" in found:
-        one = keys_of(found, "name, mean, spread, curve, reach")
+    elif "mean" in result:
+        one = keys_of(result, "name, mean, spread, curve, reach")
         side = {key: one[key] for key in ("spread", "curve", "reach")}
         shape = {"type": "lr", "mean": one["mean"], "left": side, "right": side}
     else:
-        one = keys_of(found, "name", "above, up to, left flank, right flank, degree")
+        one = keys_of(result, "name", "above, up to, left flank, right flank, degree")
         rest = one.keys() - {"name", "degree"}
         if one.get("degree", 1) != 1 or ("degree" in one) == bool(rest):
             raise CannotRunError(f"term {one['name']!r:.60} has no shape")
@@ -148,9 +148,9 @@ def term_facts(found: Any) -> dict[str, Any]:
     return {"name": one["name"], "shape": shape}
 
 
-def _flank(found: Any) -> dict[str, Any] | None:
-    if found is None:
+def _flank(result: Any) -> dict[str, Any] | None:
+    if result is None:
         return None
-    one = keys_of(found, "from, to", "curve, fit error")
+    one = keys_of(result, "from, to", "curve, fit error")
     ends = {"start": one["from"], "end": one["to"]}
     return ends | {"curve": one.get("curve", [1.0]), "error": one.get("fit error")}

@@ -241,7 +241,7 @@ class Form(NamedTuple):
 @functools.cache
 def forms() -> tuple[Form, ...]:
     """Return every form."""
-    found: list[Form] = []
+    result: list[Form] = []
     for entry in re.split(r"\n(?=FT)", TABLE.strip()):
         head, *lines = entry.split("\n")
         start, subject, *measures = head.split(" | ")
@@ -249,8 +249,8 @@ def forms() -> tuple[Form, ...]:
         names = "|".join(_escaped(name) for name in ";".join(measures).split(";"))
         sentence = " ".join(line.strip() for line in lines)
         whole = Form(code, states, tuple(grades.split("/")), subject, names, sentence)
-        found.append(whole)
-    return tuple(found)
+        result.append(whole)
+    return tuple(result)
 
 
 def _escaped(measure: str) -> str:
@@ -283,19 +283,19 @@ class _Shown:
 
 def _pattern(text: str, facts: Mapping[str, _Shown] | None) -> str:
     """Return a form as a pattern: with the facts, or with anything in their places."""
-    found = ""
+    result = ""
     for literal, name, spec, _ in string.Formatter().parse(text):
         for sign in literal:
-            found += _SIGNS.get(sign, re.escape(sign))
+            result += _SIGNS.get(sign, re.escape(sign))
         if name is None:
             continue
         if name in _ANY or facts is None:
-            found += _ANY.get(name, r".+")
+            result += _ANY.get(name, r".+")
         elif name in facts:
-            found += re.escape(facts[name].shown(spec or ""))
+            result += re.escape(facts[name].shown(spec or ""))
         else:
-            found += "(?!)"  # no such fact: it must be missing
-    return found
+            result += "(?!)"  # no such fact: it must be missing
+    return result
 
 
 def clause_text(clause: Clause) -> str:
@@ -307,7 +307,7 @@ def clause_text(clause: Clause) -> str:
 def _facts(case: Case, answer: Answer) -> dict[str, _Shown]:
     """Return what a sentence about an answer can show."""
     settings, state = case.audit.settings, answer.state
-    found: dict[str, float | str] = {
+    result: dict[str, float | str] = {
         "epsilon": settings.epsilon,
         "margin": settings.margin,
         "lead": settings.lead,
@@ -324,24 +324,24 @@ def _facts(case: Case, answer: Answer) -> dict[str, _Shown]:
         "gap": "warning" if case.rules.semantics.uncovered is None else "info",
     }
     for place, number in enumerate(answer.rules[:2], 1):
-        found |= {str(place): case.name(number), f"n{place}": number}
-        found[f"then{place}"] = repr(case.then(number))
+        result |= {str(place): case.name(number), f"n{place}": number}
+        result[f"then{place}"] = repr(case.then(number))
     for place, label in enumerate(answer.terms[:2], 1):
-        found[f"term{place}"] = f"term {label.term!r} of {label.variable!r}"
+        result[f"term{place}"] = f"term {label.term!r} of {label.variable!r}"
     if len(answer.terms) == 2:
         one, other = answer.terms
-        found["terms"] = f"terms {one.term!r} and {other.term!r} of {one.variable!r}"
+        result["terms"] = f"terms {one.term!r} and {other.term!r} of {one.variable!r}"
     for measure in answer.measures:
-        found[measure.name] = measure.value
+        result[measure.name] = measure.value
     if isinstance(state, Declined):
-        found["reason"] = state.reason
+        result["reason"] = state.reason
     if isinstance(state, Sampled):
-        found |= {"hits": state.hits, "rows": state.rows}
-        won = found.get("rows won", found.get("rows fired"))
-        found |= {"seen": "+" if state.hits else "-", "idle": "-" if won else "+"}
+        result |= {"hits": state.hits, "rows": state.rows}
+        won = result.get("rows won", result.get("rows fired"))
+        result |= {"seen": "+" if state.hits else "-", "idle": "-" if won else "+"}
     if isinstance(state, Bracket):
-        found |= {"low": state.low, "high": state.high}
-    return {name: _Shown(value) for name, value in found.items()}
+        result |= {"low": state.low, "high": state.high}
+    return {name: _Shown(value) for name, value in result.items()}
 
 
 def _fits(form: Form, answer: Answer, facts: Mapping[str, _Shown]) -> bool:
@@ -364,7 +364,7 @@ def _clauses(case: Case, answer: Answer) -> Iterator[str]:
                 yield repr(clause_text(clause))
 
 
-def is_as_told(case: Case, answer: Answer) -> bool | None:
+def matches_facts(case: Case, answer: Answer) -> bool | None:
     """Return whether a sentence says what stands beside it; None if nobody can tell."""
     facts = _facts(case, answer)
     ways = [facts]

@@ -19,8 +19,8 @@ from fuzzytree.auditing.recheck.outcomes import UndecidedError
 from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
 
 MOST_SETS = 50_000
-Asked = tuple[int, ...]
-"""What a rule asks of each axis, its functions as bits; and how many stand again."""
+RuleBits = tuple[int, ...]
+"""The functions of a rule on each axis, as bits; and how many are repeated."""
 
 
 Span = list[tuple[int, int, int, int]]
@@ -35,7 +35,7 @@ class Cuts(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """A variable: the numbers of the functions that rules ask, and its cells."""
+    """A variable: the numbers of the functions of the rules, and its cells."""
 
     numbers: dict[tuple[Clause, Fraction], int]
     cells: list[Cell]
@@ -71,8 +71,8 @@ class Grid:
                     one: number for number, one in enumerate(dict.fromkeys(functions))
                 }
                 numbers = {c: known[f] for c, f in zip(clauses, functions, strict=True)}
-                found = cells([*known], lines[variable.name], self.levels)
-                self.axes.append(Axis(numbers, found, [], []))
+                result = cells([*known], lines[variable.name], self.levels)
+                self.axes.append(Axis(numbers, result, [], []))
         self.levels.sort()
         for axis in self.axes:
             axis.spans.extend(map(self._spans, axis.cells))
@@ -80,7 +80,7 @@ class Grid:
                 bands = {band for _, least, most, _ in span for band in (least, most)}
                 axis.cuts.append(Cuts(sorted(bands), {}))
         pairs = zip(rules.rules, weights, strict=True)
-        self.of = [self.asked(rule.when, weight) for rule, weight in pairs]
+        self.of = [self.bits_of(rule.when, weight) for rule, weight in pairs]
         self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
 
     def _weighted(
@@ -92,8 +92,8 @@ class Grid:
             for place, clause in enumerate(when)
         ]
 
-    def asked(self, when: Iterable[Clause], weight: Fraction = ONE) -> Asked:
-        """Return what clauses ask of each axis; every one must be of some rule."""
+    def bits_of(self, when: Iterable[Clause], weight: Fraction = ONE) -> RuleBits:
+        """Return the functions of clauses on each axis, all of which rules have."""
         bits, again = [0] * len(self.axes), 0
         for clause in self._weighted(when, weight):
             for place, axis in enumerate(self.axes):
@@ -104,11 +104,11 @@ class Grid:
         return (*bits, again)
 
     def _spans(self, cell: Cell) -> Span:
-        band, found = self.levels.band, list[tuple[int, int, int, int]]()
+        band, result = self.levels.band, list[tuple[int, int, int, int]]()
         for number, rank in enumerate(cell.rank):
             one, other = band[cell.left[number]], band[cell.right[number]]
-            found.append((rank, min(one, other), max(one, other), 1 << number))
-        return sorted(found, key=lambda span: -span[0])
+            result.append((rank, min(one, other), max(one, other), 1 << number))
+        return sorted(result, key=lambda span: -span[0])
 
     def sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
         """Return per axis which sets of functions can be at a level or above.
@@ -123,25 +123,25 @@ class Grid:
         return self.patterns[key]
 
     def _of_axis(self, axis: Axis, band: int, is_gap: bool) -> set[int]:
-        found: set[int] = set()
+        result: set[int] = set()
         for cell, cuts in zip(axis.spans, axis.cuts, strict=True):
             if not is_gap:
-                found.update(_of_cell(cell, band, is_gap))
+                result.update(_of_cell(cell, band, is_gap))
                 continue
             # Between two levels of its own a cell has the same sets at every band.
             place = bisect_right(cuts.bands, band)
             if place not in cuts.known:
                 cuts.known[place] = _of_cell(cell, band, is_gap)
-            found.update(cuts.known[place])
-        return found
+            result.update(cuts.known[place])
+        return result
 
-    def wins(self, mine: Asked, rivals: Sequence[Asked]) -> bool:
+    def wins(self, mine: RuleBits, rivals: Sequence[RuleBits]) -> bool:
         """Return whether a rule is somewhere stronger than each rival.
 
         Variables are free of each other.
 
         Raises:
-            UndecidedError: If it is too much, or levels are too near to tell apart.
+            UndecidedError: If it is too much, or levels are too near to distinguish.
         """
         bands = self.levels.bands
         work = len(bands) * sum(len(a.cells) for a in self.axes) * (1 + len(rivals))
@@ -151,47 +151,47 @@ class Grid:
             return True
         for band, (low, high) in enumerate(bands):
             if low < high and self.leaves(mine, rivals, band, is_gap=False):
-                raise UndecidedError("two critical levels are too near to tell apart")
+                raise UndecidedError("two critical levels are too near to distinguish")
         return False
 
-    def fires(self, mine: Asked) -> bool:
+    def fires(self, mine: RuleBits) -> bool:
         """Return whether a rule is above 0 somewhere: on each axis in some cell."""
-        asked = zip(self.axes, mine[:-1], strict=True)
-        every = ((self._zeros(axis, is_vague=False), own) for axis, own in asked)
+        bits_of_rule = zip(self.axes, mine[:-1], strict=True)
+        every = ((self._zeros(axis, is_vague=False), own) for axis, own in bits_of_rule)
         return all(any(not own & zeros for zeros in sets) for sets, own in every)
 
-    def is_bare(self, rules: Sequence[Asked]) -> bool | None:
+    def is_bare(self, rules: Sequence[RuleBits]) -> bool | None:
         """Return whether all rules are somewhere exactly 0; None if it is not known."""
-        found: list[bool] = []
+        result: list[bool] = []
         for is_vague in (False, True):
             every = [self._zeros(axis, is_vague=is_vague) for axis in self.axes]
             axes = [
                 {bits(of[place] & zeros for of in rules) for zeros in sets}
                 for place, sets in enumerate(every)
             ]
-            found.append(reach(axes, len(rules)))
-        return found[0] if found[0] == found[1] else None
+            result.append(reach(axes, len(rules)))
+        return result[0] if result[0] == result[1] else None
 
     def _zeros(self, axis: Axis, *, is_vague: bool) -> set[int]:
         """Return which functions are 0 together: in a cell, or at its right end."""
         bands, zero = self.levels.bands, self.marks[ZERO]
         lowest = self.levels.band[zero]
         is_sharp = bands[lowest][0] == bands[lowest][1]
-        found: set[int] = set()
+        result: set[int] = set()
         for cell in axis.cells:
             pairs = zip(cell.left, cell.right, strict=True)
-            found.add(bits(ends == (zero, zero) for ends in pairs))
+            result.add(bits(ends == (zero, zero) for ends in pairs))
             right = [self.levels.band[end] == lowest for end in cell.right]
             if not is_vague and not is_sharp:
                 right = [end == zero for end in cell.right]
-            found.add(bits(right))
-        return found
+            result.add(bits(right))
+        return result
 
     def gap(self, level: Fraction, *, is_above: bool) -> int:
         """Return the band whose gap is just above or just below an extra level."""
         return self.levels.band[self.marks[level]] - (not is_above)
 
-    def is_below(self, mine: Asked, theirs: Asked) -> bool:
+    def is_below(self, mine: RuleBits, theirs: RuleBits) -> bool:
         """Return whether a rule's degree is nowhere above a rival's, on every axis.
 
         That suffices for min and product alike. A rule of several clauses on one
@@ -212,8 +212,8 @@ class Grid:
 
     def leaves(
         self,
-        mine: Asked | None,
-        rivals: Sequence[Asked],
+        mine: RuleBits | None,
+        rivals: Sequence[RuleBits],
         band: int,
         *,
         is_gap: bool = True,
@@ -254,7 +254,7 @@ def _functions(
 
 
 def bits(flags: Iterable[int]) -> int:
-    """Return a number whose n-th bit tells whether the n-th flag is set."""
+    """Return a number whose n-th bit is the n-th flag."""
     return sum(1 << place for place, flag in enumerate(flags) if flag)
 
 
@@ -296,13 +296,13 @@ class Ties:
         self.lowest = grid.levels.band[grid.marks[ZERO]]
         self.levels: dict[int, list[set[tuple[int, int]]]] = {}
 
-    def tie(self, one: Asked, other: Asked, rivals: Sequence[Asked]) -> bool:
+    def tie(self, one: RuleBits, other: RuleBits, rivals: Sequence[RuleBits]) -> bool:
         """Return whether both are equal on an open set, and no rival is stronger.
 
         Inputs are free of each other.
 
         Raises:
-            UndecidedError: If it is too much, or levels are too near to tell apart.
+            UndecidedError: If it is too much, or levels are too near to distinguish.
         """
         return self._moves(one, other, rivals) or self._stands(one, other, rivals)
 
@@ -311,7 +311,9 @@ class Ties:
         if self.left < 0:
             raise UndecidedError(f"ties that take more than {MOST_STEPS:,} steps")
 
-    def _moves(self, one: Asked, other: Asked, rivals: Sequence[Asked]) -> bool:
+    def _moves(
+        self, one: RuleBits, other: RuleBits, rivals: Sequence[RuleBits]
+    ) -> bool:
         """Return whether both follow one function of one axis."""
         for place, spans in enumerate(self.wide):
             own = one[place], other[place]
@@ -323,9 +325,9 @@ class Ties:
                     axes: list[set[int]] = []
                     every = self.grid.sets(band, is_gap=True)
                     for k, sets in enumerate(every):
-                        asked = one[k] | other[k]
+                        bits_of_rule = one[k] | other[k]
                         met = (
-                            {s for s in sets if not asked & ~s}
+                            {s for s in sets if not bits_of_rule & ~s}
                             if k != place
                             else {above}
                         )
@@ -334,7 +336,9 @@ class Ties:
                         return True
         return False
 
-    def _stands(self, one: Asked, other: Asked, rivals: Sequence[Asked]) -> bool:
+    def _stands(
+        self, one: RuleBits, other: RuleBits, rivals: Sequence[RuleBits]
+    ) -> bool:
         """Return whether both are constant, at one level."""
         flat = self._flat(one) & self._flat(other)
         for band in sorted(flat - {self.lowest}):
@@ -342,32 +346,32 @@ class Ties:
             low, high = self.grid.levels.bands[band]
             axes: list[set[int]] = []
             for k, sets in enumerate(self._at(band)):
-                asked = one[k] | other[k]
+                bits_of_rule = one[k] | other[k]
                 axes.append(
                     {
                         bits(
                             (*(r[k] & ~gt for r in rivals), one[k] & eq, other[k] & eq)
                         )
                         for gt, eq in sets
-                        if not asked & ~(gt | eq)
+                        if not bits_of_rule & ~(gt | eq)
                     }
                 )
             if reach(axes, len(rivals) + 2):
                 if low < high:
                     raise UndecidedError(
-                        "two critical levels are too near to tell apart"
+                        "two critical levels are too near to distinguish"
                     )
                 return True
         return False
 
-    def _flat(self, asked: Asked) -> set[int]:
+    def _flat(self, bits_of_rule: RuleBits) -> set[int]:
         """Return the bands at which a clause stays in some cell."""
         return {
             least
             for place, spans in enumerate(self.wide)
             for cell in spans
             for _, least, most, bit in cell
-            if least == most and asked[place] & bit
+            if least == most and bits_of_rule[place] & bit
         }
 
     def _at(self, band: int) -> list[set[tuple[int, int]]]:

@@ -96,13 +96,13 @@ def compact(value: Any) -> str:
     names: tuple[str, ...] = getattr(value, "_fields", ())
     if not names:
         return f"[{','.join(map(compact, value))}]"
-    given: list[tuple[str, Any]] = [*zip(names, value, strict=True)]
-    given = [pair for pair in given if pair != ("label_type", None)]
+    settings: list[tuple[str, Any]] = [*zip(names, value, strict=True)]
+    settings = [pair for pair in settings if pair != ("label_type", None)]
     tag = _TAGS.get(type(value))
     if isinstance(value, Curve):
-        tag, given = value.kind, [*value.facts]
+        tag, settings = value.kind, [*value.facts]
     pairs = [f'"type":"{tag}"'] if tag else []
-    pairs += [f'"{n.rstrip("_")}":{compact(v)}' for n, v in given]
+    pairs += [f'"{n.rstrip("_")}":{compact(v)}' for n, v in settings]
     return f"{{{','.join(pairs)}}}"
 
 
@@ -171,9 +171,9 @@ def check_head(case: Case, report: Report) -> None:
     is_plain = numbers == tuple(range(1, len(numbers) + 1))
     text = "the numbers of rules in the file are not those of the system"
     expect(audit.numbers == (() if is_plain else numbers), text)
-    expect(audit.rows > 0 or audit.data is None, "a table is told without rows")
+    expect(audit.rows > 0 or audit.data is None, "a table is named without rows")
     report.counts["facts about the audit"] += 12
-    _asked(case, report)
+    _questions(case, report)
     _complete(case, report)
     _ids(case, report)
 
@@ -190,13 +190,13 @@ def _content(case: Case, report: Report) -> None:
 
 
 def _settings(case: Case, report: Report) -> None:
-    given, expect = case.audit.settings, report.expect
+    settings, expect = case.audit.settings, report.expect
     for name in ("epsilon", "margin", "lead", "level", "overlap"):
-        is_share = 0 < getattr(given, name) <= 1
+        is_share = 0 < getattr(settings, name) <= 1
         expect(is_share, f"the setting {name} is not in (0, 1]")
-    expect(1 <= given.rows <= 10**7, "the setting rows is not in 1 to 10,000,000")
-    expect(0 <= given.seed < 2**32, "the setting seed is not in 0 to 2**32 - 1")
-    expect(0 < given.budget_s <= 1e9, "the budget is not in (0, 1e9] seconds")
+    expect(1 <= settings.rows <= 10**7, "the setting rows is not in 1 to 10,000,000")
+    expect(0 <= settings.seed < 2**32, "the setting seed is not in 0 to 2**32 - 1")
+    expect(0 < settings.budget_s <= 1e9, "the budget is not in (0, 1e9] seconds")
 
 
 def _domain(case: Case, report: Report) -> None:
@@ -224,8 +224,8 @@ def _domain(case: Case, report: Report) -> None:
         expect(bool(variable.parts) or name in case.sides, f"{name!r} has no side")
 
 
-def _asked(case: Case, report: Report) -> None:
-    """Check that every question was asked or is told to be left out."""
+def _questions(case: Case, report: Report) -> None:
+    """Check that every code has answers or is listed as left out."""
     audit, expect = case.audit, report.expect
     codes = [one.code for one in audit.answers]
     is_sorted = codes == sorted(codes)
@@ -234,8 +234,10 @@ def _asked(case: Case, report: Report) -> None:
     starts = {text.removesuffix(end) for text, end in ends}
     is_one = starts <= {""} or all(text.endswith(end) for text, end in ends)
     expect(is_one and len(starts) < 2, "the commands that find it again differ")
-    told = [text.split(" ")[0] for text in audit.unasked]
-    expect(told == sorted(set(told)), "what was not asked is not in order")
+    entries = [text.split(" ")[0] for text in audit.unasked]
+    expect(
+        entries == sorted(set(entries)), "the list of what was left out is not in order"
+    )
     is_cut = any(
         ": cut short: " in text or text.endswith(("is spent", "interrupted"))
         for text in audit.unasked
@@ -243,17 +245,17 @@ def _asked(case: Case, report: Report) -> None:
     text = "is_complete is not what was left out says"
     expect(audit.is_complete == (not is_cut), text)
     for code in SEVERITIES:
-        is_told = code.startswith("FTD") or code in codes or code in told
-        expect(is_told, f"{code} was neither asked nor told to be left out")
-    for code, text in zip(told, audit.unasked, strict=True):
+        is_stated = code.startswith("FTD") or code in codes or code in entries
+        expect(is_stated, f"{code} is neither answered nor listed as left out")
+    for code, text in zip(entries, audit.unasked, strict=True):
         is_left = text.endswith(("left out by the user", "to ask it of"))
         is_both = code in codes and (is_left or ": not asked: " in text)
-        expect(not is_both, f"{code} was asked, and told to be left out")
+        expect(not is_both, f"{code} is answered, and listed as left out")
 
 
 def _complete(case: Case, report: Report) -> None:
-    """Check that each rule and clause was asked about, if the code was not cut."""
-    told = {text.split(" ")[0] for text in case.audit.unasked}
+    """Check that each rule and clause has an answer, if the code was not cut."""
+    entries = {text.split(" ")[0] for text in case.audit.unasked}
     by = {code: case.coded(code) for code in SEVERITIES}
     every = {*case.numbers}
     dead = {one.rules[0] for one in by["FT101"] if one.is_finding and one.rules}
@@ -261,32 +263,36 @@ def _complete(case: Case, report: Report) -> None:
     if isinstance(case.model, Tree):
         wanted["FT101"] = dead
         wanted["FT205"] = every - dead
-        told_of = {one.rules[0] for one in by["FT102"] if one.rules}
-        wanted["FT102"] = {n for n in every if n in told_of or _wins(case, n)}
+        rules_with_entries = {one.rules[0] for one in by["FT102"] if one.rules}
+        wanted["FT102"] = {
+            n for n in every if n in rules_with_entries or _wins(case, n)
+        }
     if len(every) == 1:
         del wanted["FT103"]
     if case.view is not None:
-        told_silent = sorted(one.subject for one in by["FT101"] if not one.rules)
-        is_all = told_silent == sorted(case.view.silent) or not by["FT101"]
+        silent_entries = sorted(one.subject for one in by["FT101"] if not one.rules)
+        is_all = silent_entries == sorted(case.view.silent) or not by["FT101"]
         report.expect(is_all, "other rules never fire, as their text says")
         wanted = {"FT101": every}
     for code, numbers in wanted.items():
-        found = {one.rules[0] for one in by[code] if one.rules}
-        if code == "FT102" and "FT101" in told:
-            continue  # of which rules it is to be asked is not known
-        if code not in told and by[code] and found != numbers:
-            report.wrong.append(f"{code} was not asked of each rule, or twice")
+        result = {one.rules[0] for one in by[code] if one.rules}
+        if code == "FT102" and "FT101" in entries:
+            continue  # the rules that it is about are not known
+        if code not in entries and by[code] and result != numbers:
+            report.wrong.append(f"{code} has not one answer for each rule")
     clauses = sum(len(rule.when) for rule in case.rules.rules)
-    asked = sum(_clauses(case, one) for one in by["FT107"])
-    is_all = "FT107" in told or not by["FT107"] or asked == clauses
-    report.expect(is_all, "FT107 was not asked of each clause")
+    clause_answers = sum(_clauses(case, one) for one in by["FT107"])
+    is_all = "FT107" in entries or not by["FT107"] or clause_answers == clauses
+    report.expect(is_all, "FT107 has not one answer for each clause")
 
 
 def _wins(case: Case, number: int) -> bool:
     """Return whether a rule is known to beat those of other classes somewhere."""
-    rivals = [case.asked(n) for n in case.numbers if case.then(n) != case.then(number)]
+    rivals = [
+        case.bits_of(n) for n in case.numbers if case.then(n) != case.then(number)
+    ]
     try:
-        return case.is_free and case.beats(case.asked(number), rivals)
+        return case.is_free and case.beats(case.bits_of(number), rivals)
     except UndecidedError:
         return False
 

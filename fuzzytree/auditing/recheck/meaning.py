@@ -41,20 +41,20 @@ def strengths(rules: Rules, point: Point) -> list[Fraction]:
         x = value_of(variables[clause.variable], point)
         highest = max(degree(shapes[clause.variable, term], x) for term in clause.terms)
         degrees[clause] = 1 - highest if clause.negated else highest
-    found = [[degrees[clause] for clause in rule.when] for rule in rules.rules]
+    result = [[degrees[clause] for clause in rule.when] for rule in rules.rules]
     if rules.semantics.conjunction == "product":
-        return [math.prod(one, start=ONE) for one in found]
-    return [min(one, default=ONE) for one in found]
+        return [math.prod(one, start=ONE) for one in result]
+    return [min(one, default=ONE) for one in result]
 
 
 def answer_of(model: Model, point: Point) -> str | None:
     """Return the class that a model gives a point; None is no class."""
     if isinstance(model, Rules):
-        found = strengths(model, point)
-        best = max(found)
+        result = strengths(model, point)
+        best = max(result)
         if best == 0:
             return model.semantics.uncovered
-        return model.rules[found.index(best)].then
+        return model.rules[result.index(best)].then
     return model.leaves[leaf_of(model, point) - 1].label
 
 
@@ -84,10 +84,8 @@ def paths(tree: Tree) -> Iterator[tuple[int, Steps]]:
         if node is None:
             yield leaf or 0, path
             continue
-        asked = tree.nodes[node - 1]
-        todo += [
-            (b.node, b.leaf, (*path, (asked, b))) for b in reversed(asked.branches)
-        ]
+        used = tree.nodes[node - 1]
+        todo += [(b.node, b.leaf, (*path, (used, b))) for b in reversed(used.branches)]
 
 
 def rules_of(tree: Tree, kind: Literal["relative", "raw"]) -> Rules:

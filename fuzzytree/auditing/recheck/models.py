@@ -67,19 +67,19 @@ def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
     if not isinstance(top, dict) or kind not in ("rule base", "tree", "system"):
         text = f"{name}: rule bases, trees and systems are checked, not {kind!r:.60}"
         raise CannotRunError(text)
-    found: Model | System
+    result: Model | System
     try:
         if kind == "system":
-            found = read_system(top, name)
+            result = read_system(top, name)
         elif kind == "tree":
-            found = built(Tree, _tree_facts(top), name)
+            result = built(Tree, _tree_facts(top), name)
         else:
-            found = built(Rules, _rule_facts(top), name)
-        if isinstance(found, Tree):
-            _check_numbers(found, name)
-        if not isinstance(found, System):
-            _check_names(found, name)
-        return found, Places(top)
+            result = built(Rules, _rule_facts(top), name)
+        if isinstance(result, Tree):
+            _check_numbers(result, name)
+        if not isinstance(result, System):
+            _check_names(result, name)
+        return result, Places(top)
     except CannotRunError as error:
         if str(error).startswith(name):
             raise
@@ -88,8 +88,8 @@ def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
         raise CannotRunError(f"{name}: not a {kind} that fuzzytree writes") from error
 
 
-def _rule_facts(found: Any) -> dict[str, Any]:
-    top = keys_of(found, f"{_HEAD}, rules", "columns, variables, terms")
+def _rule_facts(result: Any) -> dict[str, Any]:
+    top = keys_of(result, f"{_HEAD}, rules", "columns, variables, terms")
     facts = _head(
         top, {"or": "max", "not": "1 - degree"}, "first of the strongest rules"
     )
@@ -106,8 +106,8 @@ def _rule_facts(found: Any) -> dict[str, Any]:
     return facts | {"kind": top.get("terms")}
 
 
-def _tree_facts(found: Any) -> dict[str, Any]:
-    top = keys_of(found, f"{_HEAD}, leaves", "columns, variables, nodes, sets")
+def _tree_facts(result: Any) -> dict[str, Any]:
+    top = keys_of(result, f"{_HEAD}, leaves", "columns, variables, nodes, sets")
     cuts = {"cuts": "a value equal to a cut lies below it"}
     facts = _head(top, cuts, "leaf that the nodes lead to")
     facts["nodes"] = [_node(n, one) for n, one in enumerate(top.get("nodes", []), 1)]
@@ -144,14 +144,14 @@ def _head(top: dict[str, Any], fixed: dict[str, str], decides: str) -> dict[str,
     }
 
 
-def _clause(found: Any, known: Mapping[str, Collection[str]]) -> dict[str, Any]:
-    if isinstance(found, dict):
-        verb = "is not" if "is not" in found else "is"
-        one = keys_of(found, f"variable, {verb}")
+def _clause(result: Any, known: Mapping[str, Collection[str]]) -> dict[str, Any]:
+    if isinstance(result, dict):
+        verb = "is not" if "is not" in result else "is"
+        one = keys_of(result, f"variable, {verb}")
         return Clause(one["variable"], one[verb], verb == "is not")._asdict()
-    read = [*itertools.islice(readings(found, known), 2)]
+    read = [*itertools.islice(readings(result, known), 2)]
     if len(read) != 1:
-        raise CannotRunError(f"{len(read)} readings of {found!r:.200}")
+        raise CannotRunError(f"{len(read)} readings of {result!r:.200}")
     return read[0]._asdict()
 
 
@@ -189,8 +189,8 @@ def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
                 todo.append((end + 4, (*terms, name)))
 
 
-def _node(number: int, found: Any) -> dict[str, Any]:
-    one = keys_of(found, "node, ask, cuts, branches", "interval owners")
+def _node(number: int, result: Any) -> dict[str, Any]:
+    one = keys_of(result, "node, ask, cuts, branches", "interval owners")
     ways = [keys_of(way, "is, go to", "sets") for way in one["branches"]]
     owners = [owner - 1 for owner in one.get("interval owners", [])]
     if one["node"] != number:
@@ -210,8 +210,8 @@ def _target(text: str) -> dict[str, int | None]:
     return {"node": None, "leaf": None, kind: int(number)}
 
 
-def _leaf(number: int, found: Any) -> dict[str, Any]:
-    one = keys_of(found, "leaf, class", "pattern, support")
+def _leaf(number: int, result: Any) -> dict[str, Any]:
+    one = keys_of(result, "leaf, class", "pattern, support")
     if one["leaf"] != number:
         raise CannotRunError(f"leaf {number} has another number")
     rest = {"pattern": one.get("pattern", ""), "support": one.get("support")}

@@ -35,7 +35,7 @@ def require(is_so: bool, otherwise: str) -> None:
 
 UNCHECKED = (
     "the version, the table, how many rows and how long, how proofs were made, why "
-    "something is open or was not asked, the commands"
+    "something is open or left out, the commands"
 )
 """What of an audit is read and cannot be compared with anything."""
 

@@ -188,13 +188,13 @@ def roots(poly: Poly, low: Fraction, high: Fraction) -> list[Root]:
         shared = common(poly, derivative(poly))
         if len(shared) > 1:  # several times the same root: once is enough
             return roots(quotient(poly, shared), low, high)
-    found: list[Root] = []
+    result: list[Root] = []
     todo = [(low, high, heights)]
     while todo:
         a, b, heights = todo.pop()
         changes = _changes(heights)
         if changes == 1 and heights[0] and heights[-1]:
-            found.append(Root(poly, a, b))
+            result.append(Root(poly, a, b))
         elif changes:
             middle, size = (a + b) / 2, len(heights) - 1
             left, right = [heights[0] << size], [heights[-1] << size]
@@ -203,9 +203,9 @@ def roots(poly: Poly, low: Fraction, high: Fraction) -> list[Root]:
                 left.append(heights[0] << left_over)
                 right.append(heights[-1] << left_over)
             if not left[-1]:
-                found.append(Root(poly, middle, middle))
+                result.append(Root(poly, middle, middle))
             todo += [(a, middle, left), (middle, b, right[::-1])]
-    return found
+    return result
 
 
 def _changes(heights: Sequence[int]) -> int:
@@ -288,13 +288,13 @@ def pieces(shape: Shape) -> tuple[Piece, ...]:
             [*map(Fraction, shape.values)],
             [*map(Fraction, shape.degrees)],
         )
-        found = [Piece(None, values[0], (degrees[0],), ONE)]
+        result = [Piece(None, values[0], (degrees[0],), ONE)]
         for (a, b), (p, r) in zip(
             itertools.pairwise(values), itertools.pairwise(degrees), strict=True
         ):
             slope = (r - p) / (b - a) if a < b else ZERO
-            found += [Piece(a, b, (p - a * slope, slope), ONE)] if a < b else []
-        return (*found, Piece(values[-1], None, (degrees[-1],), ONE))
+            result += [Piece(a, b, (p - a * slope, slope), ONE)] if a < b else []
+        return (*result, Piece(values[-1], None, (degrees[-1],), ONE))
     if isinstance(shape, LR):
         left, right = _side_pieces(shape, -1), _side_pieces(shape, 1)
         return (*left[::-1], *right)
@@ -303,17 +303,17 @@ def pieces(shape: Shape) -> tuple[Piece, ...]:
 
 def _band_pieces(shape: Band) -> tuple[Piece, ...]:
     low, high = (None if e is None else Fraction(e) for e in (shape.low, shape.high))
-    found: list[Piece] = []
+    result: list[Piece] = []
     for piece in _flank_pieces(shape.left):
         if low is not None and (piece.low is None or piece.low < low):
             end = low if piece.high is None else min(piece.high, low)
-            found.append(piece._replace(high=end))
-    found.append(Piece(low, high, (ONE,), ONE))
+            result.append(piece._replace(high=end))
+    result.append(Piece(low, high, (ONE,), ONE))
     for piece in _flank_pieces(shape.right):
         if high is not None and (piece.high is None or piece.high > high):
             end = high if piece.low is None else max(piece.low, high)
-            found.append(piece._replace(low=end))
-    return tuple(found)
+            result.append(piece._replace(low=end))
+    return tuple(result)
 
 
 def _flank_pieces(flank: Flank | None) -> list[Piece]:
@@ -355,21 +355,21 @@ def is_exact(shape: Shape) -> bool:
 
 def _curve_pieces(curve: Curve) -> tuple[Piece, ...]:
     """Return the pieces of a system's curve; a step up stands one double below."""
-    given = dict(curve.facts)
+    data = dict(curve.facts)
     match curve.kind:
         case "trapezoid":
-            return _trapezoid(given["a"], given["b"], given["c"], given["d"])
+            return _trapezoid(data["a"], data["b"], data["c"], data["d"])
         case "singleton":
-            return _trapezoid(*[given["value"]] * 4)
+            return _trapezoid(*[data["value"]] * 4)
         case "binary":
-            start: float = given["start"]
-            is_above = bool(given["is_above"])
+            start: float = data["start"]
+            is_above = bool(data["is_above"])
             ends = (start, None) if is_above else (None, start)
             return _trapezoid(ends[0], start, start, ends[1])
         case "s":
-            return tuple(_s(Fraction(given["start"]), Fraction(given["end"])))
+            return tuple(_s(Fraction(data["start"]), Fraction(data["end"])))
         case "pi":
-            a, b, c, d = (Fraction(given[name]) for name in "abcd")
+            a, b, c, d = (Fraction(data[name]) for name in "abcd")
             rise = [p for p in _s(a, b) if p.high is not None]
             fall = [
                 p._replace(high=c) if p.high == c else p for p in _s(d, c, is_down=True)
@@ -385,31 +385,31 @@ def _trapezoid(
 ) -> tuple[Piece, ...]:
     """Return the pieces of a trapezoid; ends that are None are open."""
     start, end = Fraction(b), Fraction(c)
-    found: list[Piece] = []
+    result: list[Piece] = []
     low: Fraction | None = None
     if a is not None and a == b:
         below = math.nextafter(b, -math.inf)
         low = start if math.isinf(below) else Fraction(below)
-        found.append(Piece(None, low, (), ONE))
+        result.append(Piece(None, low, (), ONE))
     elif a is not None:
         foot, slope = Fraction(a), 1 / (start - Fraction(a))
-        found.append(Piece(None, foot, (), ONE))
-        found.append(Piece(foot, start, (-foot * slope, slope), ONE))
+        result.append(Piece(None, foot, (), ONE))
+        result.append(Piece(foot, start, (-foot * slope, slope), ONE))
         low = start
     high = end if d is not None else None
     if low is None or high is None or low < high:
-        found.append(Piece(low, high, (ONE,), ONE))
+        result.append(Piece(low, high, (ONE,), ONE))
     if d is not None and c < d:
         foot, slope = Fraction(d), 1 / (end - Fraction(d))
-        found.append(Piece(end, foot, (-foot * slope, slope), ONE))
+        result.append(Piece(end, foot, (-foot * slope, slope), ONE))
         end = foot
     if d is not None:
-        found.append(Piece(end, None, (), ONE))
-    return tuple(found)
+        result.append(Piece(end, None, (), ONE))
+    return tuple(result)
 
 
 def _s(start: Fraction, end: Fraction, *, is_down: bool = False) -> list[Piece]:
-    """Return an S curve, which falls if it ends before it starts, or is told to."""
+    """Return an S curve, which falls if it ends before it starts, or with `is_down`."""
     if start == end:
         steps = [(ONE,), ()] if is_down else [(), (ONE,)]
         return [
@@ -439,13 +439,13 @@ def degree(shape: Shape, x: Fraction) -> Fraction:
 
 def piece_at(shape: Shape, x: Fraction) -> Piece:
     """Return the first piece that ends at x or above it."""
-    found = pieces(shape)
-    first, last = 0, len(found) - 1
+    result = pieces(shape)
+    first, last = 0, len(result) - 1
     while first < last:
         middle = (first + last) // 2
-        high = found[middle].high
+        high = result[middle].high
         if high is None or x <= high:
             last = middle
         else:
             first = middle + 1
-    return found[first]
+    return result[first]

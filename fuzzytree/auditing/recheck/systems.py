@@ -41,7 +41,7 @@ class _Sentence:
     """The words of a sentence, from the last to the first one that is not yet read."""
 
     def __init__(self, text: str) -> None:
-        found: list[tuple[str, bool]] = []
+        result: list[tuple[str, bool]] = []
         place = 0
         while text[place:].strip():
             token = _TOKEN.match(text, place)
@@ -49,8 +49,8 @@ class _Sentence:
                 raise ValueError("a quote that is not closed")
             quoted, place = token[1], token.end()
             name = quoted[1:-1].replace(quoted[0] * 2, quoted[0]) if quoted else ""
-            found.append((name, True) if quoted else (token[2] or token[3], False))
-        self.rest = found[::-1]
+            result.append((name, True) if quoted else (token[2] or token[3], False))
+        self.rest = result[::-1]
 
     def takes(self, *words: str) -> str:
         """Read a word that is the next one, and return it; an empty text if not."""
@@ -109,13 +109,13 @@ class _Sentence:
                 raise ValueError("a term is missing")
             return Is(variable, label, hedges)
         word = self.takes("and", "or")
-        found = self.part(level + 1) if word else self.joined(level + 1)
+        result = self.part(level + 1) if word else self.joined(level + 1)
         self.needs(")")
-        return And((found,)) if word == "and" else Or((found,)) if word else found
+        return And((result,)) if word == "and" else Or((result,)) if word else result
 
 
 def read_condition(text: str) -> Condition | None:
-    """Return what a sentence asks; None for `always`.
+    """Return the condition of a sentence; None for `always`.
 
     Raises:
         ValueError: If it is none.
@@ -125,10 +125,10 @@ def read_condition(text: str) -> Condition | None:
         Is(variable='speed', label='high', hedges=('not', 'very'))
     """
     sentence = _Sentence(text)
-    found = None if sentence.takes("always") else sentence.joined(1)
+    result = None if sentence.takes("always") else sentence.joined(1)
     if sentence.rest:
         raise ValueError("more behind the condition")
-    return found
+    return result
 
 
 def read_conclusions(text: str) -> tuple[Conclusion, ...]:
@@ -137,15 +137,15 @@ def read_conclusions(text: str) -> tuple[Conclusion, ...]:
     Raises:
         ValueError: If it is none.
     """
-    sentence, found = _Sentence(text), list[Conclusion]()
-    while not found or sentence.takes("and"):
+    sentence, result = _Sentence(text), list[Conclusion]()
+    while not result or sentence.takes("and"):
         output, hedges, label = sentence.clause()
         if label is None:
             raise ValueError("a term is missing")
-        found.append(Conclusion(output, label, hedges))
+        result.append(Conclusion(output, label, hedges))
     if sentence.rest:
         raise ValueError("more behind the conclusions")
-    return tuple(found)
+    return tuple(result)
 
 
 # --- systems
@@ -189,12 +189,12 @@ def read_system(top: dict[str, Any], name: str) -> System:
         "blocks": [*map(_block, facts["blocks"])],
         "note": facts.get("note", ""),
     }
-    found: System = built(System, whole, name)
-    groups = [[name for name, _ in _labelled(found)]]
-    groups += [[label.name for label in labels] for _, labels in _labelled(found)]
+    result: System = built(System, whole, name)
+    groups = [[name for name, _ in _labelled(result)]]
+    groups += [[label.name for label in labels] for _, labels in _labelled(result)]
     if any(len(set(group)) < len(group) for group in groups):
         raise CannotRunError(f"{name}: a name stands twice")
-    return found
+    return result
 
 
 def _variable(one: dict[str, Any]) -> dict[str, Any]:
@@ -206,13 +206,13 @@ def _variable(one: dict[str, Any]) -> dict[str, Any]:
     return facts | {"labels": labels, "clips": clips}
 
 
-def _input(found: Any) -> dict[str, Any]:
-    return _variable(keys_of(found, "name", "unit, range, sum of, terms"))
+def _input(result: Any) -> dict[str, Any]:
+    return _variable(keys_of(result, "name", "unit, range, sum of, terms"))
 
 
-def _output(found: Any) -> dict[str, Any]:
+def _output(result: Any) -> dict[str, Any]:
     one = keys_of(
-        found,
+        result,
         "name, defuzzifier",
         "unit, range, terms, samples, grid, aggregation, default",
     )
@@ -227,8 +227,8 @@ def _output(found: Any) -> dict[str, Any]:
     return facts
 
 
-def _label(found: Any) -> dict[str, Any]:
-    one = dict(found)
+def _label(result: Any) -> dict[str, Any]:
+    one = dict(result)
     height = one.pop("height", 1.0)
     kinds = one.keys() - {"name"}
     kind = next(iter(kinds), "")
@@ -238,40 +238,40 @@ def _label(found: Any) -> dict[str, Any]:
     return {"name": one["name"], "curve": curve, "height": height}
 
 
-def _curve(kind: str, given: Any) -> Curve | None:
+def _curve(kind: str, data: Any) -> Curve | None:
     """Return a curve that is none of the shapes; None if it is one of these."""
     if kind in ("trapezoid", "triangle"):
-        corners = [*map(float, given)]
+        corners = [*map(float, data)]
         a, b, c, d = corners if kind == "trapezoid" else [*corners[:2], *corners[1:]]
         ends = None if a == -math.inf else a, None if d == math.inf else d
         _check_finite(*(end for end in (*ends, b, c) if end is not None))
         return Curve("trapezoid", (("a", ends[0]), ("b", b), ("c", c), ("d", ends[1])))
     if kind in CURVES:
-        return Curve(kind, _numbers(given, CURVES[kind]))
+        return Curve(kind, _numbers(data, CURVES[kind]))
     if kind in ("sigmoid difference", "sigmoid product"):
-        both = [Curve("sigmoid", _numbers(one, CURVES["sigmoid"])) for one in given]
+        both = [Curve("sigmoid", _numbers(one, CURVES["sigmoid"])) for one in data]
         return Curve(kind, tuple(zip(("first", "second"), both, strict=True)))
     if kind == "pi":
-        values = [*map(float, given)]
+        values = [*map(float, data)]
         _check_finite(*values)
         return Curve(kind, tuple(zip("abcd", values, strict=True)))
     if kind in ("at least", "at most", "singleton"):
-        value = float(given)
+        value = float(data)
         _check_finite(value)
         if kind == "singleton":
             return Curve(kind, (("value", value),))
         return Curve("binary", (("start", value), ("is_above", kind == "at least")))
     if kind == "linear":
-        weights = tuple(map(float, keys_of(given, "weights, offset")["weights"]))
-        return Curve(kind, (("weights", weights), ("offset", float(given["offset"]))))
+        weights = tuple(map(float, keys_of(data, "weights, offset")["weights"]))
+        return Curve(kind, (("weights", weights), ("offset", float(data["offset"]))))
     if kind == "formula":
-        return Curve(kind, (("text", str(given)),))
+        return Curve(kind, (("text", str(data)),))
     return None
 
 
-def _numbers(found: Any, names: str) -> tuple[tuple[str, float], ...]:
-    given = keys_of(found, names)
-    values = [float(given[name]) for name in names.split(", ")]
+def _numbers(result: Any, names: str) -> tuple[tuple[str, float], ...]:
+    data = keys_of(result, names)
+    values = [float(data[name]) for name in names.split(", ")]
     _check_finite(*values)
     fields = [name.replace(" ", "_") for name in names.split(", ")]
     return tuple(zip(fields, values, strict=True))
@@ -282,8 +282,8 @@ def _check_finite(*values: float) -> None:
         raise ValueError("an infinite number")
 
 
-def _block(found: Any) -> dict[str, Any]:
-    one = keys_of(found, "activation, rules", "name, and, or, implication")
+def _block(result: Any) -> dict[str, Any]:
+    one = keys_of(result, "activation, rules", "name, and, or, implication")
     how = keys_of(one["activation"], "method", "count, threshold, relation")
     return {
         "rules": [*map(_rule, one["rules"])],
@@ -300,8 +300,8 @@ def _block(found: Any) -> dict[str, Any]:
     }
 
 
-def _rule(found: Any) -> dict[str, Any]:
-    one = keys_of(found, "if, then", "name, weight")
+def _rule(result: Any) -> dict[str, Any]:
+    one = keys_of(result, "if, then", "name, weight")
     return {
         "when": read_condition(one["if"]),
         "then": read_conclusions(one["then"]),
@@ -318,5 +318,5 @@ def has_formula(system: System) -> bool:
 
 def _labelled(system: System) -> list[tuple[str, tuple[Label, ...]]]:
     """Return the name and the terms of every variable."""
-    found = [(one.name, one.labels) for one in system.inputs]
-    return found + [(one.name, one.labels) for one in system.outputs]
+    result = [(one.name, one.labels) for one in system.inputs]
+    return result + [(one.name, one.labels) for one in system.outputs]

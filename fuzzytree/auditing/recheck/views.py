@@ -1,6 +1,6 @@
 """A fuzzy system as it is audited: its conditions as rules, and what they mean.
 
-A rule that asks `a and (b or c)` becomes two rules of an audit, its ways; under minimum
+A rule of `a and (b or c)` becomes two rules of an audit, its ways; under minimum
 or product it holds as far as the best of them. The classes of the rules are the texts
 of their conclusions.
 """
@@ -63,7 +63,7 @@ class View:
         ways: The numbers of the rules that are ways of each owner.
         names: What answers call each rule.
         silent: The names of the rules that never fire, as their text says.
-        labels: The terms that are asked about.
+        labels: The terms of the audit.
         is_whole: Whether no rule is left out.
     """
 
@@ -80,10 +80,10 @@ class View:
         self.owners: list[Owner] = []
         self.names: list[str] = []
         self.silent: list[str] = []
-        made: list[Rule] = []
+        items: list[Rule] = []
         for owner, then in _owners(system):
             for way in self._ways_of(owner):
-                made.append(Rule(way, then, None))
+                items.append(Rule(way, then, None))
                 self.owners.append(owner)
         self.ways = {
             owner: [n for n, one in enumerate(self.owners, 1) if one is owner]
@@ -99,12 +99,12 @@ class View:
             for label in one.labels
             if not self._is_left_out(one.name, label.name)
         ]
-        kept = dict.fromkeys(clause for rule in made for clause in rule.when)
+        kept = dict.fromkeys(clause for rule in items for clause in rule.when)
         self.rules = Rules(
             system.name,
-            tuple(dict.fromkeys(rule.then for rule in made)),
+            tuple(dict.fromkeys(rule.then for rule in items)),
             tuple(_variable(one, kept) for one in system.inputs),
-            tuple(made),
+            tuple(items),
             Semantics(self.conjunction, None, None),
             None,
             (),
@@ -131,13 +131,13 @@ class View:
             ways = [()]
             self.is_plain &= is_left_out
         else:
-            asked = [
+            clause = [
                 (c.variable, term) for way in ways for c in way for term in c.terms
             ]
             is_easy = owner.weight == 1 and all(
-                not self._is_left_out(*pair) and "\0" not in pair[1] for pair in asked
+                not self._is_left_out(*pair) and "\0" not in pair[1] for pair in clause
             )
-            text = f"{owner.name} is left out, and can be asked"
+            text = f"{owner.name} is left out, and can be audited"
             require(not (is_left_out and is_easy), text)
         if is_left_out:
             self.is_whole = False
@@ -158,7 +158,7 @@ class View:
             case None:
                 return [()]
             case Is():
-                return self._asked(condition, negated=negated)
+                return self._ways_of_clause(condition, negated=negated)
             case Not(part=part):
                 return self._ways(part, block, negated=not negated)
             case And(parts=(part,)) | Or(parts=(part,)):
@@ -176,64 +176,67 @@ class View:
                 is_union = not negated
         if not is_fit:
             raise UndecidedError("a condition that does not hold by its ways")
-        found: list[Way] = [] if is_union else [()]
+        result: list[Way] = [] if is_union else [()]
         for part in parts:
             ways = self._ways(part, block, negated=negated)
             if is_union:
-                found += ways
+                result += ways
             else:
-                found = [self._both(*pair) for pair in itertools.product(found, ways)]
-            found = [*dict.fromkeys(found)]
-            if len(found) > MOST_WAYS:
+                result = [self._both(*pair) for pair in itertools.product(result, ways)]
+            result = [*dict.fromkeys(result)]
+            if len(result) > MOST_WAYS:
                 raise UndecidedError("a condition that holds in too many ways")
-        return found
+        return result
 
     def _both(self, one: Way, other: Way) -> Way:
         both = (*one, *other)
         return tuple(dict.fromkeys(both)) if self.conjunction == "min" else both
 
-    def _asked(self, asked: Is, *, negated: bool) -> list[Way]:
-        hedges = asked.hedges
+    def _ways_of_clause(self, clause: Is, *, negated: bool) -> list[Way]:
+        hedges = clause.hedges
         while hedges[:1] == ("not",):
             negated, hedges = not negated, hedges[1:]
         if hedges[:1] == ("any",):
             return [] if negated else [()]
-        known = self.inputs.get(asked.variable)
-        if known is None or asked.label not in {one.name for one in known.labels}:
-            raise UndecidedError("it asks an output")
-        term = "\0".join((asked.label or "", *hedges))
-        return [(Clause(asked.variable, (term,), negated),)]
+        known = self.inputs.get(clause.variable)
+        if known is None or clause.label not in {one.name for one in known.labels}:
+            raise UndecidedError("it uses an output")
+        term = "\0".join((clause.label or "", *hedges))
+        return [(Clause(clause.variable, (term,), negated),)]
 
     def _one_clause(
         self, parts: tuple[Condition, ...], block: Block, *, negated: bool
     ) -> Clause | None:
         """Return `x is a or b` as one clause, if it is that and a maximum."""
-        asked = [*_plain(parts)]
-        if block.disjunction != "maximum" or None in asked:
+        clause = [*_plain(parts)]
+        if block.disjunction != "maximum" or None in clause:
             return None
-        found = [
-            way[0] for one in asked if one for way in self._asked(one, negated=False)
+        result = [
+            way[0]
+            for one in clause
+            if one
+            for way in self._ways_of_clause(one, negated=False)
         ]
-        if len({clause.variable for clause in found}) > 1:
+        if len({clause.variable for clause in result}) > 1:
             return None
-        terms = dict.fromkeys(term for clause in found for term in clause.terms)
-        return Clause(found[0].variable, tuple(terms), negated)
+        terms = dict.fromkeys(term for clause in result for term in clause.terms)
+        return Clause(result[0].variable, tuple(terms), negated)
 
     def questions(self) -> set[tuple[str, str]]:
-        """Return the variable and term of everything that rules ask."""
-        found: set[tuple[str, str]] = set()
+        """Return the variable and term of every proposition of the rules."""
+        result: set[tuple[str, str]] = set()
         todo = [rule.when for block in self.system.blocks for rule in block.rules]
         while todo:
             match todo.pop():
                 case Is(variable=variable, label=label):
-                    found.add((variable, label or ""))
+                    result.add((variable, label or ""))
                 case And(parts=parts) | Or(parts=parts):
                     todo += parts
                 case Not(part=part):
                     todo.append(part)
                 case None:
                     pass
-        return found
+        return result
 
     def absent(self, name: str) -> list[int]:
         """Return the number, from 0, of a rule of which no way is taken over."""
@@ -243,12 +246,12 @@ class View:
 
     def may_conflict(self, one: int, other: int) -> bool:
         """Return whether two rules say different things of one output."""
-        told = [
+        entries = [
             {(c.output, _text((c,))) for c in self._then(number)}
             for number in (one, other)
         ]
-        shared = {name for name, _ in told[0]} & {name for name, _ in told[1]}
-        return any(name in shared for name, _ in told[0] ^ told[1])
+        shared = {name for name, _ in entries[0]} & {name for name, _ in entries[1]}
+        return any(name in shared for name, _ in entries[0] ^ entries[1])
 
     def _then(self, number: int) -> tuple[Conclusion, ...]:
         place = self.owners[number - 1].number
@@ -264,12 +267,12 @@ class View:
         """
         values = {v.name: value_of(v, point) for v in self.rules.variables}
         known: dict[Clause, Between] = {}
-        found: dict[int, Between] = {}
+        result: dict[int, Between] = {}
         for owner in dict.fromkeys(self.owners[number - 1] for number in numbers):
             ways = self.ways[owner]
             own = _times(owner.weight, self.condition(owner.when, owner.block, values))
             if not self.rules.rules[ways[0] - 1].when:
-                found[ways[0]] = own  # of no clauses, or not of ways alone
+                result[ways[0]] = own  # of no clauses, or not of ways alone
                 continue
             for number in ways:
                 one = (ONE, ONE)
@@ -278,11 +281,11 @@ class View:
                         known[clause] = self._degree(clause, values[clause.variable])
                     join = "minimum" if self.conjunction == "min" else "product"
                     one = joined(join, one, known[clause])
-                found[number] = _times(owner.weight, one)
-            best = [max(found[number][end] for number in ways) for end in (0, 1)]
+                result[number] = _times(owner.weight, one)
+            best = [max(result[number][end] for number in ways) for end in (0, 1)]
             if own[1] < best[0] or best[1] < own[0]:
                 raise DoesNotHoldError(f"{owner.name} holds otherwise than its ways")
-        return found
+        return result
 
     def _degree(self, clause: Clause, x: Fraction) -> Between:
         every = [bounds(self.shapes[clause.variable, t], x) for t in clause.terms]
@@ -295,7 +298,7 @@ class View:
         """Return between which numbers the degree of a condition lies.
 
         Raises:
-            UndecidedError: If it asks an output.
+            UndecidedError: If it uses an output.
         """
         match condition:
             case None:
@@ -317,9 +320,9 @@ class View:
                 norm = block.conjunction
                 if isinstance(condition, Or):
                     norm = block.disjunction
-                found = [self.condition(part, block, values) for part in parts]
-                whole_of = found[0]
-                for other in found[1:]:
+                result = [self.condition(part, block, values) for part in parts]
+                whole_of = result[0]
+                for other in result[1:]:
                     whole_of = joined(norm or "", whole_of, other)
                 return whole_of
 
@@ -385,7 +388,7 @@ def _plain(parts: tuple[Condition, ...]) -> Iterator[Is | None]:
 
 
 def _variable(one: Input, clauses: dict[Clause, None]) -> Variable:
-    """Return an input with its terms as they are asked, hedged ones by both names."""
+    """Return an input with the terms of its propositions, hedged ones by both names."""
     curves = {label.name: label for label in one.labels}
     names = dict.fromkeys(curves)
     names |= dict.fromkeys(

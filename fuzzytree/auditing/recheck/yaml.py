@@ -98,11 +98,11 @@ class _Blocks:
     def document(self) -> Yaml:
         if not self.lines:
             raise CannotRunError(f"{self.name}: the file is empty")
-        found = self.block(self.lines[0].indent, 1)
+        result = self.block(self.lines[0].indent, 1)
         if self.at < len(self.lines):
             line = self.lines[self.at]
             raise self.error(line.number, f"{line.text[:40]!r} is not understood here")
-        return found
+        return result
 
     def block(self, indent: int, level: int) -> Yaml:
         """Return the list or mapping whose lines begin at this indent."""
@@ -168,12 +168,12 @@ class _Blocks:
         if text[0] in "'\"" and len(parts) > 1:
             raise self.error(line.number, "a quoted text over several lines")
         flow = _Flow(whole, lambda what: self.error(line.number, what))
-        found = flow.value(0) if text[0] in "[{" else flow.scalar(whole)
+        result = flow.value(0) if text[0] in "[{" else flow.scalar(whole)
         if text[0] in "[{" and flow.at != len(whole):
             raise self.error(
                 line.number, f"more behind the bracket: {whole[flow.at :]!r}"
             )
-        return found
+        return result
 
 
 class _Flow:
@@ -247,13 +247,13 @@ class _Flow:
             return whole[1].replace("''", "'")
         return _ESCAPE.sub(self._escaped, whole[2])
 
-    def _escaped(self, found: re.Match[str]) -> str:
-        code = found[1]
+    def _escaped(self, result: re.Match[str]) -> str:
+        code = result[1]
         if len(code) == 1:
             if code not in _ESCAPES:
-                raise self.error(f"no escape: {found[0]!r}")
+                raise self.error(f"no escape: {result[0]!r}")
             return _ESCAPES[code]
         number = int(code[1:], 16)
         if number > 0x10FFFF or 0xD800 <= number < 0xE000:
-            raise self.error(f"no character: {found[0]!r}")
+            raise self.error(f"no character: {result[0]!r}")
         return chr(number)

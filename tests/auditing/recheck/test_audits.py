@@ -261,7 +261,7 @@ def changed(**changes: Any) -> list[str]:
 def test_each_sentence_of_a_real_audit_is_held_against_its_facts() -> None:
     facts = json.loads(small()[0])
     report = recheck(*small(), ("audit.json", "grip.yaml"))
-    assert report.counts["sentences held against facts"] == len(facts["answers"])
+    assert report.counts["sentences compared with facts"] == len(facts["answers"])
 
 
 def test_a_sentence_that_says_other_than_its_facts_is_told() -> None:

@@ -245,4 +245,4 @@ def test_a_rule_that_is_left_out_without_need_is_told() -> None:
         "places": [],
     }
     facts["answers"].append(facts["answers"][-1] | left_out)
-    assert wrong_of(facts, content) == ["rule 1 is left out, and can be asked"]
+    assert wrong_of(facts, content) == ["rule 1 is left out, and can be audited"]
