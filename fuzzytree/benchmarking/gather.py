@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from fuzzytree.benchmarking.candidates import Bounds, Layouts, own, questions
 from fuzzytree.benchmarking.floors import floors
 from fuzzytree.benchmarking.judging import MOST_ROWS
-from fuzzytree.benchmarking.peers import peers
 from fuzzytree.benchmarking.records import Bound, Candidate, Kind, Omission, Question
 from fuzzytree.benchmarking.variants import variants
 from fuzzytree.model.contracts import Dtype, Model
@@ -19,33 +21,82 @@ from fuzzytree.numerics.bounds import certify
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
 
+Candidates = tuple[list[Candidate], list[Omission]]
+"""What can be measured, and what cannot be, each with its reason."""
+
+Peers = Callable[[Model, Bounds], Candidates]
+"""Returns candidates of third-party libraries for a model."""
+
 _GROUPS = (*get_args(Question), *get_args(Kind))
 _MOST_DEGREES = 10_000_000  # whose errors are bounded in about a second
 
 
-def gather(model: Model, values: FloatArray) -> tuple[list[Candidate], list[Omission]]:
+def gather(model: Model, values: FloatArray, peers: str | None = None) -> Candidates:
     """Return every candidate for a model, and what cannot be one.
 
     Args:
         model: A tree or a rule base.
         values: The rows of the study: certified bounds hold on them, or on the first
             of them where the model is large.
+        peers: The path of a module with further candidates; see `load_peers`.
     """
     layouts = Layouts()
     main = next(iter(questions(model)))
     found, omitted = floors(main)
     bounds = _bounds(values)
     mine, absent = own(model, bounds, layouts)
-    others, missing = peers(model, bounds)
+    others, missing = load_peers(peers)(model, bounds)
     changed, left = variants(model, bounds, layouts)
     return [*found, *mine, *others, *changed], [*omitted, *absent, *missing, *left]
 
 
-def foreign(model: Model) -> list[Candidate]:
+def foreign(model: Model, peers: str | None) -> list[Candidate]:
     """Return the candidates that a child process tries; see `trial`."""
     main = next(iter(questions(model)))
-    mine = own(model, lambda _rules, _dtype: None, Layouts())[0]
-    return [*floors(main)[0], *mine, *peers(model)[0]]
+    mine = own(model, _no_bounds, Layouts())[0]
+    return [*floors(main)[0], *mine, *load_peers(peers)(model, _no_bounds)[0]]
+
+
+def load_peers(path: str | None) -> Peers:
+    """Run a Python module or package and return its function `peers`.
+
+    The function takes a model and a function that certifies the error of its strengths
+    in a number type. It returns further candidates, and omissions with their reasons.
+
+    Args:
+        path: The module's file or the package's folder. None: no further candidates.
+
+    Raises:
+        ValueError: If there is no such module, it cannot be run or has no function
+            `peers`, or another module of its name is loaded.
+    """
+    if path is None:
+        return lambda _model, _bounds: ([], [])
+    folder = Path(path).resolve()
+    file = folder / "__init__.py" if folder.is_dir() else folder
+    spec = spec_from_file_location(folder.stem, file)
+    if not file.is_file() or spec is None or spec.loader is None:
+        raise ValueError(f"peers: {path!r} is not a Python module or package")
+    module = sys.modules.get(spec.name)
+    if module is None:
+        module = sys.modules[spec.name] = module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:  # whatever the user's code raises
+            del sys.modules[spec.name]
+            raise ValueError(f"peers: {path!r} cannot be run: {error}") from error
+    elif getattr(module, "__file__", None) != str(file):
+        raise ValueError(
+            f"peers: another module {spec.name!r} is loaded; rename {path!r}"
+        )
+    peers: Peers | None = getattr(module, "peers", None)
+    if peers is None:
+        raise ValueError(f"peers: {path!r} has no function 'peers'")
+    return peers
+
+
+def _no_bounds(rules: RuleBase, dtype: Dtype) -> None:
+    """Certify nothing."""
 
 
 def chosen(

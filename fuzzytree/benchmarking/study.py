@@ -68,6 +68,8 @@ class BenchSettings(msgspec.Struct, frozen=True):
         budget_s: The time for the study; see `bench`.
         rounds: The most samples of each timing.
         seed: Of made rows, and of the order of the rounds.
+        peers: The path of a Python module or package, which is run, and whose function
+            `peers(model, bounds)` returns further candidates and omissions.
 
     Raises:
         ValueError: If one of them cannot be.
@@ -79,6 +81,7 @@ class BenchSettings(msgspec.Struct, frozen=True):
     budget_s: float = BUDGET_S
     rounds: int = 15
     seed: int = 0
+    peers: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be done, before any work."""
@@ -151,7 +154,7 @@ def bench(
         _check(model, values)
         count = values.shape[1]
         text = _data_text(f"{data or 'a table'}, {_rows(count)}", count, plan)
-    found, omitted = gather(model, values)
+    found, omitted = gather(model, values, plan.peers)
     kept, left = chosen(found, as_names(only), as_names(skip))
     return run_study(
         model,
@@ -191,7 +194,6 @@ def run_study(
     plan: BenchSettings | None = None,
     tell: Tell | None = None,
     clock: Clock | None = None,
-    maker: str = "fuzzytree.benchmarking.gather:foreign",
 ) -> Study:
     """Try, judge and time candidates; see `bench`, which finds them.
 
@@ -204,7 +206,6 @@ def run_study(
         plan: How many rows, threads, seconds.
         tell: Told what is being done and which share of the whole is.
         clock: Where the time comes from; the system unless given.
-        maker: Where a child process gets the foreign ones from; see `trial`.
     """
     with noticed() as check:
 
@@ -219,7 +220,7 @@ def run_study(
         run.omissions += omissions
         before = machine(_PACKAGES)
         try:
-            run.try_foreign(candidates, maker)
+            run.try_foreign(candidates)
             run.judge(candidates)
             run.time()
             check()
@@ -271,14 +272,14 @@ class _Run:
         """Leave a candidate out, or some rows of it."""
         self.omissions.append(Omission(name, why))
 
-    def try_foreign(self, candidates: Sequence[Candidate], maker: str) -> None:
+    def try_foreign(self, candidates: Sequence[Candidate]) -> None:
         """Leave out what ends or blocks a child process."""
         todo = [c for c in candidates if c.is_foreign or c.kind == "peer"]
         faults = trial.tried(
             self.model,
             [c.name for c in sorted(todo, key=_rank)],
             self.values[:, :_TRIED],
-            maker=maker,
+            peers=self.plan.peers,
             left=lambda: self.plan.budget_s / 3 - self.spent_s(),
             tell=_part(self.tell, 0.0, 0.1),
         )

@@ -9,7 +9,6 @@ not caught: they do the same on more rows.
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 import os
@@ -23,13 +22,12 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO, TYPE_CHECKING, cast
 
+from fuzzytree.benchmarking.gather import foreign
 from fuzzytree.benchmarking.records import Candidate
 from fuzzytree.model.contracts import Model
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
-
-Maker = Callable[[Model], Sequence[Candidate]]
 
 _START = """
 import json, sys
@@ -47,7 +45,7 @@ def tried(
     names: Sequence[str],
     values: FloatArray,
     *,
-    maker: str = "fuzzytree.benchmarking.gather:foreign",
+    peers: str | None = None,
     seconds: float = _SECONDS,
     left: Callable[[], float] = lambda: math.inf,
     tell: Callable[[str, float], None] | None = None,
@@ -58,7 +56,7 @@ def tried(
         model: A tree or a rule base.
         names: The candidates to try.
         values: A few rows, shape (inputs, rows).
-        maker: The module and the function that return the candidates for a model.
+        peers: The path of a module with further candidates; see `gather.load_peers`.
         seconds: How long one candidate may take to load and to answer.
         left: The seconds that are left for all of them; what is not tried by then is
             not run.
@@ -67,7 +65,7 @@ def tried(
     faults: dict[str, str] = {}
     todo = list(names)
     while todo and left() > 0.0:
-        done = _one_child(model, todo, values, maker, seconds, left, tell)
+        done = _one_child(model, todo, values, peers, seconds, left, tell)
         faults |= {name: why for name, why in done.items() if why}
         todo = [name for name in todo if name not in done]
     return faults | dict.fromkeys(todo, _LATE)
@@ -77,7 +75,7 @@ def _one_child(
     model: Model,
     names: Sequence[str],
     values: FloatArray,
-    maker: str,
+    peers: str | None,
     seconds: float,
     left: Callable[[], float],
     tell: Callable[[str, float], None] | None,
@@ -99,7 +97,7 @@ def _one_child(
         reader = threading.Thread(target=_read, args=(source, lines), daemon=True)
         reader.start()
         try:
-            _send(target, (maker, model, names, values))
+            _send(target, (peers, model, names, values))
             for position, name in enumerate(names):
                 if tell:
                     tell(f"trying {name}", position / len(names))
@@ -118,7 +116,9 @@ def _one_child(
     return done
 
 
-def _send(stream: IO[bytes], work: tuple[str, Model, Sequence[str], object]) -> None:
+def _send(
+    stream: IO[bytes], work: tuple[str | None, Model, Sequence[str], object]
+) -> None:
     try:
         stream.write(json.dumps(sys.path).encode() + b"\n")
         stream.write(pickle.dumps(work))
@@ -149,13 +149,11 @@ def serve() -> None:
     """Be the child: try what stdin names, and write a line of JSON for each."""
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints must not look like a report
-    maker, model, names, values = cast(
-        "tuple[str, Model, Sequence[str], FloatArray]",
+    peers, model, names, values = cast(
+        "tuple[str | None, Model, Sequence[str], FloatArray]",
         pickle.loads(sys.stdin.buffer.read()),  # written by our own parent
     )
-    module, _, function = maker.partition(":")
-    make: Maker = getattr(importlib.import_module(module), function)
-    known = {one.name: one for one in make(model)}
+    known = {one.name: one for one in foreign(model, peers)}
     for name in names:
         out.write(json.dumps(_try(known, name, values)).encode() + b"\n")
         out.flush()

@@ -12,7 +12,7 @@ from fuzzytree.benchmarking.trial import error_text, tried
 from fuzzytree.model.contracts import Model
 from fuzzytree.testing import random_tree
 
-MAKER = """
+PEERS = """
 import ctypes, os, signal, sys, time
 from fuzzytree.benchmarking.records import Candidate, Found, Loaded
 
@@ -39,17 +39,17 @@ def late(threads):
         return lambda: os.kill(os.getpid(), signal.SIGKILL)
     return Loaded(lambda values: Found(values[0]), call)
 
-def make(model):
+def peers(model, bounds):
     loads = (well, crash, leave, hang, fail, late)
-    return [Candidate(one.__name__, "tree", "peer", one) for one in loads]
+    return [Candidate(one.__name__, "tree", "peer", one) for one in loads], []
 """
 
 
 @pytest.fixture
-def maker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    (tmp_path / "planted_peers.py").write_text(textwrap.dedent(MAKER), "utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    return "planted_peers:make"
+def planted(tmp_path: Path) -> str:
+    path = tmp_path / "planted_peers.py"
+    path.write_text(textwrap.dedent(PEERS), "utf-8")
+    return str(path)
 
 
 def model() -> Model:
@@ -60,14 +60,14 @@ def rows() -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     return np.zeros((len(model().inputs), 2))
 
 
-def test_what_works_is_not_named(maker: str) -> None:
-    assert tried(model(), ["well"], rows(), maker=maker) == {}
-    assert tried(model(), [], rows(), maker=maker) == {}
+def test_what_works_is_not_named(planted: str) -> None:
+    assert tried(model(), ["well"], rows(), peers=planted) == {}
+    assert tried(model(), [], rows(), peers=planted) == {}
 
 
-def test_crashes_and_errors_are_told_and_the_others_go_on(maker: str) -> None:
+def test_crashes_and_errors_are_told_and_the_others_go_on(planted: str) -> None:
     names = ["crash", "well", "leave", "fail", "late", "unheard of"]
-    assert tried(model(), names, rows(), maker=maker) == {
+    assert tried(model(), names, rows(), peers=planted) == {
         "crash": "it crashed the process (SIGSEGV)",
         "leave": "it ended the process (exit code 3): no licence",
         "fail": "it does not",
@@ -77,26 +77,26 @@ def test_crashes_and_errors_are_told_and_the_others_go_on(maker: str) -> None:
 
 
 @pytest.mark.heavy
-def test_what_hangs_is_ended(maker: str) -> None:
-    found = tried(model(), ["hang", "well"], rows(), maker=maker, seconds=4.0)
+def test_what_hangs_is_ended(planted: str) -> None:
+    found = tried(model(), ["hang", "well"], rows(), peers=planted, seconds=4.0)
     assert found == {"hang": "it did not answer within 4 s"}
 
 
-def test_what_the_budget_leaves_no_time_for_is_told(maker: str) -> None:
+def test_what_the_budget_leaves_no_time_for_is_told(planted: str) -> None:
     late = "a third of the budget was over before it was tried; a larger one helps"
     names = ["hang", "well"]
-    found = tried(model(), names, rows(), maker=maker, left=lambda: 0.0)
+    found = tried(model(), names, rows(), peers=planted, left=lambda: 0.0)
     assert found == dict.fromkeys(names, late)
     times = iter([1.0, 0.5, 0.0])  # as the first begins, while it hangs, and then
-    found = tried(model(), names, rows(), maker=maker, left=lambda: next(times))
+    found = tried(model(), names, rows(), peers=planted, left=lambda: next(times))
     assert found == dict.fromkeys(names, late)
 
 
-def test_a_maker_that_is_not_there_is_the_fault_of_every_candidate() -> None:
-    found = tried(model(), ["a"], rows(), maker="no_such_module_at_all:make")
+def test_peers_that_are_missing_are_the_fault_of_every_candidate() -> None:
+    found = tried(model(), ["a"], rows(), peers="no_such_module.py")
     assert found == {
         "a": "it ended the process (exit code 1): "
-        "ModuleNotFoundError: No module named 'no_such_module_at_all'"
+        "ValueError: peers: 'no_such_module.py' is not a Python module or package"
     }
 
 
