@@ -15,12 +15,12 @@ from functools import partial
 import msgspec
 
 from fuzzytree.benchmarking.candidates import Bounds, questions, title
-from fuzzytree.benchmarking.peers import engines, evaluator, trees
 from fuzzytree.benchmarking.records import Bound, Candidate, Loaded, Omission, Question
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.sampling import lines_bound
+from peers import engines, evaluator, trees
 
 _PYTHON = "one row after another"
 _SINGLE = "compares values rounded to float32 with cuts in double"

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fuzzytree.benchmarking.candidates import found_of
-from fuzzytree.benchmarking.peers.crisp import lines_of
 from fuzzytree.benchmarking.records import Found, Loaded
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Outcome
@@ -22,6 +21,7 @@ from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape
 from fuzzytree.runtimes.axes import plan_axes
 from fuzzytree.runtimes.rows import checked, winners
 from fuzzytree.runtimes.sampling import asked_shapes, line_error, samples, universe
+from peers.crisp import lines_of
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray

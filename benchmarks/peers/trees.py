@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.benchmarking.peers.crisp import (
+from fuzzytree.benchmarking.records import Loaded
+from fuzzytree.errors import LossError
+from fuzzytree.runtimes.axes import Axes, axis_row, plan_axes
+from peers.crisp import (
     Questions,
     guarded,
     lines_of,
     questions,
     tables,
 )
-from fuzzytree.benchmarking.records import Loaded
-from fuzzytree.errors import LossError
-from fuzzytree.runtimes.axes import Axes, axis_row, plan_axes
 
 if TYPE_CHECKING:
-    from fuzzytree.benchmarking.peers.crisp import Reals
     from fuzzytree.model.contracts import FloatArray, IntArray
     from fuzzytree.model.tree import FuzzyTree
+    from peers.crisp import Reals
 
     Ask = Callable[[Reals], IntArray]
 

@@ -9,15 +9,17 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import peers as module
 import pytest
 from msgspec.structs import replace
+from peers import TREE_PEERS, engines, peers
+from peers.crisp import questions as asked_questions
 
 from fuzzytree.benchmarking.candidates import found_of, questions
-from fuzzytree.benchmarking.peers import TREE_PEERS, engines, peers
-from fuzzytree.benchmarking.peers.crisp import questions as asked_questions
 from fuzzytree.benchmarking.records import Candidate, Found, Loaded
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Model
@@ -580,11 +582,13 @@ def test_generated_c_without_a_compiler_is_left_out(
 
 def test_the_list_of_peers_is_made_without_loading_any() -> None:
     code = (
-        "import sys; from fuzzytree.testing import random_tree; "
-        "from fuzzytree.benchmarking.peers import peers; peers(random_tree(1)); "
+        "from fuzzytree.testing import random_tree; "
+        "from fuzzytree.benchmarking.gather import load_peers; import sys; "
+        "load_peers(sys.argv[1])(random_tree(1), lambda rules, dtype: None); "
         "import fuzzytree.report.plots; "
         "names = 'sklearn skl2onnx treelite m2cgen fuzzylite simpful onnx onnxruntime "
         "matplotlib'; print([name for name in names.split() if name in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    command = [sys.executable, "-c", code, str(Path(str(module.__file__)).parent)]
+    done = subprocess.run(command, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("[]\n", "")
