@@ -474,10 +474,11 @@ def bench(
         data: A table with rows to time and to judge on, repeated where there are too
             few; rows are made of the model's declared ranges if None.
         only: Names of candidates, such as `native`, questions, such as `raw rules`,
-            or kinds, such as `peer`: the others are left out.
+            or kinds, such as `variant`: the others are left out.
         skip: The same, for what is left out.
         settings: Rows in a call, threads, the largest error allowed, and about how many
-            seconds it may take; the defaults of `BenchSettings` unless given.
+            seconds it may take, and a module with further candidates, whose code is
+            run; the defaults of `BenchSettings` unless given.
         progress: Called with the current step and the share that is done.
 
     Returns:

@@ -61,7 +61,7 @@ INTERRUPTED = 130
     "--only",
     metavar="NAME",
     multiple=True,
-    help="Candidates to measure, such as native, 'raw rules', peer (repeat).",
+    help="Candidates to measure, such as native, 'raw rules', variant (repeat).",
 )
 @click.option(
     "--skip", metavar="NAME", multiple=True, help="Candidates to leave out (repeat)."
@@ -86,6 +86,12 @@ INTERRUPTED = 130
     default=0,
     show_default=True,
     help="Random seed for generated rows and the order of rounds.",
+)
+@click.option(
+    "--peers",
+    metavar="FOLDER",
+    help="Python module or package, which is run; its function peers(model, bounds) "
+    "returns further candidates and omissions.",
 )
 @click.option("-o", "--output", metavar="FILE", help="JSON file to write the study to.")
 @click.option(
@@ -115,6 +121,7 @@ def command(
     budget: float,
     error: float | None,
     seed: int,
+    peers: str | None,
     output: str | None,
     plots: Sequence[str],
     is_full: bool,
@@ -125,10 +132,10 @@ def command(
 ) -> int:
     """Measure error against run time for every way of running MODEL, a YAML file.
 
-    Runtimes, number types, approximations and third-party libraries predict the same
-    rows in interleaved rounds; errors are those against exact arithmetic. Ctrl-C ends
-    the study early, keeps its results, and exits with 130; exit 1 if an error is
-    larger than its certified bound.
+    Runtimes, number types, approximations and what --peers adds predict the same rows
+    in interleaved rounds; errors are those against exact arithmetic. Ctrl-C ends the
+    study early, keeps its results, and exits with 130; exit 1 if an error is larger
+    than its certified bound.
     """
     from fuzzytree.api import verbs
     from fuzzytree.benchmarking.study import BenchSettings
@@ -146,7 +153,12 @@ def command(
             only=only,
             skip=skip,
             settings=BenchSettings(
-                tuple(rows), tuple(threads), error, budget_s=budget, seed=seed
+                tuple(rows),
+                tuple(threads),
+                error,
+                budget_s=budget,
+                seed=seed,
+                peers=peers,
             ),
             progress=show,
         )

@@ -105,6 +105,20 @@ def test_json_goes_to_stdout_and_to_a_file(call: Call) -> None:
     assert "wrote    study.json" in err.splitlines()
 
 
+def test_a_named_module_adds_candidates_and_omissions(call: Call) -> None:
+    Path("my_peers.py").write_text(
+        "from fuzzytree.benchmarking.records import Omission\n"
+        "def peers(model, bounds):\n"
+        "    return [], [Omission('my peer', 'it has no licence')]\n",
+        "utf-8",
+    )
+    words = ("bench", "grip.yaml", "--peers", "my_peers.py", "--json", *FAST)
+    code, out, _ = call(*words)
+    assert code == 0
+    omission = {"name": "my peer", "why": "it has no licence"}
+    assert omission in json.loads(out)["omissions"]
+
+
 def test_quiet_says_nothing_but_the_study(call: Call) -> None:
     code, out, err = call("bench", "grip.yaml", "--quiet", *FAST)
     assert (code, err) == (0, "")
@@ -169,6 +183,7 @@ def test_what_libraries_print_is_no_part_of_the_answer(
         ),
         (("--seed", "-1"), "seed: 0 is the least, not -1"),
         (("--error", "2"), "an error of a strength lies in [0, 1], not at 2"),
+        (("--peers", "absent"), "peers: 'absent' is not a Python module or package"),
         (("--plot", "a.pdf"), "--plot a.pdf: a picture ends in .svg or .png"),
     ],
 )
