@@ -34,7 +34,7 @@ PROTOCOLS: Final[dict[str, tuple[Protocol, int]]] = {
 }
 
 
-def frames_of(full: int) -> Cells:
+def frames_of_file(full: int) -> Cells:
     """Return frames of a blob that wanders about."""
     draw = np.random.default_rng(1)
     y, x = np.mgrid[:16, :16]
@@ -65,7 +65,7 @@ def main() -> None:
     print("| --- | ---: | ---: |")
     for name, (protocol, full) in PROTOCOLS.items():
         board = Board("b", Sensor(16, 16, full=full), protocol)
-        parts = [encoded(board, one, n) for n, one in enumerate(frames_of(full))]
+        parts = [encoded(board, one, n) for n, one in enumerate(frames_of_file(full))]
         data = b"".join(parts)
         seconds, frames = best(board, data)
         print(f"| {name} | {len(data) / seconds / 1e6:.0f} | {frames / seconds:,.0f} |")

@@ -14,7 +14,7 @@ from experiment_tasks import Task
 from fuzzytree.learning import LearningSettings
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER, press
-from fuzzytree.tactile.simulation.physics import Settings as Physics
+from fuzzytree.tactile.simulation.physics import PhysicsSettings as Physics
 
 PRESSES = 50
 """Presses of each object to learn from, and as many others to test on (4.1, 3)."""

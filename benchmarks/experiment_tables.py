@@ -30,7 +30,13 @@ from fuzzytree.tactile.cli.press import physics_settings
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import FULL, PAPER, SIDE, Settings, press
+from fuzzytree.tactile.simulation.physics import (
+    FULL,
+    PAPER,
+    SIDE,
+    PhysicsSettings,
+    press,
+)
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -92,7 +98,7 @@ class TableMeans:
 
 
 def compare(
-    settings: Settings = PAPER,
+    settings: PhysicsSettings = PAPER,
     seed: int = 0,
     *,
     count: int = 50,
@@ -185,7 +191,7 @@ class Effect:
 
 
 def effects(
-    settings: Settings = PAPER, seed: int = 0, *, count: int = 50
+    settings: PhysicsSettings = PAPER, seed: int = 0, *, count: int = 50
 ) -> Iterator[Effect]:
     """Switch off one effect after another; learn on a seed, test on the next.
 
@@ -324,7 +330,7 @@ def _print_means(found: TableMeans, *, quiet: bool) -> None:
 
 
 def _print_effects(
-    settings: Settings, seed: int, count: int, *, is_silent: bool
+    settings: PhysicsSettings, seed: int, count: int, *, is_silent: bool
 ) -> list[dict[str, object]]:
     """Print a line for each effect that is switched off, and return the facts."""
     facts: list[dict[str, object]] = []

@@ -24,7 +24,7 @@ from fuzzytree.report.plots.saving import style
 from fuzzytree.report.plots.sheet import SIZE
 from fuzzytree.tactile.interpolation import interpolated
 from fuzzytree.tactile.plots import colours, draw_frames
-from fuzzytree.tactile.presses import given_frames
+from fuzzytree.tactile.presses import read_frames
 from fuzzytree.tactile.sensor import pressed
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ def _draw_profiles(axes: Axes, fuzzy: Floats, plain: Floats, times: int) -> None
 
 def picture_of_a_hand() -> Figure:
     """Draw a press of a hand at each number of times (paper, Fig. 6)."""
-    given = given_frames(HAND, threshold=6)
+    given = read_frames(HAND, threshold=6)
     cells = pressed(given.sensor, given.presses.frames)[0]
     return draw_frames(
         [cells, *(interpolated(cells, times) for times in TIMES)],

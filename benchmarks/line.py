@@ -18,7 +18,7 @@ import tty
 from multiprocessing.connection import Connection
 
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link import open_line
+from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.device import blob
 from fuzzytree.tactile.simulation.encoding import encoded
@@ -31,7 +31,7 @@ def delays(count: int) -> list[float]:
     board_end, host_end = os.openpty()
     content = encoded(BOARD, next(blob(BOARD)), 0)
     found = []
-    with open_line(BOARD, os.ttyname(host_end)) as line:
+    with open_connection(BOARD, os.ttyname(host_end)) as line:
         for _ in range(count):
             os.write(board_end, content[:-1])
             time.sleep(0.004)
@@ -62,7 +62,7 @@ def most(seconds: float) -> tuple[float, float, float]:
     here, there = multiprocessing.Pipe()
     process = multiprocessing.Process(target=flood, args=(there,), daemon=True)
     process.start()
-    with open_line(BOARD, here.recv()) as line:
+    with open_connection(BOARD, here.recv()) as line:
         here.send("open")
         begin, worked = time.perf_counter(), time.process_time()
         while time.perf_counter() - begin < seconds:

@@ -31,8 +31,8 @@ from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.boards import Board, Marker, Port
 from fuzzytree.tactile.cli.live import MOST_WAITING, SWITCH_S
 from fuzzytree.tactile.cli.screen import Screen
-from fuzzytree.tactile.link import open_line
-from fuzzytree.tactile.recognition.frame_sources import PAPER_BOARD, FromLine, simulated
+from fuzzytree.tactile.link import open_connection
+from fuzzytree.tactile.recognition.frame_sources import PAPER_BOARD, FromPort, simulated
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.runtimes.frames import features_of
@@ -100,8 +100,8 @@ def latencies(
         sender.start()
         while not Path(link).exists():
             time.sleep(0.01)
-        line = open_line(board, link, most_waiting=MOST_WAITING)
-        live = Live(Recogniser(tree, board.sensor), FromLine(line), "board")
+        line = open_connection(board, link, most_waiting=MOST_WAITING)
+        live = Live(Recogniser(tree, board.sensor), FromPort(line), "board")
         late = np.full(count, np.nan)
         with contextlib.ExitStack() as stack:
             stack.callback(line.close)

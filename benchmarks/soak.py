@@ -374,7 +374,7 @@ def _answers(
     if start:
         _fed(watch, decoder, start, random)
     for number in numbers:
-        decoder.asked()
+        decoder.requested()
         after = damaged(watch.pool.sent[number % _POOL], faults, random)
         watch.sent(len(after.touched) > 0)
         given = watch.count.given

@@ -21,7 +21,7 @@ from serial_faults import ConnectionFaults, FaultyDevice
 from soak import CASES, FAULTS, Pool, frame_key, pool_of
 
 from fuzzytree.tactile.boards import Board, Request
-from fuzzytree.tactile.link import Line, open_line
+from fuzzytree.tactile.link import Connection, open_connection
 from fuzzytree.tactile.sensor import Cells, Counters
 from fuzzytree.tactile.simulation.device import BoardCounts, Pause
 
@@ -72,7 +72,7 @@ def soak_line(
     heard, begin = Heard(), time.monotonic()
     frames = _frames(pool, begin + seconds)
     with FaultyDevice(board, frames, faults, None, seed=seed) as device:
-        with open_line(board, device.port, most_waiting=10_000) as line:
+        with open_connection(board, device.port, most_waiting=10_000) as line:
             _listen(line, device, pool, heard)
             heard.counters = line.counters
         heard.truth = device.counts
@@ -88,7 +88,7 @@ def _frames(pool: Pool, until: float) -> Iterator[Cells]:
         yield cells
 
 
-def _listen(line: Line, device: FaultyDevice, pool: Pool, heard: Heard) -> None:
+def _listen(line: Connection, device: FaultyDevice, pool: Pool, heard: Heard) -> None:
     while True:
         frame = line.take(_QUIET_S)
         if frame is None and device.over.is_set():

@@ -26,10 +26,10 @@ from fuzzytree.cli.console import (
 from fuzzytree.report.bench import machine_rows
 from fuzzytree.report.text import aligned, duration
 from fuzzytree.tactile.cli.sensors import (
-    asked_model,
-    frames_of,
+    frames_model,
+    frames_of_file,
+    sensor_of_options,
     sensor_options,
-    wanted_sensor,
 )
 
 
@@ -92,9 +92,9 @@ def command(
     NumPy, ONNX, C and plain Python answer the same frames in interleaved rounds;
     errors are those against exact arithmetic.
     """
-    sensor = wanted_sensor(board, size, full, threshold)
-    asked = asked_model(model)
-    frames = frames_of(data, sensor, quiet=quiet)
+    sensor = sensor_of_options(board, size, full, threshold)
+    asked = frames_model(model)
+    frames = frames_of_file(data, sensor, quiet=quiet)
     with wrong_options(), progress_bar(quiet=quiet) as tell:
         found = time_frames(
             asked,

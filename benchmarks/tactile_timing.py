@@ -24,8 +24,8 @@ from fuzzytree.tactile.recognition.agreement import errors
 from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
     PLAIN,
-    Found,
     Runner,
+    RunnerResult,
     as_sent,
     runners,
 )
@@ -244,7 +244,7 @@ def _largest(
     model: Model,
     sensor: Sensor,
     frames: Cells,
-    found: Found,
+    found: RunnerResult,
     exact: Sequence[Sequence[Fraction]],
 ) -> float:
     shares = [

@@ -105,7 +105,7 @@ class SentinelOfBoard(FileRecord, frozen=True, kw_only=True):
 
 
 class RequestOfBoard(FileRecord, frozen=True, kw_only=True):
-    """Frames that are asked for, and have a fixed length.
+    """Frames on request, of a fixed length.
 
     `skip` bytes that are ignored, the cells, and the checksum of both. The `timeout`
     is in seconds.

@@ -72,7 +72,7 @@ class Sentinel(Value, frozen=True, tag="sentinel"):
 
 
 class Request(Value, frozen=True, tag="request"):
-    """The host asks, the board answers with a fixed number of bytes.
+    """The host sends a request, the board responds with a fixed number of bytes.
 
     Attributes:
         ask: The bytes that the host sends for each frame, in hexadecimal.
@@ -80,7 +80,7 @@ class Request(Value, frozen=True, tag="request"):
         byte_order: Of 16 bits.
         skip: Bytes before the cells that are ignored (time stamps).
         checksum: As in `Marker`.
-        timeout_s: How long an answer may take before the host asks again.
+        timeout_s: Seconds before the host repeats a request without a response.
     """
 
     ask: str

@@ -195,7 +195,7 @@ def _checked(cells: Real, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
 
 
 def _is_exact(cells: npt.NDArray[Any], most: int, kind: np.dtype[Any]) -> bool:
-    """Tell whether sums of whole cells by weights, `most` in all, are exact."""
+    """Return whether sums of whole cells by weights, `most` in all, are exact."""
     if cells.dtype.kind == "f":
         return False
     bound = int(np.iinfo(cells.dtype).max) + 1

@@ -35,7 +35,7 @@ _COLOURS = 240  # of 256: without the ones that are black
 _AXIS = "#00a3c4"  # seen on white and on the darkest colour
 
 
-class Axis(NamedTuple):
+class FrameAxis(NamedTuple):
     """The centre of pressure and the principal axis of a frame.
 
     Attributes:
@@ -71,7 +71,7 @@ def draw_frames(
     titles: Sequence[str] = (),
     title: str = "",
     full: float | None = None,
-    axes: Sequence[Axis | None] = (),
+    axes: Sequence[FrameAxis | None] = (),
     cells: Sequence[tuple[int, int]] = (),
     columns: int | None = None,
     unit: str = "pressure",
@@ -215,7 +215,7 @@ def _draw(panel: Axes, frame: Cells, end: float) -> Any:
 
 
 def _mark(
-    panel: Axes, axis: Axis, shape: tuple[int, ...], cells: tuple[int, ...]
+    panel: Axes, axis: FrameAxis, shape: tuple[int, ...], cells: tuple[int, ...]
 ) -> None:
     """Draw the centre of pressure and the principal axis of a frame."""
     from matplotlib.patheffects import withStroke

@@ -247,26 +247,26 @@ def _number(
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class SensorFrames:
     """Frames, and the sensor that they come from.
 
     Attributes:
         presses: The frames and what is known of them.
-        sensor: As told, as recorded, or as the size of the frames tells.
+        sensor: From the caller, the recording, or the size of the frames.
     """
 
     presses: Presses
     sensor: Sensor
 
 
-def given_frames(
+def read_frames(
     path: PathLike,
     *,
     sensor: Sensor | None = None,
     full: int | None = None,
     threshold: int | None = None,
     label: str = "label",
-) -> Given:
+) -> SensorFrames:
     """Return the frames of a file.
 
     Args:
@@ -308,4 +308,4 @@ def given_frames(
             f"{name}: holds frames of {rows} x {columns} cells, and the board has "
             f"{sensor.rows} x {sensor.columns}"
         )
-    return Given(presses, sensor or found)
+    return SensorFrames(presses, sensor or found)

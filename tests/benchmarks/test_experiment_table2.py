@@ -16,7 +16,12 @@ from experiment_tables import (
 
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.simulation.objects import OBJECTS, FloatArray, Object, rectangle
-from fuzzytree.tactile.simulation.physics import PAPER, Settings, press, press_object
+from fuzzytree.tactile.simulation.physics import (
+    PAPER,
+    PhysicsSettings,
+    press,
+    press_object,
+)
 
 EVEN = msgspec.structs.replace(
     PAPER,
@@ -87,7 +92,7 @@ def test_a_bar_that_reads_full_on_an_ideal_sensor_has_the_papers_means() -> None
         assert ratios[name] == pytest.approx(1.0, abs=0.15), name
 
 
-def _apart(settings: Settings) -> float:
+def _apart(settings: PhysicsSettings) -> float:
     """Return how far S1 of the bars at 0 and 45 degrees lies apart, in spreads.
 
     S1 is divided by the force: what is left is shape.

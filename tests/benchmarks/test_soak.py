@@ -41,7 +41,7 @@ def test_the_boards_of_the_examples_send_what_is_read(path: Path) -> None:
     decoder = decoder_of(board)
     given = decoder.feed(banner(board)) if board.banner else []
     for number, cells in enumerate(frames):
-        decoder.asked()
+        decoder.requested()
         given += decoder.feed(encoded(board, cells, number))
     given += decoder.flush()
     assert [cells.tolist() for cells in given] == [cells.tolist() for cells in frames]
@@ -89,7 +89,7 @@ def test_the_memory_of_a_decoder_does_not_grow(name: str) -> None:
     tracemalloc.start()
     sizes: list[int] = []
     for _ in range(30):
-        decoder.asked()
+        decoder.requested()
         decoder.feed(stream[: int(random.integers(len(stream)))])
         sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
@@ -146,10 +146,10 @@ def test_an_answer_that_was_too_long_is_late_and_doubtful() -> None:
         (b"\1\2\3\4", "untold", 0),
         (b"\1\2\3\4\4", "late", 1),
     ):
-        decoder.asked()
+        decoder.requested()
         assert [one.tolist() for one in decoder.feed(answer)] == [cells.tolist()]
         assert soak_verdicts.explained(board, answer, cells) == verdict
-        decoder.asked()
+        decoder.requested()
         assert decoder.counters.doubtful == doubtful
 
 

@@ -56,7 +56,7 @@ FAMILIES: Final = {
 }
 
 
-def frames_of(board: Board, count: int, seed: int = 1) -> list[Cells]:
+def frames_of_file(board: Board, count: int, seed: int = 1) -> list[Cells]:
     """Return different frames, with zeros in runs, that the board can send."""
     draw = np.random.default_rng(seed)
     sensor = board.sensor

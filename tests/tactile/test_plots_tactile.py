@@ -23,7 +23,7 @@ from fuzzytree.report import plots
 from fuzzytree.report.plots.saving import drawn
 from fuzzytree.report.plots.trees import COLOURS, MOST_LEAVES, class_colours
 from fuzzytree.report.svg_tree import boxes_of, placed
-from fuzzytree.tactile.plots import MOST_FRAMES, Axis, colours, draw_frames
+from fuzzytree.tactile.plots import MOST_FRAMES, FrameAxis, colours, draw_frames
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -140,7 +140,7 @@ def test_a_frame_without_pressure_is_white() -> None:
 
 
 def test_the_centre_of_pressure_lies_where_the_features_say() -> None:
-    one = Axis(x=0.5, y=-0.5, angle_deg=90.0, length=1.0)
+    one = FrameAxis(x=0.5, y=-0.5, angle_deg=90.0, length=1.0)
     figure = draw_frames([np.ones((6, 6))], axes=[one], cells=[(2, 2)])
     found = {
         line.get_gid(): np.asarray(line.get_xydata()) for line in figure.axes[0].lines
@@ -335,7 +335,7 @@ def test_tables_that_are_no_confusion_are_refused(
 
 def pictures() -> list[Figure]:
     return [
-        draw_frames([FRAME, FRAME], axes=[None, Axis(0.0, 0.0, 45.0)]),
+        draw_frames([FRAME, FRAME], axes=[None, FrameAxis(0.0, 0.0, 45.0)]),
         plots.draw_tree(learnt(3)),
         plots.draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
     ]

@@ -22,7 +22,7 @@ ACTIONS = (
 
 
 class Actions(click.Group):
-    """A group that imports an action's module when the action is asked for."""
+    """A group that imports an action's module on its first use."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the actions in the order in which one needs them."""

@@ -1,4 +1,4 @@
-"""`fuzzytree tactile check`: files from frame to class, held against their model."""
+"""`fuzzytree tactile check`: compare files of frames with their model."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ from fuzzytree.cli.console import (
     rows_only_option,
     say,
 )
-from fuzzytree.tactile.cli.sensors import asked_model, sensor_options, wanted_sensor
+from fuzzytree.tactile.cli.sensors import (
+    frames_model,
+    sensor_of_options,
+    sensor_options,
+)
 
 
-@click.command("check", short_help="Hold files of frames against their model.")
+@click.command("check", short_help="Compare files of frames with their model.")
 @click.argument("model", metavar="MODEL")
 @click.argument("files", metavar="FILE.onnx...", nargs=-1, required=True)
 @click.option(
@@ -53,15 +57,15 @@ def command(
     """
     from fuzzytree.files import read_bounded
     from fuzzytree.report.text import agreement_lines, verdict_text
-    from fuzzytree.tactile.presses import given_frames
-    from fuzzytree.tactile.recognition.onnx_files import check_shipped
+    from fuzzytree.tactile.presses import read_frames
+    from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
 
     is_named = any(one is not None for one in (board, size, full, threshold))
-    sensor = wanted_sensor(board, size, full, threshold) if is_named else None
-    asked = asked_model(model)
+    sensor = sensor_of_options(board, size, full, threshold) if is_named else None
+    asked = frames_model(model)
     contents = {name: read_bounded(name) for name in files}
-    frames = None if data is None else given_frames(data).presses.frames
-    found = check_shipped(
+    frames = None if data is None else read_frames(data).presses.frames
+    found = check_onnx_files(
         asked, contents, frames, sensor=sensor, reject=reject, rows_only=rows_only
     )
     if as_json:

@@ -22,10 +22,10 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import (
-    asked_model,
-    frames_of,
+    frames_model,
+    frames_of_file,
+    sensor_of_options,
     sensor_options,
-    wanted_sensor,
 )
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def command(
     """
     from fuzzytree.report.text import verdict_text
     from fuzzytree.tactile.recognition.agreement import (
-        check_frames_carriers,
+        check_frames_agree,
         frames_export,
     )
     from fuzzytree.tactile.report.frames import check_lines
@@ -82,12 +82,12 @@ def command(
     options = _options(form, settings)
     if output != "-":
         check_place(output)
-    sensor = wanted_sensor(board, size, full, threshold)
-    asked = asked_model(model)
-    frames = frames_of(data, sensor, quiet=quiet)
+    sensor = sensor_of_options(board, size, full, threshold)
+    asked = frames_model(model)
+    frames = frames_of_file(data, sensor, quiet=quiet)
     with wrong_options():
         written = frames_export(asked, sensor, form, **options)
-        found = check_frames_carriers(
+        found = check_frames_agree(
             asked, sensor, frames, reject=options.get("reject", 0.0)
         )
     lines = check_lines(found)
@@ -107,8 +107,8 @@ def command(
     else:
         write_atomically(output, written.content)
     digest = hashlib.sha256(written.content).hexdigest()
-    told = f"{form}, {len(written.content)} bytes, sha256 {digest}"
-    say_rows(("wrote", output, told), quiet=quiet)
+    facts = f"{form}, {len(written.content)} bytes, sha256 {digest}"
+    say_rows(("wrote", output, facts), quiet=quiet)
     return 0
 
 
@@ -123,7 +123,7 @@ def _form(output: str, to: Form | None) -> Form:
 
 
 def _options(form: Form, settings: Sequence[str]) -> dict[str, Any]:
-    """Return what `--set` tells."""
+    """Return the values of the `--set` options."""
     from fuzzytree.model.contracts import Format
     from fuzzytree.model.options import option_value
     from fuzzytree.tactile.exporters.c_frames import write_frames_c

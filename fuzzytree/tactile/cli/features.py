@@ -22,10 +22,10 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.errors import ReadError
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import given_options, wanted_frames
+from fuzzytree.tactile.cli.sensors import frames_and_sensor, frames_options
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.presses import Given
+    from fuzzytree.tactile.presses import SensorFrames
     from fuzzytree.tactile.runtimes.frames import Features
 
 CLASS = "class"
@@ -42,7 +42,7 @@ CLASS = "class"
     show_default=True,
     help="Names and sets of features, with commas between them.",
 )
-@given_options
+@frames_options
 @click.option(
     "--label", metavar="ARRAY", default="label", help="The classes in FRAMES; `label`."
 )
@@ -64,7 +64,7 @@ def command(
 
     With -o they become a table for `fuzzytree learn`; without it, what each feature
     costs is listed. Frames on which nothing presses are left out and counted. Files
-    of one class each are told as CLASS=FILE: cup=cup.ftr pen=pen.ftr.
+    of one class each are written as CLASS=FILE: cup=cup.ftr pen=pen.ftr.
     """
     from fuzzytree.tactile.features import costs
     from fuzzytree.tactile.features.names import names_of
@@ -74,7 +74,7 @@ def command(
     with wrong_options():
         names = names_of(text)
     parts = [
-        _of_class(word, wanted_frames(path, board, full, threshold, label=label))
+        _of_class(word, frames_and_sensor(path, board, full, threshold, label=label))
         for word, path in _named(frames)
     ]
     _check_alike(frames, parts)
@@ -90,7 +90,7 @@ def command(
 
 
 def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the class, empty if none is told, and the path of each file.
+    """Return the class, empty if not stated, and the path of each file.
 
     Raises:
         click.UsageError: If there are several files, and one is of no class.
@@ -108,8 +108,8 @@ def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
     return found
 
 
-def _of_class(word: str, given: Given) -> Given:
-    """Return frames of one class; as they were if none is told."""
+def _of_class(word: str, given: SensorFrames) -> SensorFrames:
+    """Return frames of one class, unchanged if none is stated."""
     if not word:
         return given
     import numpy as np
@@ -119,15 +119,15 @@ def _of_class(word: str, given: Given) -> Given:
     return replace(given, presses=replace(presses, label=code, label_names=(word,)))
 
 
-def _check_alike(frames: Sequence[str], parts: Sequence[Given]) -> None:
+def _check_alike(frames: Sequence[str], parts: Sequence[SensorFrames]) -> None:
     """Refuse files that make no table together.
 
     Raises:
         ReadError: If sensors differ in more than what rests on them, or if some files
-            tell subjects and others do not.
+            state subjects and others do not.
     """
 
-    def kind(part: Given) -> str:
+    def kind(part: SensorFrames) -> str:
         found = part.sensor
         size = f"{found.rows} x {found.columns} cells"
         return f"{size}, full {found.full}, threshold {found.threshold}"
@@ -139,12 +139,12 @@ def _check_alike(frames: Sequence[str], parts: Sequence[Given]) -> None:
                 f"({kind(parts[0])})"
             )
         if bool(len(part.presses.subject)) != bool(len(parts[0].presses.subject)):
-            raise ReadError(f"of {name} and {frames[0]}, only one tells subjects")
+            raise ReadError(f"of {name} and {frames[0]}, only one states subjects")
 
 
 def _table(
     sources: Sequence[str],
-    parts: Sequence[Given],
+    parts: Sequence[SensorFrames],
     names: Sequence[str],
     costs: object,
     output: str,
@@ -180,8 +180,8 @@ def _table(
         rows.append(("full", counted(full, "frame"), text))
     after = ["fuzzytree", "learn", output, "--target", CLASS, "-o", "tree.yaml"]
     after += ["--ignore", "subject"] if len(presses.subject) else []
-    told = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
-    rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {told}"))
+    text = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
+    rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {text}"))
     say_rows(*rows, quiet=quiet)
     if as_json:
         answer_json(
@@ -197,7 +197,7 @@ def _table(
     return 0
 
 
-def _lines(parts: Sequence[Given], found: Sequence[Features]) -> Iterator[str]:
+def _lines(parts: Sequence[SensorFrames], found: Sequence[Features]) -> Iterator[str]:
     """Yield the lines of a table: features, and class and subject where known."""
     has_class = bool(len(parts[0].presses.label))
     has_subject = bool(len(parts[0].presses.subject))

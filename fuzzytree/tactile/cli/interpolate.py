@@ -16,14 +16,14 @@ from fuzzytree.cli.console import (
     wrong_options,
 )
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import given_options, wanted_frames
+from fuzzytree.tactile.cli.sensors import frames_and_sensor, frames_options
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from fuzzytree.tactile.plots import Axis
-    from fuzzytree.tactile.presses import Given
+    from fuzzytree.tactile.plots import FrameAxis
+    from fuzzytree.tactile.presses import SensorFrames
 
     Pressed = npt.NDArray[np.int64]
 
@@ -49,7 +49,7 @@ MOST_BYTES = 2**30
     help="From 0; a picture is of the first that something presses on if none.",
 )
 @click.option("--axis", "is_marked", is_flag=True, help="Mark centre and axis as well.")
-@given_options
+@frames_options
 @click.option(
     "-o",
     "--output",
@@ -86,7 +86,7 @@ def command(
         raise click.UsageError(f"{output}: the name ends in {names} or {ARCHIVE}")
     times = _times(text)
     check_place(output)
-    given = wanted_frames(frames, board, full, threshold)
+    given = frames_and_sensor(frames, board, full, threshold)
     values = pressed(given.sensor, given.presses.frames)
     number = _chosen(frames, frame, values, is_picture=suffix != ARCHIVE)
     if number is not None:
@@ -108,7 +108,7 @@ def command(
 
 
 def _facts(
-    given: Given, number: int | None, values: Pressed, times: Sequence[int]
+    given: SensorFrames, number: int | None, values: Pressed, times: Sequence[int]
 ) -> dict[str, Any]:
     from fuzzytree.tactile.sensor import saturated
 
@@ -135,15 +135,15 @@ def _tell(
     rows, columns = facts["rows"], facts["columns"]
     one = f"frame {facts['frame']} of {counted(facts['of'], 'frame')}"
     read = counted(facts["frames"], "frame") if facts["frame"] is None else one
-    told = [("read", source, f"{read}, {rows} x {columns} cells")]
+    lines = [("read", source, f"{read}, {rows} x {columns} cells")]
     if facts["nothing"]:
-        told.append(("empty", counted(facts["nothing"], "frame"), "nothing presses"))
+        lines.append(("empty", counted(facts["nothing"], "frame"), "nothing presses"))
     if facts["saturated"]:
         text = f"a cell reads {full} or more"
-        told.append(("full", counted(facts["saturated"], "frame"), text))
+        lines.append(("full", counted(facts["saturated"], "frame"), text))
     sizes = ", ".join(f"{n * rows} x {n * columns}" for n in facts["times"])
-    told.append(("wrote", output, f"{sizes} points, {size} bytes"))
-    say_rows(*told)
+    lines.append(("wrote", output, f"{sizes} points, {size} bytes"))
+    say_rows(*lines)
 
 
 def _times(text: str) -> list[int]:
@@ -192,7 +192,7 @@ def _archive(values: Pressed, times: Sequence[int]) -> bytes:
 
 
 def _picture(
-    given: Given,
+    given: SensorFrames,
     number: int,
     times: Sequence[int],
     suffix: str,
@@ -227,9 +227,9 @@ def _times_text(times: int) -> str:
     return f"{times} times" if times > 1 else "once"
 
 
-def _axis(given: Given, number: int) -> Axis | None:
+def _axis(given: SensorFrames, number: int) -> FrameAxis | None:
     """Return the centre and axis of a frame; None where nothing presses."""
-    from fuzzytree.tactile.plots import Axis
+    from fuzzytree.tactile.plots import FrameAxis
     from fuzzytree.tactile.runtimes.frames import features_of
 
     frame = given.presses.frames[number]
@@ -237,6 +237,6 @@ def _axis(given: Given, number: int) -> Axis | None:
     if not found.is_pressed[0]:
         return None
     x, y, angle_deg = found.values[:, 0].tolist()
-    return Axis(
+    return FrameAxis(
         x, y, angle_deg, length=min(given.sensor.rows, given.sensor.columns) / 5
     )

@@ -13,13 +13,13 @@ import click
 import msgspec
 
 from fuzzytree.cli.console import quiet_option, say_rows, wrong_options
-from fuzzytree.tactile.cli.sensors import asked_model
+from fuzzytree.tactile.cli.sensors import frames_model
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.link import Line
+    from fuzzytree.tactile.link import Connection
     from fuzzytree.tactile.link.recording import Recorder
-    from fuzzytree.tactile.recognition.live import Answer, Hold, Live, Source
+    from fuzzytree.tactile.recognition.live import FrameSource, Hold, Live, LiveResult
     from fuzzytree.tactile.sensor import Frame
 
 SIMULATOR = "simulator"
@@ -38,7 +38,8 @@ SWITCH_S = 2e-4
     "--reject",
     type=click.FloatRange(0.0, 1.0),
     metavar="SHARE",
-    help="What is weaker is none of the known objects; 0.001 if strengths can tell.",
+    help="Firing strength below which an object is unknown; default 0.001, or 0 for "
+    "relative rules.",
 )
 @click.option(
     "--hold",
@@ -103,7 +104,7 @@ def command(
     from fuzzytree.tactile.recognition.live import Hold, Live
     from fuzzytree.tactile.recognition.recogniser import Recogniser, usual_floor
 
-    known = asked_model(model)
+    known = frames_model(model)
     floor = usual_floor(known) if reject is None else reject
     with contextlib.ExitStack() as stack:
         stack.callback(_switched(SWITCH_S))
@@ -128,16 +129,16 @@ def command(
         tally = _Tally()
         try:
             with _display(live, times, is_wanted=not (lines or as_json)) as shows:
-                tell = None if shows else _teller(Hold(hold), as_json=as_json)
+                write = None if shows else _writer(Hold(hold), as_json=as_json)
                 for answer in live.answers(frames):
-                    if tell is not None:
-                        tell(answer)
+                    if write is not None:
+                        write(answer)
                     tally.add(answer)
                     if recorder is not None:
                         recorder.write(answer.frame, found.counters)
         except KeyboardInterrupt:
             pass
-    tally.tell(live, floor, record, quiet=quiet)
+    tally.report(live, floor, record, quiet=quiet)
 
 
 def _switched(seconds: float) -> Callable[[], None]:
@@ -155,14 +156,14 @@ def _opened(
     seed: int,
     is_kept: bool,
     quiet: bool,
-) -> tuple[Source, Board]:
+) -> tuple[FrameSource, Board]:
     """Return where frames come from, and the board that they fit."""
     from fuzzytree.tactile.recognition import frame_sources as sources
 
     is_file = Path(source).is_file()
     if board is None and source != SIMULATOR and not is_file:
         raise click.UsageError(
-            f"{source} is no recording; for a port, tell its board with --board"
+            f"{source} is no recording; for a port, name its board with --board"
         )
     if board is not None and (source == SIMULATOR or is_file):
         raise click.UsageError(f"--board is for a port; {source} has its own")
@@ -175,23 +176,25 @@ def _opened(
     return _line(source, board, is_kept=is_kept, quiet=quiet)
 
 
-def _line(port: str, board: str, *, is_kept: bool, quiet: bool) -> tuple[Source, Board]:
+def _line(
+    port: str, board: str, *, is_kept: bool, quiet: bool
+) -> tuple[FrameSource, Board]:
     """Open a port, and measure what its board reads when nothing presses."""
     from fuzzytree.tactile import link as lines
     from fuzzytree.tactile.board_file import load_board
-    from fuzzytree.tactile.recognition.frame_sources import FromLine
+    from fuzzytree.tactile.recognition.frame_sources import FromPort
 
     known = load_board(board)
     most = lines.MOST_WAITING if is_kept else MOST_WAITING
-    line = lines.open_line(known, port, most_waiting=most)
+    line = lines.open_connection(known, port, most_waiting=most)
     try:
-        return FromLine(line), _rested(known, line, quiet=quiet)
+        return FromPort(line), _rested(known, line, quiet=quiet)
     except BaseException:
         line.close()
         raise
 
 
-def _rested(board: Board, line: Line, *, quiet: bool) -> Board:
+def _rested(board: Board, line: Connection, *, quiet: bool) -> Board:
     """Return a board with the baseline that its first frames show."""
     from fuzzytree.tactile.link import start
 
@@ -205,7 +208,7 @@ def _rested(board: Board, line: Line, *, quiet: bool) -> Board:
     return found.board
 
 
-def _coming(line: Line, *, quiet: bool) -> Iterator[Frame]:
+def _coming(line: Connection, *, quiet: bool) -> Iterator[Frame]:
     """Give the frames of a line; say once that none comes."""
     is_told = False
     while line.state != "ended":
@@ -218,9 +221,9 @@ def _coming(line: Line, *, quiet: bool) -> Iterator[Frame]:
 
 
 def _served(live: Live, port: int, times: int, stack: contextlib.ExitStack) -> str:
-    from fuzzytree.tactile.report.page import Page
+    from fuzzytree.tactile.report.page import LivePage
 
-    return stack.enter_context(Page(live, port, times=times)).url
+    return stack.enter_context(LivePage(live, port, times=times)).url
 
 
 def _recorder(path: str | None, board: Board) -> Recorder | None:
@@ -231,7 +234,7 @@ def _recorder(path: str | None, board: Board) -> Recorder | None:
 
 @contextlib.contextmanager
 def _display(live: Live, times: int, *, is_wanted: bool) -> Generator[bool]:
-    """Show a picture if there is a terminal; tell whether there is."""
+    """Show a picture on a terminal; yield whether there is one."""
     from fuzzytree.tactile.cli.screen import Screen, ended_by_signals, look_of
 
     look = look_of(sys.stdout) if is_wanted else None
@@ -244,18 +247,18 @@ def _display(live: Live, times: int, *, is_wanted: bool) -> Generator[bool]:
         yield True
 
 
-def _teller(hold: Hold, *, as_json: bool) -> Callable[[Answer], None]:
-    """Return what writes a line for an answer that is new and has held."""
+def _writer(hold: Hold, *, as_json: bool) -> Callable[[LiveResult], None]:
+    """Return a function that writes a line for each new, stable result."""
     from fuzzytree.tactile.report.live import line, line_facts
 
-    def tell(answer: Answer) -> None:
+    def write(answer: LiveResult) -> None:
         if answer.state is None or not hold((answer.state, answer.code)):
             return
         text = msgspec.json.encode(line_facts(answer)).decode() if as_json else ""
         sys.stdout.write(f"{text or line(answer)}\n")
         sys.stdout.flush()
 
-    return tell
+    return write
 
 
 class _Tally:
@@ -264,14 +267,14 @@ class _Tally:
     def __init__(self) -> None:
         self._labels: Counter[str] = Counter()
 
-    def add(self, answer: Answer) -> None:
+    def add(self, answer: LiveResult) -> None:
         """Take an answer."""
         from fuzzytree.tactile.recognition.live import STATES
 
         word = "refused" if answer.state is None else STATES[answer.state]
         self._labels[answer.label or word] += 1
 
-    def tell(
+    def report(
         self, live: Live, reject: float, record: str | None, *, quiet: bool
     ) -> None:
         """Say what was answered, how fast, and what was out of the ordinary."""

@@ -22,7 +22,7 @@ from fuzzytree.cli.console import (
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.simulation.physics import Settings, Simulated
+    from fuzzytree.tactile.simulation.physics import PhysicsSettings, Simulated
 
 
 @click.command("press", short_help="Press objects on a simulated sensor.")
@@ -88,7 +88,7 @@ def command(
         answer_json(facts)
 
 
-def physics_settings(changes: Sequence[str]) -> Settings:
+def physics_settings(changes: Sequence[str]) -> PhysicsSettings:
     """Return the simulator's settings with those that were given."""
     from fuzzytree.tactile.simulation.physics import PAPER
 

@@ -16,11 +16,11 @@ import click
 from fuzzytree.cli.console import answer_json, json_option, quiet_option, say, say_rows
 from fuzzytree.errors import PortError, WriteError
 from fuzzytree.files import check_place
-from fuzzytree.tactile.cli.signals import told_to_end
+from fuzzytree.tactile.cli.signals import stop_signal
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.link import Line, Started, State
+    from fuzzytree.tactile.link import Connection, Started, State
     from fuzzytree.tactile.link.recording import Recorder
     from fuzzytree.tactile.sensor import Frame
 
@@ -68,7 +68,7 @@ def command(
     that goes away is waited for. Exit 1 if it went away for good.
     """
     from fuzzytree.tactile.board_file import load_board
-    from fuzzytree.tactile.link import open_line, start
+    from fuzzytree.tactile.link import open_connection, start
     from fuzzytree.tactile.link.recording import Recorder
 
     if output == "-":
@@ -78,17 +78,19 @@ def command(
     if Path(output).exists() and not force:
         raise WriteError(f"{output}: is there already; --force replaces it")
     with (
-        told_to_end() as told,
-        open_line(known, port, wait=not no_wait, most_waiting=_waiting(known)) as line,
+        stop_signal() as stop,
+        open_connection(
+            known, port, wait=not no_wait, most_waiting=_waiting(known)
+        ) as line,
     ):
-        coming = _Coming(line, told, quiet=quiet)
+        coming = _Coming(line, stop, quiet=quiet)
         settings = f"{known.port.baud} baud"
         say_rows(("opened", port, f"{known.name}, {settings}"), quiet=quiet)
         coming.begin(seconds)  # a line that stays silent ends, too
         try:
             started = start(known, coming.frames())
         except PortError:
-            if not told.is_set():
+            if not stop.is_set():
                 raise
             say("ended before the baseline was measured; nothing was written")
             return 0
@@ -102,7 +104,7 @@ def command(
 
 
 def _record(
-    line: Line,
+    line: Connection,
     coming: _Coming,
     recorder: Recorder,
     *,
@@ -119,7 +121,7 @@ def _record(
             return "frames"
     if line.state == "ended":
         return "port"
-    if not coming.is_told():
+    if not coming.is_stopped():
         return "seconds"
     line.close()  # what came before is kept
     with contextlib.suppress(PortError):  # whatever it is, it comes too late
@@ -133,10 +135,10 @@ def _record(
 class _Coming:
     """The frames of a line, with a word on whatever happens to it."""
 
-    def __init__(self, line: Line, told: threading.Event, *, quiet: bool) -> None:
+    def __init__(self, line: Connection, stop: threading.Event, *, quiet: bool) -> None:
         self.count = 0
         self.first_s = self.last_s = 0.0
-        self._line, self._told, self._quiet = line, told, quiet
+        self._line, self._stop, self._quiet = line, stop, quiet
         self._state: State = "open"
         self._reconnects = 0
         self._any = False
@@ -153,12 +155,12 @@ class _Coming:
         self._begun = self._said = time.monotonic()
         self._limit_s = limit_s
 
-    def is_told(self) -> bool:
-        """Tell whether to end."""
-        return self._told.is_set()
+    def is_stopped(self) -> bool:
+        """Return whether a signal ends the recording."""
+        return self._stop.is_set()
 
     def takes(self, frame: Frame) -> bool:
-        """Tell whether a frame came within the time, from the first one on."""
+        """Return whether a frame came within the time limit."""
         limit_s = self._limit_s
         return limit_s is None or not self.count or frame.time - self.first_s < limit_s
 
@@ -171,8 +173,8 @@ class _Coming:
         return self.count
 
     def frames(self) -> Iterator[Frame]:
-        """Give frames until told to end, until the time is over or the line ends."""
-        while not self._told.is_set():
+        """Yield frames until a signal, the time limit or the end of the connection."""
+        while not self._stop.is_set():
             frame = None
             try:
                 frame = self._line.take(_LOOK_S)
@@ -233,7 +235,7 @@ def _tell_start(started: Started, *, quiet: bool) -> None:
 
 def _tell(
     output: str,
-    line: Line,
+    line: Connection,
     started: Started,
     recorder: Recorder,
     coming: _Coming,
@@ -262,7 +264,7 @@ def _tell(
 
 def _facts(
     output: str,
-    line: Line,
+    line: Connection,
     started: Started,
     recorder: Recorder,
     coming: _Coming,

@@ -20,7 +20,7 @@ from fuzzytree.cli.console import (
     say_rows,
 )
 from fuzzytree.files import check_place, open_atomically, write_atomically
-from fuzzytree.tactile.cli.signals import told_to_end
+from fuzzytree.tactile.cli.signals import stop_signal
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.link.recording import RecordingFile, Review
@@ -29,7 +29,7 @@ _LOOK_S = 0.1
 _LAST_S = 0.2  # for the reader of a port to take the last bytes
 
 
-@click.command("replay", short_help="Tell what is in a recording, or play it again.")
+@click.command("replay", short_help="Summarise a recording, or play it again.")
 @click.argument("recording", metavar="FILE")
 @click.option(
     "-o",
@@ -54,7 +54,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Tell what is in a recording: board, frames, seconds, counters, gaps, damage.
+    """Summarise a recording: board, frames, seconds, counters, gaps, damage.
 
     With --to-port the frames go out through a new port, whose name is printed, once
     something reads there, each when it came; Ctrl-C ends.
@@ -178,10 +178,10 @@ def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
     paced = Paced(file, speed)
     cells = (frame.cells for frame in paced)
     device = Device(file.board, cells, rate=max(speed, 1.0))
-    with contextlib.closing(device), contextlib.closing(paced), told_to_end() as told:
+    with contextlib.closing(device), contextlib.closing(paced), stop_signal() as stop:
         answer(device.port)
         say("the frames begin when it is opened; Ctrl-C ends", quiet=quiet)
-        while not (device.over.wait(_LOOK_S) or told.is_set()):
+        while not (device.over.wait(_LOOK_S) or stop.is_set()):
             pass
-        told.wait(_LAST_S)
+        stop.wait(_LAST_S)
     say_rows(("sent", counted(device.counts.frames, "frame"), ""), quiet=quiet)

@@ -120,7 +120,7 @@ class Screen:
 
 @contextlib.contextmanager
 def ended_by_signals(shown: Screen | None) -> Generator[None]:
-    """End as by Ctrl-C when the program is told to end or its terminal goes away.
+    """End on SIGTERM, or when the terminal goes away, as on Ctrl-C.
 
     When it is stopped (Ctrl-Z), the terminal is given back until it goes on.
     """

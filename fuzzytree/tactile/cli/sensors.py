@@ -1,4 +1,4 @@
-"""Which sensor frames come from: that of a board's file, or one told in words."""
+"""The sensor of frames, from the file of a board or from options."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fuzzytree.cli.console import say_rows, wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import Model
-    from fuzzytree.tactile.presses import Given
+    from fuzzytree.tactile.presses import SensorFrames
     from fuzzytree.tactile.sensor import Cells, Sensor
 
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
@@ -32,13 +32,13 @@ def sensor_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def wanted_sensor(
+def sensor_of_options(
     board: str | None, size: str | None, full: int | None, threshold: int | None
 ) -> Sensor:
-    """Return the sensor that the options tell.
+    """Return the sensor that the options describe.
 
     Raises:
-        click.UsageError: If they tell none, or two.
+        click.UsageError: If they describe none, or two.
         ReadError: If the board's file is none.
     """
     from fuzzytree.tactile.sensor import Sensor
@@ -46,7 +46,7 @@ def wanted_sensor(
     if board is not None:
         if size is not None or full is not None or threshold is not None:
             raise click.UsageError(
-                "--board tells --sensor, --full and --threshold; give one of them"
+                "--board sets --sensor, --full and --threshold; choose one of them"
             )
         from fuzzytree.tactile.board_file import load_board
 
@@ -63,7 +63,7 @@ def wanted_sensor(
         return Sensor(rows, columns, 255 if full is None else full, threshold or 0)
 
 
-def given_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def frames_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that say more of a file of frames than it does itself."""
     for option in (
         click.option("--threshold", type=int, help="Above it a cell is pressed."),
@@ -74,53 +74,57 @@ def given_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def wanted_frames(
+def frames_and_sensor(
     path: str,
     board: str | None,
     full: int | None,
     threshold: int | None,
     *,
     label: str = "label",
-) -> Given:
+) -> SensorFrames:
     """Return the frames of an archive or recording, with the sensor they fit.
 
     Raises:
-        click.UsageError: If a board is named, and what it tells as well.
+        click.UsageError: If a board is named with --full or --threshold.
         ReadError: If a file is none, or the frames do not fit the board.
     """
-    from fuzzytree.tactile.presses import given_frames
+    from fuzzytree.tactile.presses import read_frames
 
     if board is None:
-        return given_frames(path, full=full, threshold=threshold, label=label)
+        return read_frames(path, full=full, threshold=threshold, label=label)
     from fuzzytree.tactile.board_file import load_board
 
     sensor = load_board(board).sensor
     if full is not None or threshold is not None:
-        raise click.UsageError("--board tells --full and --threshold; give one of them")
-    return given_frames(path, sensor=sensor, label=label)
+        raise click.UsageError(
+            "--board sets --full and --threshold; choose one of them"
+        )
+    return read_frames(path, sensor=sensor, label=label)
 
 
-def frames_of(path: str | None, sensor: Sensor, *, quiet: bool = False) -> Cells | None:
+def frames_of_file(
+    path: str | None, sensor: Sensor, *, quiet: bool = False
+) -> Cells | None:
     """Return the frames of an archive or recording, None if none is named.
 
-    Says so where the file tells another threshold than the sensor's.
+    Prints a line where the file states another threshold than the sensor's.
 
     Raises:
         ReadError: If the file is neither, or its frames do not fit the sensor.
     """
     if path is None:
         return None
-    from fuzzytree.tactile.presses import given_frames
+    from fuzzytree.tactile.presses import read_frames
 
-    presses = given_frames(path, sensor=sensor).presses
-    if presses.threshold not in (0, sensor.threshold):  # 0 where it tells none
-        told = f"tells the threshold {presses.threshold}, not {sensor.threshold}"
-        say_rows(("differs", path, told), quiet=quiet)
+    presses = read_frames(path, sensor=sensor).presses
+    if presses.threshold not in (0, sensor.threshold):  # 0 where it states none
+        text = f"states the threshold {presses.threshold}, not {sensor.threshold}"
+        say_rows(("differs", path, text), quiet=quiet)
     return presses.frames
 
 
-def asked_model(path: str) -> Model:
-    """Return a model that frames can be asked of.
+def frames_model(path: str) -> Model:
+    """Return the model of a file, which must be a tree or a rule base.
 
     Raises:
         TableError: If the file holds something else.
@@ -132,5 +136,5 @@ def asked_model(path: str) -> Model:
 
     found = verbs.opened(path)
     if not isinstance(found, FuzzyTree | RuleBase):
-        raise TableError(f"{path}: frames are asked of a tree or rules, not of this")
+        raise TableError(f"{path}: a model of frames is a tree or a rule base")
     return found

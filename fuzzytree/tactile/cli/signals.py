@@ -12,17 +12,17 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 @contextlib.contextmanager
-def told_to_end() -> Generator[threading.Event]:
+def stop_signal() -> Generator[threading.Event]:
     """Give an event that Ctrl-C and its like set; the next one is an interruption.
 
     A process that `nohup` started outlives its terminal.
     """
-    told = threading.Event()
+    stop = threading.Event()
 
     def note(_number: int, _frame: object) -> None:
-        if told.is_set():
+        if stop.is_set():
             raise KeyboardInterrupt
-        told.set()
+        stop.set()
 
     with contextlib.ExitStack() as stack:
         if threading.current_thread() is threading.main_thread():
@@ -32,4 +32,4 @@ def told_to_end() -> Generator[threading.Event]:
                     continue
                 stack.callback(signal.signal, number, before)
                 signal.signal(number, note)
-        yield told
+        yield stop

@@ -17,7 +17,7 @@ from fuzzytree.cli.console import (
     say_rows,
     wrong_options,
 )
-from fuzzytree.tactile.cli.signals import told_to_end
+from fuzzytree.tactile.cli.signals import stop_signal
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
@@ -59,7 +59,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Send what BOARD.yaml would send, through a port that is told, until Ctrl-C.
+    """Send what BOARD.yaml would send, through a new port, until Ctrl-C.
 
     Something round wanders over the sensor, unless an object or a recording is named.
     The first frames after a host has opened the port are those at rest, as many as
@@ -73,7 +73,7 @@ def command(
 
     known = load_board(board)
     rest, coming = _frames(known, name, recording, seed, quiet=quiet)
-    with told_to_end() as told:
+    with stop_signal() as stop:
         with wrong_options():
             device = Device(
                 known,
@@ -90,7 +90,7 @@ def command(
             speed = f"{known.port.baud} baud, {FRAMES_A_SECOND} frames a second at most"
             speed = "as fast as it is read" if fast else speed
             say_rows(("opened", device.port, f"{known.name}, {speed}"), quiet=quiet)
-            _wait(device, told)
+            _wait(device, stop)
     facts = device.counts.facts()
     counts = ", ".join(f"{what} {count}" for what, count in facts.items() if count)
     say_rows(("counted", counts or "nothing", ""), quiet=quiet)
@@ -98,9 +98,9 @@ def command(
         answer_json({"port": device.port, "board": known.name, "truth": facts})
 
 
-def _wait(device: Device, told: threading.Event) -> None:
-    """Wait until told to end, or until the host is gone that had the last frame."""
-    while not told.wait(_LOOK_S):
+def _wait(device: Device, stop: threading.Event) -> None:
+    """Wait for a signal, or for the host to close the port after the last frame."""
+    while not stop.wait(_LOOK_S):
         if device.over.is_set() and not device.is_open:
             return
 

@@ -188,7 +188,7 @@ def _recognise(reject: float) -> str:
 
 
 def _cells(sensor: Sensor) -> Iterator[str]:
-    """Yield the function that tells how much presses on a cell."""
+    """Yield the function of the pressure on a cell."""
     taken = offsets(sensor)
     if taken:
         about = "The baseline of each cell; all that a masked one can read."

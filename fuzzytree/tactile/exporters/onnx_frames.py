@@ -1,7 +1,7 @@
 """ONNX: one graph from the raw frame to what lies on the sensor.
 
 The cells become exact sums by one product of matrices, the sums become the features
-that the model asks for by the steps of their program, and the model's own graph
+that the model uses by the steps of their program, and the model's own graph
 decides. Nothing stands in it that the model does not need.
 
 All numbers up to the sums are whole and below 2^53 (`frame_program` refuses a sensor

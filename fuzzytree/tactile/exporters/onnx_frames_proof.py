@@ -1,4 +1,4 @@
-"""A graph of frames, run in onnxruntime and held against plain Python, bit by bit."""
+"""A graph of frames, run in onnxruntime and compared with plain Python bit by bit."""
 
 from __future__ import annotations
 

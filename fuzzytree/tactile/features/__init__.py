@@ -1,4 +1,4 @@
-"""From a frame to the features that a model asks for, and nothing besides.
+"""From a frame to the features that a model uses, and no others.
 
 The features of a sensor's frames are a few exact sums over the pressed cells and a
 program on these sums (`FrameProgram`). Numpy, ONNX and C all run that program, so that
@@ -132,8 +132,8 @@ def _program(
             results.append(Result("output", feature.name, make.feature(feature)))
     results.append(Result("output", PRESSED, pressed))
     whole = make.steps.program("features", tuple(inputs), tuple(results))
-    asked = {step.name for step in whole.steps if step.operation == "input"}
-    needed = tuple(name for name in inputs if name in asked)
+    used = {step.name for step in whole.steps if step.operation == "input"}
+    needed = tuple(name for name in inputs if name in used)
     return Program(whole.name, needed, whole.steps, whole.results, whole.titles)
 
 

@@ -1,4 +1,4 @@
-"""Features of a frame in fractions: what every computation of them is held against.
+"""Features of a frame in fractions, the reference of every other computation.
 
 Written from the definitions (paper, 2.1), sum by sum about the exact centre of
 pressure, and not from the steps of `fuzzytree.tactile.features`.

@@ -158,7 +158,7 @@ _PASCAL = ((1,), (1, 1), (1, 2, 1), (1, 3, 3, 1), (1, 4, 6, 4, 1))
 
 @dataclass
 class Centred:
-    """Moments about the centre of pressure, from exact sums, made when asked for.
+    """Moments about the centre of pressure, from exact sums.
 
     Attributes:
         make: Where the steps go.

@@ -54,7 +54,7 @@ PAPER: tuple[str, ...] = tuple(f"S{number}" for number in range(1, 12))
 """The paper's features (2.1)."""
 
 ORIENTATION: tuple[str, ...] = ("angle", "Re C30", "Re C21")
-"""What tells orientations apart on any sensor; invariants hardly do."""
+"""Features that distinguish orientations on any sensor."""
 
 _UNSCALED = frozenset(("angle", "cos2", "sin2", "area", "x", "y"))
 _PLACE = "(0|[1-9][0-9]{0,2})"
@@ -65,7 +65,7 @@ Kind = Literal["moment", "cell", "block"]
 
 
 class Feature(Value, frozen=True):
-    """A feature as its name tells it.
+    """A feature, parsed from its name.
 
     Attributes:
         name: The whole name.
@@ -210,7 +210,7 @@ def _members(part: str) -> Iterator[str]:
     if division:
         rows, columns = map(int, division.groups())
         if not 1 <= rows * columns <= MOST_FEATURES:
-            raise TableError(f"{part!r}: 1 to {MOST_FEATURES} blocks can be asked for")
+            raise TableError(f"{part!r}: 1 to {MOST_FEATURES} blocks are possible")
         members = blocks(rows, columns)
     elif base in SETS:
         members = SETS[base]

@@ -27,7 +27,7 @@ from fuzzytree.tactile.link.markers import MarkerDecoder
 from fuzzytree.tactile.link.sentinels import SentinelDecoder
 from fuzzytree.tactile.link.starting import measured, remarks
 from fuzzytree.tactile.link.texts import TextDecoder
-from fuzzytree.tactile.link.watching import PATIENCE_S, Questions, Watch
+from fuzzytree.tactile.link.watching import PATIENCE_S, RequestTimer, Watch
 from fuzzytree.tactile.sensor import Cells, Counters, Frame
 
 if TYPE_CHECKING:
@@ -114,9 +114,9 @@ def ports() -> list[SerialPort]:
     return sorted(found, key=lambda port: port.device)
 
 
-def open_line(
+def open_connection(
     board: Board, port: str, *, wait: bool = True, most_waiting: int = MOST_WAITING
-) -> Line:
+) -> Connection:
     """Open a serial port, and begin to read its frames.
 
     Args:
@@ -136,7 +136,9 @@ def open_line(
     """
     if most_waiting < 1:
         raise ValueError(f"at least 1 frame waits, not {most_waiting}")
-    return Line(board, port, opened(board, port), wait=wait, most_waiting=most_waiting)
+    return Connection(
+        board, port, opened(board, port), wait=wait, most_waiting=most_waiting
+    )
 
 
 class Started(NamedTuple):
@@ -167,11 +169,11 @@ def start(board: Board, frames: Iterable[Frame]) -> Started:
     return Started(measured(board, cells), remarks(board, cells))
 
 
-class Line:
+class Connection:
     """The frames of a board, read in a thread of their own.
 
     Iterating waits for each frame and ends with the line. `take` waits no longer than
-    it is told. A slow reader gets the newest frames: the oldest are dropped, counted,
+    `timeout_s`. A slow reader gets the newest frames: the oldest are dropped, counted,
     and missing in the frames' numbers.
 
     Attributes:
@@ -249,7 +251,7 @@ class Line:
         return bool(self._waiting) or self._error is not None or self.state == "ended"
 
     def _run(self) -> None:
-        """Read until told to stop, through all that may happen to a port."""
+        """Read until `close`, whatever happens to the port."""
         try:
             while not self._stop.is_set():
                 try:
@@ -258,7 +260,7 @@ class Line:
                     self._shut()
                     if not self._is_back():
                         return
-        except BaseException as error:  # raised by `take`, in the thread that asks
+        except BaseException as error:  # raised by `take`
             self._error = error
         finally:
             self._shut()
@@ -271,17 +273,17 @@ class Line:
             self._serial.close()
 
     def _listen(self) -> None:
-        """Read and ask until told to stop, or until the port fails."""
-        port, questions = self._serial, Questions(self.board)
+        """Read and send requests until `close`, or until the port fails."""
+        port, questions = self._serial, RequestTimer(self.board)
         while not self._stop.is_set():
             now = time.monotonic()
             if questions.is_overdue(now):
                 self._decoder.timed_out()
             if questions.is_due(now):
                 port.write(self._decoder.ask)
-                self._decoder.asked()
-                self._watch.asked()
-                questions.asked(time.monotonic())
+                self._decoder.requested()
+                self._watch.requested()
+                questions.sent(time.monotonic())
             data = self._read()
             now = time.monotonic()
             if data:
@@ -295,7 +297,7 @@ class Line:
         """Return what has come, after a short wait if nothing has.
 
         A port that is busy is sometimes said to have bytes when it has none, which
-        pyserial takes for a port that is gone: so it is asked again before it is.
+        pyserial takes for a port that is gone: so it is read again before.
         """
         port = self._serial
         for pause in _PAUSES:
@@ -307,7 +309,7 @@ class Line:
         return bytes(port.read(1))
 
     def _pass_on(self, found: list[Cells], now: float) -> None:
-        """Give frames to whoever reads them, and what was counted."""
+        """Pass frames and counters on to the reader."""
         with self._news:
             for cells in found:
                 if len(self._waiting) == self._most_waiting:

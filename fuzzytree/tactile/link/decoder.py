@@ -72,7 +72,7 @@ class Decoder(ABC):
         self._need = 1
         return frames
 
-    def asked(self) -> None:  # noqa: B027  # most boards are never asked
+    def requested(self) -> None:  # noqa: B027  # most boards need no request
         """Note that `ask` was sent: bytes that came before are no part of the answer.
 
         Without effect for boards that speak by themselves.

@@ -57,7 +57,7 @@ class Layout(msgspec.Struct, frozen=True):
 
     @property
     def proof_bytes(self) -> int:
-        """How many bytes at the end tell a whole frame from others."""
+        """Number of bytes at the end that prove a whole frame."""
         return _CHECKSUM_BYTES[self.checksum] + len(self.tail)
 
 
@@ -134,7 +134,7 @@ def are_whole(layout: Layout, blocks: Blocks) -> Truths:
 def are_whole_at(
     layout: Layout, data: npt.NDArray[np.uint8], places: npt.NDArray[np.int64]
 ) -> Truths:
-    """Return at which places a whole frame stands, as `are_whole` would tell.
+    """Return at which places a whole frame stands, with the result of `are_whole`.
 
     The time grows with the bytes plus the places, not with their product: what a
     frame sums up to is the difference of two running totals.
@@ -254,7 +254,7 @@ class RequestDecoder(Decoder):
         self._banner = board.banner
         self._is_given = False  # the last bytes were an answer, and it is not proven
 
-    def asked(self) -> None:
+    def requested(self) -> None:
         """Note that `ask` was sent: what came before is no part of the answer."""
         if not self._banner:
             # An answer that was too long: a byte of it may have been added.

@@ -119,7 +119,7 @@ class MarkerDecoder(Decoder):
         self._drop(1)
 
     def _is_found(self, *, is_final: bool) -> bool:
-        """Bring the next beginning to the front; tell whether there is one so far."""
+        """Bring the next beginning to the front; return whether there is one so far."""
         head, many = self._layout.head, 1
         while True:
             place = self._buffer.find(head)
@@ -155,7 +155,7 @@ class MarkerDecoder(Decoder):
         return True
 
     def _is_whole_soon(self, many: int) -> bool:
-        """Bring the next whole frame to the front; tell whether one came soon.
+        """Bring the next whole frame to the front; return whether one came soon.
 
         Markers at which none stands are skipped, so many at once: they may be frequent.
         """
@@ -176,7 +176,7 @@ class MarkerDecoder(Decoder):
 
         Returns:
             Where a frame begins that is believed; -1 if none begins at the front;
-            None if more bytes are needed to tell.
+            None if more bytes are needed.
         """
         if self._is_confirmed or self._expected in (0, -self._size):
             return 0

@@ -55,7 +55,7 @@ _PATIENCE = 8  # how often each byte may be looked at,
 _TRIES_BYTES = 2**24  # beside these
 
 
-class Record(NamedTuple):
+class FrameRecord(NamedTuple):
     """A frame, and what the line had counted when it came."""
 
     frame: Frame
@@ -122,7 +122,7 @@ def layout_of(board: Board, *, counters: int = _COUNTERS) -> np.dtype[np.void]:
     )
 
 
-def packed(record: Record, board: Board) -> bytes:
+def packed(record: FrameRecord, board: Board) -> bytes:
     """Return a record as bytes.
 
     Raises:
@@ -184,7 +184,7 @@ def unpacked_board(content: bytes, name: str) -> tuple[Board, int, int]:
 
 def pieces(
     chunks: Iterable[bytes], layout: np.dtype[np.void], name: str
-) -> Iterator[Record | int]:
+) -> Iterator[FrameRecord | int]:
     """Give records, and between them how many bytes belong to none."""
     length = layout.itemsize
     window, passed, tried = b"", 0, 0
@@ -209,7 +209,7 @@ def pieces(
         yield len(window)
 
 
-def unpacked(content: bytes, layout: np.dtype[np.void]) -> Record | None:
+def unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
     """Return a record, or None if the bytes are none, or a damaged one."""
     if not content.startswith(MARK) or content[-4:] != crc(content[:-4]):
         return None
@@ -218,7 +218,7 @@ def unpacked(content: bytes, layout: np.dtype[np.void]) -> Record | None:
     number = int(fields["number"])
     if min(number, time_ns, *counters) < 0:
         return None
-    return Record(
+    return FrameRecord(
         Frame(fields["cells"], time_ns / _NS, number), Counters(*counters[:_COUNTERS])
     )
 
@@ -263,9 +263,9 @@ class Recorder:
     """Write frames to a file, so that at most the last one can be lost.
 
     Each frame goes to the system in one piece: whatever ends this program, it is in
-    the file. A thread asks the disk, without pause while there are new frames, to
-    keep what it has: if the power fails, the frames that came since the last answer
-    are lost (`most_at_risk` tells how many that ever were).
+    the file. A thread syncs the file to the disk, without pause while there are new
+    frames: if the power fails, the frames that came since the last answer
+    are lost (`most_at_risk` is the largest number so far).
 
     Args:
         path: A file that is not there yet.
@@ -325,7 +325,7 @@ class Recorder:
             TableError: If the frame is of another size, or a cell has no place.
             WriteError: If it cannot be written; all frames before it are kept.
         """
-        content = packed(Record(frame, counters), self._board)
+        content = packed(FrameRecord(frame, counters), self._board)
         self._raise_failure()
         try:
             self._put(content)
@@ -420,7 +420,7 @@ class RecordingFile:
             raise
         self.most_frames = (self._end - self._begin) // self._layout.itemsize
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[FrameRecord]:
         """Give the records that are whole, from the first on.
 
         Raises:
@@ -483,7 +483,7 @@ def read_recording(path: PathLike) -> Recording:
 
     Raises:
         ReadError: If it is no recording, or its header is damaged, or it is too large
-            to be held at once; `RecordingFile` reads it frame by frame.
+            for memory; `RecordingFile` reads it frame by frame.
     """
     with RecordingFile(path) as file:
         sensor, most = file.board.sensor, file.most_frames
@@ -492,7 +492,7 @@ def read_recording(path: PathLike) -> Recording:
         if math.prod(shape) * kind.itemsize > LARGEST_ARRAY:
             raise ReadError(
                 f"{os.fspath(path)}: its {most} frames are more than "
-                f"{LARGEST_ARRAY} bytes, too many to be held at once"
+                f"{LARGEST_ARRAY} bytes, too many for memory"
             )
         frames, count = np.empty(shape, kind), 0
         times, numbers = np.empty(most, np.float64), np.empty(most, np.int64)
@@ -519,7 +519,7 @@ def _to_disk(file: int) -> None:
 
 
 def _keep_name(path: Path) -> None:
-    """Ask the disk to keep a file's name, where a folder can be asked."""
+    """Sync the name of a file to the disk, where folders can be synced."""
     if os.name != "posix":
         return
     with contextlib.suppress(OSError):  # some file systems cannot

@@ -147,7 +147,7 @@ def _hot(board: Board, baseline: npt.NDArray[np.int64]) -> Places:
 
 
 def _has_neighbours(is_so: Places) -> bool:
-    """Tell whether two of the places lie side by side in a row or a column."""
+    """Return whether two of the places lie side by side in a row or a column."""
     in_rows = is_so[:, 1:] & is_so[:, :-1]
     in_columns = is_so[1:] & is_so[:-1]
     return bool(in_rows.any() or in_columns.any())

@@ -181,7 +181,7 @@ class TextDecoder(Decoder):
         return words
 
     def _is_attempt(self, line: bytes) -> bool:
-        """Tell whether a line that is no frame was to be one, and no title.
+        """Return whether a line that is no frame was meant as one, and not as a title.
 
         It is if it begins like one, or is mostly numbers, and half as many.
         """

@@ -13,7 +13,7 @@ from fuzzytree.tactile.link.fixed import layout_of
 from fuzzytree.tactile.link.texts import SEPARATORS
 
 
-def line_bytes(board: Board) -> int:
+def frame_bytes(board: Board) -> int:
     """Return about how many bytes a frame has on the line: text and runs vary."""
     cells = board.sensor.rows * board.sensor.columns
     match board.protocol:
@@ -27,13 +27,13 @@ def line_bytes(board: Board) -> int:
             assert_never(board.protocol)
 
 
-def seen(board: Board, content: bytes, *, asked: int = 0) -> str:
-    """Return what stands in bytes that held no frame, for the one who described it.
+def described(board: Board, content: bytes, *, requests: int = 0) -> str:
+    """Describe bytes without a frame, as a hint at what is wrong in the board's file.
 
     Args:
         board: What was expected.
         content: What came; not empty.
-        asked: How often the board was asked for a frame meanwhile.
+        requests: Number of requests that were sent meanwhile.
 
     Returns:
         A clause, in one line.
@@ -41,18 +41,18 @@ def seen(board: Board, content: bytes, *, asked: int = 0) -> str:
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor
         >>> board = Board("mat", Sensor(2, 2), Marker("AA"))
-        >>> print(seen(board, bytes.fromhex("AA 01 02 03 04 05 06") * 9))
+        >>> print(described(board, bytes.fromhex("AA 01 02 03 04 05 06") * 9))
         the marker AA came 9 times, mostly 7 bytes apart, which is 3 x 2 and not 2 x 2
     """
     match board.protocol:
         case Marker() as protocol:
-            found = _seen_markers(board, protocol, content)
+            found = _described_markers(board, protocol, content)
         case Sentinel() as protocol:
-            found = _seen_ends(board, protocol, content)
+            found = _described_ends(board, protocol, content)
         case Request() as protocol:
-            found = _seen_answers(board, protocol, content, asked)
+            found = _described_answers(board, protocol, content, requests)
         case Text() as protocol:
-            found = _seen_lines(board, protocol, content)
+            found = _described_lines(board, protocol, content)
         case _:
             assert_never(board.protocol)
     if not isinstance(board.protocol, Text) and _is_text(content):
@@ -60,7 +60,7 @@ def seen(board: Board, content: bytes, *, asked: int = 0) -> str:
     return found
 
 
-def _seen_markers(board: Board, protocol: Marker, content: bytes) -> str:
+def _described_markers(board: Board, protocol: Marker, content: bytes) -> str:
     marker = bytes.fromhex(protocol.marker)
     shown = marker.hex(" ").upper()
     places = [found.start() for found in re.finditer(re.escape(marker), content)]
@@ -75,7 +75,7 @@ def _seen_markers(board: Board, protocol: Marker, content: bytes) -> str:
     return f"{text}, mostly {apart} bytes apart{wrong or _wrong_around(protocol)}"
 
 
-def _seen_ends(board: Board, protocol: Sentinel, content: bytes) -> str:
+def _described_ends(board: Board, protocol: Sentinel, content: bytes) -> str:
     end = bytes([protocol.end])
     frames = content.split(end)[1:-1]
     text = f"the end {protocol.end} came {content.count(end)} times"
@@ -85,16 +85,18 @@ def _seen_ends(board: Board, protocol: Sentinel, content: bytes) -> str:
     return f"{text}, mostly behind {size} values{_wrong_cells(board, size)}"
 
 
-def _seen_answers(board: Board, protocol: Request, content: bytes, asked: int) -> str:
-    text = f"the board was asked {asked} times"
-    if not asked:
+def _described_answers(
+    board: Board, protocol: Request, content: bytes, requests: int
+) -> str:
+    text = f"the host sent {requests} requests"
+    if not requests:
         return text
-    size = round(len(content) / asked)
+    size = round(len(content) / requests)
     wrong = _wrong_bytes(board, size - _around(board, protocol), protocol.bits)
-    return f"{text} and gave about {size} bytes each time{wrong}"
+    return f"{text} and received about {size} bytes for each{wrong}"
 
 
-def _seen_lines(board: Board, protocol: Text, content: bytes) -> str:
+def _described_lines(board: Board, protocol: Text, content: bytes) -> str:
     lines = [line.strip() for line in content.split(b"\n")[1:-1]]
     if not _is_text(content):
         return "it is no text: is the baud rate right?"
@@ -200,7 +202,7 @@ PATIENCE_S: Final = 3.0
 
 _REST_S = 0.05  # without a byte: a late answer is over
 _SHORTEST_STALL_S = 0.25
-_KEPT_BYTES = 65536  # of those that are no frame, to tell what they look like
+_KEPT_BYTES = 65536  # of bytes without a frame, to describe them
 
 
 class Watch:
@@ -227,7 +229,7 @@ class Watch:
         self._has_frame = self._is_silent = False
         self._gap_s: float | None = None  # between frames, smoothed
         self._last_frame = self._last_byte = now
-        self._asked = 0  # since the last frame
+        self._requests = 0  # since the last frame
         self._unread = bytearray()  # since the last frame
         self._unread_since: float | None = None
 
@@ -235,15 +237,15 @@ class Watch:
     def stall_s(self) -> float:
         """How long the board may be silent now.
 
-        Boards that are USB devices keep to no baud rate: their own pace tells.
+        Boards that are USB devices keep to no baud rate: their own pace counts.
         """
         gap_s = self._frame_s if self._gap_s is None else self._gap_s
         shortest_s = _SHORTEST_STALL_S if self._has_frame else PATIENCE_S
         return max(STALL_FRAMES * gap_s, shortest_s)
 
-    def asked(self) -> None:
-        """Note that the board was asked for a frame."""
-        self._asked += 1
+    def requested(self) -> None:
+        """Note that a request was sent."""
+        self._requests += 1
 
     def came(self, data: bytes, frames: int, now: float) -> None:
         """Note bytes, and how many frames ended in them."""
@@ -263,21 +265,21 @@ class Watch:
         self._forget()
 
     def is_quiet(self, now: float) -> bool:
-        """Tell whether no byte came for as long as the board may be silent."""
+        """Return whether no byte came for as long as the board may be silent."""
         return now - self._last_byte > self.stall_s
 
     def is_silent(self, now: float) -> bool:
-        """Tell, once for each silence, that no frame came for too long."""
+        """Return True, once for each silence, if no frame came for too long."""
         if self._is_silent or now - self._last_frame <= self.stall_s:
             return False
         self._is_silent = True
         return True
 
     def contradiction(self, now: float) -> str | None:
-        """Tell, after each time of patience, what bytes came that are no frame.
+        """Describe, after each time of patience, bytes that are no frame.
 
         Returns:
-            A sentence, or None if there is nothing to tell.
+            A sentence, or None.
         """
         since = self._unread_since
         patience_s = max(PATIENCE_S, 2 * STALL_FRAMES * self._frame_s)
@@ -285,7 +287,7 @@ class Watch:
             return None
         found = None
         if now - self._last_byte < patience_s / 2:
-            what = seen(self._board, bytes(self._unread), asked=self._asked)
+            what = described(self._board, bytes(self._unread), requests=self._requests)
             text = f"for {now - since:.0f} s bytes came but no frame of"
             found = f"{text} {self._board.name!r}: {what}"
         self._forget()
@@ -293,37 +295,37 @@ class Watch:
 
     def _forget(self) -> None:
         self._unread.clear()
-        self._unread_since, self._asked = None, 0
+        self._unread_since, self._requests = None, 0
 
 
-class Questions:
-    """When to ask a board for its next frame: never, if it speaks by itself.
+class RequestTimer:
+    """When to request the next frame: never, if the board sends by itself.
 
-    A late answer must not be taken for that to the next question: after a time-out
-    the board is asked again once it is silent.
+    A late response must not be taken for that to the next request: after a time-out
+    the next request waits until the board is silent.
     """
 
     def __init__(self, board: Board) -> None:
         request = board.protocol if isinstance(board.protocol, Request) else None
         self._timeout_s = request.timeout_s if request else 0.0
         self._is_needed = request is not None
-        self._is_open = False  # asked, and neither answered nor given up
-        self._asked_at = self._due = 0.0
+        self._is_open = False  # sent, without a response or a time-out
+        self._sent_at = self._due = 0.0
 
     def is_overdue(self, now: float) -> bool:
-        """Tell, once for each question, that its answer did not come in time."""
-        if not self._is_open or now - self._asked_at <= self._timeout_s:
+        """Return True, once for each request, if its response is late."""
+        if not self._is_open or now - self._sent_at <= self._timeout_s:
             return False
         self._is_open, self._due = False, now + _REST_S
         return True
 
     def is_due(self, now: float) -> bool:
-        """Tell whether to ask now."""
+        """Return whether to send a request now."""
         return self._is_needed and not self._is_open and now >= self._due
 
-    def asked(self, now: float) -> None:
-        """Note that the board was asked."""
-        self._is_open, self._asked_at = True, now
+    def sent(self, now: float) -> None:
+        """Note that a request was sent."""
+        self._is_open, self._sent_at = True, now
 
     def came(self, frames: int, now: float) -> None:
         """Note that bytes came, and how many frames ended in them."""
@@ -341,4 +343,4 @@ def frame_time(board: Board) -> float:
         >>> round(frame_time(Board("mat", Sensor(16, 16), Marker("AA 55"))), 4)
         0.0224
     """
-    return line_bytes(board) * board.port.bits_of_a_byte / board.port.baud
+    return frame_bytes(board) * board.port.bits_of_a_byte / board.port.baud

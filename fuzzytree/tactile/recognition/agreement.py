@@ -29,8 +29,8 @@ from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
     NUMPY,
     PLAIN,
-    Found,
     Runner,
+    RunnerResult,
     as_sent,
     runners,
 )
@@ -151,8 +151,8 @@ ALLOWED = 1e-12
 """The largest error of a feature as a share of its scale: some thousand roundings, and
 what the series of angles and logarithms leave out (`docs/explanation/moments.md`)."""
 
-_PLAIN_CELLS, _EXACT_CELLS = 512_000, 51_200  # of frames that are asked slowly
-_FEWEST, _TOLD = 10, 3
+_PLAIN_CELLS, _EXACT_CELLS = 512_000, 51_200  # of frames for the slow ones
+_FEWEST, _SHOWN = 10, 3
 
 
 class FrameCounts(msgspec.Struct, frozen=True):
@@ -234,10 +234,10 @@ def frames_export(
     )
 
 
-def check_frames_carriers(
+def check_frames_agree(
     model: Model, sensor: Sensor, frames: Cells | None = None, *, reject: float = 0.0
 ) -> FramesAgreement:
-    """Hold every way from frame to class against plain Python, and that against exact.
+    """Compare every implementation with plain Python, and that with exact arithmetic.
 
     Args:
         model: A tree or a rule base whose inputs are names of features.
@@ -246,10 +246,10 @@ def check_frames_carriers(
         reject: Of raw rules: what is weaker in the rule that decides is unknown.
 
     Returns:
-        What was compared and counted; `ok` tells whether all agree.
+        What was compared and counted.
 
     Raises:
-        TableError: If the model asks for other features, or frames do not fit.
+        TableError: If an input of the model is no feature, or frames do not fit.
         InvalidModelError: If a feature is beyond the sensor.
         ValueError: If the model has no strengths to reject by.
 
@@ -257,7 +257,7 @@ def check_frames_carriers(
         >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
         >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
-        >>> check_frames_carriers(tree, Sensor(4, 4)).ok
+        >>> check_frames_agree(tree, Sensor(4, 4)).ok
         True
     """
     check_inputs(model)
@@ -311,7 +311,7 @@ def _shown(
 
 
 def _compared(
-    name: str, one: Found, other_name: str, other: Found, model: Model
+    name: str, one: RunnerResult, other_name: str, other: RunnerResult, model: Model
 ) -> Comparison:
     """Hold the answers to some frames against others: bits, states, classes, rules."""
     count = min(one.features.shape[1], other.features.shape[1])
@@ -325,7 +325,7 @@ def _compared(
     if one.rules is not None and other.rules is not None:
         wrong = wrong | (one.rules[:count] != other.rules[:count])
     apart = np.abs(one.features[:, :count] - other.features[:, :count])
-    told = np.flatnonzero(wrong)[:_TOLD].tolist()
+    shown = np.flatnonzero(wrong)[:_SHOWN].tolist()
     return Comparison(
         name,
         other_name,
@@ -335,11 +335,13 @@ def _compared(
         differing=int(wrong.sum()),
         largest_difference=float(apart.max(initial=0.0)),
         flips=int(flips.sum()),
-        detail=tuple(_told(frame, one, other, model) for frame in told),
+        detail=tuple(_difference_text(frame, one, other, model) for frame in shown),
     )
 
 
-def _told(frame: int, one: Found, other: Found, model: Model) -> str:
+def _difference_text(
+    frame: int, one: RunnerResult, other: RunnerResult, model: Model
+) -> str:
     ends = (found.features[:, frame].tolist() for found in (one, other))
     every = zip(model.inputs, *ends, strict=True)
     shown = [(name, repr(a), repr(b)) for name, a, b in every]  # -0.0 is not 0.0
@@ -350,12 +352,12 @@ def _told(frame: int, one: Found, other: Found, model: Model) -> str:
     return f"frame {frame}: {'; '.join(texts) or 'another rule'}"
 
 
-def _label(found: Found, frame: int, model: Model) -> str:
+def _label(found: RunnerResult, frame: int, model: Model) -> str:
     code = int(found.codes[frame])
     return model.classes[code] if code >= 0 else State(found.states[frame]).name.lower()
 
 
-def _singly(way: Runner, frames: Cells, found: Found) -> Comparison:
+def _singly(way: Runner, frames: Cells, found: RunnerResult) -> Comparison:
     """Ask with no frame, one at a time, some, another memory order, a wrong width."""
     wrong: list[str] = []
     step = max(len(frames) // 8, 1)
@@ -385,7 +387,7 @@ def _singly(way: Runner, frames: Cells, found: Found) -> Comparison:
     )
 
 
-def _is_same(one: Found, all_of: Found, part: slice) -> bool:
+def _is_same(one: RunnerResult, all_of: RunnerResult, part: slice) -> bool:
     return (
         np.array_equal(one.features, all_of.features[:, part])
         and np.array_equal(one.codes, all_of.codes[part])
@@ -394,7 +396,7 @@ def _is_same(one: Found, all_of: Found, part: slice) -> bool:
 
 
 def _against_exact(
-    model: Model, sensor: Sensor, frames: Cells, plain: Found, reject: float
+    model: Model, sensor: Sensor, frames: Cells, plain: RunnerResult, reject: float
 ) -> Comparison:
     """Hold plain Python's features against fractions, and its classes against theirs.
 
@@ -432,5 +434,5 @@ def _against_exact(
         allowed=ALLOWED,
         origin="a share of each feature's scale",
         flips=flips,
-        detail=tuple(detail[:_TOLD]),
+        detail=tuple(detail[:_SHOWN]),
     )

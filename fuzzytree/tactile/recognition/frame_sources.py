@@ -11,8 +11,8 @@ import numpy as np
 from fuzzytree.errors import PortError
 from fuzzytree.files import PathLike
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link import Line
-from fuzzytree.tactile.link.recording import Record, RecordingFile
+from fuzzytree.tactile.link import Connection
+from fuzzytree.tactile.link.recording import FrameRecord, RecordingFile
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import FULL, PAPER, SIDE, press
@@ -40,15 +40,15 @@ class Paced:
 
     Example:
         >>> frame = Frame(np.zeros((2, 2), np.uint8), 0.01, 0)
-        >>> source = Paced([Record(frame, Counters(frames=1))])
+        >>> source = Paced([FrameRecord(frame, Counters(frames=1))])
         >>> [seen.number for seen in source], source.counters.frames
         ([0], 1)
     """
 
-    def __init__(self, records: Iterable[Record], speed: float = 1.0) -> None:
+    def __init__(self, records: Iterable[FrameRecord], speed: float = 1.0) -> None:
         if not speed >= 0.0:
             raise ValueError(f"a speed is 0 or more, not {speed!r}")
-        self._records: Iterable[Record] = records
+        self._records: Iterable[FrameRecord] = records
         self._speed = speed
         self._is_closed = threading.Event()
         self._last = 0.0, time.monotonic()  # a frame's time, and when it went out
@@ -116,14 +116,14 @@ class Replayed(Paced):
         self._file.close()
 
 
-class FromLine:
+class FromPort:
     """Gives the frames of a line out as they come.
 
     Args:
         line: An open line; it is closed with this.
     """
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: Connection) -> None:
         self._line = line
         self._contradiction = ""
 
@@ -176,7 +176,7 @@ class FromLine:
 
 def simulated(
     seed: int = 0, *, names: Sequence[str] = tuple(OBJECTS)
-) -> Iterator[Record]:
+) -> Iterator[FrameRecord]:
     """Give frames without end: the paper's objects, pressed one after another.
 
     Between two of them the sensor is empty for half a second.
@@ -205,4 +205,4 @@ def simulated(
                 whole = np.rint(noisy).clip(0, 255).astype(np.uint8)
                 frame = Frame(whole, number / FRAMES_A_SECOND, number)
                 number += 1
-                yield Record(frame, Counters(frames=number))
+                yield FrameRecord(frame, Counters(frames=number))

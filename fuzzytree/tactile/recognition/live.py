@@ -28,12 +28,12 @@ SENTENCES = {
 }
 """What a display says of each state."""
 
-_KEPT = 1024  # latencies of which the median and the 99 % are told
-_RATED = 64  # frames of which the rate is told
-_TOLD_S = 3.0  # how long a sentence about a frame that is past stays
+_KEPT = 1024  # latencies of the median and the 99 %
+_RATED = 64  # frames of the rate
+_SHOWN_S = 3.0  # how long a sentence about a frame that is past stays
 
 
-class Source(Protocol):
+class FrameSource(Protocol):
     """Where frames come from: a line, a recording or the simulator."""
 
     @property
@@ -55,17 +55,17 @@ class Source(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of what is held; a frame that is waited for comes no more."""
+        """Release the source; a reader that waits gets no frame any more."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class LiveResult:
     """What one frame shows.
 
     Attributes:
         frame: The frame.
-        state: What it shows; None if it could not be asked.
+        state: What it shows; None if the frame does not fit.
         code: The place of the class among the classes; -1 if it shows no object.
         label: The class; empty if it shows no object.
         strengths: Of the classes, in [0, 1].
@@ -107,7 +107,7 @@ class Latency:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class LiveView:
     """All that a display shows at one moment.
 
     Attributes:
@@ -120,7 +120,7 @@ class View:
         rate: Frames a second, lately; 0 before the second.
         latency: None before the first answer.
         counters: Of the source, by name.
-        refused: Frames that could not be asked.
+        refused: Frames that do not fit.
         trouble: A sentence about the last thing that went wrong; empty if nothing did.
         silent_s: Seconds since the last frame, or since the beginning.
         is_over: Whether no frame will come any more.
@@ -131,7 +131,7 @@ class View:
     classes: tuple[str, ...]
     full: int
     cells: Cells | None
-    answer: Answer | None
+    answer: LiveResult | None
     rate: float
     latency: Latency | None
     counters: dict[str, int]
@@ -142,22 +142,22 @@ class View:
 
 
 class Live:
-    """Answers the frames of a source, and tells any number of displays of it.
+    """Recognises the frames of a source, and updates any number of displays.
 
     `answers` gives one for each frame as soon as there is one. Displays live in
     threads of their own: they `wait` for news and take a `view` when they have time,
     so that a slow one misses frames and never holds up an answer.
 
     Args:
-        recogniser: What is asked.
+        recogniser: The model and its sensor.
         source: Where frames come from.
         name: Of the source, for people.
     """
 
-    def __init__(self, recogniser: Recogniser, source: Source, name: str) -> None:
+    def __init__(self, recogniser: Recogniser, source: FrameSource, name: str) -> None:
         self.recogniser, self.source, self.name = recogniser, source, name
         self._news = threading.Condition()
-        self._answer: Answer | None = None
+        self._answer: LiveResult | None = None
         self._number = 0
         self._refused = 0
         self._is_over = False
@@ -166,9 +166,9 @@ class Live:
         self._times = np.zeros(_RATED)
         self._largest = 0.0
         self._counted = _failures(source.counters)
-        self._past: tuple[str, float] = "", -_TOLD_S
+        self._past: tuple[str, float] = "", -_SHOWN_S
 
-    def answers(self, most: int | None = None) -> Iterator[Answer]:
+    def answers(self, most: int | None = None) -> Iterator[LiveResult]:
         """Give an answer for each frame, until the source has no more.
 
         Args:
@@ -184,26 +184,26 @@ class Live:
                 self._is_over = True
                 self._news.notify_all()
 
-    def wait(self, seen: int, seconds: float) -> int:
-        """Wait for an answer that was not seen, or for the end.
+    def wait(self, known: int, seconds: float) -> int:
+        """Wait for a new result, or for the end.
 
         Args:
-            seen: What the last call returned; 0 at first.
+            known: The result of the last call; 0 at first.
             seconds: The longest to wait.
 
         Returns:
             How many answers there were.
         """
         with self._news:
-            self._news.wait_for(lambda: self._number > seen or self._is_over, seconds)
+            self._news.wait_for(lambda: self._number > known or self._is_over, seconds)
             return self._number
 
-    def view(self) -> View:
+    def view(self) -> LiveView:
         """Return what there is to see now."""
         model, sensor = self.recogniser.model, self.recogniser.sensor
         now, answer = self.source.now(), self._answer
         is_asked = answer is not None and answer.state is not None
-        return View(
+        return LiveView(
             self.name,
             model.name,
             model.classes,
@@ -219,20 +219,20 @@ class Live:
             self._is_over,
         )
 
-    def _answered(self, frame: Frame) -> Answer:
+    def _answered(self, frame: Frame) -> LiveResult:
         try:
             found = self.recogniser(frame.cells)
         except TableError as error:  # of another size: the next one may fit
             self._refused += 1
             late = self.source.now() - frame.time
-            return Answer(frame, None, -1, "", (), 0, late, str(error))
+            return LiveResult(frame, None, -1, "", (), 0, late, str(error))
         code = int(found.codes[0])
         state, saturated = State(int(found.states[0])), int(found.saturated[0])
         trouble = ""
         if saturated:
             cells = "1 cell takes" if saturated == 1 else f"{saturated} cells take"
             trouble = f"{cells} no more: the frame is saturated"
-        return Answer(
+        return LiveResult(
             frame,
             state,
             code,
@@ -243,8 +243,8 @@ class Live:
             trouble,
         )
 
-    def _show(self, answer: Answer) -> None:
-        """Keep an answer for the displays, and tell them."""
+    def _show(self, answer: LiveResult) -> None:
+        """Keep a result for the displays, and notify them."""
         latency, time = answer.latency_s, answer.frame.time
         self._latencies[self._number % _KEPT] = latency
         self._times[self._number % _RATED] = time
@@ -273,7 +273,7 @@ class Live:
     def _trouble(self, now: float) -> str:
         past, time = self._past
         sentences = [self.source.trouble, self._answer.trouble if self._answer else ""]
-        sentences.append(past if now - time < _TOLD_S else "")
+        sentences.append(past if now - time < _SHOWN_S else "")
         return "; ".join(filter(None, sentences))
 
 
@@ -297,7 +297,7 @@ def _counted(count: int) -> str:
 
 
 class Hold:
-    """Tells when something has changed and stays.
+    """Detects a change that lasts for some frames.
 
     Args:
         frames: For how many frames it must stay, from 1.
@@ -307,7 +307,7 @@ class Hold:
 
     Example:
         >>> is_new = Hold(2)
-        >>> [is_new(seen) for seen in "aabaabbb"]
+        >>> [is_new(value) for value in "aabaabbb"]
         [False, True, False, False, False, False, True, False]
     """
 
@@ -315,15 +315,15 @@ class Hold:
         if frames < 1:
             raise ValueError(f"something holds for 1 frame or more, not {frames}")
         self._frames = frames
-        self._seen: object = None
+        self._value: object = None
         self._count = 0
-        self._told: object = None
+        self._last: object = None
 
-    def __call__(self, seen: object) -> bool:
-        """Return whether what is seen is new and has just held for long enough."""
-        self._count = self._count + 1 if seen == self._seen else 1
-        self._seen = seen
-        if self._count < self._frames or seen == self._told:
+    def __call__(self, value: object) -> bool:
+        """Return whether a value is new and has just lasted long enough."""
+        self._count = self._count + 1 if value == self._value else 1
+        self._value = value
+        if self._count < self._frames or value == self._last:
             return False
-        self._told = seen
+        self._last = value
         return True

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from fuzzytree.exporters.onnx_session import Bare
 
 
-_TOLD = 3
-_MOST_CELLS = 2**22  # of frames that are asked in plain Python, about a minute
+_SHOWN = 3
+_MOST_CELLS = 2**22  # of frames for plain Python, about a minute
 
 
 class FramesFile(msgspec.Struct, frozen=True, kw_only=True):
@@ -74,7 +74,7 @@ def frames_file(content: bytes, name: str) -> FramesFile:
     if texts.get("carrier") != "frames":
         raise ReadError(
             f"{name}: the file takes rows, and not frames of a sensor; "
-            "`fuzzytree check` asks it"
+            "`fuzzytree check` checks it"
         )
     records = {"sensor", "features", "classes", "outputs", "reject"}
     try:
@@ -93,7 +93,7 @@ def frames_file(content: bytes, name: str) -> FramesFile:
     return found
 
 
-def check_shipped(
+def check_onnx_files(
     model: Model,
     files: Mapping[str, bytes],
     frames: Cells | None = None,
@@ -102,7 +102,7 @@ def check_shipped(
     reject: float = 0.0,
     rows_only: bool = False,
 ) -> Agreement:
-    """Hold ONNX files of frames against a model, by what they say and by their answers.
+    """Compare ONNX files of frames with a model: metadata, graph and predictions.
 
     Args:
         model: A tree or a rule base whose inputs are names of features.
@@ -114,7 +114,7 @@ def check_shipped(
 
     Raises:
         ReadError: If a file is no graph of frames, or does not run.
-        TableError: If the model asks for other features, or frames do not fit.
+        TableError: If an input of the model is no feature, or frames do not fit.
         MissingExtraError: If onnx or onnxruntime is not installed.
 
     Example:
@@ -122,7 +122,7 @@ def check_shipped(
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
         >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
         >>> content = write_frames(tree, Sensor(4, 4)).content
-        >>> check_shipped(tree, {"tree.onnx": content}).ok
+        >>> check_onnx_files(tree, {"tree.onnx": content}).ok
         True
     """
     check_inputs(model)
@@ -143,13 +143,13 @@ def check_shipped(
         aimed = proving_frames(made, model)
         every = [aimed] if frames is None else [aimed, as_sent(known.sensor, frames)]
         rows = np.concatenate(every)
-        asked = rows[: _MOST_CELLS // aimed[0].size]
-        if len(asked) < len(rows):
-            skipped.append(f"{name}: {len(rows) - len(asked)} frames, to save time")
+        some = rows[: _MOST_CELLS // aimed[0].size]
+        if len(some) < len(rows):
+            skipped.append(f"{name}: {len(rows) - len(some)} frames, to save time")
         probes += len(aimed)
         stated = _misstated(known, sensor, reject)
         graph, metadata = _differences(model, known, content)
-        answers = _answers(model, known, loaded(content, name), asked, name)
+        answers = _answers(model, known, loaded(content, name), some, name)
         comparisons += [
             counted("file", name, "the model's metadata", 1, (*metadata, *stated)),
             judged(name, "a freshly written graph", graph, [answers]),
@@ -182,9 +182,9 @@ def _sensor_text(sensor: Sensor) -> str:
 
 
 def _strangers(known: FramesFile, name: str) -> Comparison:
-    asked, classes = ", ".join(known.features), ", ".join(known.classes)
-    told = f"it asks for {asked}, and knows {classes}"
-    return counted("file", name, "the model's features and classes", 1, (told,))
+    features, classes = ", ".join(known.features), ", ".join(known.classes)
+    text = f"it uses {features}, and has the classes {classes}"
+    return counted("file", name, "the model's features and classes", 1, (text,))
 
 
 def _differences(model: Model, known: FramesFile, content: bytes) -> Differences:
@@ -215,7 +215,7 @@ def _differences(model: Model, known: FramesFile, content: bytes) -> Differences
 def _answers(
     model: Model, known: FramesFile, bare: Bare, frames: Cells, name: str
 ) -> Comparison:
-    """Hold the answers to some frames against those of plain Python, bit by bit."""
+    """Compare the predictions of some frames with plain Python, bit by bit."""
     from fuzzytree.tactile.exporters.onnx_frames_proof import apart
 
     found = _run(bare, known, frames, name)
@@ -223,7 +223,7 @@ def _answers(
     wrong: dict[int, list[tuple[Output, str]]] = {}
     for number, output, text in apart(found, made, model, frames, known.reject):
         wrong.setdefault(number, []).append((output, text))
-    firsts = [(number, *found[0]) for number, found in wrong.items()][:_TOLD]
+    firsts = [(number, *found[0]) for number, found in wrong.items()][:_SHOWN]
     return Comparison(
         name,
         PLAIN,

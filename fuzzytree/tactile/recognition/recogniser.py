@@ -41,7 +41,7 @@ class Recognition:
         strengths: Shape (classes, frames), in [0, 1]: the strongest rule of each
             class; 0 where nothing presses.
         saturated: Shape (frames,): how many cells take no more.
-        features: What the model was asked with.
+        features: The features of the frames.
     """
 
     classes: tuple[str, ...]
@@ -160,7 +160,7 @@ def usual_floor(model: Model) -> float:
 
 
 def strength_rules(model: Model) -> RuleBase:
-    """Return the rules whose strengths tell how sure a model is."""
+    """Return the rules whose firing strengths measure the certainty of a model."""
     if isinstance(model, RuleBase):
         return model
     has_sets = bool(model.sets) or not model.nodes
@@ -168,7 +168,7 @@ def strength_rules(model: Model) -> RuleBase:
 
 
 def check_inputs(model: Model) -> None:
-    """Refuse a model that asks for other things than features of a frame.
+    """Refuse a model with inputs that are no features of a frame.
 
     Raises:
         TableError: If one of its inputs is no feature; it names the model.
@@ -177,6 +177,4 @@ def check_inputs(model: Model) -> None:
         try:
             feature_of(name)
         except TableError as error:
-            raise TableError(
-                f"{model.name} asks for other features: {error}"
-            ) from error
+            raise TableError(f"{model.name} uses other features: {error}") from error

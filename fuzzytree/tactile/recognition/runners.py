@@ -36,15 +36,15 @@ _ANSWERS: tuple[Output, ...] = ("label", "state", "rule")
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class RunnerResult:
     """The answers of a runner to some frames.
 
     Attributes:
         features: Shape (features, frames).
         codes: Shape (frames,): the place of the class, -1 for none.
         states: Shape (frames,): a `fuzzytree.tactile.features.plain.State` each.
-        rules: Shape (frames,): the rule or leaf that decides; None where it is not
-            told.
+        rules: Shape (frames,): the rule or leaf that decides; None if not
+            computed.
     """
 
     features: FloatArray
@@ -66,7 +66,7 @@ class Runner:
     """
 
     name: str
-    answer: Callable[[Cells], Found]
+    answer: Callable[[Cells], RunnerResult]
     call: Callable[[Cells], object]
     bytes: int = 0
 
@@ -115,7 +115,7 @@ def runners(
 
 
 def _looked_at(one: Runner, sensor: Sensor) -> Runner:
-    def answer(frames: Cells) -> Found:
+    def answer(frames: Cells) -> RunnerResult:
         return one.answer(as_sent(sensor, frames))
 
     return replace(one, answer=answer)
@@ -124,9 +124,9 @@ def _looked_at(one: Runner, sensor: Sensor) -> Runner:
 def _numpy(model: Model, sensor: Sensor, reject: float) -> Runner:
     recogniser = Recogniser(model, sensor, reject)
 
-    def answer(frames: Cells) -> Found:
+    def answer(frames: Cells) -> RunnerResult:
         found = recogniser(frames)
-        return Found(found.features.values, found.codes, found.states, None)
+        return RunnerResult(found.features.values, found.codes, found.states, None)
 
     decide = load(model)
 
@@ -147,10 +147,10 @@ def _plain(model: Model, sensor: Sensor, reject: float) -> Runner:
             shown.append(one)
         return shown
 
-    def answer(frames: Cells) -> Found:
+    def answer(frames: Cells) -> RunnerResult:
         shown = call(frames)
         values = np.array([one.features for one in shown], np.float64)
-        return Found(
+        return RunnerResult(
             values.reshape(len(shown), len(model.inputs)).T,
             np.array([one.code for one in shown], np.int64),
             np.array([one.state for one in shown], np.int64),
@@ -175,7 +175,7 @@ def _onnx(model: Model, sensor: Sensor, reject: float) -> Runner:
         for start in range(0, len(frames), step):
             yield [*bare(names, {"frames": frames[start : start + step]})]
 
-    def answer(frames: Cells) -> Found:
+    def answer(frames: Cells) -> RunnerResult:
         found = [*pieces([*every], frames)]
         if not found:
             found = [[*bare([*every], {"frames": frames})]]
@@ -184,7 +184,7 @@ def _onnx(model: Model, sensor: Sensor, reject: float) -> Runner:
             for line in range(4)
         )
         numbers = np.array([codes[text] for text in label.tolist()], np.int64)
-        return Found(np.ascontiguousarray(features.T), numbers, state, rule)
+        return RunnerResult(np.ascontiguousarray(features.T), numbers, state, rule)
 
     def call(frames: Cells) -> None:
         for _ in pieces([*_ANSWERS], frames):
@@ -224,10 +224,10 @@ def _c(model: Model, sensor: Sensor, reject: float) -> Runner:
         run(_at(frames), len(frames), start, *ends)
         return found
 
-    def answer(frames: Cells) -> Found:
+    def answer(frames: Cells) -> RunnerResult:
         features = np.empty((len(frames), len(model.inputs)))
         codes, states, rules = numbers(frames, features)
-        return Found(np.ascontiguousarray(features.T), codes, states, rules)
+        return RunnerResult(np.ascontiguousarray(features.T), codes, states, rules)
 
     return Runner(C, answer, lambda frames: numbers(frames, None), len(content))
 

@@ -13,7 +13,7 @@ def check_lines(found: FramesAgreement, *, is_full: bool = False) -> Iterator[st
 
     Args:
         found: The check.
-        is_full: Whether to tell also what did not fail.
+        is_full: Whether to print the comparisons that agree, too.
     """
     yield from agreement_lines(found, is_full=is_full)
     shown = found.shown

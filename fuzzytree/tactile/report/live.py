@@ -11,7 +11,7 @@ from rich.cells import cell_len, set_cell_size
 
 from fuzzytree.model.naming import printable
 from fuzzytree.tactile.interpolation import interpolated
-from fuzzytree.tactile.recognition.live import SENTENCES, STATES, Answer, View
+from fuzzytree.tactile.recognition.live import SENTENCES, STATES, LiveResult, LiveView
 from fuzzytree.tactile.recognition.recogniser import State
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _coarse(cells: Cells, step: int) -> Cells:
 
 
 def _halves(upper: Sequence[int], lower: Sequence[int], codes: Sequence[str]) -> str:
-    """Return two rows of points as one line, its colours told where they change."""
+    """Return two rows of points as one line of half blocks."""
     parts: list[str] = []
     before = ("", "")
     for up, down in zip(upper, lower, strict=True):
@@ -162,7 +162,7 @@ def visible(text: str) -> str:
     return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 
-def headline(view: View) -> str:
+def headline(view: LiveView) -> str:
     """Return what is recognised in a few words: a class, or why there is none."""
     answer = view.answer
     if answer is None:
@@ -174,7 +174,7 @@ def headline(view: View) -> str:
     return SENTENCES[answer.state]
 
 
-def status(view: View) -> str:
+def status(view: LiveView) -> str:
     """Return a sentence about what is wrong now; empty if nothing is."""
     if view.is_over:
         return "the source is gone: no more frames"
@@ -184,7 +184,7 @@ def status(view: View) -> str:
     return visible("; ".join(parts))
 
 
-def counts(view: View) -> str:
+def counts(view: LiveView) -> str:
     """Return the counters that a display shows, those of failures only above 0."""
     known = {**view.counters, "refused": view.refused}
     parts = [f"{known.pop('frames')} frames"]
@@ -192,7 +192,7 @@ def counts(view: View) -> str:
     return ", ".join(part.replace(" bytes", " B") for part in parts)
 
 
-def timing(view: View) -> str:
+def timing(view: LiveView) -> str:
     """Return the rate, and how long answers took from a frame's last byte."""
     found = view.latency
     if found is None:
@@ -203,7 +203,7 @@ def timing(view: View) -> str:
     return f"{view.rate:.1f} frames/s; answer after {spread}"
 
 
-def screen(view: View, columns: int, lines: int, *, look: Look, times: int) -> str:
+def screen(view: LiveView, columns: int, lines: int, *, look: Look, times: int) -> str:
     """Return a whole screen: at most `lines` lines of at most `columns` signs.
 
     Args:
@@ -246,7 +246,7 @@ def _side_by_side(drawn: Sequence[str], facts: Sequence[str]) -> list[str]:
     return [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
 
 
-def _facts(view: View, lines: int, *, look: Look) -> list[str]:
+def _facts(view: LiveView, lines: int, *, look: Look) -> list[str]:
     """Return the answer and the strengths of the classes."""
     bold, end = ("", "") if look == "plain" else (_BOLD, _END)
     found = [f"{bold}{_cut(headline(view), _SIDE - 2)}{end}", ""]
@@ -266,11 +266,11 @@ def _facts(view: View, lines: int, *, look: Look) -> list[str]:
     return found
 
 
-def _name_width(view: View) -> int:
+def _name_width(view: LiveView) -> int:
     return min(max(cell_len(visible(name)) for name in view.classes), _NAME)
 
 
-def _strongest(answer: Answer, count: int) -> list[int]:
+def _strongest(answer: LiveResult, count: int) -> list[int]:
     """Return the places of the strongest classes, in the order of the classes."""
     order = sorted(
         range(len(answer.strengths)), key=lambda place: -answer.strengths[place]
@@ -295,7 +295,7 @@ LINE_FIELDS = ("time", "frame", "state", "class", "strength", "saturated")
 """The fields of a line, in order."""
 
 
-def line_facts(answer: Answer) -> dict[str, object]:
+def line_facts(answer: LiveResult) -> dict[str, object]:
     """Return a recognised object as facts for other programs."""
     state = "unknown" if answer.state is None else STATES[answer.state]
     return {
@@ -308,7 +308,7 @@ def line_facts(answer: Answer) -> dict[str, object]:
     }
 
 
-def line(answer: Answer) -> str:
+def line(answer: LiveResult) -> str:
     r"""Return a recognised object as a line of fields with tabs between them.
 
     A backslash, tab or end of line within a class's name is written as `\\`, `\t`,

@@ -19,7 +19,7 @@ import msgspec
 
 from fuzzytree.errors import PortError
 from fuzzytree.files import reason
-from fuzzytree.tactile.recognition.live import SENTENCES, STATES, Live, View
+from fuzzytree.tactile.recognition.live import SENTENCES, STATES, Live, LiveView
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.report.live import PALETTE, headline, shades, status
 
@@ -33,9 +33,9 @@ MOST_BROWSERS = 8
 """How many connections are served at a time; others are turned away."""
 
 _REFRESHES = 30  # a second, at most
-_PATIENCE_S = 10.0  # for a browser that neither reads nor asks
+_PATIENCE_S = 10.0  # for an idle browser
 _ALIVE_S = 0.5  # between two events where no frames come
-_RETRY_MS = 1000  # after which a browser that lost the connection asks again
+_RETRY_MS = 1000  # before a browser reconnects
 _BACKLOG = 1 << 16  # bytes that wait for a slow browser: newer frames replace older
 _MOST_POINTS = 1 << 16  # of a picture
 
@@ -49,7 +49,7 @@ _HEADERS = {
 }
 
 
-class Page:
+class LivePage:
     """Serves the page of what is recognised, in threads, until it is closed.
 
     It listens on 127.0.0.1, answers only what names that host (a page of another name
@@ -80,7 +80,7 @@ class Page:
         )
         self._thread.start()
 
-    def __enter__(self) -> Page:
+    def __enter__(self) -> LivePage:
         """Return itself."""
         return self
 
@@ -179,14 +179,14 @@ class _Handler(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
         elif self.headers.get("Host", "").lower() not in self.own.hosts:
             self._refuse(HTTPStatus.MISDIRECTED_REQUEST, "this is another host")
-        elif not self._is_asked_by_own_page():
+        elif not self._is_of_own_page():
             self._refuse(HTTPStatus.FORBIDDEN, "only this page is answered")
         else:
             return True
         return False
 
-    def _is_asked_by_own_page(self) -> bool:
-        """Whether no page of another place asks: it could keep connections busy."""
+    def _is_of_own_page(self) -> bool:
+        """Return whether the request does not come from the page of another site."""
         origin = self.headers.get("Origin", "").lower()
         return not origin or origin.removeprefix("http://") in self.own.hosts
 
@@ -256,8 +256,8 @@ def _policy(page: str) -> str:
     )
 
 
-def hello_facts(view: View) -> dict[str, object]:
-    """Return what a page is told once: names, classes and the colours."""
+def hello_facts(view: LiveView) -> dict[str, object]:
+    """Return the constant facts of the page: names, classes and colours."""
     return {
         "source": view.source,
         "model": view.model,
@@ -267,7 +267,7 @@ def hello_facts(view: View) -> dict[str, object]:
     }
 
 
-def view_facts(view: View, times: int, *, is_over: bool) -> dict[str, object]:
+def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object]:
     """Return what a page shows at one moment.
 
     Args:
@@ -301,7 +301,7 @@ def _fitting(cells: int, times: int) -> int:
     return times
 
 
-def _sentence(view: View) -> str:
+def _sentence(view: LiveView) -> str:
     answer = view.answer
     if answer is None or answer.state is None:
         return ""
@@ -310,7 +310,7 @@ def _sentence(view: View) -> str:
     return "the sensor is free" if answer.state is State.NOTHING else "rejected"
 
 
-def _numbers(view: View) -> list[tuple[str, str]]:
+def _numbers(view: LiveView) -> list[tuple[str, str]]:
     """Return the rate, the latency and the counters, as names and texts."""
     rows = [("frames a second", f"{view.rate:.1f}")]
     found = view.latency

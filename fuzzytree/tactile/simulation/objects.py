@@ -21,7 +21,7 @@ _SIDES = 32  # of the polygon that stands for a disc
 _TINY = 1e-300  # instead of a height of 0, which nothing is divided by
 
 
-class Part(Value, frozen=True):
+class ShapePart(Value, frozen=True):
     """A polygon that presses evenly.
 
     Attributes:
@@ -44,12 +44,12 @@ class Object(Value, frozen=True):
     """
 
     name: str
-    parts: tuple[Part, ...]
+    parts: tuple[ShapePart, ...]
     force_n: float
     turned_deg: float = 0.0
 
 
-def rectangle(width: float, height: float) -> Part:
+def rectangle(width: float, height: float) -> ShapePart:
     """Return a rectangle about the origin.
 
     Example:
@@ -57,10 +57,10 @@ def rectangle(width: float, height: float) -> Part:
         ((-2.0, -1.0), (2.0, -1.0), (2.0, 1.0), (-2.0, 1.0))
     """
     x, y = width / 2, height / 2
-    return Part(((-x, -y), (x, -y), (x, y), (-x, y)))
+    return ShapePart(((-x, -y), (x, -y), (x, y), (-x, y)))
 
 
-def disc(radius: float) -> Part:
+def disc(radius: float) -> ShapePart:
     """Return a regular polygon of 32 corners about the origin, of a disc's area.
 
     Its mean square distance from the middle is 0.01 per cent above the disc's.
@@ -68,12 +68,12 @@ def disc(radius: float) -> Part:
     step = 2 * math.pi / _SIDES
     outer = radius * math.sqrt(step / math.sin(step))
     angles = [step * (side + 0.5) for side in range(_SIDES)]
-    return Part(tuple((outer * math.cos(a), outer * math.sin(a)) for a in angles))
+    return ShapePart(tuple((outer * math.cos(a), outer * math.sin(a)) for a in angles))
 
 
 def finger(
     start: tuple[float, float], angle_deg: float, length: float, width: float
-) -> Part:
+) -> ShapePart:
     """Return a bar that ends in half a round, as a finger does.
 
     Args:
@@ -90,7 +90,7 @@ def finger(
         (length - radius + radius * math.cos(t), radius * math.sin(t)) for t in turns
     ]
     outline += [(0.0, radius)]
-    return Part(
+    return ShapePart(
         tuple(
             (start[0] + u * along - v * across, start[1] + u * across + v * along)
             for u, v in outline
@@ -98,7 +98,7 @@ def finger(
     )
 
 
-def area_and_middle(part: Part) -> tuple[float, float, float]:
+def area_and_middle(part: ShapePart) -> tuple[float, float, float]:
     """Return a polygon's area and the x and y of its middle."""
     corners = np.array(part.corners)
     after = np.roll(corners, -1, axis=0)
@@ -147,13 +147,13 @@ def covered(corners: FloatArray, xs: FloatArray, ys: FloatArray) -> FloatArray:
     return areas
 
 
-def _centred(parts: list[Part]) -> tuple[Part, ...]:
+def _centred(parts: list[ShapePart]) -> tuple[ShapePart, ...]:
     """Move parts so that the centre of their pressure is the origin."""
     weights = [part.weight * area_and_middle(part)[0] for part in parts]
     middles = [area_and_middle(part)[1:] for part in parts]
     x, y = np.average(np.array(middles), axis=0, weights=weights).tolist()
     return tuple(
-        Part(tuple((a - x, b - y) for a, b in part.corners), part.weight)
+        ShapePart(tuple((a - x, b - y) for a, b in part.corners), part.weight)
         for part in parts
     )
 
@@ -186,14 +186,16 @@ def _hand(turned_deg: float) -> Object:
     """Return a right hand from its back, fitted once to Table 2 of the paper."""
     palm = rectangle(5.85, 6.99)
     low = -3.495
-    heel = Part(((-2.925, low - 1.0), (2.925, low - 1.0), (2.925, low), (-2.925, low)))
+    heel = ShapePart(
+        ((-2.925, low - 1.0), (2.925, low - 1.0), (2.925, low), (-2.925, low))
+    )
     fingers = [finger((x, -low), angle, length, 0.81) for x, angle, length in _FINGERS]
     thumb = finger((-2.925, -2.31), 151, 3.1, 1.7)
     parts = [
         palm,
-        Part(heel.corners, 3.4),
-        *(Part(one.corners, 0.21) for one in fingers),
-        Part(thumb.corners, 1.1),
+        ShapePart(heel.corners, 3.4),
+        *(ShapePart(one.corners, 0.21) for one in fingers),
+        ShapePart(thumb.corners, 1.1),
     ]
     return Object(f"hand-{turned_deg:g}", _centred(parts), 217.0, turned_deg)
 

@@ -41,7 +41,7 @@ def read_matrix(
     driver and R that of each column's load:
 
     - `diodes`: `G / (1 + (D + R) G)`, each cell for itself.
-    - `grounded`: the other rows are held at 0 V and every column has its load; the
+    - `grounded`: the other rows are at 0 V and every column has its load; the
       network's equations give, for all cells at once, the transpose of
       `C G' (B - D R G C G')^-1` with `B = diag(1 + D row sums)` and
       `C = diag(1 / (1 + R column sums))`. Without resistances this is G itself.
@@ -117,7 +117,7 @@ MOST = 100_000
 """The most presses at a time."""
 
 
-class Settings(Value, frozen=True, kw_only=True):
+class PhysicsSettings(Value, frozen=True, kw_only=True):
     """Every number of the simulator.
 
     Attributes:
@@ -138,7 +138,7 @@ class Settings(Value, frozen=True, kw_only=True):
         column_spread: The same of a column.
         board: The seed of the gains: a number for a board.
         wiring: What the other lines do while a cell is read: `diodes` (nothing flows
-            through another cell), `grounded` (rows that are not driven are held at
+            through another cell), `grounded` (rows that are not driven are at
             0 V) or `floating` (they and the other columns are left open).
         drive_ohm: Between a row and what drives it (the switch's own resistance).
         load_ohm: Between a column and 0 V; 0 for a virtual ground.
@@ -178,7 +178,7 @@ class Settings(Value, frozen=True, kw_only=True):
             raise InvalidModelError(mistakes)
 
 
-def _mistakes(settings: Settings) -> Iterator[Mistake]:
+def _mistakes(settings: PhysicsSettings) -> Iterator[Mistake]:
     for name, low, high in (
         ("force", 0.0, 1e3),
         ("force_spread", 0.0, 3.0),
@@ -207,11 +207,11 @@ def _mistakes(settings: Settings) -> Iterator[Mistake]:
         yield ("wiring",), f"wiring is one of {known}, not {settings.wiring!r}"
 
 
-PAPER = Settings()
+PAPER = PhysicsSettings()
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class PressTruth:
     """What was done in each press; arrays of shape (presses,).
 
     Attributes:
@@ -246,12 +246,12 @@ class Simulated:
 
     frames: npt.NDArray[np.uint8]
     sensor: Sensor
-    truth: Truth
+    truth: PressTruth
     clipped: npt.NDArray[np.int64]
     outside: FloatArray
 
 
-def fsr(force_n: FloatArray, settings: Settings) -> FloatArray:
+def fsr(force_n: FloatArray, settings: PhysicsSettings) -> FloatArray:
     """Return what cells conduct: 0 up to the break force, then a line that bends.
 
     `G = slope * s / (1 + s / bend)` with `s = max(force - break, 0)`: the three
@@ -267,7 +267,7 @@ def fsr(force_n: FloatArray, settings: Settings) -> FloatArray:
         Microsiemens, of the same shape.
 
     Example:
-        >>> law = Settings(break_n=1.0, slope_us=100.0, bend_n=4.0)
+        >>> law = PhysicsSettings(break_n=1.0, slope_us=100.0, bend_n=4.0)
         >>> fsr(np.array([0.5, 1.0, 5.0]), law).tolist()
         [0.0, 0.0, 200.0]
     """
@@ -276,7 +276,7 @@ def fsr(force_n: FloatArray, settings: Settings) -> FloatArray:
     return conductance
 
 
-def gains(settings: Settings) -> FloatArray:
+def gains(settings: PhysicsSettings) -> FloatArray:
     """Return the factors of a board's cells, of shape (16, 16): row times column."""
     draws = np.random.default_rng(settings.board).standard_normal((2, SIDE))
     rows = np.exp(settings.row_spread * draws[0])
@@ -286,7 +286,7 @@ def gains(settings: Settings) -> FloatArray:
 
 
 def press(
-    name: str, count: int, seed: int = 0, settings: Settings = PAPER
+    name: str, count: int, seed: int = 0, settings: PhysicsSettings = PAPER
 ) -> Simulated:
     """Press an object on the sensor again and again.
 
@@ -314,7 +314,7 @@ def press(
 
 
 def press_object(
-    thing: Object, count: int, seed: int = 0, settings: Settings = PAPER
+    thing: Object, count: int, seed: int = 0, settings: PhysicsSettings = PAPER
 ) -> Simulated:
     """Press an object of one's own, as `press` does.
 
@@ -332,7 +332,7 @@ def press_object(
         found.append((*_read(thing, done, noise, settings), outside(thing, done)))
     frames, clipped, over = map(np.concatenate, zip(*found, strict=True))
     sensor = Sensor(SIDE, SIDE, full=FULL, threshold=settings.threshold)
-    facts = Truth(*map(np.concatenate, zip(*truth, strict=True)))
+    facts = PressTruth(*map(np.concatenate, zip(*truth, strict=True)))
     return Simulated(frames, sensor, facts, clipped, over)
 
 
@@ -361,7 +361,7 @@ def _draws(thing: Object, count: int, seed: int) -> Iterator[_Draws]:
         )
 
 
-def _truth(thing: Object, draws: _Draws, settings: Settings) -> Truth:
+def _truth(thing: Object, draws: _Draws, settings: PhysicsSettings) -> PressTruth:
     """Scale random numbers by the settings, and lay the object on the sensor.
 
     It lies in the middle, moved by a share of the room that is free; an object larger
@@ -375,11 +375,11 @@ def _truth(thing: Object, draws: _Draws, settings: Settings) -> Truth:
     high = SIDE / 2 - corners.max(axis=1)
     room = settings.roam * np.maximum(high - low, 0.0) / 2
     x, y = ((low + high) / 2 + room * draws.place).T
-    return Truth(x, y, angle, force, slope[:, 0], slope[:, 1])
+    return PressTruth(x, y, angle, force, slope[:, 0], slope[:, 1])
 
 
 def _read(
-    thing: Object, truth: Truth, noise: FloatArray, settings: Settings
+    thing: Object, truth: PressTruth, noise: FloatArray, settings: PhysicsSettings
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
     """Return what the sensor reads, and how many cells are clipped."""
     newtons = forces_of(thing, truth, settings.aperture)
@@ -404,13 +404,13 @@ def _outlines(thing: Object, angle_deg: FloatArray) -> list[FloatArray]:
     return found
 
 
-def _laid(thing: Object, truth: Truth) -> list[FloatArray]:
+def _laid(thing: Object, truth: PressTruth) -> list[FloatArray]:
     """Return each part's corners on the sensor."""
     middle = np.stack([truth.x, truth.y], axis=-1)[:, np.newaxis]
     return [outline + middle for outline in _outlines(thing, truth.angle_deg)]
 
 
-def outside(thing: Object, truth: Truth) -> FloatArray:
+def outside(thing: Object, truth: PressTruth) -> FloatArray:
     """Return the share of an object's area that hangs over the edge in each press."""
     edges = np.array([-SIDE / 2, SIDE / 2])
     laid = _laid(thing, truth)
@@ -419,7 +419,7 @@ def outside(thing: Object, truth: Truth) -> FloatArray:
     return np.maximum(1 - inside / size, 0.0)
 
 
-def forces_of(thing: Object, truth: Truth, aperture: float) -> FloatArray:
+def forces_of(thing: Object, truth: PressTruth, aperture: float) -> FloatArray:
     """Return the force that each cell feels.
 
     The pressure is a plane over the object: its mean at the centre of pressure, and

@@ -54,7 +54,7 @@ def test_what_is_no_file_of_frames_ends_with_2(
     assert main(["tactile", "check", "one.yaml", "rows.onnx"]) == 2
     assert capsys.readouterr().err == (
         "rows.onnx: the file takes rows, and not frames of a sensor; "
-        "`fuzzytree check` asks it\n"
+        "`fuzzytree check` checks it\n"
     )
     assert main(["tactile", "check", "one.yaml", "none.onnx"]) == 2
     assert capsys.readouterr().err == (

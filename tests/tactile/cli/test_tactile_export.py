@@ -9,7 +9,7 @@ import pytest
 
 from fuzzytree.api.verbs import save
 from fuzzytree.cli import main
-from fuzzytree.tactile.cli.sensors import frames_of
+from fuzzytree.tactile.cli.sensors import frames_of_file
 from fuzzytree.tactile.presses import Presses, write_presses
 from fuzzytree.tactile.recognition import agreement
 from fuzzytree.tactile.sensor import Sensor
@@ -54,9 +54,9 @@ def test_frames_that_were_pressed_above_another_threshold_are_told(
     cells = np.ones((1, 6, 4), np.uint8)
     write_presses("six.npz", Presses(cells, 100, NONE, (), NONE, threshold=6))
     for threshold in (4, 6):
-        frames_of("six.npz", Sensor(6, 4, 100, threshold))
+        frames_of_file("six.npz", Sensor(6, 4, 100, threshold))
     told = capsys.readouterr().err
-    assert told == "differs  six.npz tells the threshold 6, not 4\n"
+    assert told == "differs  six.npz states the threshold 6, not 4\n"
 
 
 def test_c_goes_to_standard_output(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
@@ -96,8 +96,8 @@ def test_nothing_is_written_where_a_way_disagrees(
         (["pad.c"], "name the board with --board, or its size: --sensor 16x16"),
         (["pad.c", "--sensor", "6by4"], "--sensor 6by4: rows and columns are as in "
          "16x16"),
-        (["pad.c", "--board", "b.yaml", "--full", "9"], "--board tells --sensor, "
-         "--full and --threshold; give one of them"),
+        (["pad.c", "--board", "b.yaml", "--full", "9"], "--board sets --sensor, "
+         "--full and --threshold; choose one of them"),
         (["pad.c", *SIZE, "--threshold", "100"], "the threshold lies in 0 to full - 1, "
          "not 100"),
         (["pad.c", *SIZE, "--set", "name"], "--set name: must be NAME=VALUE"),
@@ -120,5 +120,5 @@ def test_a_model_for_other_things_is_refused(capsys: Said) -> None:
     example = Path(__file__).parents[3] / "examples" / "tipper.fll"
     assert main(["tactile", "export", str(example), "pad.c", *SIZE]) == 2
     assert capsys.readouterr().err == (
-        f"{example}: frames are asked of a tree or rules, not of this\n"
+        f"{example}: a model of frames is a tree or a rule base\n"
     )

@@ -109,7 +109,7 @@ def test_files_of_one_class_each_become_one_table(
         ("cup.ftr", "pen=pen.ftr"): "of several files, each has a class: "
         "CLASS=cup.ftr, not cup.ftr\n"
         "  fuzzytree tactile features --help lists the options\n",
-        ("cup=cup.ftr", "f=f.npz"): "of f=f.npz and cup=cup.ftr, only one tells "
+        ("cup=cup.ftr", "f=f.npz"): "of f=f.npz and cup=cup.ftr, only one states "
         "subjects\n",
         ("cup=cup.ftr", "f=g.npz"): "f=g.npz: is of another sensor (6 x 6 cells, full "
         "255, threshold 3) than cup=cup.ftr (6 x 6 cells, full 255, threshold 0)\n",

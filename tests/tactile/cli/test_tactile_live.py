@@ -152,7 +152,7 @@ def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_asks(
 def test_a_model_of_other_features_is_refused_by_name(call: Call) -> None:
     code, out, err = call("some.ftr", "--model", "pressure_kpa.yaml")
     assert (code, out) == (2, "")
-    assert err.startswith("sizes asks for other features: ")
+    assert err.startswith("sizes uses other features: ")
     assert err.count("\n") == 1
 
 
@@ -161,7 +161,7 @@ def test_a_model_of_other_features_is_refused_by_name(call: Call) -> None:
     [
         (
             ("none.ftr",),
-            "none.ftr is no recording; for a port, tell its board with --board",
+            "none.ftr is no recording; for a port, name its board with --board",
         ),
         (
             ("some.ftr", "--board", "mat.yaml"),

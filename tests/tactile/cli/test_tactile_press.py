@@ -13,7 +13,7 @@ import pytest
 
 from fuzzytree.tactile.presses import read_presses
 from fuzzytree.tactile.simulation.objects import OBJECTS
-from fuzzytree.tactile.simulation.physics import PAPER, Settings, press
+from fuzzytree.tactile.simulation.physics import PAPER, PhysicsSettings, press
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -54,7 +54,7 @@ def test_a_setting_is_changed_by_name(call: Call, folder: Path) -> None:
         "tactile", "press", "circle", "--count", "2", "-o", "p.npz", "--json", *words
     )
     assert code == 0
-    settings = Settings(tilt=0.0, bend_n=float("inf"), wiring="diodes")
+    settings = PhysicsSettings(tilt=0.0, bend_n=float("inf"), wiring="diodes")
     wanted = press("circle", 2, settings=settings)
     assert np.array_equal(read_presses(folder / "p.npz").frames, wanted.frames)
     facts = json.loads(out)
@@ -81,7 +81,8 @@ def test_frames_on_standard_output_leave_no_room_for_more(
         (
             ("circle", "--set", "tild=1", "-o", "p.npz"),
             "the simulator has no setting 'tild'; "
-            f"it has {', '.join(Settings.__struct_fields__)} (did you mean 'tilt'?)",
+            f"it has {', '.join(PhysicsSettings.__struct_fields__)} "
+            "(did you mean 'tilt'?)",
         ),
         (
             ("circle", "--set", "tilt=1", "--set", "tilt=2", "-o", "p.npz"),
@@ -122,6 +123,6 @@ def test_the_documented_settings_are_those_that_there_are() -> None:
     page = Path(__file__).parents[3] / "docs" / "explanation" / "simulator.md"
     rows = [line for line in page.read_text().splitlines() if line.startswith("| `")]
     told = {row.split("`")[1]: row.split("|")[2].strip() for row in rows}
-    for name in Settings.__struct_fields__:
+    for name in PhysicsSettings.__struct_fields__:
         value = getattr(PAPER, name)
         assert told[name] == (f"{value:g}" if not isinstance(value, str) else value)

@@ -44,4 +44,4 @@ def test_an_unknown_set_is_told_with_those_there_are() -> None:
 def test_too_many_or_no_blocks_are_refused(text: str) -> None:
     with pytest.raises(TableError) as told:
         names_of(text)
-    assert str(told.value) == f"{text!r}: 1 to 4096 blocks can be asked for"
+    assert str(told.value) == f"{text!r}: 1 to 4096 blocks are possible"

@@ -16,9 +16,9 @@ import pytest
 
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
-from fuzzytree.tactile.recognition.live import Answer, Live
+from fuzzytree.tactile.recognition.live import Live, LiveResult
 from fuzzytree.tactile.recognition.recogniser import Recogniser
-from fuzzytree.tactile.report.page import Page
+from fuzzytree.tactile.report.page import LivePage
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 pytestmark = pytest.mark.heavy
@@ -61,9 +61,9 @@ class Shown:
 class Seen:
     """Live recognition, its page, and a browser that shows it."""
 
-    def __init__(self, browser: Any, live: Live, source: Shown, page: Page) -> None:
+    def __init__(self, browser: Any, live: Live, source: Shown, page: LivePage) -> None:
         self.browser, self.live, self.source, self.page = browser, live, source, page
-        self.answers: list[Answer] = []
+        self.answers: list[LiveResult] = []
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
         browser.get(page.url)
@@ -124,7 +124,7 @@ def seen(browser: Any) -> Iterator[Seen]:
     tree = learn(table(areas, columns=["area"]), target=labels, name="sizes")
     source = Shown()
     live = Live(Recogniser(tree, Sensor(4, 4), 0.05), source, "a board")
-    with Page(live) as page:
+    with LivePage(live) as page:
         found = Seen(browser, live, source, page)
         yield found
         source.close()
@@ -185,7 +185,7 @@ def test_the_page_comes_back_when_live_is_started_anew(seen: Seen) -> None:
     live = Live(seen.live.recogniser, source, "another board")
     answers = live.answers()
     next(answers)
-    with Page(live, int(seen.page.url.strip("/").rpartition(":")[2])):
+    with LivePage(live, int(seen.page.url.strip("/").rpartition(":")[2])):
         seen.until_text("source", "another board")
 
 

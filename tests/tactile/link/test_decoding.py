@@ -15,7 +15,7 @@ from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.link import decoder_of
 from fuzzytree.tactile.sensor import Cells, Counters, Sensor
 from fuzzytree.tactile.simulation.encoding import banner, encoded
-from tests.tactile.families import FAMILIES, check_account, frames_of, stream_of
+from tests.tactile.families import FAMILIES, check_account, frames_of_file, stream_of
 
 CUT_HERE = st.lists(st.integers(0, 10_000), max_size=12)
 
@@ -48,7 +48,7 @@ def test_frames_come_back_whole_and_nothing_else_is_counted(
     name: str, size: int
 ) -> None:
     board = FAMILIES[name]
-    frames = frames_of(board, 9)
+    frames = frames_of_file(board, 9)
     data = stream_of(board, frames)
     pieces = [data[start : start + size] for start in range(0, len(data), size)]
     found, counters = decoded(board, *pieces)
@@ -68,10 +68,10 @@ def test_how_a_stream_is_cut_into_pieces_changes_nothing(
     name: str, is_still: bool, faults: list[tuple[int, int, int]], places: list[int]
 ) -> None:
     board = FAMILIES[name]
-    data = bytearray(stream_of(board, frames_of(board, 7, seed=3)))
+    data = bytearray(stream_of(board, frames_of_file(board, 7, seed=3)))
     if is_still:
         # A picture that does not change, with the marker among its cells.
-        one = bytearray(encoded(board, frames_of(board, 1)[0]))
+        one = bytearray(encoded(board, frames_of_file(board, 1)[0]))
         one[7:9] = one[:2]
         data += one * 20
     for fault, lost, copied in faults:
@@ -116,7 +116,7 @@ def touched(board: Board, ends: list[int], place: int, fault: str) -> set[int]:
 
 def check_one_fault(name: str, step: int) -> None:
     board = replace(FAMILIES[name], banner=0)
-    frames = frames_of(board, 8)
+    frames = frames_of_file(board, 8)
     sent = [frame.tolist() for frame in frames]
     parts = [encoded(board, frame, number) for number, frame in enumerate(frames)]
     ends = np.cumsum([0, *map(len, parts)]).tolist()
@@ -154,7 +154,7 @@ def test_no_fault_anywhere_loses_a_frame_that_it_does_not_touch(name: str) -> No
 )
 def test_a_changed_byte_that_a_checksum_covers_is_never_taken(name: str) -> None:
     board = replace(FAMILIES[name], banner=0)
-    frame = frames_of(board, 1)[0]
+    frame = frames_of_file(board, 1)[0]
     data = encoded(board, frame)
     for place in range(len(data)):
         for change in (1, 0x80, 0xFF):
@@ -183,7 +183,7 @@ def test_memory_is_bounded_whatever_comes(name: str) -> None:
 
 def test_a_decoder_begins_again_after_its_end() -> None:
     for board in FAMILIES.values():
-        frames = frames_of(board, 3)
+        frames = frames_of_file(board, 3)
         decoder = decoder_of(board)
         for _ in range(2):
             got = [*decoder.feed(stream_of(board, frames)), *decoder.flush()]
@@ -192,7 +192,7 @@ def test_a_decoder_begins_again_after_its_end() -> None:
 
 def test_frames_stay_when_others_come() -> None:
     board = FAMILIES["marker"]
-    one, two = frames_of(board, 2)
+    one, two = frames_of_file(board, 2)
     decoder = decoder_of(board)
     decoder.feed(encoded(board, one))
     [first] = decoder.feed(encoded(board, two)[:2])
@@ -207,7 +207,7 @@ def test_only_boards_that_answer_are_asked() -> None:
     assert set(asks.values()) == {b""}
     decoder = decoder_of(FAMILIES["marker"])
     decoder.feed(b"\xaa\x55\x01")
-    decoder.asked()
+    decoder.requested()
     decoder.timed_out()
     assert decoder.pending == 3
 

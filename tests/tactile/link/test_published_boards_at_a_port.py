@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.tactile.board_file import load_board
-from fuzzytree.tactile.link import open_line
+from fuzzytree.tactile.link import open_connection
 from fuzzytree.tactile.simulation.device import Device, blob
 
 BOARDS = sorted(
@@ -22,7 +22,10 @@ def test_a_published_board_is_read_at_its_own_rate(path: Path) -> None:
     board = load_board(path)
     sent = list(itertools.islice(blob(board), 200))
     known = [frame.tolist() for frame in sent]
-    with Device(board, sent, rate=1.0) as device, open_line(board, device.port) as line:
+    with (
+        Device(board, sent, rate=1.0) as device,
+        open_connection(board, device.port) as line,
+    ):
         frames = [line.take(5.0) for _ in range(10)]
         if lost := device.counts.overrun:
             pytest.skip(f"the computer is too busy to listen: {lost} bytes are lost")

@@ -194,7 +194,7 @@ def test_a_recording_too_large_for_memory_is_refused(
     with pytest.raises(ReadError) as caught:
         _read(path, _record(tmp_path / "b.ftr", 3))
     assert str(caught.value) == (
-        f"{path}: its 3 frames are more than 30 bytes, too many to be held at once"
+        f"{path}: its 3 frames are more than 30 bytes, too many for memory"
     )
 
 

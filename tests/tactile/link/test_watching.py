@@ -7,11 +7,11 @@ import pytest
 
 from fuzzytree.tactile.boards import Board, Marker, Protocol, Request, Sentinel, Text
 from fuzzytree.tactile.link.watching import (
-    Questions,
+    RequestTimer,
     Watch,
+    described,
+    frame_bytes,
     frame_time,
-    line_bytes,
-    seen,
 )
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.encoding import encoded
@@ -128,7 +128,7 @@ CASES: list[tuple[Protocol, Protocol, tuple[int, int], str]] = [
         Request("41"),
         Request("41"),
         (9, 6),
-        "the board was asked 20 times and gave about 54 bytes each time, "
+        "the host sent 20 requests and received about 54 bytes for each, "
         "which is 9 x 6 and not 4 x 6",
     ),
 ]
@@ -138,7 +138,7 @@ CASES: list[tuple[Protocol, Protocol, tuple[int, int], str]] = [
 def test_what_came_is_told_beside_what_was_expected(
     told: Protocol, true: Protocol, size: tuple[int, int], text: str
 ) -> None:
-    assert seen(_board(told), _sent(true, *size), asked=20) == text
+    assert described(_board(told), _sent(true, *size), requests=20) == text
 
 
 def test_two_bytes_are_enough_to_say_something() -> None:
@@ -150,7 +150,7 @@ def test_two_bytes_are_enough_to_say_something() -> None:
             b"\x00" * 999,
             bytes(range(256)),
         ):
-            assert seen(_board(protocol), content)
+            assert described(_board(protocol), content)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_two_bytes_are_enough_to_say_something() -> None:
     ],
 )
 def test_a_frame_on_the_line_has_a_length(protocol: Protocol, count: int) -> None:
-    assert line_bytes(_board(protocol)) == count
+    assert frame_bytes(_board(protocol)) == count
     assert frame_time(_board(protocol)) == pytest.approx(count * 10 / 115200)
 
 
@@ -216,9 +216,9 @@ def test_noise_that_is_over_contradicts_nothing() -> None:
 
 
 def test_a_late_answer_is_waited_for_until_it_is_over() -> None:
-    questions = Questions(_board(Request("41", timeout_s=0.5)))
+    questions = RequestTimer(_board(Request("41", timeout_s=0.5)))
     assert questions.is_due(0.0)
-    questions.asked(0.0)
+    questions.sent(0.0)
     assert not questions.is_due(0.4)
     assert not questions.is_overdue(0.4)
     assert questions.is_overdue(0.6)
@@ -226,10 +226,10 @@ def test_a_late_answer_is_waited_for_until_it_is_over() -> None:
     questions.came(0, 0.62)
     assert not questions.is_due(0.66)
     assert questions.is_due(0.68)
-    questions.asked(0.68)
+    questions.sent(0.68)
     questions.came(1, 0.7)
     assert questions.is_due(0.7)
 
 
 def test_a_board_that_speaks_by_itself_is_never_asked() -> None:
-    assert not Questions(_board(Text())).is_due(9.0)
+    assert not RequestTimer(_board(Text())).is_due(9.0)

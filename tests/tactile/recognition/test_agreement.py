@@ -14,11 +14,11 @@ from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.names import FEATURES
 from fuzzytree.tactile.recognition import agreement
 from fuzzytree.tactile.recognition.agreement import (
-    check_frames_carriers,
+    check_frames_agree,
     errors,
     frames_export,
 )
-from fuzzytree.tactile.recognition.runners import Found, Runner, as_sent, runners
+from fuzzytree.tactile.recognition.runners import Runner, RunnerResult, as_sent, runners
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.testing import random_tree
@@ -30,7 +30,7 @@ MIXED = ("force", "area", "peak", "angle", "log S1", "cell r1 c3", "block r1 c0 
 @pytest.mark.parametrize("sensor", [PLAIN, WIDE], ids=["16x16", "5x7"])
 def test_every_way_gives_the_same_bits_and_classes(sensor: Sensor) -> None:
     tree = learnt_tree(sensor, MIXED)
-    found = check_frames_carriers(tree, sensor, aimed_frames(sensor, 40, seed=5))
+    found = check_frames_agree(tree, sensor, aimed_frames(sensor, 40, seed=5))
     assert found.ok
     pairs = {(one.representation, one.against) for one in found.comparisons}
     assert {("plain Python", "exact arithmetic"), ("onnx", "numpy"), ("c", "numpy")} < (
@@ -43,7 +43,7 @@ def test_every_way_gives_the_same_bits_and_classes(sensor: Sensor) -> None:
 
 def test_what_is_too_weak_is_counted_as_unknown() -> None:
     rules = raw_rules(learnt_tree(PLAIN, ("S1", "S9")))
-    found = check_frames_carriers(rules, PLAIN, reject=0.5)
+    found = check_frames_agree(rules, PLAIN, reject=0.5)
     assert found.ok
     assert 0 < found.shown.unknown < found.shown.frames
     assert found.shown.aimed == found.shown.frames
@@ -75,7 +75,7 @@ def test_an_error_is_measured_against_what_could_cancel() -> None:
 def turned(one: Runner) -> Runner:
     """Return a runner that is wrong about its third frame."""
 
-    def answer(frames: Cells) -> Found:
+    def answer(frames: Cells) -> RunnerResult:
         found = one.answer(frames)
         features = found.features.copy()
         features[0, 2:3] = np.nextafter(features[0, 2:3], np.inf)
@@ -92,7 +92,7 @@ def test_a_bit_that_differs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         return [turned(way) if way.name == "onnx" else way for way in ways], missing
 
     monkeypatch.setattr(agreement, "runners", broken)
-    found = check_frames_carriers(tree, SMALL)
+    found = check_frames_agree(tree, SMALL)
     wrong = [one for one in found.comparisons if one.verdict == "DISAGREES"]
     assert [(one.representation, one.against, one.differing) for one in wrong[:2]] == [
         ("onnx", "numpy", 1),
@@ -126,5 +126,5 @@ def test_files_are_those_of_the_writers() -> None:
 
 def test_a_model_for_other_features_is_refused_by_its_name() -> None:
     model = random_tree(1)
-    with pytest.raises(TableError, match=f"^{model.name} asks for other features: "):
+    with pytest.raises(TableError, match=f"^{model.name} uses other features: "):
         frames_export(model, SMALL, "onnx")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link import open_line
-from fuzzytree.tactile.recognition.frame_sources import FromLine
+from fuzzytree.tactile.link import open_connection
+from fuzzytree.tactile.recognition.frame_sources import FromPort
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.device import Wire
 from fuzzytree.tactile.simulation.encoding import encoded
@@ -31,8 +31,8 @@ def wire(tmp_path: Path) -> Iterator[Wire]:
 
 
 @pytest.fixture
-def source(wire: Wire, tmp_path: Path) -> Iterator[FromLine]:
-    found = FromLine(open_line(BOARD, str(tmp_path / "board")))
+def source(wire: Wire, tmp_path: Path) -> Iterator[FromPort]:
+    found = FromPort(open_connection(BOARD, str(tmp_path / "board")))
     yield found
     found.close()
 
@@ -45,7 +45,7 @@ def until(is_so: Callable[[], bool]) -> None:
 
 
 def test_a_line_says_that_it_is_silent_away_and_back(
-    wire: Wire, source: FromLine, tmp_path: Path
+    wire: Wire, source: FromPort, tmp_path: Path
 ) -> None:
     frames = iter(source)
     wire.send(FRAME * 2)
@@ -65,14 +65,14 @@ def test_a_line_says_that_it_is_silent_away_and_back(
 
 
 def test_a_line_that_is_closed_gives_no_more_frames(
-    wire: Wire, source: FromLine, tmp_path: Path
+    wire: Wire, source: FromPort, tmp_path: Path
 ) -> None:
     source.close()
     assert list(source) == []
     assert source.trouble == f"{tmp_path / 'board'} gives no more frames"
 
 
-def test_the_time_of_a_line_is_that_of_its_frames(wire: Wire, source: FromLine) -> None:
+def test_the_time_of_a_line_is_that_of_its_frames(wire: Wire, source: FromPort) -> None:
     wire.send(FRAME)
     frame = next(iter(source))
     assert 0.0 <= frame.time <= source.now() < frame.time + 20.0
@@ -80,7 +80,7 @@ def test_the_time_of_a_line_is_that_of_its_frames(wire: Wire, source: FromLine) 
 
 @pytest.mark.heavy
 def test_bytes_that_are_no_frames_end_nothing_once_there_were_frames(
-    wire: Wire, source: FromLine
+    wire: Wire, source: FromPort
 ) -> None:
     seen: list[int] = []
 

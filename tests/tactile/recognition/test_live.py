@@ -12,7 +12,7 @@ import pytest
 
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
-from fuzzytree.tactile.link.recording import Record
+from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Paced, simulated
 from fuzzytree.tactile.recognition.live import Hold, Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
@@ -30,10 +30,10 @@ def recogniser(reject: float = 0.0) -> Recogniser:
     return Recogniser(tree, SENSOR, reject)
 
 
-def records(frames: Iterable[Cells], **counters: int) -> Iterator[Record]:
+def records(frames: Iterable[Cells], **counters: int) -> Iterator[FrameRecord]:
     for number, cells in enumerate(frames):
         counted = Counters(frames=number + 1, **counters if number else {})
-        yield Record(Frame(cells, number / 100, number), counted)
+        yield FrameRecord(Frame(cells, number / 100, number), counted)
 
 
 def live(frames: Iterable[Cells], **counters: int) -> Live:

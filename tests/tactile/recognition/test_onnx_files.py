@@ -16,7 +16,7 @@ from fuzzytree.exporters.onnx import write
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.tactile.exporters.onnx_frames import write_frames
-from fuzzytree.tactile.recognition.onnx_files import check_shipped, frames_file
+from fuzzytree.tactile.recognition.onnx_files import check_onnx_files, frames_file
 from fuzzytree.tactile.sensor import Sensor
 
 SENSOR = Sensor(4, 4, threshold=3)
@@ -29,7 +29,7 @@ def tree(name: str = "pad") -> FuzzyTree:
 
 
 def verdicts(content: bytes, model: FuzzyTree) -> list[str]:
-    found = check_shipped(model, {"pad.onnx": content})
+    found = check_onnx_files(model, {"pad.onnx": content})
     return [one.verdict for one in found.comparisons]
 
 
@@ -48,7 +48,7 @@ def test_frames_of_ones_own_are_asked_as_well() -> None:
     rules = rules_from_tree(tree(), "raw")
     content = write_frames(rules, SENSOR, reject=0.2, outputs=("strengths",)).content
     frames = np.random.default_rng(0).integers(0, 256, (9, 4, 4))
-    found = check_shipped(rules, {"pad.onnx": content}, frames, reject=0.2)
+    found = check_onnx_files(rules, {"pad.onnx": content}, frames, reject=0.2)
     assert found.ok
     assert found.comparisons[-1].rows == found.probes + 9
 
@@ -67,9 +67,9 @@ def test_a_changed_constant_is_found_by_the_graph_and_by_the_answers() -> None:
 def test_a_file_of_another_model_is_told() -> None:
     other = learn(table(AREAS[:, :1], columns=["peak"]), target=["s", "s", "l", "l"])
     content = write_frames(other, SENSOR).content
-    found = check_shipped(tree(), {"pad.onnx": content})
+    found = check_onnx_files(tree(), {"pad.onnx": content})
     assert [one.detail for one in found.comparisons] == [
-        ("it asks for peak, and knows l, s",),
+        ("it uses peak, and has the classes l, s",),
     ]
 
 
@@ -78,7 +78,7 @@ def test_a_file_that_takes_rows_is_refused() -> None:
         frames_file(write(tree()).content, "rows.onnx")
     assert str(caught.value) == (
         "rows.onnx: the file takes rows, and not frames of a sensor; "
-        "`fuzzytree check` asks it"
+        "`fuzzytree check` checks it"
     )
 
 
@@ -115,18 +115,18 @@ def test_a_file_that_another_version_wrote_is_compared_as_any() -> None:
             entry.value = "0.0.1"
     proto.graph.node[-1].name += " of old"
     files = {"pad.onnx": proto.SerializeToString()}
-    found = check_shipped(tree(), files)
+    found = check_onnx_files(tree(), files)
     assert not found.ok
     assert [one.verdict for one in found.comparisons] == [
         "agrees", "rows only", "agrees",
     ]  # fmt: skip
-    assert check_shipped(tree(), files, rows_only=True).ok
+    assert check_onnx_files(tree(), files, rows_only=True).ok
 
 
 def test_a_file_cannot_choose_its_sensor_and_reject() -> None:
     rules = rules_from_tree(tree(), "raw")
     content = write_frames(rules, Sensor(4, 4, threshold=200), reject=0.9).content
-    found = check_shipped(rules, {"pad.onnx": content}, sensor=SENSOR)
+    found = check_onnx_files(rules, {"pad.onnx": content}, sensor=SENSOR)
     assert [one.verdict for one in found.comparisons] == [
         "DISAGREES", "agrees", "agrees",
     ]  # fmt: skip
@@ -139,7 +139,7 @@ def test_a_file_cannot_choose_its_sensor_and_reject() -> None:
 
 def test_a_sensor_that_only_the_file_states_is_reported() -> None:
     content = write_frames(tree(), SENSOR).content
-    found = check_shipped(tree(), {"pad.onnx": content})
+    found = check_onnx_files(tree(), {"pad.onnx": content})
     assert found.skipped == (
         "pad.onnx: its sensor, which is 4 x 4 cells up to 255, threshold 3; "
         "name the right one with --sensor or --board",

@@ -95,7 +95,7 @@ def test_a_model_for_other_features_is_refused() -> None:
     with pytest.raises(TableError) as caught:
         check_inputs(wine)
     assert str(caught.value).startswith(
-        "tree asks for other features: 'flavanoids' is no feature of a frame"
+        "tree uses other features: 'flavanoids' is no feature of a frame"
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rich.cells import cell_len
 
-from fuzzytree.tactile.recognition.live import Answer, Latency, View
+from fuzzytree.tactile.recognition.live import Latency, LiveResult, LiveView
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.report.live import (
     PALETTE,
@@ -29,10 +29,10 @@ from fuzzytree.tactile.report.live import (
 from fuzzytree.tactile.sensor import Cells, Counters, Frame
 
 CELLS = np.array([[0, 10, 20], [0, 255, 30]], np.int64)
-ANSWER = Answer(
+ANSWER = LiveResult(
     Frame(CELLS, 1.25, 55), State.OBJECT, 1, "soft", (0.0, 0.75), 1, 4e-4, "a cell"
 )
-VIEW = View(
+VIEW = LiveView(
     source="/dev/ttyUSB0",
     model="grip",
     classes=("firm", "soft"),

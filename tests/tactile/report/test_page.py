@@ -18,11 +18,11 @@ import pytest
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.errors import PortError
-from fuzzytree.tactile.link.recording import Record
+from fuzzytree.tactile.link.recording import FrameRecord
 from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser
-from fuzzytree.tactile.report.page import MOST_BROWSERS, Page
+from fuzzytree.tactile.report.page import MOST_BROWSERS, LivePage
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 LARGE = np.full((4, 4), 255, np.uint8)
@@ -33,7 +33,7 @@ EVIL = "<img src=x onerror=alert(1)>"
 def shown(frames: int | None = None) -> Live:
     tree = learn(table(AREAS, columns=["area"]), target=["s", "s", EVIL, EVIL])
     records = (
-        Record(Frame(LARGE, number / 100, number), Counters(frames=number + 1))
+        FrameRecord(Frame(LARGE, number / 100, number), Counters(frames=number + 1))
         for number in (itertools.count() if frames is None else range(frames))
     )
     return Live(Recogniser(tree, Sensor(4, 4)), Paced(records), "frames")
@@ -45,13 +45,13 @@ def live() -> Live:
 
 
 @pytest.fixture
-def page(live: Live) -> Iterator[Page]:
-    with Page(live) as found:
+def page(live: Live) -> Iterator[LivePage]:
+    with LivePage(live) as found:
         yield found
 
 
 def asked(
-    page: Page,
+    page: LivePage,
     path: str = "/",
     method: str = "GET",
     host: str | None = None,
@@ -78,11 +78,13 @@ def events(response: HTTPResponse) -> Iterator[tuple[str, dict[str, object]]]:
             yield name, json.loads(value)
 
 
-def test_the_page_listens_on_this_computer_only(page: Page) -> None:
+def test_the_page_listens_on_this_computer_only(page: LivePage) -> None:
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", page.url)
 
 
-def test_the_page_is_one_file_that_asks_for_nothing_from_outside(page: Page) -> None:
+def test_the_page_is_one_file_that_asks_for_nothing_from_outside(
+    page: LivePage,
+) -> None:
     found = asked(page)
     content = found.read().decode()
     assert found.status == 200
@@ -94,7 +96,7 @@ def test_the_page_is_one_file_that_asks_for_nothing_from_outside(page: Page) -> 
 
 
 def test_the_policy_allows_the_own_script_and_style_and_nothing_else(
-    page: Page,
+    page: LivePage,
 ) -> None:
     found = asked(page)
     policy = found.headers["Content-Security-Policy"]
@@ -113,37 +115,39 @@ def test_the_policy_allows_the_own_script_and_style_and_nothing_else(
     "host", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", ""]
 )
 @pytest.mark.parametrize("path", ["/", "/events"])
-def test_a_name_of_another_host_is_refused(page: Page, host: str, path: str) -> None:
+def test_a_name_of_another_host_is_refused(
+    page: LivePage, host: str, path: str
+) -> None:
     found = asked(page, path, host=host)
     assert (found.status, found.read()) == (421, b"this is another host\n")
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost"])
-def test_a_page_of_another_place_is_refused(page: Page, origin: str) -> None:
+def test_a_page_of_another_place_is_refused(page: LivePage, origin: str) -> None:
     found = asked(page, "/events", origin=origin)
     assert (found.status, found.read()) == (403, b"only this page is answered\n")
     assert asked(page, origin=page.url.rstrip("/")).status == 200
 
 
-def test_the_name_localhost_is_this_host(page: Page) -> None:
+def test_the_name_localhost_is_this_host(page: LivePage) -> None:
     port = urlsplit(page.url).port
     assert asked(page, host=f"localhost:{port}").status == 200
 
 
 @pytest.mark.parametrize("method", ["POST", "HEAD", "PUT", "DELETE", "OPTIONS", "X"])
-def test_only_get_is_answered(page: Page, method: str) -> None:
+def test_only_get_is_answered(page: LivePage, method: str) -> None:
     found = asked(page, method=method)
     assert found.status == 405
     assert found.headers["Allow"] == "GET"
 
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "/../x", "/events/", "/?x"])
-def test_there_are_no_other_paths(page: Page, path: str) -> None:
+def test_there_are_no_other_paths(page: LivePage, path: str) -> None:
     found = asked(page, path)
     assert (found.status, found.read()) == (404, b"there is / and nothing else\n")
 
 
-def test_what_is_no_http_is_refused_and_the_page_goes_on(page: Page) -> None:
+def test_what_is_no_http_is_refused_and_the_page_goes_on(page: LivePage) -> None:
     place = urlsplit(page.url)
     for content in (b"\x00\xff" * 40, b"GET\r\n\r\n", b"GET /" + b"a" * 70000):
         with socket.create_connection((place.hostname, place.port), 10) as line:
@@ -153,7 +157,7 @@ def test_what_is_no_http_is_refused_and_the_page_goes_on(page: Page) -> None:
 
 
 def test_events_bring_the_names_then_the_picture_and_the_answer(
-    page: Page, live: Live
+    page: LivePage, live: Live
 ) -> None:
     answers = live.answers()
     next(answers), next(answers)
@@ -175,7 +179,7 @@ def test_events_bring_the_names_then_the_picture_and_the_answer(
 
 def test_the_last_event_tells_that_the_source_is_gone() -> None:
     live = shown(3)
-    with Page(live) as page:
+    with LivePage(live) as page:
         found = events(asked(page, "/events"))
         next(found)
         list(live.answers())
@@ -185,7 +189,7 @@ def test_the_last_event_tells_that_the_source_is_gone() -> None:
 
 
 def test_closing_the_page_tells_browsers_that_it_is_over(live: Live) -> None:
-    page = Page(live)
+    page = LivePage(live)
     found = events(asked(page, "/events"))
     next(found)
     page.close()
@@ -193,7 +197,7 @@ def test_closing_the_page_tells_browsers_that_it_is_over(live: Live) -> None:
 
 
 def test_too_many_browsers_are_turned_away_and_room_is_found_again(
-    page: Page,
+    page: LivePage,
 ) -> None:
     place = urlsplit(page.url)
     held = [
@@ -209,7 +213,7 @@ def test_too_many_browsers_are_turned_away_and_room_is_found_again(
 
 
 def test_a_browser_that_reads_nothing_holds_up_no_answer(
-    page: Page, live: Live
+    page: LivePage, live: Live
 ) -> None:
     place = urlsplit(page.url)
     with socket.create_connection((place.hostname, place.port), 10) as line:
@@ -219,11 +223,11 @@ def test_a_browser_that_reads_nothing_holds_up_no_answer(
     assert threading.active_count() < 10
 
 
-def test_a_port_that_is_taken_is_told(page: Page, live: Live) -> None:
+def test_a_port_that_is_taken_is_told(page: LivePage, live: Live) -> None:
     port = urlsplit(page.url).port
     assert port is not None
     with pytest.raises(PortError) as caught:
-        Page(live, port)
+        LivePage(live, port)
     assert str(caught.value) == (
         f"127.0.0.1:{port}: cannot be served: address already in use"
     )

@@ -15,7 +15,7 @@ from fuzzytree.tactile.simulation.objects import (
     OBJECTS,
     FloatArray,
     Object,
-    Part,
+    ShapePart,
     area_and_middle,
     covered,
     disc,
@@ -26,8 +26,8 @@ from fuzzytree.tactile.simulation.objects import (
 from fuzzytree.tactile.simulation.physics import (
     PAPER,
     SIDE,
-    Settings,
-    Truth,
+    PhysicsSettings,
+    PressTruth,
     Wiring,
     forces_of,
     fsr,
@@ -38,7 +38,7 @@ from fuzzytree.tactile.simulation.physics import (
     read_matrix,
 )
 
-IDEAL = Settings(
+IDEAL = PhysicsSettings(
     aperture=1.0,
     roam=0.0,
     turn_deg=0.0,
@@ -56,9 +56,9 @@ IDEAL = Settings(
 """Everything off: what is left is the geometry and 8 bits."""
 
 
-def _truth(*, x: float = 0.3, y: float = -0.2, angle: float = 11.0) -> Truth:
+def _truth(*, x: float = 0.3, y: float = -0.2, angle: float = 11.0) -> PressTruth:
     values = (x, y, angle, 10.0, 0.0, 0.0)
-    return Truth(*(np.array([value]) for value in values))
+    return PressTruth(*(np.array([value]) for value in values))
 
 
 def _clipped_area(
@@ -155,7 +155,7 @@ def test_the_forces_of_parts_add_up() -> None:
 
 def test_a_tilted_object_presses_more_on_one_side_and_never_pulls() -> None:
     x = np.zeros(1)
-    truth = Truth(x, x, x, np.array([10.0]), np.array([0.5]), x)
+    truth = PressTruth(x, x, x, np.array([10.0]), np.array([0.5]), x)
     felt = forces_of(Object("bar", (rectangle(8.0, 2.0),), 1.0), truth, 1.0)
     row = felt[0, 7]
     mean = 10.0 / 16
@@ -165,7 +165,7 @@ def test_a_tilted_object_presses_more_on_one_side_and_never_pulls() -> None:
 
 
 def test_an_object_turned_by_a_quarter_gives_frames_turned_by_a_quarter() -> None:
-    bar = Object("bar", (Part(((-2.0, -1.0), (3.0, -0.7), (1.0, 1.5))),), 12.0)
+    bar = Object("bar", (ShapePart(((-2.0, -1.0), (3.0, -0.7), (1.0, 1.5))),), 12.0)
     turned = Object("bar", bar.parts, 12.0, turned_deg=90.0)
     frames = press_object(bar, 5, settings=IDEAL).frames
     assert frames.any()
@@ -183,22 +183,22 @@ def test_a_column_with_a_load_makes_rows_and_columns_unequal() -> None:
 
 
 def test_a_cell_conducts_nothing_then_a_line_then_no_more() -> None:
-    law = Settings(break_n=0.5, slope_us=100.0, bend_n=8.0)
+    law = PhysicsSettings(break_n=0.5, slope_us=100.0, bend_n=8.0)
     force = np.array([0.0, 0.5, 0.50001, 8.5, 1e9])
     found = fsr(force, law)
     assert found[:2].tolist() == [0.0, 0.0]
     assert found[2] == pytest.approx(1e-3, rel=1e-5)
     assert found[3] == pytest.approx(400.0)
     assert found[4] == pytest.approx(800.0)
-    straight = fsr(force, Settings(break_n=0.5, slope_us=100.0, bend_n=math.inf))
+    straight = fsr(force, PhysicsSettings(break_n=0.5, slope_us=100.0, bend_n=math.inf))
     assert straight[3] == pytest.approx(800.0)
 
 
 def test_gains_are_a_rows_times_a_columns_and_a_boards_own() -> None:
-    own = gains(Settings(row_spread=0.2, column_spread=0.1, board=5))
+    own = gains(PhysicsSettings(row_spread=0.2, column_spread=0.1, board=5))
     assert np.linalg.matrix_rank(own) == 1
-    assert not np.allclose(own, gains(Settings(board=6)))
-    assert np.all(gains(Settings(row_spread=0.0, column_spread=0.0)) == 1.0)
+    assert not np.allclose(own, gains(PhysicsSettings(board=6)))
+    assert np.all(gains(PhysicsSettings(row_spread=0.0, column_spread=0.0)) == 1.0)
 
 
 def _nodal(
@@ -286,8 +286,8 @@ def test_more_presses_begin_with_the_same_ones() -> None:
 
 
 def test_two_settings_are_compared_on_the_same_presses() -> None:
-    one = press("square", 20, 1, Settings(force_spread=0.0, noise=0.0))
-    two = press("square", 20, 1, Settings(wiring="diodes", bend_n=3.0))
+    one = press("square", 20, 1, PhysicsSettings(force_spread=0.0, noise=0.0))
+    two = press("square", 20, 1, PhysicsSettings(wiring="diodes", bend_n=3.0))
     assert np.array_equal(one.truth.x, two.truth.x)
     assert np.array_equal(one.truth.angle_deg, two.truth.angle_deg)
     assert set(one.truth.force_n.tolist()) == {OBJECTS["square"].force_n}
@@ -309,7 +309,7 @@ def test_what_hangs_over_the_edge_is_told() -> None:
 
 def test_numbers_out_of_range_are_told_all_at_once() -> None:
     with pytest.raises(InvalidModelError) as caught:
-        Settings(roam=1.5, aperture=0.0, wiring="crossed")  # type: ignore[arg-type] # wrong on purpose
+        PhysicsSettings(roam=1.5, aperture=0.0, wiring="crossed")  # type: ignore[arg-type] # wrong on purpose
     assert str(caught.value) == (
         "roam lies in 0 to 1, not 1.5\n"
         "aperture lies in 0.001 to 1, not 0\n"
@@ -319,7 +319,7 @@ def test_numbers_out_of_range_are_told_all_at_once() -> None:
 
 def test_no_number_is_no_setting() -> None:
     with pytest.raises(InvalidModelError, match=r"^tilt lies in 0 to 10, not nan$"):
-        Settings(tilt=math.nan)
+        PhysicsSettings(tilt=math.nan)
 
 
 def test_an_object_that_is_not_there_is_told() -> None:

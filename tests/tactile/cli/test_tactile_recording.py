@@ -19,7 +19,7 @@ import pytest
 from fuzzytree.cli.console import say
 from fuzzytree.tactile.board_file import board_text, load_board
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.link import SerialPort, open_line, ports
+from fuzzytree.tactile.link import SerialPort, open_connection, ports
 from fuzzytree.tactile.link import recording as records
 from fuzzytree.tactile.link.recording import Recorder, read_recording
 from fuzzytree.tactile.presses import read_presses
@@ -336,7 +336,7 @@ def test_a_recording_goes_through_a_port_again(place: Path) -> None:
     ) as process:
         assert process.stdout is not None
         port = process.stdout.readline().strip()
-        with open_line(BOARD, port) as line:
+        with open_connection(BOARD, port) as line:
             found = [line.take(5) for _ in range(6)]
         out, err = process.communicate(timeout=20)
     assert (process.returncode, out) == (0, "")

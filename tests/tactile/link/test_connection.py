@@ -28,7 +28,7 @@ from fuzzytree.tactile.boards import (
     Start,
     Text,
 )
-from fuzzytree.tactile.link import Line, open_line, opened, ports, start
+from fuzzytree.tactile.link import Connection, open_connection, opened, ports, start
 from fuzzytree.tactile.sensor import Cells, Frame, Sensor
 from fuzzytree.tactile.simulation.device import Device, Faults, Pause, blob
 from fuzzytree.tactile.simulation.encoding import encoded
@@ -40,7 +40,7 @@ def _frames(count: int, board: Board = BOARD) -> list[Cells]:
     return list(itertools.islice(blob(board), count))
 
 
-def _taken(line: Line, count: int, timeout_s: float = 5.0) -> list[Frame]:
+def _taken(line: Connection, count: int, timeout_s: float = 5.0) -> list[Frame]:
     """Return so many frames, or those that come before nothing comes for too long."""
     found: list[Frame] = []
     while len(found) < count and (frame := line.take(timeout_s)) is not None:
@@ -96,7 +96,7 @@ def test_the_frames_of_every_family_come_as_they_were_sent(protocol: Protocol) -
     sent = _frames(30, board)
     with (
         Device(board, sent, rate=None) as device,
-        open_line(board, device.port) as line,
+        open_connection(board, device.port) as line,
     ):
         found = _taken(line, 30)
         assert line.counters.frames == 30
@@ -111,7 +111,7 @@ def test_the_frames_of_every_family_come_as_they_were_sent(protocol: Protocol) -
 
 def test_the_rest_of_a_line_that_began_before_is_no_frame(terminal: Terminal) -> None:
     board = Board("mat", Sensor(2, 2), Text())
-    with open_line(board, terminal.name) as line:
+    with open_connection(board, terminal.name) as line:
         terminal.write(b"2 2 3 4\n1 2 3 4\n")  # of 12 2 3 4, say
         frame = line.take(5.0)
         assert frame is not None
@@ -121,7 +121,7 @@ def test_the_rest_of_a_line_that_began_before_is_no_frame(terminal: Terminal) ->
 
 def test_a_frame_has_the_time_of_its_last_byte(terminal: Terminal) -> None:
     cells = _frames(1)[0]
-    with open_line(BOARD, terminal.name) as line:
+    with open_connection(BOARD, terminal.name) as line:
         content = encoded(BOARD, cells, 0)
         terminal.write(content[:-1])
         _until(lambda: line.counters.bytes == len(content) - 1)
@@ -137,7 +137,7 @@ def test_a_slow_reader_gets_the_newest_frames_and_the_count_of_the_others() -> N
     sent = _frames(40)
     with (
         Device(BOARD, sent, rate=None) as device,
-        open_line(BOARD, device.port, most_waiting=5) as line,
+        open_connection(BOARD, device.port, most_waiting=5) as line,
     ):
         _until(lambda: line.counters.frames == 40)
         found = _taken(line, 5)
@@ -148,7 +148,7 @@ def test_a_slow_reader_gets_the_newest_frames_and_the_count_of_the_others() -> N
 
 def test_frames_can_be_taken_after_the_line_is_closed() -> None:
     with Device(BOARD, _frames(4), rate=None) as device:
-        line = open_line(BOARD, device.port)
+        line = open_connection(BOARD, device.port)
         _until(lambda: line.counters.frames == 4)
         line.close()
         line.close()
@@ -162,7 +162,7 @@ def test_a_line_waits_for_a_plug_that_was_pulled() -> None:
     sent = _frames(1000)
     with (
         Device(BOARD, sent, faults) as device,
-        open_line(BOARD, device.port) as line,
+        open_connection(BOARD, device.port) as line,
     ):
         _until(lambda: line.counters.reconnects == 2)
         before = line.counters.frames
@@ -175,7 +175,7 @@ def test_a_line_waits_for_a_plug_that_was_pulled() -> None:
 
 
 def test_a_line_ends_with_the_port_if_told(terminal: Terminal) -> None:
-    with open_line(BOARD, terminal.name, wait=False) as line:
+    with open_connection(BOARD, terminal.name, wait=False) as line:
         terminal.write(encoded(BOARD, _frames(1)[0], 0))
         assert line.take(5) is not None
         terminal.unplug()
@@ -189,7 +189,7 @@ def test_a_line_ends_with_the_port_if_told(terminal: Terminal) -> None:
 def test_a_line_that_waits_says_that_the_port_is_away(
     terminal: Terminal,
 ) -> None:
-    with open_line(BOARD, terminal.name) as line:
+    with open_connection(BOARD, terminal.name) as line:
         terminal.unplug()
         _until(lambda: line.state == "away")
         assert line.take(0.01) is None
@@ -199,7 +199,7 @@ def test_silence_is_counted_once_and_ends_with_the_next_frame(
     terminal: Terminal,
 ) -> None:
     content = encoded(BOARD, _frames(1)[0], 0)
-    with open_line(BOARD, terminal.name) as line:
+    with open_connection(BOARD, terminal.name) as line:
         terminal.write(content)
         assert line.take(5) is not None
         _until(lambda: line.state == "silent")
@@ -215,7 +215,7 @@ def test_a_board_that_does_not_answer_is_asked_again(
     terminal: Terminal,
 ) -> None:
     board = Board("mat", Sensor(2, 2), Request("3F 0A", timeout_s=0.03))
-    with open_line(board, terminal.name) as line:
+    with open_connection(board, terminal.name) as line:
         assert os.read(terminal.end, 9) == b"?\n"
         terminal.write(b"\1\2\3")  # one byte is missing
         assert os.read(terminal.end, 9) == b"?\n"
@@ -232,7 +232,7 @@ def test_bytes_that_are_no_frames_are_told_and_the_line_goes_on(
     monkeypatch.setattr("fuzzytree.tactile.link.watching.PATIENCE_S", 0.2)
     other = Board("mat", Sensor(4, 6), Marker("AA 55", checksum="crc16"))
     cells = np.full((4, 6), 7)
-    with open_line(BOARD, terminal.name) as line:
+    with open_connection(BOARD, terminal.name) as line:
         stop = threading.Event()
 
         def talk() -> None:
@@ -273,7 +273,7 @@ def test_what_is_no_port_is_one_sentence(
 ) -> None:
     (tmp_path / "file").write_text("no port")
     with pytest.raises(PortError) as caught:
-        open_line(BOARD, port.format(folder=tmp_path))
+        open_connection(BOARD, port.format(folder=tmp_path))
     assert str(caught.value) == message.format(folder=tmp_path)
 
 
@@ -282,13 +282,13 @@ def test_a_port_that_is_not_there_names_those_that_are(
 ) -> None:
     there = ", ".join(port.device for port in ports()) or "none"
     with pytest.raises(PortError) as caught:
-        open_line(BOARD, "/dev/ttyUSB77")
+        open_connection(BOARD, "/dev/ttyUSB77")
     assert str(caught.value) == f"there is no port '/dev/ttyUSB77'; there is {there}"
 
 
 def test_a_port_is_opened_once_only(terminal: Terminal) -> None:
-    with open_line(BOARD, terminal.name), pytest.raises(PortError) as caught:
-        open_line(BOARD, terminal.name)
+    with open_connection(BOARD, terminal.name), pytest.raises(PortError) as caught:
+        open_connection(BOARD, terminal.name)
     assert str(caught.value) == f"{terminal.name}: another program has it open"
 
 
@@ -305,7 +305,7 @@ def test_a_port_that_is_not_allowed_names_its_group(
         os.seteuid(65534)
     try:
         with pytest.raises(PortError) as caught:
-            open_line(BOARD, terminal.name)
+            open_connection(BOARD, terminal.name)
     finally:
         if is_root:
             os.seteuid(0)
@@ -322,7 +322,7 @@ def test_a_line_without_its_library_names_the_extra(
 ) -> None:
     for name in ("serial", "serial.tools"):
         monkeypatch.setitem(sys.modules, name, None)
-    for call in (ports, lambda: open_line(BOARD, "/dev/ttyS0")):
+    for call in (ports, lambda: open_connection(BOARD, "/dev/ttyS0")):
         with pytest.raises(MissingExtraError) as caught:
             call()
         assert str(caught.value) == (
@@ -332,7 +332,7 @@ def test_a_line_without_its_library_names_the_extra(
 
 def test_at_least_one_frame_waits() -> None:
     with pytest.raises(ValueError, match="at least 1 frame waits, not 0"):
-        open_line(BOARD, "/dev/null", most_waiting=0)
+        open_connection(BOARD, "/dev/null", most_waiting=0)
 
 
 def test_the_settings_of_the_port_are_those_of_the_board(terminal: Terminal) -> None:
@@ -351,7 +351,7 @@ def test_the_first_frames_of_a_line_are_the_baseline() -> None:
     cells = np.arange(48).reshape(8, 6)
     with (
         Device(board, itertools.repeat(cells, 9), rate=None) as device,
-        open_line(board, device.port) as line,
+        open_connection(board, device.port) as line,
     ):
         found, remarks = start(board, line)
         frame = line.take(5)
@@ -381,7 +381,7 @@ def test_what_fails_within_the_line_is_raised_where_frames_are_taken(
         raise RuntimeError("a decoder failed")
 
     monkeypatch.setattr("fuzzytree.tactile.link.decoder.Decoder.feed", feed)
-    with open_line(BOARD, terminal.name) as line:
+    with open_connection(BOARD, terminal.name) as line:
         terminal.write(b"any")
         with pytest.raises(RuntimeError, match="a decoder failed"):
             line.take(5)
@@ -408,7 +408,7 @@ def test_no_frame_is_made_up_and_none_is_lost_uncounted(protocol: Protocol) -> N
     found: list[Frame] = []
     with (
         FaultyDevice(board, sent, faults, rate=20.0, seed=3) as device,
-        open_line(board, device.port, most_waiting=50) as line,
+        open_connection(board, device.port, most_waiting=50) as line,
     ):
         while not device.over.is_set() and line.state != "ended":
             found += _taken(line, 10, 0.1)
