@@ -43,13 +43,13 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Or,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.runtimes import find_runtime
@@ -144,7 +144,7 @@ def seven_rules() -> FuzzySystem:
     inputs = tuple(
         SystemInput(
             v.name,
-            tuple(Label(_word(t.name), curves[v.name, t.name]) for t in v.terms),
+            tuple(SystemTerm(_word(t.name), curves[v.name, t.name]) for t in v.terms),
             v.low,
             v.high,
         )
@@ -152,7 +152,7 @@ def seven_rules() -> FuzzySystem:
     )
     output = SystemOutput(
         "answer",
-        tuple(Label(f"rule{k}", Singleton(float(k))) for k in range(1, 8)),
+        tuple(SystemTerm(f"rule{k}", Singleton(float(k))) for k in range(1, 8)),
         0.0,
         8.0,
         Defuzzifier("weighted average"),
@@ -481,7 +481,7 @@ def _simpful(system: FuzzySystem, _: Path) -> Engine:
     return Engine(many, single, note="a loop over rows in Python")
 
 
-def _simpful_set(sf: Any, label: Label, low: float, high: float) -> Any:
+def _simpful_set(sf: Any, label: SystemTerm, low: float, high: float) -> Any:
     if isinstance(label.curve, Gaussian):
         shape = sf.GaussianFuzzySet(label.curve.mean, label.curve.deviation, label.name)
         return shape

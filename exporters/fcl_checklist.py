@@ -15,8 +15,8 @@ from fuzzytree.model.system import (
     And,
     Condition,
     FuzzySystem,
-    Label,
     Or,
+    SystemTerm,
     joints,
     questions,
 )
@@ -108,7 +108,7 @@ def _operators(system: FuzzySystem) -> Iterator[str]:
     yield from dict.fromkeys(result)
 
 
-def _beyond_basic(system: FuzzySystem, labels: list[Label]) -> Iterator[str]:
+def _beyond_basic(system: FuzzySystem, labels: list[SystemTerm]) -> Iterator[str]:
     if any(_most_points(label) > _MOST_BASIC for label in labels):
         yield f"terms of more than {_MOST_BASIC} points"
     if any(not output.defuzzifier.is_weighted for output in system.outputs):
@@ -126,7 +126,7 @@ def _beyond_basic(system: FuzzySystem, labels: list[Label]) -> Iterator[str]:
         yield "numbers that are summed, and not joined by ACCU maximum"
 
 
-def _beyond_extension(system: FuzzySystem, labels: list[Label]) -> Iterator[str]:
+def _beyond_extension(system: FuzzySystem, labels: list[SystemTerm]) -> Iterator[str]:
     if any(_most_points(label) > _MOST_EXTENDED for label in labels):
         yield f"terms of more than {_MOST_EXTENDED} points"
     degrees = {
@@ -154,7 +154,7 @@ def _beyond_extension(system: FuzzySystem, labels: list[Label]) -> Iterator[str]
         yield "weighted sums"
 
 
-def _most_points(label: Label) -> int:
+def _most_points(label: SystemTerm) -> int:
     return len(label.curve.values) if isinstance(label.curve, Points) else 0
 
 

@@ -19,13 +19,13 @@ from fuzzytree.model.system import (
     Condition,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
     SNorm,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     questions,
 )
 from fuzzytree.semantics.conversion import number_losses
@@ -42,7 +42,7 @@ def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
         return system
     first = system.inputs[0]
     name = unlike("always", [label.name for label in first.labels])
-    label = Label(name, ALWAYS)
+    label = SystemTerm(name, ALWAYS)
     always = Is(first.name, name)
     return replace(
         system,

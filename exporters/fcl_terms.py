@@ -21,7 +21,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Label,
     Linear,
     Name,
     Number,
@@ -30,6 +29,7 @@ from fuzzytree.model.system import (
     Singleton,
     SystemInput,
     SystemOutput,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
 )
@@ -44,7 +44,10 @@ def number(value: float) -> str:
 
 
 def term_text(
-    variable: SystemInput | SystemOutput, label: Label, words: FclWords, names: Names
+    variable: SystemInput | SystemOutput,
+    label: SystemTerm,
+    words: FclWords,
+    names: Names,
 ) -> str | None:
     """Return the curve of a label; None if the dialect has none for it."""
     is_weighted = (
@@ -147,10 +150,10 @@ def as_points(
     losses: list[Loss] = []
     reasons: list[str] = []
 
-    def changed(variable: SystemInput | SystemOutput) -> tuple[Label, ...]:
+    def changed(variable: SystemInput | SystemOutput) -> tuple[SystemTerm, ...]:
         if isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted:
             return variable.labels
-        labels: list[Label] = []
+        labels: list[SystemTerm] = []
         for label in variable.labels:
             where = f"term {label.name!r} of {variable.name!r}"
             try:
@@ -165,12 +168,12 @@ def as_points(
 
 
 def _pointed(
-    label: Label,
+    label: SystemTerm,
     variable: SystemInput | SystemOutput,
     words: FclWords,
     tolerance: float,
     losses: list[Loss],
-) -> Label:
+) -> SystemTerm:
     is_kept = isinstance(label.curve, (Points, *words.curves))
     if is_kept and term_text(variable, label, words, {}) is not None:
         return label
@@ -186,7 +189,7 @@ def _pointed(
         losses.append(Loss(where, what, EXACT))
         degrees = tuple(label.height * degree for degree in points.degrees)
         points = replace(points, degrees=degrees)
-    return Label(label.name, points)
+    return SystemTerm(label.name, points)
 
 
 def unspeakable(system: FuzzySystem, words: FclWords) -> Iterator[str]:
@@ -203,7 +206,7 @@ def unspeakable(system: FuzzySystem, words: FclWords) -> Iterator[str]:
 def plain_linear(system: FuzzySystem) -> FuzzySystem:
     """Return a system whose weighted sums of inputs are formulas."""
 
-    def formula(label: Label) -> Label:
+    def formula(label: SystemTerm) -> SystemTerm:
         if not isinstance(label.curve, Linear):
             return label
         total: Expression = Number(0.0)

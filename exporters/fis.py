@@ -46,10 +46,10 @@ from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import (
     Activation,
     FuzzySystem,
-    Label,
     SNorm,
     SystemInput,
     SystemOutput,
+    SystemTerm,
 )
 from fuzzytree.semantics.conversion import (
     FACTS,
@@ -298,7 +298,7 @@ def _private_losses(terms: FisTerms, dialect: Dialect) -> Iterator[Loss]:
 
 
 def _term(
-    output: SystemOutput, label: Label, dialect: Dialect
+    output: SystemOutput, label: SystemTerm, dialect: Dialect
 ) -> tuple[str, str] | None:
     find = number_of if output.defuzzifier.is_weighted else term_of
     return find(label.curve, dialect)
@@ -353,7 +353,7 @@ def _section(title: str, entries: Mapping[str, str]) -> list[str]:
 def _variable(
     title: str,
     one: SystemInput | SystemOutput,
-    about: tuple[Sequence[Label], Sequence[tuple[str, str] | None]],
+    about: tuple[Sequence[SystemTerm], Sequence[tuple[str, str] | None]],
     names: FileNames,
 ) -> list[str]:
     labels, result = about

@@ -24,12 +24,12 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Hedge,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     questions,
 )
 from fuzzytree.numerics import pointwise
@@ -81,7 +81,7 @@ class FisTerms:
         for number, label in enumerate(labels, 1):
             if label.curve == curve and label.height == 1.0:
                 return number
-        labels.append(Label(unlike(name, [one.name for one in labels]), curve))
+        labels.append(SystemTerm(unlike(name, [one.name for one in labels]), curve))
         return len(labels)
 
     def code(self, proposition: Is) -> str | None:

@@ -40,12 +40,12 @@ from fuzzytree.model.system import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,
-    Label,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.semantics.conversion import (
@@ -62,7 +62,7 @@ from fuzzytree.semantics.conversion import (
 
 _RESERVED: Final = (*RULE_WORDS, *FUNCTIONS, "fabs", "pow", "pi", "inf", "nan", "x")
 _ONE: Final = SystemOutput(
-    "y", (Label("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
+    "y", (SystemTerm("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
 )
 _ALWAYS: Final = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
 _FINEST: Final = 1e-3
@@ -210,7 +210,7 @@ def _speakable(system: FuzzySystem) -> tuple[RuleBlock, ...]:
 
 
 def _term_text(
-    variable: SystemInput | SystemOutput, label: Label, names: Mapping[str, str]
+    variable: SystemInput | SystemOutput, label: SystemTerm, names: Mapping[str, str]
 ) -> str | None:
     if isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted:
         return number_text(label, weighted_type(variable), names)

@@ -28,7 +28,6 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     Is,
-    Label,
     Linear,
     Name,
     Not,
@@ -45,6 +44,7 @@ from fuzzytree.model.system import (
     Spike,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
     joints,
@@ -179,7 +179,7 @@ KNOWN: tuple[type, ...] = (
 """The curves that FLL has, beside points."""
 
 
-def degree_text(label: Label, names: Mapping[str, str]) -> str | None:
+def degree_text(label: SystemTerm, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term; None if FLL has no such term."""
     match label.curve:
         case Formula(expression=expression):
@@ -208,7 +208,7 @@ def weighted_type(output: SystemOutput) -> str:
     return "Tsukamoto" if is_inverse and all(is_inverse) else "TakagiSugeno"
 
 
-def number_text(label: Label, kind: str, names: Mapping[str, str]) -> str | None:
+def number_text(label: SystemTerm, kind: str, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term of a weighted output, or None."""
     match label.curve:
         case Singleton(value=value):
@@ -298,7 +298,7 @@ def _renamed(expression: Expression, names: Mapping[str, str]) -> Expression:
             return expression
 
 
-def _inverse(label: Label) -> Expression:
+def _inverse(label: SystemTerm) -> Expression:
     """Return where a monotone label has the degree `x`, as a formula."""
     d = "x" if label.height == 1.0 else f"(x / {label.height!r})"
     match label.curve:

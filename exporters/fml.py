@@ -33,13 +33,13 @@ from fuzzytree.model.system import (
     Curve,
     FuzzySystem,
     Gaussian,
-    Label,
     Linear,
     RuleBlock,
     SCurve,
     Singleton,
     SystemInput,
     SystemOutput,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
 )
@@ -325,7 +325,7 @@ def _is_tsk(one: SystemOutput) -> bool:
     return all(isinstance(label.curve, Singleton | Linear) for label in one.labels)
 
 
-def _tsk_term(variable: str, label: Label, names: _Ids) -> Iterator[str]:
+def _tsk_term(variable: str, label: SystemTerm, names: _Ids) -> Iterator[str]:
     numbers: tuple[float, ...] = ()
     match label.curve:
         case Singleton(value=value):
@@ -340,7 +340,7 @@ def _tsk_term(variable: str, label: Label, names: _Ids) -> Iterator[str]:
     yield "      </tskTerm>"
 
 
-def _term(kind: str, variable: str, label: Label, names: _Ids) -> Iterator[str]:
+def _term(kind: str, variable: str, label: SystemTerm, names: _Ids) -> Iterator[str]:
     yield f'      <{kind} name="{names.term(variable, label.name)}">'
     result = _shape(label.curve)
     if result is not None:

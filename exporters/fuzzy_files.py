@@ -15,13 +15,13 @@ from fuzzytree.model.system import (
     And,
     Condition,
     FuzzySystem,
-    Label,
     Linear,
     Or,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
+    SystemTerm,
 )
 
 TITLE = "Written by fuzzytree."
@@ -72,7 +72,7 @@ def refuse(name: str, to: str, reasons: Iterable[str]) -> None:
 
 def with_labels(
     system: FuzzySystem,
-    change: Callable[[SystemInput | SystemOutput], Iterable[Label]],
+    change: Callable[[SystemInput | SystemOutput], Iterable[SystemTerm]],
 ) -> FuzzySystem:
     """Return a system whose variables have other terms."""
     inputs = tuple(replace(v, labels=tuple(change(v))) for v in system.inputs)
@@ -90,7 +90,7 @@ def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySy
         LossError: If a term with another height is not a list of points.
     """
 
-    def scaled(variable: SystemInput | SystemOutput, label: Label) -> Label:
+    def scaled(variable: SystemInput | SystemOutput, label: SystemTerm) -> SystemTerm:
         is_number = isinstance(variable, SystemOutput) and (
             variable.defuzzifier.is_weighted
             and isinstance(label.curve, Singleton | Linear)
@@ -105,7 +105,7 @@ def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySy
         what = f"its height {label.height!r} is in its points, which are rounded"
         losses.append(Loss(where, what, 2.0**-52))
         degrees = tuple(label.height * degree for degree in label.curve.degrees)
-        return Label(label.name, Points(label.curve.values, degrees))
+        return SystemTerm(label.name, Points(label.curve.values, degrees))
 
     return with_labels(system, lambda v: [scaled(v, one) for one in v.labels])
 

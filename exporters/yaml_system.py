@@ -28,7 +28,6 @@ from fuzzytree.model.system import (
     Defuzzifier,
     Formula,
     FuzzySystem,
-    Label,
     Linear,
     PiCurve,
     RuleBlock,
@@ -38,6 +37,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 
@@ -145,7 +145,7 @@ def _variable(one: SystemInput | SystemOutput) -> dict[str, Entry]:
     return entries
 
 
-def _label(label: Label) -> Entry:
+def _label(label: SystemTerm) -> Entry:
     match label.curve:
         case Band() | LR() | Points():
             entries = named_shape(label.name, label.curve)

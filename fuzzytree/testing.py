@@ -41,12 +41,12 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.model.tree import (
     Branch,
@@ -160,8 +160,10 @@ def _named_rules(names: Sequence[str]) -> RuleBase:
 def _named_system(names: Sequence[str]) -> FuzzySystem:
     """Return a system whose inputs and terms have these names."""
     ramp = Points((0.0, 1.0), (0.0, 1.0))
-    curves = tuple(Label(name, ramp) for name in names)
-    numbers = tuple(Label(name, Singleton(float(k))) for k, name in enumerate(names, 1))
+    curves = tuple(SystemTerm(name, ramp) for name in names)
+    numbers = tuple(
+        SystemTerm(name, Singleton(float(k))) for k, name in enumerate(names, 1)
+    )
     output = SystemOutput(
         f"{names[0]} 2", numbers, 0.0, 9.0, Defuzzifier("weighted average")
     )
@@ -196,8 +198,8 @@ def _extreme_rules() -> RuleBase:
 def _extreme_system() -> FuzzySystem:
     """Return a system of extreme numbers."""
     degrees = (0.0, 1.0, 5e-324, 0.5, 1.0 - 2.0**-53, 0.1, 1.0, 0.0)
-    label = Label("wide", Points(_EXTREMES, degrees), height=5e-324)
-    numbers = tuple(Label(f"n{k}", Singleton(x)) for k, x in enumerate(_EXTREMES))
+    label = SystemTerm("wide", Points(_EXTREMES, degrees), height=5e-324)
+    numbers = tuple(SystemTerm(f"n{k}", Singleton(x)) for k, x in enumerate(_EXTREMES))
     how = Defuzzifier("weighted average")
     output = SystemOutput("y", numbers, -1e308, 1e308, how, default=-0.0)
     rules = tuple(
@@ -210,11 +212,11 @@ def _extreme_system() -> FuzzySystem:
 
 def _system_by_lines() -> FuzzySystem:
     """Return a system whose output's curve is made of lines."""
-    ramp = Label("ramp", Points((0.0, 1.0), (0.0, 1.0)))
+    ramp = SystemTerm("ramp", Points((0.0, 1.0), (0.0, 1.0)))
     labels = (
-        Label("low", Points((0.0, 0.4, 1.0), (1.0, 0.25, 0.0))),
-        Label("high", Points((0.1, 0.5, 0.9), (0.0, 1.0, 0.3)), height=0.75),
-        Label("all", Points((0.0,), (0.125,))),
+        SystemTerm("low", Points((0.0, 0.4, 1.0), (1.0, 0.25, 0.0))),
+        SystemTerm("high", Points((0.1, 0.5, 0.9), (0.0, 1.0, 0.3)), height=0.75),
+        SystemTerm("all", Points((0.0,), (0.125,))),
     )
     how = Defuzzifier("centroid", 6, "lines")
     output = SystemOutput("y", labels, 0.0, 1.0, how, aggregation="maximum")

@@ -20,7 +20,6 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
@@ -28,6 +27,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.runtimes.systems import run_system
@@ -38,12 +38,16 @@ from fuzzytree.semantics.samples import samples
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
 
-LOW = Label("low", Trapezoid(0.0, 0.1, 0.1, 0.2))
-THIN = Label("thin", Trapezoid(0.5, 0.5, 0.5, 0.5))
-NEVER = Label("never", Trapezoid(0.7, 0.8, 0.8, 0.9))
+LOW = SystemTerm("low", Trapezoid(0.0, 0.1, 0.1, 0.2))
+THIN = SystemTerm("thin", Trapezoid(0.5, 0.5, 0.5, 0.5))
+NEVER = SystemTerm("never", Trapezoid(0.7, 0.8, 0.8, 0.9))
 INPUTS = tuple(SystemInput(n, (LOW, THIN, NEVER), 0.0, 1.0) for n in "ab")
 OUTPUT = SystemOutput(
-    "y", (Label("one", Singleton(1.0)),), None, None, Defuzzifier("weighted average")
+    "y",
+    (SystemTerm("one", Singleton(1.0)),),
+    None,
+    None,
+    Defuzzifier("weighted average"),
 )
 THEN = (Conclusion("y", "one"),)
 
@@ -133,7 +137,9 @@ def test_rows_are_drawn_from_the_ranges_themselves() -> None:
 def test_probing_thousands_of_rules_runs_fewer_rows_than_rules(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    labels = tuple(Label(f"t{k}", Trapezoid(k - 1.0, k, k, k + 1.0)) for k in range(7))
+    labels = tuple(
+        SystemTerm(f"t{k}", Trapezoid(k - 1.0, k, k, k + 1.0)) for k in range(7)
+    )
     inputs = tuple(SystemInput(f"x{k}", labels, 0.0, 6.0) for k in range(4))
     rules = tuple(
         SystemRule(And(tuple(Is(f"x{k}", f"t{t}") for k, t in enumerate(terms))), THEN)

@@ -36,7 +36,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Hedge,
     Is,
-    Label,
     Name,
     Not,
     Or,
@@ -44,6 +43,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     joints,
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
@@ -232,8 +232,8 @@ def _output(one: SystemOutput, names: Names, labels: Labels) -> SystemOutput:
 
 
 def _labels(
-    labels: tuple[Label, ...], variables: Names, names: Names, *, are_numbers: bool
-) -> tuple[Label, ...]:
+    labels: tuple[SystemTerm, ...], variables: Names, names: Names, *, are_numbers: bool
+) -> tuple[SystemTerm, ...]:
     return tuple(
         replace(
             one,

@@ -27,7 +27,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -37,6 +36,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     Trapezoid,
     TwoGaussians,
@@ -179,14 +179,14 @@ def _sugeno(
     functions: Mapping[str, tuple[Mapping[str, float], float]],
     columns: list[str],
 ) -> SystemOutput:
-    labels: dict[str, Label] = {}
+    labels: dict[str, SystemTerm] = {}
     for end in ends:
         if end.output == output:
             weights, offset = functions[end.term]
             found = [weights.get(column, 0.0) * end.weight for column in columns]
             number = offset * end.weight
             curve = Linear(tuple(found), number) if weights else Singleton(number)
-            labels[end.label] = Label(end.label, curve)
+            labels[end.label] = SystemTerm(end.label, curve)
     how = Defuzzifier("weighted average")
     return SystemOutput(output, (*labels.values(),), None, None, how, default=0.0)
 
@@ -251,9 +251,9 @@ def _range(variable: Any) -> tuple[float, float] | None:
     return float(ends[0]), float(ends[1])
 
 
-def _labels(name: str, variable: Any) -> tuple[Label, ...]:
+def _labels(name: str, variable: Any) -> tuple[SystemTerm, ...]:
     return tuple(
-        Label(one._term, _curve(one, f"term {one._term!r} of {name!r}"))
+        SystemTerm(one._term, _curve(one, f"term {one._term!r} of {name!r}"))
         for one in variable._FSlist
     )
 

@@ -23,13 +23,13 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     SNorm,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
 )
 
@@ -166,14 +166,14 @@ def _universe(variable: Any) -> list[float]:
     return found
 
 
-def _labels(variable: Any) -> tuple[Label, ...]:
+def _labels(variable: Any) -> tuple[SystemTerm, ...]:
     values = _universe(variable)
-    labels: list[Label] = []
+    labels: list[SystemTerm] = []
     for term in variable.terms.values():
         degrees = np.asarray(term.mf, np.float64).tolist()
         kept = _corners(values, degrees)
         curve = Points(tuple(values[k] for k in kept), tuple(degrees[k] for k in kept))
-        labels.append(Label(term.label, curve))
+        labels.append(SystemTerm(term.label, curve))
     return tuple(labels)
 
 

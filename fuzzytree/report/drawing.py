@@ -12,7 +12,7 @@ from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.model.naming import printable
 from fuzzytree.model.rulebase import LR, Band, Part, Points, RuleBase, Shape, Variable
 from fuzzytree.model.system import Curve as SystemCurve
-from fuzzytree.model.system import Formula, FuzzySystem, Label, Linear, SystemInput
+from fuzzytree.model.system import Formula, FuzzySystem, Linear, SystemInput, SystemTerm
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.report.markup import Attribute, Content, Markup, tag, trimmed
@@ -175,7 +175,7 @@ def _corners(shape: Shape) -> Iterator[float | None]:
             yield from values
 
 
-def _labelled(label: Label) -> Curve:
+def _labelled(label: SystemTerm) -> Curve:
     curve = label.curve
     if isinstance(curve, (Band, LR, Points)) and label.height == 1.0:
         return curve_of(label.name, curve)

@@ -17,7 +17,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -28,6 +27,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.model.tree import FuzzyTree
@@ -263,7 +263,7 @@ def sum_text(parts: Sequence[Part]) -> str:
     return " + ".join(terms)
 
 
-def _label_lines(labels: Sequence[Label], columns: Sequence[str]) -> Iterator[str]:
+def _label_lines(labels: Sequence[SystemTerm], columns: Sequence[str]) -> Iterator[str]:
     rows = [
         (
             f"  {one.name}",

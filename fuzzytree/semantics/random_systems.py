@@ -30,7 +30,6 @@ from fuzzytree.model.system import (
     Grid,
     Hedge,
     Is,
-    Label,
     Linear,
     Name,
     Not,
@@ -50,6 +49,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     Trapezoid,
     TwoGaussians,
@@ -170,13 +170,13 @@ class _Maker:
             names.append(plain if name in (*names, *self.scales, "x") else name)
         return names
 
-    def _labels(self, curves: Sequence[Curve]) -> tuple[Label, ...]:
+    def _labels(self, curves: Sequence[Curve]) -> tuple[SystemTerm, ...]:
         names: list[str] = []
         for plain in _PLAIN[: len(curves)]:
             name = self._name(plain)
             names.append(plain if name in names or name in _PLAIN else name)
         return tuple(
-            Label(name, curve, self.chance.choice((1.0, 1.0, 1.0, 0.75, 0.3)))
+            SystemTerm(name, curve, self.chance.choice((1.0, 1.0, 1.0, 0.75, 0.3)))
             for name, curve in zip(names, curves, strict=True)
         )
 

@@ -37,7 +37,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Linear,
     Name,
     Not,
@@ -50,6 +49,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
@@ -170,8 +170,8 @@ def _input(name: str, low: str, high: str) -> SystemInput:
     return SystemInput(
         name,
         (
-            Label(low, Trapezoid(None, 0.0, 2.0, 6.0)),
-            Label(high, Trapezoid(4.0, 8.0, 10.0, None)),
+            SystemTerm(low, Trapezoid(None, 0.0, 2.0, 6.0)),
+            SystemTerm(high, Trapezoid(4.0, 8.0, 10.0, None)),
         ),
         0.0,
         10.0,
@@ -186,8 +186,8 @@ def _sugeno(
 ) -> FuzzySystem:
     """Return a system whose output is a weighted number."""
     labels = (
-        Label("slow", slow or Singleton(1.0)),
-        Label("fast", fast or Singleton(3.5)),
+        SystemTerm("slow", slow or Singleton(1.0)),
+        SystemTerm("fast", fast or Singleton(3.5)),
     )
     output = SystemOutput(
         "fan", labels, 0.0, 5.0, method or Defuzzifier("weighted average")
@@ -224,7 +224,7 @@ def _mamdani(method: Defuzzifier | None = None) -> FuzzySystem:
 def _singletons() -> FuzzySystem:
     """Return a classifier as JFML writes them: terms without width, and a maximum."""
     system = _mamdani(Defuzzifier("smallest of maximum", 1000))
-    labels = (Label("slow", Singleton(1.0)), Label("fast", Singleton(3.5)))
+    labels = (SystemTerm("slow", Singleton(1.0)), SystemTerm("fast", Singleton(3.5)))
     output = replace(system.outputs[0], labels=labels)
     return replace(system, outputs=(output,))
 
@@ -232,7 +232,7 @@ def _singletons() -> FuzzySystem:
 def _curved(curve: Curve) -> FuzzySystem:
     system = _sugeno()
     heat = replace(
-        system.inputs[0], labels=(system.inputs[0].labels[0], Label("high", curve))
+        system.inputs[0], labels=(system.inputs[0].labels[0], SystemTerm("high", curve))
     )
     return replace(system, inputs=(heat, system.inputs[1]))
 

@@ -14,12 +14,12 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Hedge,
     Is,
-    Label,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.random_systems import random_system
@@ -78,7 +78,11 @@ def test_rules_in_another_order_are_not_equal() -> None:
 
 def _system(**changes: object) -> FuzzySystem:
     output = SystemOutput(
-        "y", (Label("one", Singleton(1.0)),), 0.0, 2.0, Defuzzifier("weighted average")
+        "y",
+        (SystemTerm("one", Singleton(1.0)),),
+        0.0,
+        2.0,
+        Defuzzifier("weighted average"),
     )
     rule = SystemRule(None, (Conclusion("y", "one"),))
     system = FuzzySystem("s", (SystemInput("x"),), (output,), (RuleBlock((rule,)),))
@@ -99,8 +103,8 @@ def test_what_no_number_depends_on_is_left_out() -> None:
         {"clips": True},
         {"aggregation": "maximum"},
         {"defuzzifier": Defuzzifier("weighted sum")},
-        {"labels": (Label("one", Singleton(1.5)),)},
-        {"labels": (Label("one", Singleton(1.0), height=0.5),)},
+        {"labels": (SystemTerm("one", Singleton(1.5)),)},
+        {"labels": (SystemTerm("one", Singleton(1.0), height=0.5),)},
     ],
     ids=lambda changes: next(iter(changes)),
 )
@@ -114,7 +118,7 @@ def test_the_range_of_an_output_that_is_clipped_stays() -> None:
 
 def test_very_very_is_very_twice() -> None:
     def asking(*hedges: Hedge) -> FuzzySystem:
-        ramp = Label("low", Points((0.0, 1.0), (0.0, 1.0)))
+        ramp = SystemTerm("low", Points((0.0, 1.0), (0.0, 1.0)))
         rule = SystemRule(Is("x", "low", hedges), (Conclusion("y", "one"),))
         return replace(
             _system(), inputs=(SystemInput("x", (ramp,)),), blocks=(RuleBlock((rule,)),)

@@ -18,21 +18,21 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.testing import random_system
 
 
 def washer(time: float = 60.0, output: str = "time") -> FuzzySystem:
-    dirty = Label("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+    dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
     how = Defuzzifier("weighted sum")
-    one = SystemOutput(output, (Label("long", Singleton(time)),), None, None, how)
+    one = SystemOutput(output, (SystemTerm("long", Singleton(time)),), None, None, how)
     rule = SystemRule(Is("dirt", "dirty"), (Conclusion(output, "long"),))
     inputs = (SystemInput("dirt", (dirty,)),)
     return FuzzySystem("washer", inputs, (one,), (RuleBlock((rule,)),))
@@ -110,7 +110,7 @@ def test_a_file_with_other_names_agrees() -> None:
 def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
     system = washer()
     (dirt,) = system.inputs
-    key = Label("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
+    key = SystemTerm("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
     (block,) = system.blocks
     rules = (*block.rules, SystemRule(Is("dirt", "key"), block.rules[0].then))
     other = replace(
@@ -180,7 +180,7 @@ def shifted(system: FuzzySystem, by: float) -> FuzzySystem:
 def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> None:
     system = washer()
     (soaked,) = system.inputs
-    bell = replace(soaked, labels=(Label("dirty", Gaussian(0.0, 1.5)),))
+    bell = replace(soaked, labels=(SystemTerm("dirty", Gaussian(0.0, 1.5)),))
     system = replace(system, inputs=(bell,))
     data = np.array([[0.3, 1.0, 2.5]])
     found = check_system(system, shifted(system, 1e-9), limit=50, data=data)
@@ -194,7 +194,7 @@ def test_rows_on_an_edge_are_told_apart_from_the_table() -> None:
     # The rule passes from the very degree of dirt 1 on.
     system = washer()
     (soaked,) = system.inputs
-    bell = replace(soaked, labels=(Label("dirty", Gaussian(0.0, 1.5)),))
+    bell = replace(soaked, labels=(SystemTerm("dirty", Gaussian(0.0, 1.5)),))
     edge = math.exp(-0.5 * (1.0 / 1.5) ** 2)
     only = Activation("threshold", threshold=edge)
     (block,) = system.blocks

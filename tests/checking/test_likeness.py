@@ -20,7 +20,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import FuzzySystem, Is, Label, Trapezoid
+from fuzzytree.model.system import FuzzySystem, Is, SystemTerm, Trapezoid
 from fuzzytree.semantics.conversion import as_system
 from fuzzytree.semantics.conversion.points import straightened
 from fuzzytree.semantics.samples import samples
@@ -64,10 +64,10 @@ def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> N
     always = samples()["a conclusion without a condition"]
     assert isinstance(always, FuzzySystem)
     heat, damp = always.inputs
-    label = Label("always", Trapezoid(None, 0.0, 0.0, None))
+    label = SystemTerm("always", Trapezoid(None, 0.0, 0.0, None))
     block = always.blocks[0]
 
-    def asking(label: Label) -> FuzzySystem:
+    def asking(label: SystemTerm) -> FuzzySystem:
         rules = tuple(
             replace(one, when=one.when or Is("heat", label.name)) for one in block.rules
         )
@@ -79,7 +79,9 @@ def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> N
 
     assert is_alike(always, asking(label))
     assert not is_alike(always, asking(replace(label, height=0.5)))
-    assert not is_alike(always, asking(Label("near", Trapezoid(None, 0.0, 9.0, 10.0))))
+    assert not is_alike(
+        always, asking(SystemTerm("near", Trapezoid(None, 0.0, 9.0, 10.0)))
+    )
 
 
 def test_another_name_needs_a_remark() -> None:

@@ -16,12 +16,12 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     SCurve,
     Singleton,
     SystemOutput,
+    SystemTerm,
     Trapezoid,
     questions,
 )
@@ -57,7 +57,7 @@ def tamed(system: FuzzySystem, dialect: Dialect) -> FuzzySystem:
     return FuzzySystem(system.name, inputs, outputs, blocks)
 
 
-def _curved(labels: tuple[Label, ...], dialect: Dialect) -> tuple[Label, ...]:
+def _curved(labels: tuple[SystemTerm, ...], dialect: Dialect) -> tuple[SystemTerm, ...]:
     kept = (Points, *WORDS[dialect].curves)
     return tuple(
         one if isinstance(one.curve, kept) else replace(one, curve=PLAIN)

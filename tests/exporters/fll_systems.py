@@ -12,11 +12,11 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Hedge,
     Is,
-    Label,
     Linear,
     Not,
     Or,
     RuleBlock,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.testing import random_system
@@ -55,7 +55,7 @@ def plain_system(seed: int, *, outputs: int = 2, rules: int = 8) -> FuzzySystem:
     )
 
 
-def _label(label: Label, columns: int) -> Label:
+def _label(label: SystemTerm, columns: int) -> SystemTerm:
     match label.curve:
         case Band() | LR():
             return replace(label, curve=Trapezoid(-1.0, -0.5, 0.25, 2.0))

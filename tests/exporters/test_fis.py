@@ -31,7 +31,6 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -44,6 +43,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     Trapezoid,
     TwoGaussians,
@@ -89,7 +89,7 @@ def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
     inputs = tuple(
         SystemInput(
             f"x{k}",
-            tuple(Label(f"t{n}", random_curve(chance)) for n in range(3)),
+            tuple(SystemTerm(f"t{n}", random_curve(chance)) for n in range(3)),
             -5.0,
             5.0,
         )
@@ -105,7 +105,7 @@ def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
         SystemOutput(
             f"y{k}",
             tuple(
-                Label(f"t{n}", numbers[n] if is_weighted else _wide_curve(chance))
+                SystemTerm(f"t{n}", numbers[n] if is_weighted else _wide_curve(chance))
                 for n in range(3)
             ),
             -5.0,
@@ -237,14 +237,14 @@ def test_scores_read_back_are_within_the_bounds_of_the_losses(
 
 
 def test_every_line_of_a_small_file() -> None:
-    low = Label("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
+    low = SystemTerm("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
     system = FuzzySystem(
         "tip %1",
         (SystemInput("food", (low,), 0.0, 10.0),),
         (
             SystemOutput(
                 "tip",
-                (Label("small", Singleton(0.1)),),
+                (SystemTerm("small", Singleton(0.1)),),
                 0.0,
                 30.0,
                 Defuzzifier("weighted average"),
@@ -301,11 +301,11 @@ def _small() -> Conclusion:
 
 def _sugeno(*rules: SystemRule, block: RuleBlock | None = None) -> FuzzySystem:
     labels = (
-        Label("low", Trapezoid(None, 1.0, 1.0, 2.0)),
-        Label("high", Trapezoid(1.0, 2.0, 2.0, None)),
+        SystemTerm("low", Trapezoid(None, 1.0, 1.0, 2.0)),
+        SystemTerm("high", Trapezoid(1.0, 2.0, 2.0, None)),
     )
     output = SystemOutput(
-        "tip", (Label("small", Singleton(1.0)),), None, None, _AVERAGE, None
+        "tip", (SystemTerm("small", Singleton(1.0)),), None, None, _AVERAGE, None
     )
     inputs = SystemInput("a", labels, 0.0, 3.0), SystemInput("b", labels, 0.0, 3.0)
     return FuzzySystem("s", inputs, (output,), (block or RuleBlock(rules),))
@@ -389,13 +389,13 @@ def test_a_rule_without_a_place_in_fis_is_refused(
 
 def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
     one = SystemOutput(
-        "y", (Label("t", Gaussian(0.0, 1.0)),), 0.0, 1.0,
+        "y", (SystemTerm("t", Gaussian(0.0, 1.0)),), 0.0, 1.0,
         Defuzzifier("centroid", 200, "middle"), "maximum", default=0.25, clips=True,
     )  # fmt: skip
     rule = SystemRule(Is("x", "t"), (Conclusion("y", "t"),))
     system = FuzzySystem(
         "s",
-        (SystemInput("x", (Label("t", Gaussian(0.0, 1.0)),), 0.0, 1.0),),
+        (SystemInput("x", (SystemTerm("t", Gaussian(0.0, 1.0)),), 0.0, 1.0),),
         (one,),
         (
             RuleBlock((rule,), "minimum", "maximum", "minimum"),
@@ -437,9 +437,13 @@ def test_what_matlab_answers_where_no_rule_fires_is_a_loss_if_the_model_differs(
 def test_terms_of_one_number_are_a_loss_where_octave_joins_their_rules() -> None:
     number = Singleton(5.0)
     output = SystemOutput(
-        "tip", (Label("small", number), Label("tiny", number)), 0.0, 9.0, _AVERAGE,
+        "tip",
+        (SystemTerm("small", number), SystemTerm("tiny", number)),
+        0.0,
+        9.0,
+        _AVERAGE,
         "maximum",
-    )  # fmt: skip
+    )
     rules = [
         SystemRule(Is("a", term), (Conclusion("tip", then),))
         for term, then in (("low", "small"), ("high", "tiny"))
@@ -476,8 +480,8 @@ def test_points_are_a_loss_where_standard_curves_are_required() -> None:
     curve = Points((0.0, 1.0, 2.0), (0.0, 0.5, 1.0))
     system = FuzzySystem(
         "s",
-        (SystemInput("x", (Label("t", curve),), 0.0, 2.0),),
-        (SystemOutput("y", (Label("t", Singleton(1.0)),), 0.0, 1.0, _AVERAGE),),
+        (SystemInput("x", (SystemTerm("t", curve),), 0.0, 2.0),),
+        (SystemOutput("y", (SystemTerm("t", Singleton(1.0)),), 0.0, 1.0, _AVERAGE),),
         (RuleBlock((SystemRule(Is("x", "t"), (Conclusion("y", "t"),)),)),),
     )
     assert write(system).losses == ()

@@ -28,7 +28,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Is,
-    Label,
     Linear,
     Name,
     Not,
@@ -42,6 +41,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     Trapezoid,
 )
@@ -57,20 +57,20 @@ TANK = FuzzySystem(
         SystemInput(
             "water level",
             (
-                Label("low", Trapezoid(None, 0.0, 1.0, 2.5)),
-                Label("high", Arc(0.1, 3.0)),
+                SystemTerm("low", Trapezoid(None, 0.0, 1.0, 2.5)),
+                SystemTerm("high", Arc(0.1, 3.0)),
             ),
             0.0,
             3.0,
             clips=True,
             unit="m",
         ),
-        SystemInput("is", (Label("big", Sigmoid(1e-7, 2.0), 0.5),)),
+        SystemInput("is", (SystemTerm("big", Sigmoid(1e-7, 2.0), 0.5),)),
     ),
     (
         SystemOutput(
             "valve",
-            (Label("shut", Trapezoid(0.0, 0.0, 0.2, 0.2)),),
+            (SystemTerm("shut", Trapezoid(0.0, 0.0, 0.2, 0.2)),),
             0.0,
             1.0,
             Defuzzifier("bisector", 50),
@@ -80,9 +80,9 @@ TANK = FuzzySystem(
         SystemOutput(
             "rate",
             (
-                Label("none", Singleton(0.0)),
-                Label("some", Linear((0.5, 1.0 / 3.0), -1.0)),
-                Label(
+                SystemTerm("none", Singleton(0.0)),
+                SystemTerm("some", Linear((0.5, 1.0 / 3.0), -1.0)),
+                SystemTerm(
                     "most",
                     Formula(Call("negate", (Call("+", (Name("x"), Number(2.0))),))),
                 ),
@@ -230,13 +230,13 @@ def test_what_is_lost_is_listed_and_refused() -> None:
     system = replace(
         TANK,
         inputs=(
-            SystemInput("a", (Label("low", Band(0.0, 1.0, flank, None)),)),
+            SystemInput("a", (SystemTerm("low", Band(0.0, 1.0, flank, None)),)),
             SystemInput("b", parts=(Part("a", 2.0, 0.5),)),
         ),
         outputs=(
             SystemOutput(
                 "y",
-                (Label("t", Trapezoid(0.0, 1.0, 1.0, 2.0)),),
+                (SystemTerm("t", Trapezoid(0.0, 1.0, 1.0, 2.0)),),
                 0.0,
                 2.0,
                 Defuzzifier("centroid", 101, "ends"),
@@ -330,7 +330,10 @@ def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
     rule = SystemRule(Is("water level", "low"), (Conclusion("rate", "none"),))
     system = replace(
         TANK,
-        inputs=(SystemInput("water level", (Label("low", STEPS),)), TANK.inputs[1]),
+        inputs=(
+            SystemInput("water level", (SystemTerm("low", STEPS),)),
+            TANK.inputs[1],
+        ),
         blocks=(RuleBlock((rule,)),),
     )
     text = write(system).content.decode()
@@ -360,9 +363,9 @@ MIXED: list[Curve] = [
 def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
     curve: Curve, height: float, is_mixed: bool
 ) -> None:
-    labels = (Label("t", curve, height), Label("n", Singleton(1.0)))
+    labels = (SystemTerm("t", curve, height), SystemTerm("n", Singleton(1.0)))
     output = replace(TANK.outputs[1], labels=labels if is_mixed else labels[:1])
-    ramp = Label("up", Points((0.0, 4.0), (0.0, 1.0)))
+    ramp = SystemTerm("up", Points((0.0, 4.0), (0.0, 1.0)))
     rule = SystemRule(Is("a", "up"), (Conclusion("rate", "t"),))
     system = FuzzySystem(
         "s", (SystemInput("a", (ramp,)),), (output,), (RuleBlock((rule,)),)
@@ -381,7 +384,7 @@ def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
 
 def test_bands_and_lr_sets_as_numbers_become_points_of_their_own() -> None:
     shape = LR(0.5, Side(0.25, (1.0,)), Side(0.25, (1.0,)))
-    output = replace(TANK.outputs[1], labels=(Label("t", shape),))
+    output = replace(TANK.outputs[1], labels=(SystemTerm("t", shape),))
     rule = SystemRule(Is("is", "big"), (Conclusion("rate", "t"),))
     system = replace(TANK, outputs=(output,), blocks=(RuleBlock((rule,)),))
     written = write(system, allow_loss=True)

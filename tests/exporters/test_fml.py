@@ -25,7 +25,6 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -35,6 +34,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     Trapezoid,
     TwoGaussians,
@@ -71,7 +71,7 @@ def random_fml(seed: int) -> FuzzySystem:
     inputs = tuple(
         SystemInput(
             f"x{k}",
-            tuple(Label(f"t{n}", random_curve(chance)) for n in range(3)),
+            tuple(SystemTerm(f"t{n}", random_curve(chance)) for n in range(3)),
             -5.0,
             5.0,
             unit="mm & <",
@@ -90,7 +90,7 @@ def random_fml(seed: int) -> FuzzySystem:
     is_mamdani = kind == "mamdani"
     output = SystemOutput(
         "y",
-        tuple(Label(f"t{n}", curve) for n, curve in enumerate(numbers[kind])),
+        tuple(SystemTerm(f"t{n}", curve) for n, curve in enumerate(numbers[kind])),
         -5.0,
         5.0,
         USUAL if is_mamdani else Defuzzifier("weighted average"),
@@ -162,14 +162,14 @@ def test_product_and_negated_clauses_are_read_back_equal() -> None:
 
 
 def test_every_line_of_a_small_file() -> None:
-    low = Label("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
+    low = SystemTerm("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
     system = FuzzySystem(
         "tip",
         (SystemInput("food", (low,), 0.0, 10.0),),
         (
             SystemOutput(
                 "tip %",
-                (Label("small", Singleton(0.1)),),
+                (SystemTerm("small", Singleton(0.1)),),
                 None,
                 None,
                 Defuzzifier("weighted average"),

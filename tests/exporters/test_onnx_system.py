@@ -23,13 +23,13 @@ from fuzzytree.model.system import (
     DefuzzifierMethod,
     FuzzySystem,
     Is,
-    Label,
     Points,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.systems import infer_rows
@@ -67,12 +67,12 @@ def test_nodes_bear_the_names_of_propositions_rules_and_outputs() -> None:
 
 def test_hostile_names_become_short_unique_identifiers() -> None:
     hostile = ["outputs", "a; b", "a  b", "\u5ea6" * 40, "x" * 400, "1[2J"]
-    half = Label("x; DROP", Points((0.0, 1.0), (0.0, 1.0)))
+    half = SystemTerm("x; DROP", Points((0.0, 1.0), (0.0, 1.0)))
     rules = [
         SystemRule(Is(name, half.name), (Conclusion("status", "o"),))
         for name in hostile
     ]
-    one = Label("o", Singleton(1.0))
+    one = SystemTerm("o", Singleton(1.0))
     output = SystemOutput("status", (one,), None, None, Defuzzifier("weighted sum"))
     inputs = tuple(SystemInput(name, (half,)) for name in hostile)
     system = FuzzySystem("s", inputs, (output,), (RuleBlock(tuple(rules)),))
@@ -204,13 +204,13 @@ def grid_system(
     """Return the system of all pairs of the terms of two inputs, a rule each."""
     peaks = [float(place) for place in range(terms)]
     labels = tuple(
-        Label(f"t{place}", Points((peak - 1.0, peak, peak + 1.0), (0.0, 1.0, 0.0)))
+        SystemTerm(f"t{place}", Points((peak - 1.0, peak, peak + 1.0), (0.0, 1.0, 0.0)))
         for place, peak in enumerate(peaks)
     )
     inputs = SystemInput("a", labels), SystemInput("b", labels)
     pairs = list(itertools.product(labels, labels))
     numbers = tuple(
-        Label(f"o{place}", Singleton(place / 7.0)) for place in range(len(pairs))
+        SystemTerm(f"o{place}", Singleton(place / 7.0)) for place in range(len(pairs))
     )
     rules = tuple(
         SystemRule(

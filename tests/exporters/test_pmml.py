@@ -32,7 +32,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Name,
     Number,
     RuleBlock,
@@ -40,6 +39,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.inference import infer
@@ -292,7 +292,7 @@ def test_a_system_may_have_any_names() -> None:
     how = Defuzzifier("weighted average")
     names = ("step 1", "step", "result", "number add")
     inputs = tuple(map(SystemInput, names))
-    labels = (Label("four", Singleton(4.0)),)
+    labels = (SystemTerm("four", Singleton(4.0)),)
     output = SystemOutput("a_", labels, None, None, how)
     rule = SystemRule(None, (Conclusion("a_", "four"),))
     written = write(FuzzySystem("s", inputs, (output,), (RuleBlock((rule,)),)))
@@ -305,14 +305,14 @@ def test_a_system_of_too_many_steps_is_refused() -> None:
     curve = Gaussian(0.0, 1.0)
     output = SystemOutput(
         "y",
-        (Label("all", curve),),
+        (SystemTerm("all", curve),),
         0.0,
         1.0,
         Defuzzifier("centroid", 50_000),
         "maximum",
     )
     rule = SystemRule(None, (Conclusion("y", "all"),))
-    dirt = SystemInput("dirt", (Label("high", curve),))
+    dirt = SystemInput("dirt", (SystemTerm("high", curve),))
     rules = (replace(rule, when=Is("dirt", "high")),)
     block = RuleBlock(rules, implication="minimum")
     with pytest.raises(
@@ -324,7 +324,7 @@ def test_a_system_of_too_many_steps_is_refused() -> None:
 def test_functions_that_pmml_lacks_are_named() -> None:
     angle = Formula(Call("atan2", (Name("dirt"), Number(2.0))))
     how = Defuzzifier("weighted average")
-    output = SystemOutput("y", (Label("angle", angle),), None, None, how)
+    output = SystemOutput("y", (SystemTerm("angle", angle),), None, None, how)
     dirt = SystemInput("dirt")
     block = RuleBlock((SystemRule(None, (Conclusion("y", "angle"),)),))
     with pytest.raises(LossError) as caught:

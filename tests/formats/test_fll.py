@@ -26,7 +26,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Linear,
     Name,
     Number,
@@ -42,6 +41,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
 )
@@ -111,21 +111,21 @@ def test_every_word_of_a_file_is_in_the_system() -> None:
         SystemInput(
             "service",
             (
-                Label("poor", Trapezoid(None, 0.0, 0.0, 5.0)),
-                Label("good", Trapezoid(0.0, 5.0, 5.0, None), 0.5),
+                SystemTerm("poor", Trapezoid(None, 0.0, 0.0, 5.0)),
+                SystemTerm("good", Trapezoid(0.0, 5.0, 5.0, None), 0.5),
             ),
             0.0,
             10.0,
             clips=True,
         ),
-        SystemInput("food", (Label("fine", Points((0.0, 2.5), (0.0, 1.0))),)),
+        SystemInput("food", (SystemTerm("fine", Points((0.0, 2.5), (0.0, 1.0))),)),
     )
     assert system.outputs == (
         SystemOutput(
             "tip",
             (
-                Label("cheap", Points((0.0, 10.0), (1.0, 0.0))),
-                Label("generous", Points((10.0, 30.0), (0.0, 1.0))),
+                SystemTerm("cheap", Points((0.0, 10.0), (1.0, 0.0))),
+                SystemTerm("generous", Points((10.0, 30.0), (0.0, 1.0))),
             ),
             0.0,
             30.0,
@@ -136,8 +136,8 @@ def test_every_word_of_a_file_is_in_the_system() -> None:
         SystemOutput(
             "share",
             (
-                Label("flat", Singleton(0.1)),
-                Label("fair", Linear((0.01, 0.02), 0.05)),
+                SystemTerm("flat", Singleton(0.1)),
+                SystemTerm("fair", Linear((0.01, 0.02), 0.05)),
             ),
             None,
             None,
@@ -219,16 +219,16 @@ CURVES: list[tuple[str, Curve]] = [
 
 @pytest.mark.parametrize(("text", "curve"), CURVES)
 def test_every_class_of_terms_has_its_curve(text: str, curve: Curve) -> None:
-    assert term_of(text) == Label("t", curve)
+    assert term_of(text) == SystemTerm("t", curve)
 
 
-def term_of(text: str, head: str = "") -> Label:
+def term_of(text: str, head: str = "") -> SystemTerm:
     file = f"InputVariable: a\n term: t {text}\nOutputVariable: b\n {head}\n"
     file += "defuzzifier: WeightedSum\n term: one Constant 1"
     return system_of(with_rule(file, "b is one")).inputs[0].labels[0]
 
 
-def output_of(term: str, defuzzifier: str) -> Label:
+def output_of(term: str, defuzzifier: str) -> SystemTerm:
     lines = ["InputVariable: a", "OutputVariable: b", f"defuzzifier: {defuzzifier}"]
     text = "\n".join([*lines, f"term: t {term}"])
     return system_of(with_rule(text, "b is t")).outputs[0].labels[0]
@@ -451,7 +451,7 @@ def test_of_two_terms_with_one_name_the_second_counts_and_the_first_is_a_loss() 
     text = "\n".join([*lines, "term: t Constant 1", "term: t Constant 2"])
     reading = read(with_rule(text, "y is t").encode(), "t.fll")
     assert isinstance(reading.model, FuzzySystem)
-    assert reading.model.outputs[0].labels == (Label("t", Singleton(2.0)),)
+    assert reading.model.outputs[0].labels == (SystemTerm("t", Singleton(2.0)),)
     assert [one.where for one in reading.losses] == ["line 4"]
 
 

@@ -17,11 +17,11 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     RuleBlock,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.tables import FloatArray
 
@@ -288,7 +288,7 @@ def test_something_else_is_no_control_system() -> None:
 def test_lines_are_refused_where_they_mean_nothing(
     defuzzifier: Any, aggregation: Any, implication: Any, text: str
 ) -> None:
-    ramp = Label("ramp", Points((0.0, 1.0), (0.0, 1.0)))
+    ramp = SystemTerm("ramp", Points((0.0, 1.0), (0.0, 1.0)))
     how = Defuzzifier(*defuzzifier)
     output = SystemOutput("y", (ramp,), 0.0, 1.0, how, aggregation)
     rule = SystemRule(Is("a", "ramp"), (Conclusion("y", "ramp"),))

@@ -22,7 +22,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Hedge,
     Is,
-    Label,
     Name,
     Number,
     Or,
@@ -30,6 +29,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.semantics.inference import infer
 from fuzzytree.testing import random_rows, random_system
@@ -159,7 +159,7 @@ def test_a_system_that_yaml_cannot_hold_is_not_written() -> None:
     deep: Expression = Name("x1")
     for _ in range(MOST_LEVELS - 1):
         deep = Call("+", (Number(1.0), deep))
-    first = replace(whole.inputs[0], labels=(Label("deep", Formula(deep)),))
+    first = replace(whole.inputs[0], labels=(SystemTerm("deep", Formula(deep)),))
     rule = SystemRule(None, (Conclusion("y1", whole.outputs[0].labels[0].name),))
     text = refusal(
         replace(whole, inputs=(first, *whole.inputs[1:]), blocks=(RuleBlock((rule,)),))

@@ -28,7 +28,6 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     Is,
-    Label,
     Linear,
     Name,
     Not,
@@ -45,6 +44,7 @@ from fuzzytree.model.system import (
     Spike,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
 )
@@ -210,7 +210,7 @@ def alike(system: FuzzySystem) -> FuzzySystem:
     return replace(system, inputs=inputs, outputs=outputs, blocks=blocks)
 
 
-def _looked_at(label: Label) -> Label:
+def _looked_at(label: SystemTerm) -> SystemTerm:
     match label.curve:
         case Singleton(value=value):
             return replace(label, curve=Trapezoid(value, value, value, value))
@@ -342,7 +342,7 @@ def engine(system: FuzzySystem) -> fl.Engine:
     return made
 
 
-def _terms(labels: Sequence[Label], columns: Sequence[str]) -> list[fl.Term]:
+def _terms(labels: Sequence[SystemTerm], columns: Sequence[str]) -> list[fl.Term]:
     terms: list[fl.Term] = []
     for label in labels:
         made = term(label.curve, columns, label.height)

@@ -24,13 +24,13 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Label,
     Linear,
     RuleBlock,
     SemiEllipse,
     Singleton,
     SNorm,
     SystemOutput,
+    SystemTerm,
     TNorm,
 )
 from fuzzytree.semantics.inference import infer
@@ -66,7 +66,7 @@ def alike(system: FuzzySystem) -> FuzzySystem:
     )
 
 
-def _label(label: Label) -> Label:
+def _label(label: SystemTerm) -> SystemTerm:
     is_new = isinstance(label.curve, Arc | SemiEllipse)  # fuzzylite 6 has none
     return replace(label, curve=Gaussian(0.0, 0.3)) if is_new else label
 

@@ -28,7 +28,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Linear,
     Name,
     Not,
@@ -44,6 +43,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
     curve_mistakes,
     names_in,
@@ -51,10 +51,10 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.semantics.inference.formulas import BINARY, UNARY
 
-LOW = Label("low", Trapezoid(None, 0.0, 1.0, 2.0))
+LOW = SystemTerm("low", Trapezoid(None, 0.0, 1.0, 2.0))
 INPUT = SystemInput("a", (LOW,))
 WEIGHTED = SystemOutput(
-    "y", (Label("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
+    "y", (SystemTerm("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
 )
 CENTROID = SystemOutput("y", (LOW,), 0.0, 1.0, Defuzzifier("centroid"), "maximum")
 RULE = SystemRule(Is("a", "low"), (Conclusion("y", "one"),))
@@ -304,8 +304,8 @@ def test_the_deepest_formula_is_accepted() -> None:
     assert [*curve_mistakes(Formula(deep(MOST_LEVELS)))] == []
 
 
-def labelled(curve: Curve) -> Label:
-    return Label("made", curve)
+def labelled(curve: Curve) -> SystemTerm:
+    return SystemTerm("made", curve)
 
 
 def test_a_formula_names_inputs_earlier_outputs_and_x() -> None:

@@ -15,12 +15,12 @@ from fuzzytree.model.system import (
     Expression,
     Formula,
     FuzzySystem,
-    Label,
     Name,
     RuleBlock,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.systems import infer_rows, run_system
@@ -42,7 +42,7 @@ def values_of(system: FuzzySystem, rows: list[dict[str, float]]) -> np.ndarray:
 
 def formula_system(expression: Expression) -> FuzzySystem:
     """Return a system whose output is a formula of x."""
-    label = Label("f", Formula(expression))
+    label = SystemTerm("f", Formula(expression))
     output = SystemOutput("y", (label,), None, None, Defuzzifier("weighted sum"))
     rule = SystemRule(None, (Conclusion("y", "f"),))
     return FuzzySystem("f", (SystemInput("a"),), (output,), (RuleBlock((rule,)),))
@@ -157,7 +157,7 @@ def test_functions_of_one_number_are_within_their_units(function: str) -> None:
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("function", ["^", "fmod", "%", "min", "max", "/"])
 def test_functions_of_two_numbers_are_within_their_units(function: str) -> None:
-    label = Label("f", Formula(Call(function, (Name("a"), Name("b")))))
+    label = SystemTerm("f", Formula(Call(function, (Name("a"), Name("b")))))
     output = SystemOutput("y", (label,), None, None, Defuzzifier("weighted sum"))
     rule = SystemRule(None, (Conclusion("y", "f"),))
     inputs = (SystemInput("a"), SystemInput("b"))

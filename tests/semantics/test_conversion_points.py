@@ -23,7 +23,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Name,
     PiCurve,
     RuleBlock,
@@ -37,6 +36,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
 )
@@ -182,8 +182,12 @@ def washer(curve: Curve, output: Curve, method: str) -> FuzzySystem:
     rule = SystemRule(Is("dirt", "high"), (Conclusion("time", "long"),))
     return FuzzySystem(
         "washer",
-        (SystemInput("dirt", (Label("high", curve, 0.5),)),),
-        (SystemOutput("time", (Label("long", output),), 0.0, 1.0, how, "maximum"),),
+        (SystemInput("dirt", (SystemTerm("high", curve, 0.5),)),),
+        (
+            SystemOutput(
+                "time", (SystemTerm("long", output),), 0.0, 1.0, how, "maximum"
+            ),
+        ),
         (RuleBlock((rule,), implication="minimum"),),
     )
 

@@ -34,7 +34,6 @@ from fuzzytree.model.system import (
     Grid,
     Hedge,
     Is,
-    Label,
     Linear,
     Not,
     Number,
@@ -52,6 +51,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     Trapezoid,
     TwoGaussians,
@@ -72,8 +72,8 @@ from fuzzytree.semantics.reference import Status
 from fuzzytree.testing import random_rows, random_system
 
 NAN, INF = math.nan, math.inf
-UP = Label("up", Points((0.0, 1.0), (0.0, 1.0)))
-DOWN = Label("down", Points((0.0, 1.0), (1.0, 0.0)))
+UP = SystemTerm("up", Points((0.0, 1.0), (0.0, 1.0)))
+DOWN = SystemTerm("down", Points((0.0, 1.0), (1.0, 0.0)))
 HALF = math.exp(-0.5)
 
 
@@ -326,7 +326,7 @@ def test_a_sum_adds_halves_and_fills_up_with_zeros() -> None:
 
 def system(
     rules: Sequence[SystemRule],
-    labels: Sequence[Label] = (Label("one", Singleton(1.0)),),
+    labels: Sequence[SystemTerm] = (SystemTerm("one", Singleton(1.0)),),
     method: DefuzzifierMethod = "weighted sum",
     *,
     samples: int = 4,
@@ -411,13 +411,13 @@ def test_a_height_multiplies_the_degree() -> None:
 
 
 LABELS = (
-    Label("one", Singleton(1.0)),
-    Label("three", Singleton(3.0)),
-    Label("line", Linear((2.0, -1.0), 0.5)),
-    Label("formula", Formula(parse("a + 10 * x"))),
-    Label("ramp", Points((4.0, 8.0), (0.0, 1.0))),
-    Label("low ramp", Points((4.0, 8.0), (0.0, 1.0)), height=0.5),
-    Label("bump", Trapezoid(0.0, 0.5, 0.5, 1.0)),
+    SystemTerm("one", Singleton(1.0)),
+    SystemTerm("three", Singleton(3.0)),
+    SystemTerm("line", Linear((2.0, -1.0), 0.5)),
+    SystemTerm("formula", Formula(parse("a + 10 * x"))),
+    SystemTerm("ramp", Points((4.0, 8.0), (0.0, 1.0))),
+    SystemTerm("low ramp", Points((4.0, 8.0), (0.0, 1.0)), height=0.5),
+    SystemTerm("bump", Trapezoid(0.0, 0.5, 0.5, 1.0)),
 )
 
 
@@ -472,7 +472,7 @@ def mamdani(degrees: Sequence[float], method: DefuzzifierMethod, grid: Grid) -> 
     bare = SystemOutput("y", (), 0.0, 2.0, how, "maximum")
     points = Points(tuple(sampled_values(bare)), tuple(degrees))
     found = system(
-        [rule(None)], [Label("one", points)], method,
+        [rule(None)], [SystemTerm("one", points)], method,
         samples=len(degrees), grid=grid, aggregation="maximum",
     )  # fmt: skip
     return infer(found, {"a": 0.0, "b": 0.0}).outputs[0]
@@ -507,7 +507,7 @@ def test_a_curve_becomes_a_number(
 def test_where_nothing_is_concluded_the_default_answers(
     method: DefuzzifierMethod,
 ) -> None:
-    labels = (Label("one", Trapezoid(0.0, 0.5, 1.0, 2.0)),)
+    labels = (SystemTerm("one", Trapezoid(0.0, 0.5, 1.0, 2.0)),)
     for default, expected in ((None, NAN), (7.0, 7.0)):
         found = infer(
             system(
@@ -521,7 +521,7 @@ def test_where_nothing_is_concluded_the_default_answers(
 
 
 def test_a_curve_without_area_answers_the_default_too() -> None:
-    labels = (Label("one", Trapezoid(5.0, 6.0, 6.0, 7.0)),)
+    labels = (SystemTerm("one", Trapezoid(5.0, 6.0, 6.0, 7.0)),)
     asked = system([rule(None)], labels, "centroid", aggregation="sum", default=9.0)
     found = infer(asked, {"a": 0.0, "b": 0.0})
     assert (found.outputs, found.status) == ((9.0,), Status.UNCOVERED)
@@ -530,8 +530,8 @@ def test_a_curve_without_area_answers_the_default_too() -> None:
 
 def test_implication_cuts_and_aggregation_joins() -> None:
     labels = (
-        Label("one", Trapezoid(0.0, 0.0, 1.0, 1.0)),
-        Label("two", Trapezoid(0.5, 0.5, 2.0, 2.0)),
+        SystemTerm("one", Trapezoid(0.0, 0.0, 1.0, 1.0)),
+        SystemTerm("two", Trapezoid(0.5, 0.5, 2.0, 2.0)),
     )
     rules = [rule(A_UP, "one"), rule(B_UP, "two")]
     row = {"a": 0.25, "b": 0.5}
@@ -637,9 +637,13 @@ def test_a_later_block_asks_for_the_joined_degrees_of_a_label(
 
 def test_a_formula_sees_inputs_and_earlier_outputs() -> None:
     first = SystemOutput(
-        "y", (Label("one", Singleton(2.0)),), None, None, Defuzzifier("weighted sum")
+        "y",
+        (SystemTerm("one", Singleton(2.0)),),
+        None,
+        None,
+        Defuzzifier("weighted sum"),
     )
-    formula = Label("sum", Formula(parse("10 * y + mix")))
+    formula = SystemTerm("sum", Formula(parse("10 * y + mix")))
     second = replace(first, name="z", labels=(formula,))
     found = FuzzySystem(
         "chain",
@@ -658,7 +662,7 @@ def test_a_formula_sees_inputs_and_earlier_outputs() -> None:
 
 
 def test_inputs_are_moved_into_their_range_before_anything_else() -> None:
-    line = Label("line", Linear((1.0,)))
+    line = SystemTerm("line", Linear((1.0,)))
     output = SystemOutput("y", (line,), None, None, Defuzzifier("weighted sum"))
     held = SystemInput("a", (UP,), 0.25, 0.5, clips=True)
     mix = SystemInput("mix", parts=(Part("a", 2.0),))
@@ -674,7 +678,7 @@ def test_inputs_are_moved_into_their_range_before_anything_else() -> None:
 
 
 def test_an_answer_is_moved_into_its_range_and_so_is_the_default() -> None:
-    labels = (Label("one", Singleton(9.0)),)
+    labels = (SystemTerm("one", Singleton(9.0)),)
     high = system([rule(A_UP)], labels, "weighted average", clips=True, default=-5.0)
     assert infer(high, {"a": 1.0, "b": 0.0}).outputs == (2.0,)
     assert infer(high, {"a": 0.0, "b": 0.0}).outputs == (0.0,)
@@ -707,7 +711,7 @@ def test_a_column_without_a_value_is_a_key_error() -> None:
 
 
 def test_a_degree_that_is_nan_activates_nothing() -> None:
-    root = SystemInput("a", (Label("up", Formula(parse("sqrt(x)"))),))
+    root = SystemInput("a", (SystemTerm("up", Formula(parse("sqrt(x)"))),))
     asked = replace(system([rule(A_UP), rule(B_UP)]), inputs=(
         root, SystemInput("b", (UP,)),
     ))  # fmt: skip
@@ -787,7 +791,8 @@ def test_degrees_above_1_are_bounded_by_the_aggregation_that_joins_them() -> Non
 @pytest.mark.parametrize("method", ["general", "last", "highest"])
 def test_numbers_are_added_in_the_order_of_the_rules(method: Any) -> None:
     labels = [
-        Label(f"n{k}", Singleton(value)) for k, value in enumerate((1e16, -1e16, 1.0))
+        SystemTerm(f"n{k}", Singleton(value))
+        for k, value in enumerate((1e16, -1e16, 1.0))
     ]
     rules = [rule(None, label.name) for label in labels]
     block = RuleBlock((), activation=Activation(method, 3))

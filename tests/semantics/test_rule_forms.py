@@ -15,18 +15,18 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.semantics.conversion.rule_forms import MOST_RULES, alternatives, split
 from fuzzytree.semantics.inference import infer
 
-TERMS = (Label("low", Gaussian(0.0, 0.4)), Label("high", Gaussian(1.0, 0.3)))
+TERMS = (SystemTerm("low", Gaussian(0.0, 0.4)), SystemTerm("high", Gaussian(1.0, 0.3)))
 
 
 def condition(chance: random.Random, level: int = 0) -> Condition:

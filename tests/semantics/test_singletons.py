@@ -20,12 +20,12 @@ from fuzzytree.model.system import (
     DefuzzifierMethod,
     FuzzySystem,
     Is,
-    Label,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
     sampled_values,
 )
@@ -113,10 +113,13 @@ def test_a_center_of_area_of_singletons_is_refused() -> None:
 def mixed(method: DefuzzifierMethod) -> FuzzySystem:
     """Return a system with an output of one singleton and one trapezoid."""
     ramps = (
-        Label("low", Points((0.0, 4.0), (1.0, 0.0))),
-        Label("high", Points((0.0, 4.0), (0.0, 1.0))),
+        SystemTerm("low", Points((0.0, 4.0), (1.0, 0.0))),
+        SystemTerm("high", Points((0.0, 4.0), (0.0, 1.0))),
     )
-    terms = (Label("one", Singleton(0.123)), Label("wide", Trapezoid(0.4, 0.5, 0.7, 1)))
+    terms = (
+        SystemTerm("one", Singleton(0.123)),
+        SystemTerm("wide", Trapezoid(0.4, 0.5, 0.7, 1)),
+    )
     output = SystemOutput("y", terms, 0.0, 1.0, Defuzzifier(method, 7), "maximum")
     rules = (
         SystemRule(Is("x", "low"), (Conclusion("y", "one"),)),
@@ -154,7 +157,10 @@ def test_every_runtime_answers_singletons_like_the_inference(
     method: DefuzzifierMethod, count: int
 ) -> None:
     system = mixed(method)
-    labels = (Label("one", Singleton(0.5)), Label("wide", Singleton(0.25 * count)))
+    labels = (
+        SystemTerm("one", Singleton(0.5)),
+        SystemTerm("wide", Singleton(0.25 * count)),
+    )
     output = replace(system.outputs[0], labels=labels)
     found = check_system(replace(system, outputs=(output,)), limit=100)
     assert found.ok

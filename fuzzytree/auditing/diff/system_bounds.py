@@ -21,7 +21,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -29,6 +28,7 @@ from fuzzytree.model.system import (
     Singleton,
     SystemInput,
     SystemOutput,
+    SystemTerm,
 )
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.conversion import joined_outputs
@@ -134,11 +134,11 @@ def _answered(one: SystemOutput, number: Fraction | None) -> Fraction | None:
     return _held(one, number) if one.clips and number is not None else number
 
 
-def _label(one: SystemInput | SystemOutput, name: str) -> Label:
+def _label(one: SystemInput | SystemOutput, name: str) -> SystemTerm:
     return next(label for label in one.labels if label.name == name)
 
 
-def _number(label: Label, columns: Sequence[str], values: Point) -> Fraction:
+def _number(label: SystemTerm, columns: Sequence[str], values: Point) -> Fraction:
     match label.curve:
         case Singleton(value=value):
             return Fraction(value)
@@ -292,7 +292,7 @@ def _move(
 
 
 def _weights(
-    system: FuzzySystem, label: Label
+    system: FuzzySystem, label: SystemTerm
 ) -> tuple[dict[str, Fraction], Fraction] | None:
     """Return the number of a label as a sum of columns; None if it is none."""
     match label.curve:

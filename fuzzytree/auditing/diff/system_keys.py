@@ -20,7 +20,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -28,6 +27,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     names_in,
     questions,
 )
@@ -53,7 +53,7 @@ class Contribution(NamedTuple):
     """
 
     strength: Hashable
-    label: Label | None
+    label: SystemTerm | None
     most: float
 
 
@@ -184,7 +184,7 @@ class _Read:
             order = tuple(self._concluded(one, label) for label in one.labels)
         return facts_of(one), joins, order, tuple(made)
 
-    def _concluded(self, one: SystemOutput, label: Label) -> Hashable:
+    def _concluded(self, one: SystemOutput, label: SystemTerm) -> Hashable:
         """Return what a term of an output is, and which of those that are the same."""
         key = self._curve(label, is_number=one.defuzzifier.is_weighted)
         same = [
@@ -201,7 +201,7 @@ class _Read:
             return variable, self._concluded(self.outputs[variable], asked)
         return self.sources[variable], self._curve(asked)
 
-    def _curve(self, label: Label, *, is_number: bool = False) -> Hashable:
+    def _curve(self, label: SystemTerm, *, is_number: bool = False) -> Hashable:
         curve = label.curve
         shape = None if is_number else shape_of(curve)
         key: Hashable = curve if shape is None else shape
@@ -261,7 +261,7 @@ class _Read:
 
     def _then(
         self, rule: SystemRule, block: RuleBlock, output: str
-    ) -> Iterator[tuple[Label, Hashable]]:
+    ) -> Iterator[tuple[SystemTerm, Hashable]]:
         """Yield the terms of an output that a rule concludes; hedges add up."""
         hedges: tuple[str, ...] = ()
         is_curve = not self.outputs[output].defuzzifier.is_weighted

@@ -48,7 +48,7 @@ from fuzzytree.model.system import (
     SystemInput,
     questions,
 )
-from fuzzytree.model.system import Label as SystemLabel
+from fuzzytree.model.system import SystemTerm as SystemLabel
 from fuzzytree.semantics.conversion.points import shape_of
 
 

@@ -50,10 +50,10 @@ from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
-    Label,
     Singleton,
     SystemInput,
     SystemOutput,
+    SystemTerm,
 )
 from fuzzytree.semantics.conversion import as_rules, joined_by_number
 
@@ -333,7 +333,7 @@ def _terms(
             made = fcl_terms.read(text, where, known.dialect)
         except PartError as error:
             known.notes.mistakes.extend(error.mistakes)
-            found.append(FllTerm(Label(label, Singleton(0.0)), "Constant"))
+            found.append(FllTerm(SystemTerm(label, Singleton(0.0)), "Constant"))
             continue
         if made.loss:
             known.notes.loss(f"term {label!r} of {name!r}", made.loss)
@@ -414,7 +414,7 @@ def _check_kinds(
 
 
 def _estimated(
-    named: FclVariable, labels: Iterable[Label], known: FclVariables
+    named: FclVariable, labels: Iterable[SystemTerm], known: FclVariables
 ) -> tuple[float, float]:
     """Return the range that an output's terms span, where the file says none."""
     name = str(named.token)

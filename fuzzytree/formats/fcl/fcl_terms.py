@@ -19,12 +19,12 @@ from fuzzytree.model.system import (
     Cosine,
     Curve,
     Gaussian,
-    Label,
     PiCurve,
     Sigmoid,
     SigmoidDifference,
     SigmoidProduct,
     Singleton,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
     curve_mistakes,
@@ -96,7 +96,7 @@ def _checked(token: Token, name: str, curve: Curve, where: TermScope) -> FllTerm
     for sentence in curve_mistakes(curve):
         whose = f"term {name!r} of {where.variable!r}"
         raise PartError((*place(token), f"{whose}: {sentence}"))
-    return FllTerm(Label(name, curve), "")
+    return FllTerm(SystemTerm(name, curve), "")
 
 
 _FUNCTIONS = {"LN": "log", "LOG": "log10"}

@@ -22,7 +22,6 @@ from fuzzytree.model.system import (
     Formula,
     Hedge,
     Is,
-    Label,
     Linear,
     Number,
     Or,
@@ -31,6 +30,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     curve_mistakes,
 )
 
@@ -48,7 +48,7 @@ def labels_of(
     count: FisEntry | None,
     about: About,
     notes: ReaderNotes,
-) -> tuple[Label, ...]:
+) -> tuple[SystemTerm, ...]:
     """Return the terms of a variable in the order of their numbers."""
     numbered = {int(entry.key[2:]): entry for entry in reversed(entries)}
     if len(numbered) < len(entries):
@@ -65,7 +65,7 @@ def labels_of(
             notes.remark(f"{about[0]!r}: {what}: fuzzylite reads them all")
         else:
             notes.mistake((count.line, count.column), what)
-    labels: list[Label] = []
+    labels: list[SystemTerm] = []
     taken: dict[str, int] = {}
     for number in sorted(numbered):
         labels.append(_label(numbered[number], about, taken, notes))
@@ -74,17 +74,17 @@ def labels_of(
 
 def _label(
     entry: FisEntry, about: About, taken: dict[str, int], notes: ReaderNotes
-) -> Label:
+) -> SystemTerm:
     written = text.term_of(entry, notes.mistakes)
     if written is None:
-        return Label(entry.key, _WRONG)
+        return SystemTerm(entry.key, _WRONG)
     name = written.name or entry.key
     found = numbered(name, taken)
     if found != written.name:
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
         notes.remark(f"{what}; here it is {found!r}")
     curve = _curve(written, entry, about, notes)
-    return Label(found, _WRONG if curve is None else curve)
+    return SystemTerm(found, _WRONG if curve is None else curve)
 
 
 def _curve(

@@ -16,13 +16,13 @@ from fuzzytree.model.system import (
     Expression,
     Formula,
     FuzzySystem,
-    Label,
     Linear,
     Number,
     SCurve,
     SemiEllipse,
     Singleton,
     SystemOutput,
+    SystemTerm,
     names_in,
 )
 from fuzzytree.semantics.inference import value_at
@@ -83,7 +83,7 @@ def _area_remarks(outputs: Sequence[SystemOutput]) -> Iterator[str]:
         )
 
 
-def _joined_twice(output: SystemOutput, twice: Sequence[Label]) -> Iterator[str]:
+def _joined_twice(output: SystemOutput, twice: Sequence[SystemTerm]) -> Iterator[str]:
     """Yield what happens to labels that several rules conclude."""
     names = ", ".join(repr(one.name) for one in twice[:3])
     same = f"output {output.name!r}: rules that conclude the same term ({names})"
@@ -99,7 +99,7 @@ def _joined_twice(output: SystemOutput, twice: Sequence[Label]) -> Iterator[str]
         )
 
 
-def _depends_on_degree(label: Label) -> bool:
+def _depends_on_degree(label: SystemTerm) -> bool:
     """Return whether a label's number depends on its degree of activation."""
     match label.curve:
         case Singleton() | Linear():
@@ -110,7 +110,7 @@ def _depends_on_degree(label: Label) -> bool:
             return True
 
 
-def _is_infinite_at_zero(label: Label) -> bool:
+def _is_infinite_at_zero(label: SystemTerm) -> bool:
     """Return whether a label's number at degree 0 is, or may be, no finite number."""
     if isinstance(label.curve, Formula):
         asked = "x" in names_in(label.curve.expression)
@@ -120,7 +120,9 @@ def _is_infinite_at_zero(label: Label) -> bool:
     return found is not None and not math.isfinite(found)
 
 
-def _inverse_remarks(output: SystemOutput, concluded: Sequence[Label]) -> Iterator[str]:
+def _inverse_remarks(
+    output: SystemOutput, concluded: Sequence[SystemTerm]
+) -> Iterator[str]:
     """Yield whether fuzzylite 6 finds other values at which a term has a degree."""
     if any(
         value_at(one.curve, 0.5) is not None
@@ -237,9 +239,9 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
     """Yield where fuzzylite 6 finds other numbers for an output of its own dialects.
 
     Example:
-        >>> from fuzzytree.model.system import Defuzzifier, Label
+        >>> from fuzzytree.model.system import Defuzzifier, SystemTerm
         >>> how = Defuzzifier("weighted average")
-        >>> falling = Label("little", Concave(0.5, 0.4))
+        >>> falling = SystemTerm("little", Concave(0.5, 0.4))
         >>> output = SystemOutput("tip", (falling,), 0.0, 1.0, how)
         >>> [loss.where for loss in fuzzylite_losses(output)]
         ["output 'tip'"]
@@ -264,8 +266,8 @@ def constant_degrees(output: SystemOutput) -> Iterator[str]:
     """Yield a remark on each number that is a degree because a curve is sampled.
 
     Example:
-        >>> from fuzzytree.model.system import Defuzzifier, Label
-        >>> low = Label("low", Formula(Number(0.3)))
+        >>> from fuzzytree.model.system import Defuzzifier, SystemTerm
+        >>> low = SystemTerm("low", Formula(Number(0.3)))
         >>> how = Defuzzifier("centroid")
         >>> len([*constant_degrees(SystemOutput("tip", (low,), 0.0, 1.0, how))])
         1

@@ -43,7 +43,6 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
@@ -51,6 +50,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.semantics.conversion import as_written
 
@@ -371,7 +371,7 @@ def _term(entry: FllEntry, place: TermScope, notes: ReaderNotes) -> FllTerm | No
     except PartError as error:
         notes.mistakes.extend(error.mistakes)
         # Rules may ask for it all the same.
-        return FllTerm(Label(name, Singleton(0.0)), "")
+        return FllTerm(SystemTerm(name, Singleton(0.0)), "")
     _tell_odd(term, rest, place, notes)
     return term
 

@@ -22,7 +22,6 @@ from fuzzytree.model.system import (
     Expression,
     Formula,
     Gaussian,
-    Label,
     Linear,
     Name,
     Number,
@@ -34,6 +33,7 @@ from fuzzytree.model.system import (
     SigmoidProduct,
     Singleton,
     Spike,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
     curve_mistakes,
@@ -64,7 +64,7 @@ class TermScope(msgspec.Struct, frozen=True):
 class FllTerm(msgspec.Struct, frozen=True):
     """A term as it was read."""
 
-    label: Label
+    label: SystemTerm
     kind: str
 
     @property
@@ -90,7 +90,9 @@ def read_term(
         TermError: If it is none.
     """
     if kind.text == "Function":
-        return FllTerm(Label(name, _function(kind, rest, place, formula)), kind.text)
+        return FllTerm(
+            SystemTerm(name, _function(kind, rest, place, formula)), kind.text
+        )
     numbers = _numbers(rest)
     height = 1.0
     match kind.text:
@@ -121,7 +123,7 @@ def read_term(
         case _:
             choice = name_choice(kind.text, CLASSES)
             raise _error(kind, f"no term {kind.text!r}; {choice}")
-    found = Label(name, curve, height)
+    found = SystemTerm(name, curve, height)
     _check(kind, found, place)
     return FllTerm(found, kind.text)
 
@@ -130,7 +132,7 @@ def _error(word: Word, sentence: str) -> PartError:
     return PartError(word.mistake(sentence))
 
 
-def _check(kind: Word, label: Label, place: TermScope) -> None:
+def _check(kind: Word, label: SystemTerm, place: TermScope) -> None:
     where = f"term {label.name!r} of {place.variable!r}"
     for sentence in curve_mistakes(label.curve):
         raise _error(kind, f"{where}: {sentence}")
@@ -284,7 +286,7 @@ CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *_CLASSES)
 """The classes of terms, by their names in files."""
 
 
-def as_degree(label: Label) -> Label:
+def as_degree(label: SystemTerm) -> SystemTerm:
     """Return a monotone term as one whose own degree is a weighted output's number.
 
     A weighted output asks a monotone term *where* it has a degree (after Tsukamoto),
@@ -317,4 +319,4 @@ def as_degree(label: Label) -> Label:
             text = f"sqrt({part} * (2 - {part}))"
         case _:
             return label
-    return Label(label.name, Formula(parse(f"{label.height!r} * ({text})")))
+    return SystemTerm(label.name, Formula(parse(f"{label.height!r} * ({text})")))

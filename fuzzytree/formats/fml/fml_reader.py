@@ -25,13 +25,13 @@ from fuzzytree.model.rulebase import Points, name_choice
 from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
-    Label,
     Linear,
     RuleBlock,
     SCurve,
     Singleton,
     SystemInput,
     SystemOutput,
+    SystemTerm,
 )
 from fuzzytree.semantics.conversion import as_written
 
@@ -232,7 +232,7 @@ def _input(
     element: FmlElement, variables: FmlVariables, notes: ReaderNotes
 ) -> SystemInput:
     name = element.attributes.get("name", "")
-    labels: list[Label] = []
+    labels: list[SystemTerm] = []
     for plain, term in _terms(element, variables, notes):
         key = (name, term.attributes.get("name", ""))
         if _is_complement(term):
@@ -242,7 +242,7 @@ def _input(
             variables.circular[key] = circular[0]
             continue
         curve = curve_of(term, f"term {plain!r} of {name!r}", notes)
-        labels += [Label(plain, curve)] if curve is not None else []
+        labels += [SystemTerm(plain, curve)] if curve is not None else []
     low, high = _range(element, notes)
     unit = element.attributes.get("scale", "")
     return SystemInput(name, tuple(labels), low, high, unit=unit)
@@ -265,7 +265,7 @@ def _output(
     element: FmlElement, inputs: int, variables: FmlVariables, notes: ReaderNotes
 ) -> SystemOutput:
     name = element.attributes.get("name", "")
-    labels: list[Label] = []
+    labels: list[SystemTerm] = []
     for plain, term in _terms(element, variables, notes):
         where = f"term {plain!r} of {name!r}"
         if _is_complement(term) or term.all(CIRCULAR):
@@ -280,7 +280,7 @@ def _output(
                 found = _tsukamoto_term(term, plain, where, notes)
             case _:
                 curve = curve_of(term, where, notes)
-                found = None if curve is None else Label(plain, curve)
+                found = None if curve is None else SystemTerm(plain, curve)
         labels += [found] if found is not None else []
     default = number(element, "defaultValue", notes, 0.0)
     low, high = (
@@ -331,7 +331,7 @@ def _word(
 
 def _tsk_term(
     term: FmlElement, plain: str, inputs: int, notes: ReaderNotes
-) -> Label | None:
+) -> SystemTerm | None:
     numbers: list[float] = []
     for value in term.all("tskValue"):
         holder = xml.FmlElement("tskValue", "", {"": value.text}, *value.position, [])
@@ -348,17 +348,17 @@ def _tsk_term(
         notes.mistake(term.position, f"{what}, not {len(numbers)}")
         return None
     if order == "0":
-        return Label(plain, Singleton(numbers[0]))
-    return Label(plain, Linear(tuple(numbers[1:]), numbers[0]))
+        return SystemTerm(plain, Singleton(numbers[0]))
+    return SystemTerm(plain, Linear(tuple(numbers[1:]), numbers[0]))
 
 
 def _tsukamoto_term(
     term: FmlElement, plain: str, where: str, notes: ReaderNotes
-) -> Label | None:
+) -> SystemTerm | None:
     curve = curve_of(term, where, notes)
     is_ramp = isinstance(curve, Points) and sorted(curve.degrees) == [0.0, 1.0]
     if curve is not None and not (is_ramp or isinstance(curve, SCurve)):
         what = "only linear, s and z shapes can be turned round, as Tsukamoto's must"
         notes.mistake(term.position, f"{where}: {what}")
         return None
-    return None if curve is None else Label(plain, curve)
+    return None if curve is None else SystemTerm(plain, curve)

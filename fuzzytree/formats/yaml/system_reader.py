@@ -44,7 +44,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Label,
     Linear,
     Number,
     PiCurve,
@@ -59,6 +58,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
     TwoGaussians,
     names_in,
@@ -158,8 +158,8 @@ def _names(variables: Node, position: int) -> list[str] | None:
     return texts if len(texts) == len(named) else None
 
 
-def _bare(names: Sequence[str]) -> tuple[Label, ...]:
-    return tuple(Label(name, Band()) for name in names)
+def _bare(names: Sequence[str]) -> tuple[SystemTerm, ...]:
+    return tuple(SystemTerm(name, Band()) for name in names)
 
 
 def _range(
@@ -173,8 +173,8 @@ def _range(
 
 def _labels(
     path: Path, terms: Sequence[layout.LabelOfVariable], mistakes: list[Mistake]
-) -> tuple[Label, ...]:
-    labels: list[Label] = []
+) -> tuple[SystemTerm, ...]:
+    labels: list[SystemTerm] = []
     for index, one in enumerate(terms):
         curve = _curve(one)
         if one.formula is not None and len(mistakes) < MOST_SHOWN:
@@ -183,7 +183,7 @@ def _labels(
             except FormulaError as error:
                 text = f"term {one.name!r}, character {error.column}: {error.sentence}"
                 mistakes.append(((*path, "labels", index, "formula"), text))
-        labels.append(Label(one.name, curve, one.height))
+        labels.append(SystemTerm(one.name, curve, one.height))
     return tuple(labels)
 
 

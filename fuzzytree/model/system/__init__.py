@@ -112,7 +112,6 @@ __all__ = [
     "Grid",
     "Hedge",
     "Is",
-    "Label",
     "Linear",
     "Name",
     "Not",
@@ -133,6 +132,7 @@ __all__ = [
     "SystemInput",
     "SystemOutput",
     "SystemRule",
+    "SystemTerm",
     "TNorm",
     "Trapezoid",
     "TwoGaussians",
@@ -148,7 +148,7 @@ MOST_SAMPLES = 100_000
 """The most values at which an output's range is looked at."""
 
 
-class Label(Value, frozen=True):
+class SystemTerm(Value, frozen=True):
     """A term of a system's variable.
 
     Attributes:
@@ -224,7 +224,7 @@ def sampled_values(output: SystemOutput) -> list[float]:
         >>> sampled_values(output)
         [0.25, 0.75, 1.25, 1.75]
         >>> from msgspec.structs import replace
-        >>> labels = (Label("a", Singleton(0.3)), Label("b", Singleton(1.7)))
+        >>> labels = (SystemTerm("a", Singleton(0.3)), SystemTerm("b", Singleton(1.7)))
         >>> sampled_values(replace(output, labels=labels))
         [0.3, 1.7]
     """
@@ -259,7 +259,7 @@ class SystemInput(Value, frozen=True):
     """
 
     name: str
-    labels: tuple[Label, ...] = ()
+    labels: tuple[SystemTerm, ...] = ()
     low: float | None = None
     high: float | None = None
     clips: bool = False
@@ -286,7 +286,7 @@ class SystemOutput(Value, frozen=True):
     """
 
     name: str
-    labels: tuple[Label, ...]
+    labels: tuple[SystemTerm, ...]
     low: float | None
     high: float | None
     defuzzifier: Defuzzifier

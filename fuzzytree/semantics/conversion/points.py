@@ -43,8 +43,8 @@ from fuzzytree.model.system import (
     Binary,
     Curve,
     FuzzySystem,
-    Label,
     Singleton,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.numerics.curves import BELOW_ONE
@@ -152,7 +152,7 @@ class _Change:
         found = self._curve(variable, term.name, term.shape)
         return Term(term.name, found) if isinstance(found, Points) else term
 
-    def label(self, variable: str, label: Label) -> Label:
+    def label(self, variable: str, label: SystemTerm) -> SystemTerm:
         found = self._curve(variable, label.name, label.curve)
         return replace(label, curve=found)
 

@@ -50,7 +50,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -59,6 +58,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     questions,
 )
@@ -212,7 +212,7 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
     Example:
         >>> from fuzzytree.model.rulebase import Part
         >>> mixed = SystemInput("mix", parts=(Part("a", 2.0, 0.5), Part("b", -1.0)))
-        >>> labels = (Label("one", Singleton(1.0)),)
+        >>> labels = (SystemTerm("one", Singleton(1.0)),)
         >>> how = Defuzzifier("weighted average")
         >>> output = SystemOutput("y", labels, 0.0, 1.0, how)
         >>> block = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
@@ -260,7 +260,7 @@ def _kept(system: FuzzySystem) -> Iterator[SystemInput]:
             yield one
 
 
-def _widened(label: Label, inputs: tuple[SystemInput, ...]) -> Label:
+def _widened(label: SystemTerm, inputs: tuple[SystemInput, ...]) -> SystemTerm:
     """Return a conclusion that gives combinations, which are columns now, no weight."""
     if not isinstance(label.curve, Linear):
         return label
@@ -294,7 +294,7 @@ def _note(rules: RuleBase, scores: Scores) -> str:
 def _input(variable: Variable) -> SystemInput:
     return SystemInput(
         variable.name,
-        tuple(Label(term.name, term.shape) for term in variable.terms),
+        tuple(SystemTerm(term.name, term.shape) for term in variable.terms),
         variable.low,
         variable.high,
         unit=variable.unit,
@@ -315,7 +315,7 @@ def _held(
     if always == "any":
         return inputs, Is(asked.name, None, ("any",))
     name = unlike("always", {label.name for label in asked.labels})
-    label = Label(name, _EVERYWHERE)
+    label = SystemTerm(name, _EVERYWHERE)
     changed = replace(asked, labels=(*asked.labels, label))
     return tuple(changed if one is asked else one for one in inputs), Is(
         asked.name, name
@@ -355,7 +355,7 @@ def _class_output(rules: RuleBase, taken: list[str]) -> SystemOutput:
     uncovered = rules.semantics.uncovered
     return SystemOutput(
         unlike("class", taken),
-        tuple(Label(name, Singleton(value)) for name, value in number.items()),
+        tuple(SystemTerm(name, Singleton(value)) for name, value in number.items()),
         1.0,
         float(len(number)),
         _AVERAGE,
@@ -364,7 +364,10 @@ def _class_output(rules: RuleBase, taken: list[str]) -> SystemOutput:
 
 
 def _score_outputs(names: list[str], taken: list[str]) -> tuple[SystemOutput, ...]:
-    labels = (Label("absent", Singleton(0.0)), Label("present", Singleton(1.0)))
+    labels = (
+        SystemTerm("absent", Singleton(0.0)),
+        SystemTerm("present", Singleton(1.0)),
+    )
     used = set(taken)
     found: list[SystemOutput] = []
     for name in names:

@@ -28,7 +28,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -36,6 +35,7 @@ from fuzzytree.model.system import (
     Singleton,
     SystemInput,
     SystemOutput,
+    SystemTerm,
     TNorm,
     is_drawn_by_lines,
     sampled_values,
@@ -95,8 +95,8 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> from fuzzytree.model.system import Defuzzifier, SystemRule
-        >>> dirty = Label("dirty", Points((0.0, 10.0), (0.0, 1.0)))
-        >>> long = Label("long", Singleton(60.0))
+        >>> dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+        >>> long = SystemTerm("long", Singleton(60.0))
         >>> system = FuzzySystem(
         ...     "washer", (SystemInput("dirt", (dirty,)),),
         ...     (SystemOutput("time", (long,), None, None,
@@ -352,7 +352,7 @@ class _Run:
             return quotient(total, weight)
         return total if weighted else math.nan
 
-    def _weights(self, output: SystemOutput) -> Iterator[tuple[Label, float]]:
+    def _weights(self, output: SystemOutput) -> Iterator[tuple[SystemTerm, float]]:
         """Yield labels and degrees: each conclusion's, or each label's if joined."""
         if output.aggregation is None:
             for one in self._of(output):
@@ -363,7 +363,9 @@ class _Run:
             if label.name in known:
                 yield label, self._so_far(output, label.name)
 
-    def _number_of(self, output: SystemOutput, label: Label, degree: float) -> float:
+    def _number_of(
+        self, output: SystemOutput, label: SystemTerm, degree: float
+    ) -> float:
         match label.curve:
             case Singleton(value=value):
                 return value
@@ -403,7 +405,7 @@ def _chosen(how: Activation, found: Sequence[float]) -> list[float]:
     return [degree if index in ranked else 0.0 for index, degree in enumerate(found)]
 
 
-def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, Label]]:
+def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, SystemTerm]]:
     """Yield the terms that rules conclude and whose degree is 0 at every sample.
 
     A rule that concludes such a term changes no answer. Terms with a formula are left
@@ -448,7 +450,7 @@ class Lines(msgspec.Struct, frozen=True):
 
 
 @functools.lru_cache(maxsize=256)
-def line_tables(output: SystemOutput, label: Label) -> Lines:
+def line_tables(output: SystemOutput, label: SystemTerm) -> Lines:
     """Return the lines of a label of an output whose grid is `lines`."""
     degrees = [
         label.height * curve_degree(label.curve, x, {}) for x in sampled_values(output)

@@ -23,7 +23,6 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -32,6 +31,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     is_drawn_by_lines,
     sampled_values,
@@ -77,8 +77,8 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
     Example:
         >>> from fuzzytree.semantics.programs.evaluate import evaluate
         >>> from fuzzytree.model.system import Conclusion, Defuzzifier, Points
-        >>> dirty = Label("dirty", Points((0.0, 10.0), (0.0, 1.0)))
-        >>> long = Label("long", Singleton(60.0))
+        >>> dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+        >>> long = SystemTerm("long", Singleton(60.0))
         >>> system = FuzzySystem(
         ...     "washer", (SystemInput("dirt", (dirty,)),),
         ...     (SystemOutput("time", (long,), None, None,
@@ -312,7 +312,7 @@ class _Run:
             self.propositions[asked] = found
         return self._unit(found, if_all=[degree])
 
-    def _label_degree(self, variable: str, label: Label, x: int) -> int:
+    def _label_degree(self, variable: str, label: SystemTerm, x: int) -> int:
         key = variable, label.name, x
         if key not in self.degrees:
             with self.make.topic(f"{variable} is {label.name}"):
@@ -457,7 +457,7 @@ class _Run:
 
     def _weights(
         self, output: SystemOutput
-    ) -> Iterator[tuple[Label, int, list[_Concluded]]]:
+    ) -> Iterator[tuple[SystemTerm, int, list[_Concluded]]]:
         """Yield labels and degrees, and the conclusions that they come from."""
         found = self._of(output)
         if output.aggregation is None:
@@ -477,7 +477,7 @@ class _Run:
         tests = [self.make("less", zero, one.degree) for one in concluded]
         return self.make.chain("or", tests)
 
-    def _number_of(self, output: SystemOutput, label: Label, degree: int) -> int:
+    def _number_of(self, output: SystemOutput, label: SystemTerm, degree: int) -> int:
         make = self.make
         match label.curve:
             case Singleton(value=value):

@@ -37,7 +37,6 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     Is,
-    Label,
     Linear,
     Not,
     Or,
@@ -47,6 +46,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
     Trapezoid,
 )
@@ -69,10 +69,10 @@ def tipper(
     numbers: Mapping[str, float] = MappingProxyType({}),
 ) -> FuzzySystem:
     """Return a system of two inputs and three rules, with some parts changed."""
-    bad = Label("bad", Trapezoid(0.0, 0.0, 2.0, 6.0))
-    good = Label("good", Trapezoid(2.0, 6.0, 10.0, 10.0))
+    bad = SystemTerm("bad", Trapezoid(0.0, 0.0, 2.0, 6.0))
+    good = SystemTerm("good", Trapezoid(2.0, 6.0, 10.0, 10.0))
     values = {"low": 5.0, "middle": 12.5, "high": 25.0, **numbers}
-    labels = tuple(Label(name, Singleton(value)) for name, value in values.items())
+    labels = tuple(SystemTerm(name, Singleton(value)) for name, value in values.items())
     rules = (
         rule(Is("food", "bad"), "low"),
         rule(And((Is("food", "good"), Is("service", "good"))), "high"),
@@ -132,8 +132,8 @@ def test_rules_in_another_order_are_alike_but_for_rounding() -> None:
 
 
 def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
-    points = Label("bad", Points((2.0, 6.0), (1.0, 0.0)))
-    long = Label("bad", Points((2.0, 4.0, 6.0), (1.0, 0.5, 0.0)))
+    points = SystemTerm("bad", Points((2.0, 6.0), (1.0, 0.0)))
+    long = SystemTerm("bad", Points((2.0, 4.0, 6.0), (1.0, 0.5, 0.0)))
     one = replace(tipper().inputs[0], labels=(points, tipper().inputs[0].labels[1]))
     other = replace(one, labels=(long, one.labels[1]))
     service = tipper().inputs[1]
@@ -213,7 +213,7 @@ def test_a_constant_that_is_changed_back_is_no_difference() -> None:
 
 
 def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
-    wide = Label("bad", Trapezoid(0.0, 0.0, 3.0, 7.0))
+    wide = SystemTerm("bad", Trapezoid(0.0, 0.0, 3.0, 7.0))
     food = replace(tipper().inputs[0], labels=(wide, tipper().inputs[0].labels[1]))
     found = told(tipper(), tipper(inputs=(food, tipper().inputs[1])))
     (bound,) = (a.state for a in found.answers if isinstance(a.state, Bracket))
@@ -223,9 +223,9 @@ def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
 
 
 def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
-    labels = (*tipper().outputs[0].labels, Label("top", Singleton(30.0)))
+    labels = (*tipper().outputs[0].labels, SystemTerm("top", Singleton(30.0)))
     output = replace(tipper().outputs[0], labels=labels)
-    sliver = Label("sliver", Trapezoid(5.0, 5.0 + 1e-12, 5.0 + 2e-12, 5.0 + 3e-12))
+    sliver = SystemTerm("sliver", Trapezoid(5.0, 5.0 + 1e-12, 5.0 + 2e-12, 5.0 + 3e-12))
     food = replace(tipper().inputs[0], labels=(*tipper().inputs[0].labels, sliver))
     old = tipper(inputs=(food, tipper().inputs[1]), outputs=(output,))
     new = with_rules(old, ONE, TWO, THREE, rule(Is("food", "sliver"), "top"))
@@ -238,7 +238,8 @@ def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
 
 def test_numbers_without_fractions_are_shown_as_they_are_computed() -> None:
     bell = replace(tipper().inputs[0], labels=(
-        Label("bad", Gaussian(0.0, 2.0)), tipper().inputs[0].labels[1]))  # fmt: skip
+        SystemTerm("bad", Gaussian(0.0, 2.0)),
+        tipper().inputs[0].labels[1]))  # fmt: skip
     old = tipper(inputs=(bell, tipper().inputs[1]))
     new = tipper(inputs=old.inputs, numbers={"low": 6.0})
     witness = told(old, new).answers[0]
@@ -253,7 +254,9 @@ def test_an_output_that_stays_is_proved_beside_one_that_differs() -> None:
     both = (tipper().outputs[0], output)
     rules = (ONE, SystemRule(TWO.when, (Conclusion("other", "high"),)), THREE)
     old = with_rules(tipper(outputs=both), *rules)
-    moved = replace(output, labels=(*output.labels[:2], Label("high", Singleton(9.0))))
+    moved = replace(
+        output, labels=(*output.labels[:2], SystemTerm("high", Singleton(9.0)))
+    )
     found = told(old, replace(old, outputs=(both[0], moved)))
     assert found.verdict == "changed"
     states = {answer.subject: answer.state for answer in found.answers}
@@ -303,8 +306,8 @@ def made(chance: random.Random) -> FuzzySystem:
         return Trapezoid(*sorted(float(chance.randrange(9)) for _ in range(4)))
 
     inputs = tuple(
-        SystemInput(name, tuple(Label(f"t{k}", curve()) for k in range(3)), 0.0, 8.0,
-                    clips=chance.random() < 0.2)
+        SystemInput(name, tuple(SystemTerm(f"t{k}", curve()) for k in range(3)),
+                    0.0, 8.0, clips=chance.random() < 0.2)
         for name in "ab"
     )  # fmt: skip
     curves = [
@@ -315,7 +318,7 @@ def made(chance: random.Random) -> FuzzySystem:
     ]
     output = SystemOutput(
         "tip",
-        tuple(Label(f"o{k}", curve) for k, curve in enumerate(curves)),
+        tuple(SystemTerm(f"o{k}", curve) for k, curve in enumerate(curves)),
         0.0,
         30.0,
         chance.choice([AVERAGE, AVERAGE, Defuzzifier("weighted sum")]),

@@ -29,12 +29,12 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.model.system.curves import (
     Arc,
@@ -58,7 +58,7 @@ from tests.cli.conftest import grip
 SET = LR(5.0, SideOfSet(1.0, (0.5,), 4.0), SideOfSet(2.0, (0.5,), 4.0))
 POWER = SystemOutput(
     "power",
-    (Label("on", Singleton(1.0)),),
+    (SystemTerm("on", Singleton(1.0)),),
     0.0,
     1.0,
     Defuzzifier("weighted average"),
@@ -125,7 +125,7 @@ def test_spreads_are_counted_from_the_rows_where_there_are_no_sets() -> None:
 
 def test_a_system_is_asked_on_its_ranges_and_curves() -> None:
     inputs = (
-        SystemInput("dirt", (Label("much", Gaussian(5.0, 1.0)),)),
+        SystemInput("dirt", (SystemTerm("much", Gaussian(5.0, 1.0)),)),
         SystemInput("load", (), 0.0, 3.0),
     )
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
@@ -234,7 +234,7 @@ def test_an_input_on_which_nothing_depends_may_be_any_number(
 def test_every_curve_of_a_system_has_a_span(
     curve: Curve, low: float, high: float
 ) -> None:
-    inputs = (SystemInput("dirt", (Label("much", curve),)),)
+    inputs = (SystemInput("dirt", (SystemTerm("much", curve),)),)
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     found = side(system)
@@ -242,7 +242,7 @@ def test_every_curve_of_a_system_has_a_span(
 
 
 def test_an_input_that_a_formula_may_name_needs_limits() -> None:
-    label = Label("much", Formula(Name("load")))
+    label = SystemTerm("much", Formula(Name("load")))
     inputs = (SystemInput("dirt", (label,), 0.0, 1.0), SystemInput("load", ()))
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))

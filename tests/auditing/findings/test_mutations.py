@@ -36,12 +36,12 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.model.tree import FuzzyTree
@@ -206,24 +206,24 @@ PLANTED = (
 def system(
     *others: tuple[str, str, float],
     falls: tuple[float, float] = (1.0, 2.5),
-    more: tuple[Label, ...] = (),
+    more: tuple[SystemTerm, ...] = (),
 ) -> FuzzySystem:
     """Return the clean rules as a system, with more rules: term, conclusion, weight."""
-    low = Label("low", Trapezoid(None, 0.0, *falls))
-    high = Label("high", Trapezoid(1.5, 3.0, 4.0, None))
+    low = SystemTerm("low", Trapezoid(None, 0.0, *falls))
+    high = SystemTerm("high", Trapezoid(1.5, 3.0, 4.0, None))
     asked = (("low", "weak", 1.0), ("high", "strong", 1.0), *others)
     rules = tuple(
         SystemRule(Is("force", term), (Conclusion("grip", then),), weight)
         for term, then, weight in asked
     )
-    ends = Label("weak", Singleton(0.0)), Label("strong", Singleton(1.0))
+    ends = SystemTerm("weak", Singleton(0.0)), SystemTerm("strong", Singleton(1.0))
     output = SystemOutput("grip", ends, None, None, Defuzzifier("weighted average"))
     force = SystemInput("force", (low, high, *more), 0.0, 4.0)
     return FuzzySystem("grip", (force,), (output,), (RuleBlock(rules),))
 
 
-FAR = Label("far", Trapezoid(120.0, 130.0, 140.0, 150.0))
-LIKE = Label("like", Trapezoid(None, 0.0, 1.0, 2.6))
+FAR = SystemTerm("far", Trapezoid(120.0, 130.0, 140.0, 150.0))
+LIKE = SystemTerm("like", Trapezoid(None, 0.0, 1.0, 2.6))
 OF_SYSTEMS = (
     Planted("FT101", system(("low", "strong", 0.0)), "error", Proved),
     Planted("FT106", system(("low", "strong", 1.0)), "info", Proved, (1, 3)),

@@ -42,7 +42,6 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
@@ -52,6 +51,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     TNorm,
 )
 from fuzzytree.numerics.exact import exact_answer
@@ -75,13 +75,13 @@ def system_of(
     **others: Curve,
 ) -> FuzzySystem:
     """Return a system of two inputs from 0 to 4, with one output."""
-    labels: tuple[Label, ...] = (Label("low", low), Label("high", high))
-    labels += tuple(Label(name, curve) for name, curve in others.items())
+    labels: tuple[SystemTerm, ...] = (SystemTerm("low", low), SystemTerm("high", high))
+    labels += tuple(SystemTerm(name, curve) for name, curve in others.items())
     inputs = tuple(SystemInput(name, labels, 0.0, 4.0) for name in ("a", "b"))
     thens = dict.fromkeys(then for _, then, _ in rules)
     output = SystemOutput(
         "power",
-        tuple(Label(then, Singleton(float(k))) for k, then in enumerate(thens)),
+        tuple(SystemTerm(then, Singleton(float(k))) for k, then in enumerate(thens)),
         None,
         None,
         Defuzzifier("weighted average"),

@@ -24,7 +24,6 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Name,
     Not,
     Or,
@@ -34,6 +33,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.numerics.exact import exact_answer
@@ -58,11 +58,11 @@ def block_of(*conditions: Condition | None, **others: object) -> RuleBlock:
 
 
 def system_of(*blocks: RuleBlock, low: Curve = LOW, clips: bool = False) -> FuzzySystem:
-    labels = (Label("low", low), Label("high", HIGH))
+    labels = (SystemTerm("low", low), SystemTerm("high", HIGH))
     inputs = tuple(SystemInput(n, labels, 0.0, 4.0, clips=clips) for n in ("a", "b"))
     output = SystemOutput(
         "power",
-        (Label("big", Singleton(1.0)),),
+        (SystemTerm("big", Singleton(1.0)),),
         None,
         None,
         Defuzzifier("weighted average"),
@@ -239,7 +239,7 @@ def test_a_height_is_carried_where_no_degree_is_rounded() -> None:
         (lines, 0.7, None),
     ):
         system = system_of(block_of(A_LOW))
-        one = replace(system.inputs[0], labels=(Label("low", curve, height),))
+        one = replace(system.inputs[0], labels=(SystemTerm("low", curve, height),))
         found = view(replace(system, inputs=(one, system.inputs[1])), BOX)
         assert found.rules is not None
         assert (found.bounds is not None) is (expected is None)

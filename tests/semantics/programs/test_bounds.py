@@ -15,13 +15,13 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Points,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.semantics import probing
 from fuzzytree.semantics.programs import evaluate
@@ -94,9 +94,12 @@ def test_another_library_stays_within_the_bounds(
 def tank(
     method: DefuzzifierMethod, curves: dict[str, Points | Singleton]
 ) -> FuzzySystem:
-    low, high = Label("low", Gaussian(0.0, 1.5)), Label("high", Gaussian(10.0, 1.5))
+    low, high = (
+        SystemTerm("low", Gaussian(0.0, 1.5)),
+        SystemTerm("high", Gaussian(10.0, 1.5)),
+    )
     level = SystemInput("level", (low, high), 0.0, 10.0)
-    labels = tuple(Label(name, curve) for name, curve in curves.items())
+    labels = tuple(SystemTerm(name, curve) for name, curve in curves.items())
     output = SystemOutput(
         "valve", labels, 0.0, 30.0, Defuzzifier(method, 20), "maximum", default=7.0
     )

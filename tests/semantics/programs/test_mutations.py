@@ -13,13 +13,13 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Is,
-    Label,
     Or,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.runtimes import systems as runtimes
@@ -43,9 +43,9 @@ SWAPS = {
 SERVICE = SystemInput(
     "service",
     (
-        Label("poor", Trapezoid(0.0, 0.0, 2.0, 5.0)),
-        Label("good", Trapezoid(2.0, 5.0, 5.0, 8.0)),
-        Label("excellent", Trapezoid(5.0, 8.0, 10.0, 10.0)),
+        SystemTerm("poor", Trapezoid(0.0, 0.0, 2.0, 5.0)),
+        SystemTerm("good", Trapezoid(2.0, 5.0, 5.0, 8.0)),
+        SystemTerm("excellent", Trapezoid(5.0, 8.0, 10.0, 10.0)),
     ),
     0.0,
     10.0,
@@ -53,8 +53,8 @@ SERVICE = SystemInput(
 FOOD = SystemInput(
     "food",
     (
-        Label("rancid", Gaussian(0.0, 1.5)),
-        Label("delicious", Trapezoid(7.0, 9.0, 10.0, 10.0)),
+        SystemTerm("rancid", Gaussian(0.0, 1.5)),
+        SystemTerm("delicious", Trapezoid(7.0, 9.0, 10.0, 10.0)),
     ),
     0.0,
     10.0,
@@ -81,9 +81,9 @@ SUGENO = tipper(
     SystemOutput(
         "tip",
         (
-            Label("cheap", Singleton(5.0)),
-            Label("average", Singleton(15.0)),
-            Label("generous", Singleton(25.0)),
+            SystemTerm("cheap", Singleton(5.0)),
+            SystemTerm("average", Singleton(15.0)),
+            SystemTerm("generous", Singleton(25.0)),
         ),
         0.0,
         30.0,
@@ -94,9 +94,9 @@ MAMDANI = tipper(
     SystemOutput(
         "tip",
         (
-            Label("cheap", Trapezoid(0.0, 5.0, 5.0, 10.0)),
-            Label("average", Trapezoid(10.0, 15.0, 15.0, 20.0)),
-            Label("generous", Trapezoid(20.0, 25.0, 25.0, 30.0)),
+            SystemTerm("cheap", Trapezoid(0.0, 5.0, 5.0, 10.0)),
+            SystemTerm("average", Trapezoid(10.0, 15.0, 15.0, 20.0)),
+            SystemTerm("generous", Trapezoid(20.0, 25.0, 25.0, 30.0)),
         ),
         0.0,
         30.0,
