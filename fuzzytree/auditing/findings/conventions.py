@@ -32,7 +32,7 @@ from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.oracle import TIE, decide, exact_answer
-from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.runtimes import all_runtimes, is_installed
 from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.probing import few_probes, probe_values
 from fuzzytree.semantics.reference import Status
@@ -40,12 +40,9 @@ from fuzzytree.semantics.reference import Status
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray, Run, SystemRun
+    from fuzzytree.model.contracts import FloatArray, IntArray, Run, Runtime, SystemRun
 
     BoolArray = npt.NDArray[np.bool_]
-
-RUNTIMES: Final = ("native", "reference", "onnxruntime float64")
-"""What is asked, if it is installed; the first is what the others are held against."""
 
 MOST: Final = 240
 """The most probes of one question."""
@@ -93,10 +90,20 @@ def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
     """Yield each form of a model in each runtime, the native ones first of a form."""
     for name, form in forms(model).items():
         kind = "tree" if isinstance(form, FuzzyTree) else "rules"
-        for runtime in map(find_runtime, RUNTIMES):
+        for runtime in _runtimes():
             if kind in runtime.runs and is_installed(runtime):
                 with contextlib.suppress(LossError):  # told by the other comparisons
                     yield f"{runtime.name}: {name}", form, runtime.load(form)
+
+
+def _runtimes() -> list[Runtime]:
+    """Return the audited runtimes of float64, the baseline of the others first."""
+    every = [
+        one
+        for one in all_runtimes()
+        if (one.in_audits or one.is_definition) and one.dtype == "float64"
+    ]
+    return sorted(every, key=lambda one: not one.is_baseline)
 
 
 def questions(subject: Subject) -> Iterator[Convention]:
@@ -266,7 +273,7 @@ def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
     are compared among the representations, within what rounding may do to them.
     """
     runs: list[tuple[str, SystemRun]] = []
-    for runtime in map(find_runtime, RUNTIMES):
+    for runtime in _runtimes():
         if runtime.load_system is not None and is_installed(runtime):
             with contextlib.suppress(LossError):  # told by the other comparisons
                 runs.append((runtime.name, runtime.load_system(system)))

@@ -26,25 +26,13 @@ from fuzzytree.checking.systems import check_system
 from fuzzytree.model.agreement import Agreement, Basis, Certified, Comparison
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.numerics.bounds import Certificate, certify
+from fuzzytree.runtimes import all_runtimes
 from fuzzytree.semantics.lowering import forms
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
     from fuzzytree.runtimes.onnxruntime import OnnxModel
 
-
-RUNTIMES: Final = (
-    "native",
-    "native mixed",
-    "native float32",
-    "onnxruntime float64",
-    "onnxruntime mixed",
-    "onnxruntime float32",
-)
-"""What is run: our own arrays and ONNX, in each number type; the native ones are held
-against exact arithmetic."""
-
-OF_SYSTEMS: Final = ("reference", "native", "onnxruntime float64")
 
 PROBES: Final = 2_000
 """The most probes of a comparison."""
@@ -104,11 +92,12 @@ def agreement(
         values: Rows beside the probes, shape (inputs, rows).
         others: Representations that were shipped with it.
     """
+    every = all_runtimes()
     if subject.system is not None:
-        return check_system(
-            subject.system, data=values, runtimes=OF_SYSTEMS, limit=PROBES
-        )
-    return check(_model(subject), *others, data=values, runtimes=RUNTIMES, limit=PROBES)
+        names = [one.name for one in every if one.in_audits or one.is_definition]
+        return check_system(subject.system, data=values, runtimes=names, limit=PROBES)
+    names = [one.name for one in every if one.in_audits]
+    return check(_model(subject), *others, data=values, runtimes=names, limit=PROBES)
 
 
 def agreement_answers(
