@@ -1,7 +1,8 @@
 """C99: a tree or rule base as one file of tables, for microcontrollers and others.
 
 The file needs no library, no memory beyond the stack, and no recursion. In double, its
-answers and strengths have the reference's bits; in float, those of `native float32`.
+predictions and strengths have the reference's bits; in float, those of `native
+float32`.
 With a macro it is a program that tests itself.
 """
 
@@ -133,14 +134,14 @@ def write(
 
     Args:
         model: A tree, a rule base or a fuzzy system.
-        allow_loss: Whether to write what float32 cannot hold as near as it can.
+        allow_loss: Whether to round what float32 cannot represent.
         dtype: The type of all numbers: double, or float. A fuzzy system needs double.
         name: The beginning of all names in the file; that of the model unless given.
         activations: Of a fuzzy system: whether the degree of activation of every rule
             stands behind the outputs.
 
     Raises:
-        LossError: If float32 cannot hold a number of the model, unless allowed.
+        LossError: If float32 cannot represent a number of the model, unless allowed.
         ValueError: If an option is not one of the above, or the name not one of C.
 
     Example:
@@ -400,7 +401,7 @@ def axes_code(
     numbers: CNumbers,
     prefix: str,
 ) -> Iterator[str]:
-    """Yield what looks whether all values are there, and computes combinations."""
+    """Yield the check that all values are finite, and the combinations."""
     if not variables:
         yield fill(_NO_INPUTS, prefix)
         return

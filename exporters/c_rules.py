@@ -26,7 +26,7 @@ from fuzzytree.exporters.c_text import (
 )
 
 _MANY_RULES = 16  # from which a first guess at the winner pays
-_MOST_KEPT = 512  # clauses whose degrees are kept while rules are looked at
+_MOST_KEPT = 512  # clauses whose degrees are kept while rules are evaluated
 
 _HELPERS = """
 static name_real name_held(name_real value, name_real low, name_real high)

@@ -32,7 +32,7 @@ _STRENGTHS = 20_000  # of all rows together
 
 
 class Example(msgspec.Struct, frozen=True):
-    """A row and its answer.
+    """A row and its prediction.
 
     Attributes:
         row: The inputs, in order.
@@ -56,7 +56,7 @@ def examples_of(
     line: Mapping[str, int],
     numbers: CNumbers,
 ) -> list[Example]:
-    """Return rows and their answers: the reference's in double, else the tables'."""
+    """Return rows and predictions: of the reference, or in float of the tables."""
     result: list[Example] = []
     rows = rows_of(model, len(tables.label) if tables else 1)
     for row in rows:
@@ -97,7 +97,7 @@ def _computed(
     numbers: CNumbers,
     row: Row,
 ) -> Answer:
-    """Return the answer that the tables give in their number type."""
+    """Return the prediction of the tables in their number type."""
     row_values = [row[name] for name in model.inputs]
     values = axis_values(model.variables, line, row_values, numbers)
     if isinstance(model, FuzzyTree) or tables is None:

@@ -434,7 +434,7 @@ int main(void)
 
 
 def system_heading(system: FuzzySystem) -> Iterator[str]:
-    """Yield comments: what the system is called, and its variables."""
+    """Yield comments: the name of the system, and its variables."""
     yield f'/* A fuzzy system, named "{remark(system.name)}". Written by fuzzytree.\n'
     yield f" * Fingerprint: {fingerprint(system)}\n *\n * Inputs, in order:\n"
     columns = [one for one in system.inputs if not one.parts]

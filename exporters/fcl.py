@@ -295,17 +295,17 @@ def _remarks(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator
         yield f"ranges of inputs have no place: of {', '.join(map(repr, ranged[:5]))}"
     if words.is_lower:
         yield (
-            "fuzzylite 6 takes values within 1e-6 for equal, as of a point, and rules "
-            "of lesser degrees for none"
+            "fuzzylite 6 treats values within 1e-6 as equal, and does not fire rules "
+            "of a lower degree"
         )
     is_curved = any(not one.defuzzifier.is_weighted for one in system.outputs)
     if words.name == "jfuzzylogic" and is_curved:
         yield (
-            "jFuzzyLogic looks at the low ends of 1000 pieces of a range, and not at "
-            "their middle: its answers are up to half a piece lower"
+            "jFuzzyLogic samples the low ends of 1000 pieces of a range, not their "
+            "middles: its outputs are up to half a piece lower"
         )
     if words.name == "portable" and any(uses(rule.when, Or) for rule in system.rules):
-        yield "OR goes beyond what JFML reads: of its readers only the others agree"
+        yield "JFML does not read OR; fuzzylite and jFuzzyLogic agree on it"
 
 
 FORMAT = Format(
@@ -319,7 +319,7 @@ FORMAT = Format(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",
         "the strongest rule alone; each rule has a score, and the highest one wins",
-        "how many values of a range are looked at",
+        "the number of samples of a range",
         "inputs that are clamped to their range",
         "portable: outputs with curves, hedges, more than one form of ACCU",
     ),

@@ -153,7 +153,7 @@ def uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
 
 
 def rule_losses(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
-    """Yield what rules say and the dialect has no words for."""
+    """Yield the parts of rules that the dialect has no words for."""
     rules = system.rules
     if words.has_hedges:
         yield from hedge_losses(rules)
@@ -204,7 +204,7 @@ def norm_losses(block: RuleBlock, number: int, words: FclWords) -> Iterator[str]
 
 
 def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
-    """Yield what an answer depends on and the dialect cannot say."""
+    """Yield what outputs depend on and the dialect cannot express."""
     default = DEFUZZIFIERS[words.name]
     for one in system.inputs:
         if one.clips:
@@ -247,7 +247,7 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
 
 
 def _says_nothing(output: SystemOutput, words: FclWords) -> bool:
-    """Return whether a file can say what an output answers where no rule fires."""
+    """Return whether a file states the value of an output where no rule fires."""
     return output.default is not None or words.name == "fuzzylite"
 
 
@@ -274,7 +274,7 @@ def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
 def _accu_losses(
     output: SystemOutput, system: FuzzySystem, words: FclWords
 ) -> Iterator[Loss]:
-    """Yield what an output's aggregation means that the dialect cannot say."""
+    """Yield the aggregation of an output that the dialect cannot express."""
     where = f"output {output.name!r}"
     norm, written = output.aggregation, output.aggregation
     is_weighted = output.defuzzifier.is_weighted

@@ -188,7 +188,7 @@ def _lines(system: FuzzySystem, terms: FisTerms) -> list[FisRule]:
 
 
 def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
-    """Yield what the one set of methods of a file cannot say of a system."""
+    """Yield what one set of methods for the whole file cannot express."""
     first = system.outputs[0]
     joined = joined_outputs(system)
     for output in system.outputs:
@@ -226,7 +226,7 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
 
 
 def _default_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
-    """Yield the predictions without a rule that a dialect has no place for."""
+    """Yield the defaults of outputs that a dialect cannot express."""
     always = always_concluded(system.rules)
     for output in system.outputs:
         where = f"output {output.name!r}"

@@ -1,4 +1,4 @@
-"""Conditions as FIS says them: a number for each input, all joined by and or by or.
+"""Conditions in FIS: a number for each input, all joined by and or by or.
 
 Several propositions on one input become one term of that input: the least or the
 greatest of the degrees at each value, which is exact but for rounding, or their

@@ -77,7 +77,7 @@ def with_known_curves(
 
 
 def term_of(curve: Curve, dialect: Dialect) -> Term | None:
-    """Return a curve as a file says it; None if the dialect cannot.
+    """Return a curve as a file writes it; None if the dialect cannot.
 
     Example:
         >>> term_of(Trapezoid(0.0, 1.0, 1.0, 2.5), "octave")
@@ -105,7 +105,7 @@ def term_of(curve: Curve, dialect: Dialect) -> Term | None:
 
 
 def number_of(curve: Curve, dialect: Dialect) -> Term | None:
-    """Return what a weighted output's term says; None if the dialect cannot."""
+    """Return the term of a weighted output; None if the dialect has none."""
     match curve:
         case Singleton(value=value):
             return "constant", repr(float(value))

@@ -108,7 +108,7 @@ def write(
         losses += [*cast_losses(model, scores), *lost]
         remarks += cast_remarks(model, scores)
         if model.kind != "relative":
-            remarks.append("fuzzylite 6 takes a strength below 1e-6 for 0")
+            remarks.append("fuzzylite 6 treats a firing strength below 1e-6 as 0")
         facts = FACTS + facts_of(rules, scores)
     else:
         if scores != "winner":
@@ -174,7 +174,7 @@ def _with_pointed_numbers(
 
 
 def _losses(system: FuzzySystem) -> Iterator[Loss]:
-    """Yield what an answer depends on and FLL cannot say."""
+    """Yield what outputs depend on and FLL cannot express."""
     for output in system.outputs:
         how = output.defuzzifier
         if not how.is_weighted and how.grid != "middle":
@@ -308,12 +308,12 @@ def _remarks(system: FuzzySystem, names: FileNames) -> Iterator[str]:
     fine = [one.name for one in system.variables if _is_fine(one)]
     if fine:
         yield (
-            "fuzzylite 6 takes values within 1e-6 for equal, and terms have corners "
+            "fuzzylite 6 treats values within 1e-6 as equal, and terms have corners "
             f"nearly as close: of {', '.join(map(repr, fine[:5]))}"
         )
     yield (
-        "fuzzylite answers a row with a missing or infinite value all the same, by the "
-        "rules that do not ask for it"
+        "fuzzylite evaluates a row with a missing or infinite value by the rules that "
+        "do not test it"
     )
     if any(rule.name for rule in system.rules):
         yield "names of rules have no place"
@@ -346,7 +346,7 @@ FORMAT = Format(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",
         "the hedges cubed, plus, minus and cube root",
-        "curves that are looked at at the ends of a range too",
+        "curves that are sampled at the ends of a range too",
         "a NOT of several conditions, for other norms than minimum and maximum",
     ),
     dtype="float64",

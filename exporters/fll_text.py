@@ -140,7 +140,9 @@ def _condition_text(condition: Condition, words_of: WordsOf, level: int) -> str:
         case Not(part=Is() as part):
             return _condition_text(_pushed(part, 1), words_of, level)
         case Not():
-            raise TypeError("a NOT of several conditions in a block that has been said")
+            raise TypeError(
+                "a NOT of several conditions in a block that `speakable` returned"
+            )
         case And(parts=parts):
             text = " and ".join(_condition_text(part, words_of, 2) for part in parts)
             return f"({text})" if level > 1 and len(parts) > 1 else text

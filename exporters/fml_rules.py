@@ -1,4 +1,4 @@
-"""Rules as FML says them: clauses that are all joined by and, or all by or.
+"""Rules in FML: clauses that are all joined by and, or all by or.
 
 Several terms of one variable, joined otherwise than the rule, are a term of their own
 with a circular definition: that is exact.
@@ -48,7 +48,7 @@ class CircularTerm(msgspec.Struct, frozen=True):
         name: What it is called.
         parts: The terms and whether they are negated.
         word: `and` or `or`.
-        norm: How they are joined, as FML says it.
+        norm: FML's word for the norm that joins them.
     """
 
     name: str

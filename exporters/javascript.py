@@ -3,9 +3,9 @@
 A tree or rule base is written as tables of numbers, and the functions of the reference,
 which read them; a fuzzy system as its program, step by step. Numbers of JavaScript are
 IEEE doubles, and `smaller` and `larger` stand where `Math.min` and `Math.max` would see
--0 and NaN otherwise than the reference: so answers have the reference's bits. Text of
-the model enters only as ASCII string literals without `<` and `>`, also in comments, so
-that nothing in it can be mistaken for code, in a file or in a page of HTML.
+-0 and NaN otherwise than the reference: so predictions have the reference's bits. Text
+of the model enters only as ASCII string literals without `<` and `>`, also in comments,
+so that nothing in it can be mistaken for code, in a file or in a page of HTML.
 """
 
 from __future__ import annotations
@@ -199,7 +199,7 @@ def _rule_tables(rules: RuleBase, places: dict[str, int]) -> Iterator[str]:
 
 
 def _examples(model: Model) -> Iterator[str]:
-    """Yield rows, and the reference's answers to them."""
+    """Yield rows and the predictions of the reference."""
     rules = len(model.rules) if isinstance(model, RuleBase) else 1
     most = min(_MOST_EXAMPLES, _STRENGTHS // rules)
     for row in few_probes(model, max(most, _FEWEST_EXAMPLES)):

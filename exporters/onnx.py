@@ -86,7 +86,7 @@ def write(
 
     Args:
         model: A tree, a rule base or a fuzzy system.
-        allow_loss: Whether to write what float32 cannot hold as near as it can.
+        allow_loss: Whether to round what float32 cannot represent.
         dtype: The number type; `mixed` compares and divides in double and does the
             rest in float32. A tree has comparisons only: `mixed` is `float64` for it.
             A fuzzy system is always `float64`.
@@ -105,8 +105,8 @@ def write(
         The file and what was lost.
 
     Raises:
-        LossError: If float32 cannot hold a number of the model, unless allowed; if a
-            system needs a function that onnxruntime lacks in double; or if the
+        LossError: If float32 cannot represent a number of the model, unless allowed; if
+            a system needs a function that onnxruntime lacks in double; or if the
             installed onnxruntime does not load the file.
         DisagreementError: If the file, run in onnxruntime, gives another prediction.
         MissingExtraError: If onnx is not installed, or onnxruntime to verify with.

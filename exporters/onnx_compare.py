@@ -1,8 +1,8 @@
 """Is a shipped file the one that would be written now?
 
 A graph that equals a fresh one to the last bit is the same function on every input:
-no row has to be run to know it. What a file says of itself only chooses the options of
-the fresh graph, among those that `write` knows; the two are always compared.
+no row has to be run to know it. The metadata of a file only choose the options of the
+fresh graph, among those that `write` knows; the two are always compared.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def _parts(
     result: onnx.ModelProto | onnx.GraphProto,
     without: tuple[str, ...],
 ) -> Iterator[str]:
-    """Yield the fields that differ, of those without which a graph could lie."""
+    """Yield the fields that differ, of those that change what a graph means."""
     for field in fresh.DESCRIPTOR.fields:
         if field.name not in without:
             one, two = getattr(fresh, field.name), getattr(result, field.name)

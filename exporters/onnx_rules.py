@@ -53,7 +53,7 @@ class EdgePart(msgspec.Struct, frozen=True):
     """One end of a band: below it the degree is that of the flank, otherwise 1.
 
     Attributes:
-        variable: Whose value is looked at.
+        variable: The variable of the value.
         sign: 1 for a left end; -1 for a right one, which lies left of it in `-x`.
         bound: The band's `low` or `high`.
         flank: The degree beyond the bound; None is 0.

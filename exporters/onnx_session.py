@@ -199,6 +199,6 @@ def _compare(model: Model, row: dict[str, float], outputs: dict[str, object]) ->
         if not same:
             right = answer.strengths if name == "strengths" else expected[name]
             raise DisagreementError(
-                f"the onnx file of {model.name} gives another {name} than the model "
+                f"the onnx file of {model.name} returns another {name} than the model "
                 f"where {row}: {value}, not {right}"
             )

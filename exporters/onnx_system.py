@@ -203,7 +203,7 @@ def _in_words(system: FuzzySystem) -> str:
 
 
 def _prove(content: bytes, system: FuzzySystem, outputs: Sequence[Output]) -> None:
-    """Load a file, run it and hold its answers against the inference."""
+    """Load a file, run it and compare its outputs with the inference."""
     import numpy as np
 
     from fuzzytree.exporters.onnx_session import proved_run
@@ -226,7 +226,7 @@ def _differences(
     table: npt.NDArray[np.float64],
     results: Mapping[str, npt.NDArray[np.generic]],
 ) -> Iterator[str]:
-    """Yield where a file's numbers are further from the inference's than they may."""
+    """Yield numbers of a file that differ from the inference by more than allowed."""
     import numpy as np
 
     from fuzzytree.semantics.inference import infer

@@ -99,7 +99,7 @@ class SystemFields:
         if program.size > MOST_FIELDS:
             raise LossError(
                 f"cannot write {system.name} as pmml: it would need {program.size:,} "
-                f"fields, and engines hold no more than {MOST_FIELDS:,} well"
+                f"fields, and engines handle no more than {MOST_FIELDS:,} well"
             )
         _refuse_unknown(system.name, program)
         self.is_inexact = any(step.operation in INEXACT for step in program.steps)

@@ -1,7 +1,7 @@
 """Python: a tree or rule base as one file that needs nothing but Python.
 
 The file holds the model as tables of numbers, and the functions of the reference, which
-read them: so its answers have the reference's bits, it may be as deep as it likes, and
+read them: so its predictions have the reference's bits, it may be of any depth, and
 a person can follow it. Text of the model enters only through `repr`, in tables and in
 comments, where nothing can be mistaken for code.
 """
@@ -343,7 +343,7 @@ def _door(name: str, what: str, part: str, names: Sequence[str]) -> Iterator[str
 
 
 def _examples(model: Model) -> Iterator[str]:
-    """Yield rows and the reference's answers to them, the last with missing values."""
+    """Yield rows and the predictions of the reference, the last with missing values."""
     rows = probes(model, limit=_EXAMPLES)
     if model.inputs:
         rows.append(dict.fromkeys(model.inputs, math.nan))

@@ -95,7 +95,7 @@ def _refuse_large(rules: RuleBase) -> None:
     if len(rules.rules) > MOST_RULES:
         raise LossError(
             f"cannot write {rules.name} as sql: it has {len(rules.rules)} rules, and "
-            f"engines hold {MOST_RULES} as columns of a query; write the tree instead"
+            f"engines allow {MOST_RULES} as columns of a query; write the tree instead"
         )
 
 
@@ -322,7 +322,7 @@ FORMAT = Format(
     write=write,
     cannot=(
         "an sql file runs, but is not read back as a tree or rule base",
-        f"more than {MOST_RULES} rules: engines hold so many columns in a query",
+        f"more than {MOST_RULES} rules: engines allow so many columns in a query",
         "overflow and underflow in PostgreSQL: it raises an error there",
     ),
     dtype="float64",

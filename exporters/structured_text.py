@@ -61,7 +61,7 @@ def write(
 
     Args:
         model: A tree, a rule base or a fuzzy system.
-        allow_loss: Of no effect: nothing is lost, or it cannot be written.
+        allow_loss: Of no effect: a model is written without loss or not at all.
         dtype: LREAL (`float64`), or REAL (`float32`), which rounds all numbers.
         name: Of the function block; made from the model's unless given.
 

@@ -43,7 +43,7 @@ from fuzzytree.model.system import (
 
 
 def entries_of(system: FuzzySystem) -> dict[str, Entry]:
-    """Return what a file says of a system, in order."""
+    """Return the entries of a system, in order."""
     entries: dict[str, Entry] = {
         "format": layout.FORMAT,
         "kind": "system",
@@ -64,7 +64,7 @@ def entries_of(system: FuzzySystem) -> dict[str, Entry]:
 
 
 def losses_of(system: FuzzySystem) -> Iterator[Loss]:
-    """Yield what of a system cannot be read again: too long, or too large."""
+    """Yield the parts of a system that are too long or too large to be read again."""
     for what, name in _names(system):
         if len(name) > LONGEST_NAME:
             text = f"{len(name)} characters are more than the {LONGEST_NAME} of a name"

@@ -103,7 +103,7 @@ def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) 
             is looked for.
 
     Raises:
-        LossError: If float32 cannot hold a number of the model.
+        LossError: If float32 cannot represent a number of the model.
         MissingExtraError: If no compiler is installed.
         FuzzyTreeError: If the compiler fails.
     """

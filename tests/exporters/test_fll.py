@@ -173,8 +173,8 @@ def test_a_system_is_written_word_by_word() -> None:
         "names were changed: 'water level' is water_level, 'is' is is_",
         "names of the system and of blocks, and its note, became single lines",
         "units have no place: of 'water level'",
-        "fuzzylite answers a row with a missing or infinite value all the same, by the "
-        "rules that do not ask for it",
+        "fuzzylite evaluates a row with a missing or infinite value by the rules that "
+        "do not test it",
         "a rule of degree 0 concludes nothing, as in fuzzylite 6; in pyfuzzylite 'any' "
         "and 'not' in a conclusion make 1 of 0",
         "Bisector is one of the values that are looked at, as in pyfuzzylite; "
