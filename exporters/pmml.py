@@ -18,6 +18,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from fuzzytree.exporters.pmml_elements import (
+    NUMBER,
+    TEXT,
     Functions,
     PmmlElement,
     apply,
@@ -105,8 +107,7 @@ def write(
         "DataField",
         *(element("Value", value=name) for name in model.classes),
         name=names.target,
-        optype="categorical",
-        dataType="string",
+        **TEXT,
     )
     data = element("DataDictionary", *_columns(model.variables), target)
     content = _content(_header(model), data, dictionary, body)
@@ -119,14 +120,13 @@ def _written_system(system: FuzzySystem) -> Written:
     system_fields = SystemFields(system, taken)
     first, *others = system.outputs
     result = unlike("result", taken)
-    number = {"optype": "continuous", "dataType": "double"}
     outputs = [
         element(
             "OutputField",
             value,
             name=one.name,
             feature="transformedValue",
-            **number,
+            **NUMBER,
         )
         for one, value in zip(others, system_fields.outputs[1:], strict=True)
     ]
@@ -149,7 +149,7 @@ def _written_system(system: FuzzySystem) -> Written:
         modelName=system.name,
         functionName="regression",
     )
-    target = element("DataField", name=first.name, **number)
+    target = element("DataField", name=first.name, **NUMBER)
     dictionary = element(
         "TransformationDictionary",
         *system_fields.functions.values(),
@@ -237,8 +237,7 @@ def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[PmmlElemen
             "DataField",
             *(_extension(name, text) for name, text in known.items() if text),
             name=variable.name,
-            optype="continuous",
-            dataType="double",
+            **NUMBER,
         )
 
 
@@ -286,15 +285,13 @@ def _model(
     predicted = element(
         "OutputField",
         name=names.new("answer"),
-        optype="categorical",
-        dataType="string",
+        **TEXT,
         feature="predictedValue",
     )
     number = element(
         "OutputField",
         name=names.new("rule"),
-        optype="categorical",
-        dataType="string",
+        **TEXT,
         feature="entityId",
     )
     return element(
@@ -378,8 +375,7 @@ def _outputs(
             "OutputField",
             apply("if", is_usable, value),
             name=names.new(name),
-            optype="continuous",
-            dataType="double",
+            **NUMBER,
             feature="transformedValue",
         )
 

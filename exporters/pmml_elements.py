@@ -26,6 +26,12 @@ _ESCAPES = {
 _DEEPEST = 20  # levels that are indented further than the one above
 
 
+NUMBER = {"optype": "continuous", "dataType": "double"}
+TEXT = {"optype": "categorical", "dataType": "string"}
+TRUTH = {"optype": "categorical", "dataType": "boolean"}
+"""The attributes of a field's type."""
+
+
 class PmmlElement(NamedTuple):
     """An element of XML, with attributes, and with children or a text."""
 
@@ -95,9 +101,7 @@ def apply(function: str, *arguments: PmmlElement) -> PmmlElement:
 
 def derived(name: str, expression: PmmlElement) -> PmmlElement:
     """Return a field that is computed."""
-    return element(
-        "DerivedField", expression, name=name, optype="continuous", dataType="double"
-    )
+    return element("DerivedField", expression, name=name, **NUMBER)
 
 
 def joined(function: str, parts: list[PmmlElement]) -> PmmlElement:
@@ -163,18 +167,14 @@ class Functions:
     def _define(self, name: str, parameters: Sequence[str], body: PmmlElement) -> str:
         if name not in self.defined:
             fields = [
-                element(
-                    "ParameterField", name=one, optype="continuous", dataType="double"
-                )
-                for one in parameters
+                element("ParameterField", name=one, **NUMBER) for one in parameters
             ]
             self.defined[name] = element(
                 "DefineFunction",
                 *fields,
                 body,
                 name=name,
-                optype="continuous",
-                dataType="double",
+                **NUMBER,
             )
         return name
 

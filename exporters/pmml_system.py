@@ -15,7 +15,15 @@ import sys
 from collections.abc import Mapping
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.pmml_elements import PmmlElement, apply, constant, element, ref
+from fuzzytree.exporters.pmml_elements import (
+    NUMBER,
+    TRUTH,
+    PmmlElement,
+    apply,
+    constant,
+    element,
+    ref,
+)
 from fuzzytree.model.naming import unlike
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.programs.operations import (
@@ -167,16 +175,8 @@ class SystemFields:
 
     def _field(self, name: str, expression: PmmlElement, kind: str) -> PmmlElement:
         full = f"{self._prefix}{name}"
-        is_truth = kind == "truth"
-        self.fields.append(
-            element(
-                "DerivedField",
-                expression,
-                name=full,
-                optype="categorical" if is_truth else "continuous",
-                dataType="boolean" if is_truth else "double",
-            )
-        )
+        how = TRUTH if kind == "truth" else NUMBER
+        self.fields.append(element("DerivedField", expression, name=full, **how))
         return ref(full)
 
     def _total(self, place: int, samples: list[Value]) -> Value:
@@ -211,24 +211,17 @@ class SystemFields:
             return
         known = OPERATIONS[operation]
         names = ("a", "b", "c")[: len(known.takes)]
-        kinds = {
-            "number": ("continuous", "double"),
-            "truth": ("categorical", "boolean"),
-        }
+        kinds = {"number": NUMBER, "truth": TRUTH}
         parameters = [
-            element("ParameterField", name=name, optype=op, dataType=dtype)
-            for name, (op, dtype) in zip(
-                names, (kinds[kind] for kind in known.takes), strict=True
-            )
+            element("ParameterField", name=name, **kinds[kind])
+            for name, kind in zip(names, known.takes, strict=True)
         ]
-        optype, dtype = kinds[known.gives]
         self.functions[operation] = element(
             "DefineFunction",
             *parameters,
             _body(operation, names),
             name=_own(operation),
-            optype=optype,
-            dataType=dtype,
+            **kinds[known.gives],
         )
 
 

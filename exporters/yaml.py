@@ -17,12 +17,12 @@ from fuzzytree.exporters.yaml_text import (
     Noted,
     Short,
     joined,
+    name_losses,
     named_shape,
     numbers,
     range_ends,
     summand,
 )
-from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.clauses import Vocabulary, readings, vocabulary_of
 from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_SENTENCE
@@ -83,14 +83,7 @@ def write(model: Document, /, *, allow_loss: bool = False) -> Written:
 
 
 def _losses(model: Model) -> Iterator[Loss]:
-    for where, text in _names(model):
-        if len(text) > LONGEST_NAME:
-            what = f"{len(text)} characters are more than the {LONGEST_NAME} of a name"
-            yield Loss(f"{where} {text[:20]!r}...", what)
-        try:
-            text.encode()
-        except UnicodeEncodeError:
-            yield Loss(f"{where} {text[:20]!r}", "a lone surrogate is no Unicode text")
+    yield from name_losses(_names(model))
     if isinstance(model, RuleBase):
         counts = [(f"rule {n}", r.support) for n, r in enumerate(model.rules, 1)]
     else:

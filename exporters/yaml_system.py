@@ -9,13 +9,14 @@ from fuzzytree.exporters.yaml_text import (
     Entry,
     Noted,
     Short,
+    name_losses,
     named_shape,
     numbers,
     range_ends,
     summand,
+    text_losses,
 )
 from fuzzytree.formats.formulas import FormulaError, parse, text_of
-from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.conditions import conclusions_text, condition_text
 from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_NOTE, LONGEST_SENTENCE
@@ -65,18 +66,11 @@ def entries_of(system: FuzzySystem) -> dict[str, Entry]:
 
 def losses_of(system: FuzzySystem) -> Iterator[Loss]:
     """Yield the parts of a system that are too long or too large to be read again."""
-    for what, name in _names(system):
-        if len(name) > LONGEST_NAME:
-            text = f"{len(name)} characters are more than the {LONGEST_NAME} of a name"
-            yield Loss(f"{what} {name[:20]!r}...", text)
+    yield from name_losses(_names(system))
+    yield from text_losses("the note", system.note)
     if len(system.note) > LONGEST_NOTE:
         text = f"{len(system.note)} characters are more than {LONGEST_NOTE}"
         yield Loss("the note", text)
-    for what, text in (("the note", system.note), *_names(system)):
-        try:
-            text.encode()
-        except UnicodeEncodeError:
-            yield Loss(f"{what} {text[:20]!r}", "a lone surrogate is no Unicode text")
     for variable in system.variables:
         for label in variable.labels:
             if isinstance(label.curve, Formula) and not _is_readable(label.curve):

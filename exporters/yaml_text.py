@@ -13,7 +13,9 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import LossError
+from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml.nodes import MOST_BYTES, MOST_NODES
+from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, Shape, Side
 
 _WIDTH: Final = 88
@@ -205,6 +207,27 @@ def _escaped(character: str) -> str:
     if code < 0x100:
         return f"\\x{code:02x}"
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def name_losses(names: Iterable[tuple[str, str]]) -> Iterator[Loss]:
+    """Yield the names that are too long or no Unicode text.
+
+    Args:
+        names: What each is the name of, and the name.
+    """
+    for where, text in names:
+        if len(text) > LONGEST_NAME:
+            what = f"{len(text)} characters are more than the {LONGEST_NAME} of a name"
+            yield Loss(f"{where} {text[:20]!r}...", what)
+        yield from text_losses(where, text)
+
+
+def text_losses(where: str, text: str) -> Iterator[Loss]:
+    """Yield a loss if a text is no Unicode text."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        yield Loss(f"{where} {text[:20]!r}", "a lone surrogate is no Unicode text")
 
 
 def range_ends(low: float | None, high: float | None) -> dict[str, Entry]:

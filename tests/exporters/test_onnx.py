@@ -425,7 +425,7 @@ def test_a_file_with_another_answer_is_not_written(
     with pytest.raises(DisagreementError) as caught:
         write(lr_rules())
     assert str(caught.value) == (
-        "the onnx file of slips gives another rule than the model "
+        "the onnx file of slips returns another rule than the model "
         "where {'slip': 9.0}: 0, not 1"
     )
 

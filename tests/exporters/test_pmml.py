@@ -316,7 +316,7 @@ def test_a_system_of_too_many_steps_is_refused() -> None:
     rules = (replace(rule, when=Is("dirt", "high")),)
     block = RuleBlock(rules, implication="minimum")
     with pytest.raises(
-        LossError, match=r"fields, and engines hold no more than 20,000"
+        LossError, match=r"fields, and engines handle no more than 20,000"
     ):
         write(FuzzySystem("s", (dirt,), (output,), (block,)))
 

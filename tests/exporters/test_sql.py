@@ -155,7 +155,7 @@ def test_what_engines_do_not_hold_is_refused() -> None:
     variable = Variable("x", (Term("low", Band(high=1.0)),))
     rule = Rule((Clause("x", ("low",)),), "c")
     rules = RuleBase("many", ("c",), (variable,), (rule,) * (MOST_RULES + 1))
-    with pytest.raises(LossError, match="401 rules, and engines hold 400"):
+    with pytest.raises(LossError, match="401 rules, and engines allow 400"):
         write(rules)
 
 
