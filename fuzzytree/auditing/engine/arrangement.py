@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -104,17 +104,11 @@ class AxisGrid(NamedTuple):
 
 
 class Bands(NamedTuple):
-    """The critical levels, joined where they touch, in ascending order.
+    """The critical levels, joined where they touch, in ascending order."""
 
-    Attributes:
-        low: The lower ends.
-        high: The upper ends.
-        is_sharp: Whether a band is one level that is known exactly.
-    """
-
-    low: list[Fraction]
-    high: list[Fraction]
-    is_sharp: BoolArray
+    low: list[Fraction]  # the lower ends
+    high: list[Fraction]  # the upper ends
+    is_sharp: BoolArray  # whether a band is one level that is known exactly
 
     def low_after(self, band: int) -> Fraction:
         """Return the lower end of the next band, 1 if there is none."""
@@ -407,6 +401,18 @@ def _chosen(axis: RuleAxis, rank: IntArray) -> IntArray:
 def strengths_at(base: Arrangement, point: Mapping[str, Fraction]) -> list[Fraction]:
     """Return every rule's exact strength at a point of the inputs."""
     return rule_strengths(base.rules, point)
+
+
+def lead_at(
+    base: Arrangement,
+    point: Mapping[str, Fraction],
+    ours: Collection[int],
+    rivals: Collection[int],
+) -> Fraction:
+    """Return by how much the weakest of some rules leads the strongest of others."""
+    strengths = strengths_at(base, point)
+    mine = min((strengths[number - 1] for number in ours), default=Fraction(1))
+    return mine - max((strengths[n - 1] for n in rivals), default=Fraction(0))
 
 
 def rule_strengths(

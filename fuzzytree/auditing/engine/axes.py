@@ -315,7 +315,6 @@ def _range(
 
 # --- how often curves cross
 
-
 _FEW: Final = 64  # curves, which are not worth counting
 _NEAR = 1e-12  # degrees that may be equal, but for rounding
 _STEPS = 256  # between the first and the last end of a piece
@@ -330,7 +329,7 @@ def crossings(elements: Sequence[RuleCurve]) -> int:
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> lines = [Points((0.0, 1.0), (k / 98, 1.0 - k / 98)) for k in range(99)]
-        >>> crossings([RuleCurve(curve_axis) for curve_axis in lines])
+        >>> crossings([RuleCurve(line) for line in lines])
         4851
     """
     if len(elements) < _FEW:

@@ -18,7 +18,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Arrangement, arrange, strengths_at
+from fuzzytree.auditing.engine.arrangement import (
+    Arrangement,
+    arrange,
+    lead_at,
+    strengths_at,
+)
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Point
 from fuzzytree.auditing.engine.space import BoxReach, RulePair, Space
@@ -50,35 +55,21 @@ _TRIES = 4  # middles of boxes that are evaluated exactly, for each batch
 
 
 class BoxVerdict(NamedTuple):
-    """What boxes can reach.
+    """What boxes can reach."""
 
-    Attributes:
-        bound: At most this; minus infinity where a box is put away.
-        value: About this in the middle.
-        worth: Shape (boxes, lines): how much parting each line promises.
-    """
-
-    bound: FloatArray
-    value: FloatArray
-    worth: FloatArray
+    bound: FloatArray  # at most this; minus infinity where a box is put away
+    value: FloatArray  # about this in the middle
+    worth: FloatArray  # shape (boxes, lines): how much parting each line promises
 
 
 class SearchResult(NamedTuple):
-    """The result of a search for the largest value of something.
+    """The result of a search for the largest value of something."""
 
-    Attributes:
-        point: Where the largest known value is, if it is above the floor.
-        value: That value, exactly; the floor if none is known.
-        bound: No value is larger.
-        boxes: How many boxes were looked at.
-        why: What stopped the search; empty if no box is left.
-    """
-
-    point: Point | None
-    value: Fraction
-    bound: float
-    boxes: int
-    why: str
+    point: Point | None  # where the largest known value is, if it is above the floor
+    value: Fraction  # that value, exactly; the floor if none is known
+    bound: float  # no value is larger
+    boxes: int  # how many boxes were looked at
+    why: str  # what stopped the search; empty if no box is left
 
 
 def search(
@@ -197,7 +188,6 @@ def simplified(
 
 # --- the questions
 
-
 _EASY = 2_000  # boxes that are looked at without knowing the order of curves
 _PATIENCE = 100_000  # boxes, before a lead that may be none is left open
 
@@ -217,14 +207,7 @@ def wins_by_boxes(
     *,
     tolerance: float = TINY,
 ) -> State:
-    """Return whether a rule is somewhere stronger than each of some others.
-
-    `tolerance`: A lead that is for certain no larger than this is not sought on.
-
-    Returns:
-        `Proved`: it never is. `Witness`: it is, at a point that was evaluated in
-        fractions. `Bracket`: the largest lead is between these.
-    """
+    """Return what `duels.wins` does, by boxes; `tolerance` is a lead left open."""
     lead = _Lead(rules, domain, rule, rivals)
     result = lead.search(clock or Clock(), tolerance, is_first_enough=True)
     if result.point is not None:
@@ -319,9 +302,7 @@ class _Lead:
         return BoxVerdict(np.where(is_over, -np.inf, bound), value, worth)
 
     def lead(self, point: Mapping[str, Fraction]) -> Fraction:
-        strengths = strengths_at(self.base, point)
-        best = max((strengths[n - 1] for n in self.rivals), default=Fraction(0))
-        return strengths[self.rule - 1] - best
+        return lead_at(self.base, point, (self.rule,), self.rivals)
 
     def _exact(self, point: Point) -> tuple[Fraction, Point] | None:
         whole = filled(self.base, point)
@@ -379,14 +360,7 @@ def below_by_boxes(
     epsilon: float | Fraction,
     clock: Clock | None = None,
 ) -> State:
-    """Return whether all rules are somewhere weaker than a level.
-
-    `epsilon`: the level, in [0, 1]; 0 stands for "no rule fires".
-
-    Returns:
-        `Proved`: some rule reaches the level everywhere. `Witness`: none does here.
-        `Bracket`: how strong the strongest rule is where that is least.
-    """
+    """Return what `cover.below` does, by boxes; level 0 stands for "no rule fires"."""
     level = Fraction(epsilon)
     cover = _Cover(rules, domain, is_zero_wanted=not level)
     floor = -level if level else Fraction(-1, 2**1100)
@@ -500,12 +474,7 @@ def highest_by_boxes(
         return (both, whole) if is_within(base, whole) else None
 
     result = search(
-        space,
-        judge,
-        exact,
-        clock or Clock(),
-        floor=Fraction(0),
-        tolerance=tolerance,
+        space, judge, exact, clock or Clock(), floor=Fraction(0), tolerance=tolerance
     )
     reached = Claim("reaches", rules=(one, other), level=str(result.value))
     return Bracket(

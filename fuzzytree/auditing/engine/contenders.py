@@ -62,19 +62,12 @@ class AxisPart(NamedTuple):
 
 
 class ClauseBounds(NamedTuple):
-    """A clause on a stretch.
+    """A clause on a stretch."""
 
-    Attributes:
-        form: Clauses of one form are equal at every point of the stretch.
-        low: At most the degree.
-        high: At least the degree.
-        is_below: Whether the degree is below `high` at every point.
-    """
-
-    form: int
-    low: float
-    high: float
-    is_below: bool = False
+    form: int  # clauses of one form are equal at every point of the stretch
+    low: float  # at most the degree
+    high: float  # at least the degree
+    is_below: bool = False  # whether the degree is below `high` at every point
 
 
 class SharedAxis:
@@ -374,7 +367,6 @@ def _near(value: Fraction) -> Fraction:
 
 # --- rules on a box
 
-
 Box = tuple[AxisPart, ...]
 """A stretch of each axis."""
 
@@ -407,17 +399,11 @@ class Contender(NamedTuple):
 
 
 class Remainder(NamedTuple):
-    """What is left of a rule base on a box.
+    """What is left of a rule base on a box."""
 
-    Attributes:
-        rules: Those that may win, in order.
-        is_sure: Whether some rule fires at every point.
-        margin: At least the largest margin of the strongest class.
-    """
-
-    rules: list[Contender]
-    is_sure: bool
-    margin: float
+    rules: list[Contender]  # those that may win, in order
+    is_sure: bool  # whether some rule fires at every point
+    margin: float  # at least the largest margin of the strongest class
 
 
 def contenders_on(

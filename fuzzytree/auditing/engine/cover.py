@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, strengths_at
+from fuzzytree.auditing.engine.bounding import below_by_boxes, least_cover_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import Point, variable_value
 from fuzzytree.auditing.engine.duels import LevelQuestion, search_level
@@ -57,8 +58,6 @@ def below(base: Arrangement, epsilon: Fraction, clock: Clock | None = None) -> S
     if base.is_empty:
         return Proved("the domain has no point")
     if base.rules.semantics.conjunction == "product" or not base.is_kept:
-        from fuzzytree.auditing.engine.bounding import below_by_boxes
-
         return below_by_boxes(base.rules, base.domain, epsilon, clock)
     every = tuple(range(1, len(base.rules.rules) + 1))
     return search_level(
@@ -76,8 +75,6 @@ def least_cover(base: Arrangement, clock: Clock | None = None) -> Bracket:
     """
     clock = clock or Clock()
     if base.rules.semantics.conjunction == "product" or not base.is_kept:
-        from fuzzytree.auditing.engine.bounding import least_cover_by_boxes
-
         return least_cover_by_boxes(base.rules, base.domain, clock)
     duel = Duel(base, (), tuple(range(len(base.rules.rules))))
     bands = duel.bands
@@ -118,8 +115,6 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
     if base.is_empty:
         return Proved("the domain has no point")
     if not base.is_kept:
-        from fuzzytree.auditing.engine.bounding import below_by_boxes
-
         return below_by_boxes(base.rules, base.domain, 0, clock)
     every = tuple(range(len(base.rules.rules)))
     duel = Duel(base, (), every)

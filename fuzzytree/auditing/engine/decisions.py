@@ -279,7 +279,6 @@ def columns(
 
 # --- decisions
 
-
 _DRAWN: Final = 256  # points in which another decision is looked for first
 
 
@@ -400,10 +399,6 @@ def _drawn(base: Arrangement, label: str | None, values: FloatArray) -> Point | 
         name: Fraction(float(value))
         for name, value in zip(base.rules.inputs, values[:, best], strict=True)
     }
-    if not _is_other(base, point, label):
+    if not is_within(base, point) or decision_at(base, point) == label:
         return None
     return simplified(base, point, lambda near: decision_at(base, near) != label)
-
-
-def _is_other(base: Arrangement, point: Point, label: str | None) -> bool:
-    return is_within(base, point) and decision_at(base, point) != label

@@ -50,9 +50,7 @@ class Domain(Value, frozen=True):
 
 
 def limited(
-    domain: Domain,
-    limits: Mapping[str, tuple[float, float]],
-    model: Document,
+    domain: Domain, limits: Mapping[str, tuple[float, float]], model: Document
 ) -> Domain:
     """Return a domain with other ends for some variables.
 
@@ -82,7 +80,6 @@ def limited(
 
 
 # --- variables at a point and on a box
-
 
 Point = dict[str, Fraction]
 """A value for each input."""

@@ -47,41 +47,24 @@ FAR = 1 << 40
 
 
 class _AxisDegrees(NamedTuple):
-    """One axis, rule by rule; levels are numbers of bands.
+    """One axis, rule by rule; levels are numbers of bands."""
 
-    Attributes:
-        rank: Shape (rules, cells): the order of the rules' degrees in a cell.
-        least: Shape (rules, cells): their infimum in it.
-        most: Shape (rules, cells): their supremum in it.
-        at: Shape (rules, zones): their values at the places between cells.
-        is_zero: Shape (rules, cells): whether it is 0 throughout.
-        is_zero_at: Shape (rules, zones): whether it is 0 there, for sure.
-        start_rank: Shape (rules,): the order at the lower end.
-        has_start: Whether the lower end belongs to the box.
-        top: Shape (rules,): the supremum.
-        is_reached: Shape (rules,): whether the supremum may be reached.
-    """
-
-    rank: IntArray
-    least: IntArray
-    most: IntArray
-    at: IntArray
-    is_zero: BoolArray
-    is_zero_at: BoolArray
-    start_rank: IntArray
-    has_start: bool
-    top: IntArray
-    is_reached: BoolArray
+    rank: IntArray  # shape (rules, cells): the order of the rules' degrees in a cell
+    least: IntArray  # shape (rules, cells): their infimum in it
+    most: IntArray  # shape (rules, cells): their supremum in it
+    at: IntArray  # shape (rules, zones): their values at the places between cells
+    is_zero: BoolArray  # shape (rules, cells): whether it is 0 throughout
+    is_zero_at: BoolArray  # shape (rules, zones): whether it is 0 there, for sure
+    start_rank: IntArray  # shape (rules,): the order at the lower end
+    has_start: bool  # whether the lower end belongs to the box
+    top: IntArray  # shape (rules,): the supremum
+    is_reached: BoolArray  # shape (rules,): whether the supremum may be reached
 
 
 class RulePairs(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """The rules of a ground, ready to be compared two by two.
+    """The rules of a ground, ready to be compared two by two."""
 
-    Attributes:
-        base: The rules and the box, which is not empty.
-    """
-
-    base: Arrangement
+    base: Arrangement  # the rules and the box, which is not empty
 
     @functools.cached_property
     def fine(self) -> RulePairs:

@@ -23,10 +23,11 @@ from typing import Final, NamedTuple
 from fuzzytree.auditing.engine.arrangement import (
     Arrangement,
     TooManyCellsError,
+    lead_at,
     strengths_at,
 )
 from fuzzytree.auditing.engine.axes import between
-from fuzzytree.auditing.engine.bounding import wins_by_boxes
+from fuzzytree.auditing.engine.bounding import largest_lead_by_boxes, wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import Point
 from fuzzytree.auditing.engine.options import (
@@ -358,12 +359,7 @@ class _Search:
         parts = {
             axis: [
                 *parts_of(
-                    duel,
-                    duel.all_options[axis],
-                    axis,
-                    band,
-                    levels,
-                    is_outer=is_outer,
+                    duel, duel.all_options[axis], axis, band, levels, is_outer=is_outer
                 )
             ]
             for axis in joined
@@ -389,7 +385,6 @@ class _Search:
 
 
 # --- does a rule win
-
 
 _TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
 
@@ -427,7 +422,6 @@ def wins(
 
 # --- by how much a rule leads
 
-
 _STEPS = 10  # halvings of the upper end
 
 
@@ -452,12 +446,12 @@ def largest_lead(
     clock = clock or Clock()
     others = tuple(sorted(rivals))
     best = point_of(won.point)
-    low = _lead(base, best, rule, others)
+    low = lead_at(base, best, (rule,), others)
     if low < enough:
         result = leader(base, (rule,), others)
-        if is_within(base, result) and _lead(base, result, rule, others) > low:
+        if is_within(base, result) and lead_at(base, result, (rule,), others) > low:
             best = plainer(base, result, (rule,), others)
-            low = _lead(base, best, rule, others)
+            low = lead_at(base, best, (rule,), others)
     name = f"the largest lead of rule {rule}"
     claims = (
         Claim("beats", rules=(rule,), rivals=others),
@@ -466,23 +460,12 @@ def largest_lead(
     high, why = Fraction(1), "a lead that large is enough"
     if low < enough:
         if base.rules.semantics.conjunction == "product" or not base.is_kept:
-            from fuzzytree.auditing.engine.bounding import largest_lead_by_boxes
-
             wide = largest_lead_by_boxes(base.rules, base.domain, rule, others, clock)
             high, why = Fraction(wide.high), wide.why
         else:
             high, why = _bound(base, rule, others, low, clock)
     return Bracket(
         name, outwards(low)[0], outwards(high)[1], why, coordinates(best), claims
-    )
-
-
-def _lead(
-    base: Arrangement, point: Point, rule: int, rivals: Collection[int]
-) -> Fraction:
-    strengths = strengths_at(base, point)
-    return strengths[rule - 1] - max(
-        (strengths[number - 1] for number in rivals), default=Fraction(0)
     )
 
 

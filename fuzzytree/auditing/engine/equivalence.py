@@ -138,7 +138,6 @@ def _holds(row: Row, values: Sequence[Fraction]) -> bool:
 
 # --- branch and bound
 
-
 MOST_BOXES = 4_000
 """Boxes that are looked at, unless the clock ends before."""
 
@@ -300,10 +299,7 @@ class _Search:
         elif clock.is_over:
             why = "the budget was spent"
         return Bracket(
-            OF,
-            0.0,
-            margin,
-            f"{why}: {settled} boxes are settled, and {left} are open",
+            OF, 0.0, margin, f"{why}: {settled} boxes are settled, and {left} are open"
         )
 
     def _look(self, open_box: _OpenBox) -> Witness | _Cut | None:
@@ -468,11 +464,7 @@ def difference_region(
 
 
 def _stretched(
-    search: _Search,
-    box: Box,
-    place: int,
-    field: Literal["low", "high"],
-    wanted: object,
+    search: _Search, box: Box, place: int, field: Literal["low", "high"], wanted: object
 ) -> Box:
     """Return a box with one end moved outwards as far as the answers stay."""
 

@@ -48,13 +48,9 @@ Group = tuple[tuple[int, ...], bool]
 
 
 class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """The rules of a ground, axis by axis.
+    """The rules of a ground, axis by axis."""
 
-    Attributes:
-        base: The rules and the box, which is not empty.
-    """
-
-    base: Arrangement
+    base: Arrangement  # the rules and the box, which is not empty
 
     @property
     def is_product(self) -> bool:
@@ -374,19 +370,12 @@ def quotient(
 
 
 class RuleDistance(NamedTuple):
-    """How far two rules' degrees are apart at most.
+    """How far two rules' degrees are apart at most."""
 
-    Attributes:
-        each: On the axis where they are farthest apart.
-        whole: No strength differs by more than this.
-        axis: The position of that axis.
-        at: The value there at which they are farthest apart.
-    """
-
-    each: Bounds
-    whole: Fraction
-    axis: int
-    at: Fraction
+    each: Bounds  # on the axis where they are farthest apart
+    whole: Fraction  # no strength differs by more than this
+    axis: int  # the position of that axis
+    at: Fraction  # the value there at which they are farthest apart
 
 
 def rule_distance(

@@ -183,7 +183,6 @@ def relation(polynomial: Polynomial, of: Polynomial) -> Polynomial:
 
 # --- many levels
 
-
 LevelSpan = tuple[Fraction, Fraction]
 
 

@@ -19,21 +19,13 @@ _MOST_DIGITS = 17  # these distinguish every double from its neighbours
 
 
 class Row(NamedTuple):
-    """An inequality: `low <= sum of weights[i] x_i <= high`.
+    """An inequality: `low <= sum of weights[i] x_i <= high`."""
 
-    Attributes:
-        weights: By the number of the variable, from 0.
-        low: The lower bound; None if there is none.
-        high: The upper bound; None if there is none.
-        is_open_low: Whether the sum must be strictly above `low`.
-        is_open_high: Whether the sum must be strictly below `high`.
-    """
-
-    weights: Mapping[int, Fraction]
-    low: Fraction | None = None
-    high: Fraction | None = None
-    is_open_low: bool = False
-    is_open_high: bool = False
+    weights: Mapping[int, Fraction]  # by the number of the variable, from 0
+    low: Fraction | None = None  # the lower bound; None if there is none
+    high: Fraction | None = None  # the upper bound; None if there is none
+    is_open_low: bool = False  # whether the sum must be strictly above `low`
+    is_open_high: bool = False  # whether the sum must be strictly below `high`
 
 
 Range = tuple[Fraction, Fraction]
@@ -161,10 +153,7 @@ class _Tableau:
     """
 
     def __init__(
-        self,
-        ranges: Sequence[Range],
-        rows: Sequence[Row],
-        reaches: Sequence[Fraction],
+        self, ranges: Sequence[Range], rows: Sequence[Row], reaches: Sequence[Fraction]
     ) -> None:
         sides = [
             side

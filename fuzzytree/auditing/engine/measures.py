@@ -63,17 +63,11 @@ CurveValue = tuple[Bounds, Fraction]
 
 
 class CurveAxis(NamedTuple):
-    """Curves on an axis between two ends, cut into cells.
+    """Curves on an axis between two ends, cut into cells."""
 
-    Attributes:
-        elements: The curves.
-        cells: The cells.
-        is_open: Whether the lower end itself is left out.
-    """
-
-    elements: tuple[RuleCurve, ...]
-    cells: Cells
-    is_open: bool = False
+    elements: tuple[RuleCurve, ...]  # the curves
+    cells: Cells  # the cells
+    is_open: bool = False  # whether the lower end itself is left out
 
     @property
     def ends(self) -> tuple[Fraction, Fraction]:
@@ -245,7 +239,6 @@ def value_at_place(
 
 # --- overlap of two curves
 
-
 _CELLS = 256  # on which degrees are enclosed before areas are exact
 
 
@@ -302,10 +295,7 @@ def overlap(of: CurveAxis) -> Overlap:
         of, lambda cell, at: local_polynomial(of.elements[1 - lower[cell]], at)
     )
     met = [
-        (
-            Bounds(min(a.low, b.low), min(a.high, b.high)),
-            at,
-        )
+        (Bounds(min(a.low, b.low), min(a.high, b.high)), at)
         for (a, at), (b, _) in _both(of)
     ]
     low = max(bounds.low for bounds, _ in met)
@@ -457,38 +447,24 @@ def _is_inside(polynomial: Polynomial, low: Fraction, high: Fraction) -> bool:
 
 
 class Excess(NamedTuple):
-    """A stretch on which a polynomial leaves [0, 1].
+    """A stretch on which a polynomial leaves [0, 1]."""
 
-    Attributes:
-        low: From where.
-        high: To where.
-        at: Where it is farthest outside.
-        depth: How far.
-        is_above: Whether it is above 1, otherwise below 0.
-    """
-
-    low: Fraction
-    high: Fraction
-    at: Fraction
-    depth: Fraction
-    is_above: bool
+    low: Fraction  # from where
+    high: Fraction  # to where
+    at: Fraction  # where it is farthest outside
+    depth: Fraction  # how far
+    is_above: bool  # whether it is above 1, otherwise below 0
 
 
 # --- distance of two curves
 
 
 class CurveDistance(NamedTuple):
-    """The largest difference of two curves on an interval.
+    """The largest difference of two curves on an interval."""
 
-    Attributes:
-        low: It is at least this; reached, or approached from above, at `at`.
-        high: It is at most this.
-        at: Where.
-    """
-
-    low: Fraction
-    high: Fraction
-    at: Fraction
+    low: Fraction  # it is at least this; reached, or approached from above, at `at`
+    high: Fraction  # it is at most this
+    at: Fraction  # where
 
 
 def curve_distance(

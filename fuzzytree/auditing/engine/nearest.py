@@ -173,9 +173,9 @@ def nearest_box(
     `domain`: in whose widths distance is measured.
 
     Example:
-        >>> curve_axis = Domain((DomainSide("x", 0.0, 4.0),))
+        >>> whole = Domain((DomainSide("x", 0.0, 4.0),))
         >>> right = Domain((DomainSide("x", 2.0, 4.0, is_open=True),))
-        >>> result = nearest_box(curve_axis, {"x": Fraction(1)}, [right])
+        >>> result = nearest_box(whole, {"x": Fraction(1)}, [right])
         >>> str(result.low), 2 < result.point["x"] < Fraction("2.01")
         ('1/4', True)
     """
@@ -319,23 +319,16 @@ class _Search:
 
 # --- polytopes
 
-
 Half = tuple[Mapping[int, Fraction], Fraction]
 """A half-space: weights of the inputs, by number, and what their sum is at least."""
 
 
 class Polytope(NamedTuple):
-    """A part of the inputs.
+    """A part of the inputs."""
 
-    Attributes:
-        ranges: The closed range of each input.
-        rows: Combinations within bounds, and open ends of inputs.
-        halves: The closed half-spaces of the combinations.
-    """
-
-    ranges: tuple[Range, ...]
-    rows: tuple[Row, ...]
-    halves: tuple[Half, ...]
+    ranges: tuple[Range, ...]  # the closed range of each input
+    rows: tuple[Row, ...]  # combinations within bounds, and open ends of inputs
+    halves: tuple[Half, ...]  # the closed half-spaces of the combinations
 
 
 def polytope_of(
@@ -390,9 +383,9 @@ class Polytopes:
         The lower bound is the distance itself, or less by next to nothing.
 
         Example:
-            >>> curve_axis = Domain((DomainSide("x", 0.0, 4.0),))
+            >>> whole = Domain((DomainSide("x", 0.0, 4.0),))
             >>> right = Domain((DomainSide("x", 2.0, 4.0, is_open=True),))
-            >>> parts = Polytopes(curve_axis, ["x"], [polytope_of(right, ["x"], {})])
+            >>> parts = Polytopes(whole, ["x"], [polytope_of(right, ["x"], {})])
             >>> result = parts.nearest({"x": Fraction(1)}, [0])
             >>> str(result.low), 2 < result.point["x"] < Fraction("2.01")
             ('1/4', True)

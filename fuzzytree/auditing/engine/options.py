@@ -17,6 +17,7 @@ inequalities in fractions decide whether any inputs have the chosen values.
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -75,10 +76,7 @@ def cover(
     order = sorted(range(len(families)), key=lambda axis: len(families[axis]))
     rest = [0] * (len(order) + 1)
     for place in range(len(order) - 1, -1, -1):
-        union = rest[place + 1]
-        for mask in families[order[place]]:
-            union |= mask
-        rest[place] = union & full
+        rest[place] = union([rest[place + 1], *families[order[place]]]) & full
     if rest[0] != full:
         return None
     steps: list[dict[int, tuple[int, int]]] = []
@@ -104,7 +102,6 @@ def cover(
 
 
 # --- options of the axes
-
 
 NEVER = np.iinfo(np.int64).max
 _MOST_BITS = 63
@@ -321,7 +318,6 @@ def _undominated(options: AxisOptions) -> AxisOptions:
 
 # --- axes that share inputs
 
-
 Part = tuple[AxisStretch, int]
 """A stretch of an axis, and the rivals that it leaves below, as bits."""
 
@@ -333,10 +329,7 @@ def union(masks: Iterable[int]) -> int:
         >>> union([0b001, 0b100])
         5
     """
-    result = 0
-    for mask in masks:
-        result |= mask
-    return result
+    return functools.reduce(operator.or_, masks, 0)
 
 
 def at_most(calls: int, clock: Clock | None = None) -> Callable[[], None]:

@@ -41,18 +41,12 @@ class PolynomialPiece(Value, frozen=True):
     """A degree on `low < x <= high`: `min(max(p(x), 0), cap)`.
 
     All shapes are continuous from the left, so the pieces' upper ends belong to them.
-
-    Attributes:
-        low: The open lower end; None reaches down without end.
-        high: The closed upper end; None reaches up without end.
-        polynomial: p in x, the constant first.
-        cap: The largest degree on this piece: 1, or `CAP` on a flank.
     """
 
-    low: Fraction | None
-    high: Fraction | None
-    polynomial: Polynomial
-    cap: Fraction = ONE
+    low: Fraction | None  # the open lower end; None reaches down without end
+    high: Fraction | None  # the closed upper end; None reaches up without end
+    polynomial: Polynomial  # p in x, the constant first
+    cap: Fraction = ONE  # the largest degree on this piece: 1, or `CAP` on a flank
 
     def degree(self, x: Fraction) -> Fraction:
         """Return the degree at x, as if the piece had no ends."""
@@ -105,11 +99,7 @@ def _flank(
     curve = (ZERO, *map(Fraction, flank.curve))
     inner = composed(curve, -end / width, ONE / width)
     first, last = min(start, end), max(start, end)
-    ends = [
-        low,
-        *(x for x in (first, last) if _is_within(x, low, high)),
-        high,
-    ]
+    ends = [low, *(x for x in (first, last) if _is_within(x, low, high)), high]
     level = min(max(sum(curve, ZERO), ZERO), CAP)
     for a, b in itertools.pairwise(ends):
         if a is not None and first <= a and b is not None and b <= last:
@@ -196,7 +186,6 @@ def degree_after(parts: tuple[PolynomialPiece, ...], x: Fraction) -> Fraction:
 
 
 # --- the curves of one axis
-
 
 _ENDS = ((ZERO,), (ONE,))
 
@@ -298,9 +287,9 @@ def _apart(result: Iterable[ChangePoint]) -> list[ChangePoint]:
             kept.append(after)
             continue
         before = kept.pop()
-        same_contenders = _same(before, after)
-        if same_contenders is not None:
-            todo.append(same_contenders)
+        same = _same(before, after)
+        if same is not None:
+            todo.append(same)
             continue
         pair = sorted(_separated(before, after), key=lambda one: one.low)
         if pair[1].low > pair[0].high:
@@ -396,13 +385,9 @@ def _overlaps(
     low: Fraction | None = None
     while True:
         (a, p), (b, q) = one[i], other[j]
-        high = a.high if b.high is None or _is_first(a.high, b.high) else b.high
+        high = min((x for x in (a.high, b.high) if x is not None), default=None)
         if low is None or high is None or low < high:
             yield low, high, p, q
         if high is None:
             return
         i, j, low = i + (a.high == high), j + (b.high == high), high
-
-
-def _is_first(one: Fraction | None, other: Fraction) -> bool:
-    return one is not None and one < other

@@ -121,8 +121,8 @@ def may_tie(base: Arrangement) -> BoolArray:
         for rule in range(count):
             checkpoint()
             cells = np.flatnonzero(alive[rule])
-            same_contenders = rank[:, cells] == rank[rule, cells]
-            result[rule] |= same_contenders.any(axis=1)
+            same = rank[:, cells] == rank[rule, cells]
+            result[rule] |= same.any(axis=1)
     return np.asarray(result | result.T)
 
 
@@ -209,19 +209,12 @@ class Pivot(NamedTuple):
 
 
 class _CellDegrees(NamedTuple):
-    """The rules' degrees in the cells of an axis; at its value where it has only one.
+    """The rules' degrees in the cells of an axis, or at its only value."""
 
-    Attributes:
-        cells: The cells.
-        of: Shape (rules, cells): the element that is a rule's degree.
-        height: The same shape: its rank.
-        is_zero: The same shape: whether it is 0 throughout.
-    """
-
-    cells: list[int]
-    of: IntArray
-    height: IntArray
-    is_zero: BoolArray
+    cells: list[int]  # the cells
+    of: IntArray  # shape (rules, cells): the element that is a rule's degree
+    height: IntArray  # the same shape: its rank
+    is_zero: BoolArray  # the same shape: whether it is 0 throughout
 
 
 def _cell_degrees(grid: AxisGrid) -> _CellDegrees:
@@ -306,8 +299,8 @@ def constant_pairs(duel: Duel, question: TieQuestion, *, is_each: bool) -> list[
     result: dict[tuple[int, ...], Pivot] = {}
     key: tuple[int, ...]
     for first, level in one:
-        for second, same_contenders in other:
-            if first.axis != second.axis and level == same_contenders:
+        for second, same in other:
+            if first.axis != second.axis and level == same:
                 key = level, first.axis, first.mask, second.axis, second.mask
                 if is_each:
                     key = *key, first.cell, second.cell
@@ -344,12 +337,7 @@ def _limits(question: TieQuestion) -> IntArray:
 
 
 def flat_family(
-    duel: Duel,
-    question: TieQuestion,
-    axis: int,
-    band: int,
-    *,
-    is_within: bool = False,
+    duel: Duel, question: TieQuestion, axis: int, band: int, *, is_within: bool = False
 ) -> tuple[int, ...]:
     """Return what does not exceed a level where ours reach it.
 

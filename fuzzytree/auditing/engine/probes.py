@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Arrangement, strengths_at
+from fuzzytree.auditing.engine.arrangement import Arrangement, lead_at
 from fuzzytree.auditing.engine.domain import Domain, Point, variable_value
 from fuzzytree.auditing.engine.linear import simple
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
@@ -152,7 +152,7 @@ def plainer(
     base: Arrangement, point: Point, ours: Sequence[int], rivals: Sequence[int]
 ) -> Point:
     """Return a point of fewer digits at which rules still lead by half as much."""
-    goal = _lead(base, point, ours, rivals) / 2
+    goal = lead_at(base, point, ours, rivals) / 2
     result = dict(point)
     for name in base.rules.inputs:
         side = base.domain.side(name)
@@ -164,23 +164,14 @@ def plainer(
             if not low < high:
                 break
             tried = {**result, name: simple(low, high)}
-            is_good = _lead(base, tried, ours, rivals) > max(goal, Fraction(0))
+            is_good = lead_at(base, tried, ours, rivals) > max(goal, Fraction(0))
             if is_good and is_within(base, tried):
                 result = tried
                 break
     return result
 
 
-def _lead(
-    base: Arrangement, point: Point, ours: Sequence[int], rivals: Sequence[int]
-) -> Fraction:
-    strengths = strengths_at(base, point)
-    mine = min((strengths[number - 1] for number in ours), default=Fraction(1))
-    return mine - max((strengths[n - 1] for n in rivals), default=Fraction(0))
-
-
 # --- random probes
-
 
 _MOST_POINTS: Final = 4096
 _MOST_STRENGTHS: Final = 1 << 23  # of all rules at all points
@@ -189,15 +180,10 @@ _CLEAR: Final = 1e-9  # leads below are not worth a look in fractions
 
 
 class RandomProbes(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """What rules do at some points of a domain.
+    """What rules do at some points of a domain."""
 
-    Attributes:
-        base: The rules and the box.
-        seed: Of what is drawn.
-    """
-
-    base: Arrangement
-    seed: int = 0
+    base: Arrangement  # the rules and the box
+    seed: int = 0  # of what is drawn
 
     @functools.cached_property
     def _points(self) -> FloatArray:

@@ -22,12 +22,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.bounding import wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.domain import (
-    Domain,
-    DomainSide,
-    Point,
-    variable_value,
-)
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, Point, variable_value
 from fuzzytree.auditing.engine.factors import Factored
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.pivots import TieQuestion, tie_witness
@@ -234,7 +229,6 @@ def _cells(run: Run) -> range:
 
 # --- ties
 
-
 _MOST_BOXES: Final = 500  # of cells, in one question
 _SHARE: Final = 0.25  # of the time that is left, for one box
 _NEAR: Final = (3, 6, 12, 24, 48)  # halvings of the way from a point to the middle
@@ -242,12 +236,7 @@ _TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
 
 
 def tie_of_products(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
-    """Return whether rules are the strongest on a set with an interior.
-
-    Returns:
-        `Proved`: they nowhere are. `Witness`: here they are. `Bracket`: time, or a
-        lead that is too small to tell, leaves it open. `Declined`: axes of one
-        direction do, or places too near to each other.
+    """Return what `ties.tie` does, under the product.
 
     Raises:
         OutOfTimeError: If the clock is over.
@@ -303,29 +292,29 @@ class _Search:
                 if len(self.visited) == _MOST_BOXES:
                     raise OutOfTimeError
                 self.visited.add(box)
-                same_contenders = {
+                same = {
                     rule
                     for rule in self.question.rivals
                     if self.of.are_one(mine, rule - 1, box)
                 }
-                if same_contenders & {*self.question.strict}:
+                if same & {*self.question.strict}:
                     continue
-                result = self._leads(box, same_contenders)
+                result = self._leads(box, same)
                 if result is not None:
                     return result
-                todo.append(self._parts(box, same_contenders))
+                todo.append(self._parts(box, same))
         return None
 
-    def _parts(self, box: Box, same_contenders: set[int]) -> Iterator[Box]:
+    def _parts(self, box: Box, same: set[int]) -> Iterator[Box]:
         """Yield the parts of a box in which more rivals are the same function."""
         mine = self.question.ours[0] - 1
         for rule in self.question.weak:
-            if rule not in same_contenders:
+            if rule not in same:
                 yield from self.of.boxes(mine, rule - 1, box)
 
-    def _leads(self, box: Box, same_contenders: set[int]) -> Witness | None:
+    def _leads(self, box: Box, same: set[int]) -> Witness | None:
         """Return a point of a box at which all but some rivals are weaker."""
-        rivals = [rule for rule in self.question.rivals if rule not in same_contenders]
+        rivals = [rule for rule in self.question.rivals if rule not in same]
         rules, rule = self.of.base.rules, self.question.ours[0]
         for is_outer in (True, False):
             domain = self._domain(box, is_outer=is_outer)

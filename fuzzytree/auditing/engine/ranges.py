@@ -37,22 +37,14 @@ class Bends(NamedTuple):
     """The places where a shape may stop rising or falling, from left to right.
 
     A cell `a < x <= b` holds a place if `low < b` and `high > a`.
-
-    Attributes:
-        low: Where each place begins.
-        high: Where it ends.
-        depths: Above minus the degree, for 2**k neighbours: shape (k, places).
-        heights: Above the degree, the same.
-        steps: Where the degree jumps.
-        after: The degrees just behind each step.
     """
 
-    low: FloatArray
-    high: FloatArray
-    depths: FloatArray
-    heights: FloatArray
-    steps: FloatArray
-    after: Enclosure
+    low: FloatArray  # where each place begins
+    high: FloatArray  # where it ends
+    depths: FloatArray  # above minus the degree, for 2**k neighbours: shape (k, places)
+    heights: FloatArray  # above the degree, the same
+    steps: FloatArray  # where the degree jumps
+    after: Enclosure  # the degrees just behind each step
 
 
 @functools.lru_cache(maxsize=1 << 12)

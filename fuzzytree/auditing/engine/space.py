@@ -179,13 +179,7 @@ class VariableUse:
         if not self.is_product:
             spread = np.maximum(spread, width[:, self.others])
         return BoundTable(
-            least_low,
-            most_high,
-            _columns(at, size[0]),
-            most,
-            least,
-            spread,
-            width,
+            least_low, most_high, _columns(at, size[0]), most, least, spread, width
         )
 
     def _width(self, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -246,10 +240,7 @@ def _columns(columns: Sequence[FloatArray], rows: int) -> FloatArray:
 
 
 def _ratios(
-    one: Enclosure,
-    other: Enclosure,
-    whole: FloatArray,
-    is_below: npt.NDArray[np.bool_],
+    one: Enclosure, other: Enclosure, whole: FloatArray, is_below: npt.NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
     """Return how many times one is as large as the other, at most and at least.
 
@@ -269,10 +260,7 @@ def _ratios(
 
 
 def _losses(
-    one: Enclosure,
-    other: Enclosure,
-    whole: FloatArray,
-    is_below: npt.NDArray[np.bool_],
+    one: Enclosure, other: Enclosure, whole: FloatArray, is_below: npt.NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
     """Return how small the other is, at least, where it is below one's rule."""
     del one
@@ -332,7 +320,9 @@ class Segment:
             self.end = np.concatenate([self.end, end])
             self.middle = np.concatenate([self.middle, middle])
             self.child = np.concatenate([self.child, np.full(len(start), -1)])
-            self.table = BoundTable(*map(_stacked, self.table, table))
+            self.table = BoundTable(
+                *map(np.concatenate, zip(self.table, table, strict=True))
+            )
         return self.child[parts]
 
     def _middles(self, start: FloatArray, end: FloatArray) -> FloatArray:
@@ -358,10 +348,6 @@ def _neighbours(marks: FloatArray, x: FloatArray) -> tuple[FloatArray, ...]:
     return np.where(is_below, above, below), np.where(is_below, below, above)
 
 
-def _stacked(one: FloatArray, other: FloatArray) -> FloatArray:
-    return np.concatenate([one, other])
-
-
 def _edges(start: FloatArray, end: FloatArray) -> FloatArray:
     share = np.arange(_CELLS + 1) / _CELLS
     edges = start[:, np.newaxis] * (1.0 - share) + end[:, np.newaxis] * share
@@ -370,7 +356,6 @@ def _edges(start: FloatArray, end: FloatArray) -> FloatArray:
 
 
 # --- boxes
-
 
 _MIX_CELLS = 4  # of a combination's values on one box
 
@@ -634,10 +619,7 @@ def _limits(
 
 
 def _mix(
-    variable: Variable,
-    use: VariableUse,
-    number: Mapping[str, int],
-    domain: Domain,
+    variable: Variable, use: VariableUse, number: Mapping[str, int], domain: Domain
 ) -> Combination:
     constant = -sum(
         (Fraction(p.weight) * Fraction(p.centre) for p in variable.parts), Fraction(0)

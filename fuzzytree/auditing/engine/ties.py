@@ -116,13 +116,7 @@ class SharedInputs:
         return None, is_open
 
     def _fitting(
-        self,
-        pivot: Pivot,
-        band: int,
-        levels: _Levels,
-        is_flat: bool,
-        *,
-        is_outer: bool,
+        self, pivot: Pivot, band: int, levels: _Levels, is_flat: bool, *, is_outer: bool
     ) -> Iterator[dict[int, AxisStretch]]:
         """Yield values of the axes at which ours tie, or may at some of the levels."""
         fixed = self._pivot_stretches(pivot, levels, is_flat=is_flat, is_outer=is_outer)
@@ -183,13 +177,7 @@ class SharedInputs:
         return None if at is None else {pivot.axis: AxisStretch(at, at, is_open=False)}
 
     def _parts(
-        self,
-        axis: int,
-        band: int,
-        levels: _Levels,
-        *,
-        is_flat: bool,
-        is_outer: bool,
+        self, axis: int, band: int, levels: _Levels, *, is_flat: bool, is_outer: bool
     ) -> Iterator[Part]:
         """Yield where ours reach a level on an axis, with the rivals left below."""
         duel = self.duel
@@ -267,9 +255,7 @@ def _result(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
 
 def _searched(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
     duel = Duel(
-        base,
-        tuple(n - 1 for n in question.ours),
-        tuple(n - 1 for n in question.rivals),
+        base, tuple(n - 1 for n in question.ours), tuple(n - 1 for n in question.rivals)
     )
     sharing = SharedInputs(duel, question, clock) if coupled(base) else None
     led = None if sharing is None else sharing.leader()

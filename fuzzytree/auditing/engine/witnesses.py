@@ -40,17 +40,11 @@ START = -1  # the number of the option at an axis's lower end itself
 
 
 class AxisStretch(NamedTuple):
-    """Values of an axis on which an option holds at a level: all between low and high.
+    """The values of an axis with which an option reaches a level: an interval."""
 
-    Attributes:
-        low: The lower end.
-        high: The upper end.
-        is_open: Whether the ends themselves are left out.
-    """
-
-    low: Fraction
-    high: Fraction
-    is_open: bool = True
+    low: Fraction  # the lower end
+    high: Fraction  # the upper end
+    is_open: bool = True  # whether the ends themselves are left out
 
 
 def stretch(
@@ -101,18 +95,14 @@ def part_of(
     middle = (low + high) / 2
     piece = piece_at(pieces(element.shape), middle)
     goal = 1 - level if element.is_complement else level
-    constant_pairs = difference(piece.polynomial, (goal,))
-    result = (
-        ()
-        if piece.degree(middle) in (0, piece.cap)
-        else roots(constant_pairs, low, high)
-    )
+    offset = difference(piece.polynomial, (goal,))
+    result = () if piece.degree(middle) in (0, piece.cap) else roots(offset, low, high)
     if not result:
         is_met = (element.degree(middle) >= level) is is_high
         return AxisStretch(low, high) if is_met else AxisStretch(high, low)
     size = max(0, -magnitude(high - low))
-    place = refined(constant_pairs, result[0], size + bits)
-    starts_above = value_at(constant_pairs, low) > 0
+    place = refined(offset, result[0], size + bits)
+    starts_above = value_at(offset, low) > 0
     if starts_above is (is_high is not element.is_complement):
         return AxisStretch(low, place.low)
     return AxisStretch(place.high, high)
@@ -169,7 +159,6 @@ def _outer(part: AxisStretch, ends: tuple[Fraction, Fraction]) -> AxisStretch:
 
 
 # --- points of the inputs
-
 
 _DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 

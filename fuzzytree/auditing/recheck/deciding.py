@@ -23,6 +23,7 @@ from fuzzytree.auditing.recheck.cases import (
 )
 from fuzzytree.auditing.recheck.cells import FINE
 from fuzzytree.auditing.recheck.claims import point_of
+from fuzzytree.auditing.recheck.forms import clause_text
 from fuzzytree.auditing.recheck.grid import RuleBits
 from fuzzytree.auditing.recheck.meaning import Point, answer_of, leaf_of, strengths
 from fuzzytree.auditing.recheck.model_records import Clause, Rules, Tree, Variable
@@ -266,15 +267,10 @@ def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:
     used = {c: tuple(Label(c.variable, term) for term in c.terms) for c in when}
     result = {clause for clause, labels in used.items() if labels == answer.terms}
     if len(result) > 1:  # one of them is negated: only the subject says which
-        result = {c for c in result if answer.subject.endswith(repr(_text(c)))}
+        result = {c for c in result if answer.subject.endswith(repr(clause_text(c)))}
     require(len(result) == 1, "it is of no clause of the rule")
     place = when.index(result.pop())
     return (*when[:place], *when[place + 1 :])
-
-
-def _text(clause: Clause) -> str:
-    verb = "is not" if clause.negated else "is"
-    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
 
 
 def shows_need(case: Case, answer: Answer, state: Witness) -> None:
@@ -560,7 +556,6 @@ def shows_gap(case: Case, answer: Answer, state: Witness) -> None:
 
 
 # --- the check of each code
-
 
 AGAIN: dict[str, Callable[[Case, Answer], None]] = {
     "FT101": dead,

@@ -283,7 +283,6 @@ def _largest(sets: Iterable[int]) -> set[int]:
 
 # --- ties
 
-
 MOST_STEPS = 400_000
 
 

@@ -69,7 +69,6 @@ SEVERITIES = {
 
 # --- fingerprints
 
-
 _TAGS: dict[type, str] = {
     kind: kind.__name__.lower() for kind in (Band, LR, Points, Is, And, Or, Not)
 }

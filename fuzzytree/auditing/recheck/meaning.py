@@ -71,7 +71,6 @@ def leaf_of(tree: Tree, point: Point) -> int:
 
 # --- trees
 
-
 Steps = tuple[tuple[Node, Branch], ...]
 
 

@@ -46,7 +46,6 @@ def _of(items: Any) -> Iterator[Place]:
 
 # --- models
 
-
 _HEAD = "format, kind, name, classes, semantics"
 
 

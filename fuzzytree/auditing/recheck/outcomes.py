@@ -32,7 +32,6 @@ def require(is_so: bool, otherwise: str) -> None:
 
 # --- the report
 
-
 UNCHECKED = (
     "the version, the table, how many rows and how long, how proofs were made, why "
     "something is open or left out, the commands"

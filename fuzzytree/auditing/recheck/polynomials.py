@@ -253,7 +253,6 @@ def is_same(one: Root, other: Root) -> bool:
 
 # --- membership functions
 
-
 CAP = 1 - Fraction(1, 2**53)  # the largest degree off a plateau
 
 

@@ -150,7 +150,6 @@ def read_conclusions(text: str) -> tuple[Conclusion, ...]:
 
 # --- systems
 
-
 CURVES = {
     "gaussian": "mean, deviation",
     "two gaussians": "left, left deviation, right, right deviation",
