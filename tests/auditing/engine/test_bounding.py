@@ -113,13 +113,13 @@ def _check_against_cells(rules: RuleBase) -> None:
             assert type(one) is type(other), (rules.name, rule)
 
 
-def test_boxes_and_cells_decide_alike_under_the_minimum() -> None:
+def test_boxes_and_cells_agree_under_the_minimum() -> None:
     _check_against_cells(random_base(2, 5, 2, "min", "mixed", shared=0.4))
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("seed", range(8))
-def test_boxes_and_cells_decide_alike_on_many_bases(seed: int) -> None:
+def test_boxes_and_cells_agree_on_many_bases(seed: int) -> None:
     _check_against_cells(
         random_base(seed, 5, 3, "min", "mixed", shared=0.2 * (seed % 4))
     )
@@ -333,7 +333,7 @@ def test_a_rule_hidden_by_two_others_in_four_inputs_is_proved_or_found() -> None
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
-def test_rules_that_ask_a_hundred_inputs_are_asked_too(
+def test_rules_of_a_hundred_inputs_are_decided_too(
     conjunction: Conjunction,
 ) -> None:
     line, names = Points((0.0, 1.0), (0.0, 1.0)), [f"x{n}" for n in range(100)]

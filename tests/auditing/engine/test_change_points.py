@@ -1,4 +1,4 @@
-"""Places of curves are told apart, also where two of them are the same."""
+"""The change points of curves are separate, and one where two of them coincide."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def test_work_that_holds_no_clock_is_ended() -> None:
     checkpoint()  # nobody watches any more
 
 
-def test_who_asks_the_clock_has_a_moment_to_tell_what_is_known() -> None:
+def test_work_with_a_clock_has_a_moment_to_return_what_is_known() -> None:
     with enforced(over(GRACE_S / 2)):
         checkpoint()
     with enforced(over(GRACE_S * 2)), pytest.raises(OutOfTimeError):

@@ -57,7 +57,7 @@ def test_one_point_between_two_triangles_is_uncovered() -> None:
     assert (found.region[0].low, found.region[0].high) == (1.0, 1.0)
 
 
-def test_a_gap_is_told_from_end_to_end() -> None:
+def test_the_region_of_a_gap_reaches_from_end_to_end() -> None:
     found = uncovered(arrange(_partition(0.0, 4.0), _box(0.0, 4.0)))
     assert isinstance(found, Witness)
     assert (found.region[0].low, found.region[0].high) == (1.0, 3.0)
@@ -127,7 +127,7 @@ def test_a_gap_behind_a_step_begins_after_it() -> None:
         assert (span.low, span.high) == (math.nextafter(9.0, 10.0), 10.0)
 
 
-def test_what_is_0_between_two_places_is_told_of_a_point_between_them() -> None:
+def test_a_gap_between_two_places_has_its_witness_between_them() -> None:
     # In this base a cell lies between two doubles; a curve is 0 at the nearer of them.
     rules = random_base(1, 5, 3, kind="mixed", shared=0.5, odd=0.3)
     given = arrange(rules, unit_domain(rules))

@@ -27,7 +27,7 @@ def test_no_more_crossings_are_counted_than_there_are() -> None:
     assert crossings(curves[:50]) == 0  # so few are not counted
 
 
-def test_rules_in_too_many_cells_are_asked_by_boxes(
+def test_rules_in_too_many_cells_are_decided_by_boxes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     base = random_base(5, 6, 2, kind="points")

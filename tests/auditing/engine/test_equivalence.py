@@ -120,7 +120,7 @@ def test_more_verdicts_are_what_a_grid_says(seed: int) -> None:
 
 @pytest.mark.parametrize("combinations", [0, 2])
 @pytest.mark.parametrize("seed", range(2))
-def test_relative_rules_decide_alike_in_any_order_and_with_any_and(
+def test_relative_rules_agree_in_any_order_and_with_any_and(
     seed: int, combinations: int
 ) -> None:
     rules = rules_from_tree(random_tree(seed, combinations=combinations))

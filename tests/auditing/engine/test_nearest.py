@@ -110,7 +110,7 @@ def test_a_fixed_input_does_not_count_in_a_distance() -> None:
 
 
 @pytest.mark.parametrize("is_open", [True, False])
-def test_the_nearest_box_is_told_exactly(is_open: bool) -> None:
+def test_the_distance_to_the_nearest_box_is_exact(is_open: bool) -> None:
     far = Domain((DomainSide("x", 3.0, 4.0), DomainSide("y", -1.0, 1.0)))
     near = Domain(
         (DomainSide("x", 2.0, 4.0, is_open=is_open), DomainSide("y", -1.0, -0.25))

@@ -71,7 +71,7 @@ def test_an_open_end_is_met_just_behind() -> None:
     assert found.point["x"] + found.point["y"] > 1
 
 
-def test_the_nearest_of_several_is_told_and_an_empty_one_is_none() -> None:
+def test_the_nearest_of_several_counts_and_an_empty_one_does_not() -> None:
     start = {"x": 0.0, "y": 0.0, "z": 0.0}
     empty = (DomainSide("sum", 2.0, 3.0, "model", True),)
     never = (DomainSide("x", 0.5, 1.0), DomainSide("sum", 0.0, 0.25))
@@ -80,7 +80,7 @@ def test_the_nearest_of_several_is_told_and_an_empty_one_is_none() -> None:
     assert _nearest(start, far, empty, near, never).low == Fraction(1, 4)
 
 
-def test_a_spent_budget_is_told() -> None:
+def test_a_spent_budget_is_reported() -> None:
     asked = Polytopes(UNIT, NAMES, [polytope_of(UNIT, NAMES, VARIABLES)])
     times = iter([0.0, 9.0, 9.0])
     clock = Clock(1.0, now=lambda: next(times))

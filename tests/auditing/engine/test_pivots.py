@@ -1,4 +1,4 @@
-"""Pairs that cannot tie are told apart at once, and no pair that ties is."""
+"""Pairs that cannot tie are excluded at once, and no pair that ties is."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def test_a_root_in_the_middle_is_exact() -> None:
     assert [(r.low, r.high) for r in found][1] == (Fraction(1, 2), Fraction(1, 2))
 
 
-def test_roots_far_from_zero_are_told_apart() -> None:
+def test_roots_far_from_zero_are_separated() -> None:
     base = Fraction(10**12)
     polynomial = _with_roots(base + Fraction(1, 10), base + Fraction(2, 10))
     assert len(roots(polynomial, base, base + 1)) == 2

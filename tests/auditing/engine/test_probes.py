@@ -18,7 +18,7 @@ from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_ru
 def test_a_rule_that_is_seen_to_win_does_so_in_fractions(
     conjunction: Conjunction,
 ) -> None:
-    seen = told = 0
+    seen = reported = 0
     for seed in range(6):
         base = random_base(seed, 9, 3, conjunction, "mixed", odd=0.3, combinations=1)
         given = arrange(base, unit_domain(base))
@@ -35,7 +35,7 @@ def test_a_rule_that_is_seen_to_win_does_so_in_fractions(
                 ),
             )
             for found, rest in pairs:
-                told += 1
+                reported += 1
                 if found is None:
                     continue
                 seen += 1
@@ -43,7 +43,7 @@ def test_a_rule_that_is_seen_to_win_does_so_in_fractions(
                 assert strengths[rule - 1] > max(strengths[n - 1] for n in rest)
                 assert found.claims[0].rivals == tuple(rest)
                 assert found.claims[1].level == str(strengths[rule - 1])
-    assert told // 2 < seen < told
+    assert reported // 2 < seen < reported
 
 
 def test_a_rule_that_never_wins_is_not_seen_to() -> None:
@@ -66,7 +66,7 @@ def test_a_rule_that_is_not_seen_may_win_in_a_sliver() -> None:
     assert isinstance(wins(given, number, rivals), Witness)
 
 
-def test_as_few_clauses_are_asked_as_it_takes_to_see_who_is_stronger() -> None:
+def test_no_clause_is_evaluated_after_the_stronger_rule_is_known() -> None:
     base = random_base(4, 8, 3)
     given = arrange(base, unit_domain(base))
     point = {name: Fraction(3, 8) for name in base.inputs}

@@ -56,7 +56,7 @@ def test_a_rule_fires_where_a_multiple_of_an_input_is_limited() -> None:
     assert 0.25 <= 2 * point_of(found.point)["x"] - 1 <= 0.625
 
 
-def test_what_is_asked_of_a_negative_multiple_is_turned_round() -> None:
+def test_the_bounds_of_a_negative_multiple_are_swapped() -> None:
     rules = _rules(Part("x", -4.0, 1.0))  # 4 - 4 x
     given = arrange(rules, Domain((*BOX.sides, DomainSide("mix", 1.0, 3.0))))
     found = wins(given, 1, ())

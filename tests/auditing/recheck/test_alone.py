@@ -60,12 +60,12 @@ def test_alone_in_an_empty_folder_it_checks_a_real_audit(tmp_path: Path) -> None
     for name, content in zip(names, small(), strict=True):
         Path(name).write_bytes(content)
     ran = alone(tmp_path, *names)
-    told = "\n".join(recheck_files(*names).lines()) + "\n"
-    assert (ran.returncode, ran.stdout, ran.stderr) == (0, told, "")
-    assert "answers PROVED, decided again" in told
+    reported = "\n".join(recheck_files(*names).lines()) + "\n"
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, reported, "")
+    assert "answers PROVED, decided again" in reported
 
 
-def test_alone_it_tells_what_does_not_hold(tmp_path: Path) -> None:
+def test_alone_it_reports_what_is_wrong(tmp_path: Path) -> None:
     audit, model = small()
     (tmp_path / "audit.json").write_bytes(audit.replace(b'"min"', b'"product"', 1))
     (tmp_path / "grip.yaml").write_bytes(model)
@@ -74,7 +74,7 @@ def test_alone_it_tells_what_does_not_hold(tmp_path: Path) -> None:
     assert "WRONG: the policy is not the model's\n" in ran.stdout
 
 
-def test_alone_it_tells_how_it_is_called(tmp_path: Path) -> None:
+def test_alone_it_prints_its_usage(tmp_path: Path) -> None:
     ran = alone(tmp_path, "audit.json")
     usage = "usage: python -m fuzzytree.auditing.recheck AUDIT.json MODEL.yaml\n"
     assert (ran.returncode, ran.stdout, ran.stderr) == (2, "", usage)

@@ -48,7 +48,7 @@ FREE = (
     r"answers\.measures(\..*)?",
     r"answers\.(state\.)?region(\..*)?",  # a smaller one, or none
 )
-"""What an edit of cannot always be told once the digest is made again."""
+"""What an edit of need not be reported once the digest is computed again."""
 
 UNSURE = ("FT102", "FT103", "FT106", "FT203", "FT204", "FT301", "FT402", "FT6", "FT7")
 """Codes some of whose answers are not decided again, so that one may be missing."""
@@ -99,7 +99,7 @@ def edited(facts: Facts, way: Way, chance: random.Random) -> str:
 
 
 def is_free(name: str, facts: Facts, way: Way) -> bool:
-    """Return whether an edit of a place may stay untold."""
+    """Return whether an edit of a place may stay unreported."""
     if any(re.fullmatch(pattern, name) for pattern in FREE):
         return True
     if way[0] != "answers" or len(way) < 2:
@@ -208,7 +208,7 @@ def test_audits_of_odd_models_hold(seed: int) -> None:
     assert wrong_of(model, clock=Clock(2.0)) == []
 
 
-def test_any_edit_is_told_by_the_digest() -> None:
+def test_the_digest_shows_any_edit() -> None:
     audit_, content = small()
     chance = random.Random(1)
     every = [way for way in ways(json.loads(audit_)) if way != ("digest",)]
@@ -218,8 +218,8 @@ def test_any_edit_is_told_by_the_digest() -> None:
         assert wrong_with(facts, content), name
 
 
-def told(seeds: range) -> tuple[int, list[str]]:
-    """Make edits with new digests; return how many are told, and which must be."""
+def reported(seeds: range) -> tuple[int, list[str]]:
+    """Make edits with new digests; return how many are reported, and which must be."""
     audit_, content = small()
     count, missed = 0, list[str]()
     for seed in seeds:
@@ -237,15 +237,15 @@ def told(seeds: range) -> tuple[int, list[str]]:
 
 
 @pytest.mark.heavy
-def test_edits_are_told_with_a_new_digest_too() -> None:
-    count, missed = told(range(12))
+def test_edits_with_a_new_digest_are_reported_too() -> None:
+    count, missed = reported(range(12))
     assert missed == []
     assert count > 6
 
 
 @pytest.mark.heavy
-def test_hundreds_of_edits_are_told_with_a_new_digest_too() -> None:
-    count, missed = told(range(1000, 1400))
+def test_hundreds_of_edits_with_a_new_digest_are_reported_too() -> None:
+    count, missed = reported(range(1000, 1400))
     assert missed == []
     assert count > 250
 
@@ -258,13 +258,13 @@ def changed(**changes: Any) -> list[str]:
     return wrong_with(facts, content)
 
 
-def test_each_sentence_of_a_real_audit_is_held_against_its_facts() -> None:
+def test_each_sentence_of_a_real_audit_is_compared_with_its_facts() -> None:
     facts = json.loads(small()[0])
     report = recheck(*small(), ("audit.json", "grip.yaml"))
     assert report.counts["sentences compared with facts"] == len(facts["answers"])
 
 
-def test_a_sentence_that_says_other_than_its_facts_is_told() -> None:
+def test_a_sentence_that_contradicts_its_facts_is_reported() -> None:
     facts = json.loads(small()[0])
     number, answer = next(
         (n, one) for n, one in enumerate(facts["answers"], 1) if one["code"] == "FT102"
@@ -275,35 +275,37 @@ def test_a_sentence_that_says_other_than_its_facts_is_told() -> None:
     assert changed(answers=facts["answers"]) == [text]
 
 
-def test_a_sentence_in_new_words_is_not_checked_and_told_so() -> None:
+def test_a_sentence_in_new_words_is_reported_as_not_checked() -> None:
     answers = json.loads(small()[0])["answers"]
     answers[0]["sentence"] = "all is well"
     reason = "sentences of a form that is not known here"
     assert changed(answers=answers) == [reason]
 
 
-def test_a_panel_that_was_edited_is_told() -> None:
+def test_an_edited_panel_is_reported() -> None:
     limits = [*LIMITS[:-1]]
     assert changed(limits=limits) == ["the panel of limits is not the fixed one"]
 
 
-def test_a_finding_that_was_removed_is_told() -> None:
+def test_a_removed_finding_is_reported() -> None:
     answers = json.loads(small()[0])["answers"]
     kept = [one for one in answers if (one["code"], one["rules"]) != ("FT104", [4, 2])]
     assert len(kept) == len(answers) - 1
     assert any("rule 4 hides behind 2" in text for text in changed(answers=kept))
 
 
-def test_a_finding_that_was_made_up_is_told() -> None:
+def test_a_finding_without_a_cause_is_reported() -> None:
     answers = json.loads(small()[0])["answers"]
     made = json.loads(json.dumps(answers))
-    told = next(one for one in made if (one["code"], one["rules"]) == ("FT104", [4, 2]))
-    told["rules"] = [2, 4]
+    reported = next(
+        one for one in made if (one["code"], one["rules"]) == ("FT104", [4, 2])
+    )
+    reported["rules"] = [2, 4]
     wrong = changed(answers=made)
     assert any("rule 2 is somewhere stronger than rule 4" in text for text in wrong)
 
 
-def test_a_model_that_is_another_one_is_told() -> None:
+def test_another_model_is_reported() -> None:
     audit_, content = small()
     other = content.replace(
         b"range: {from: 0.0, to: 4.0}", b"range: {from: 0.0, to: 5}"
@@ -313,7 +315,7 @@ def test_a_model_that_is_another_one_is_told() -> None:
     assert any(text.startswith("the model's fingerprint is ") for text in wrong)
 
 
-def test_a_witness_outside_the_domain_is_told(tmp_path: Path) -> None:
+def test_a_witness_outside_the_domain_is_reported(tmp_path: Path) -> None:
     audit_, content = small()
     facts = json.loads(audit_)
     number, answer = next(
@@ -328,7 +330,7 @@ def test_a_witness_outside_the_domain_is_told(tmp_path: Path) -> None:
     assert wrong_with(facts, content) == [f"{where}: the point lies outside the domain"]
 
 
-def test_an_answer_that_names_three_rules_for_two_is_told() -> None:
+def test_an_answer_with_three_rules_for_two_is_reported() -> None:
     answers = json.loads(small()[0])["answers"]
     number, answer = next(
         (n, one)
@@ -345,7 +347,7 @@ def test_the_audit_with_rows_that_are_no_table_holds() -> None:
     assert wrong_of(rules_of((Clause("x", ("up",)),)), rows=rows) == []
 
 
-def test_distances_in_sentences_about_rows_are_held_against_their_measures() -> None:
+def test_distances_in_sentences_about_rows_are_compared_with_their_measures() -> None:
     tree = random_tree(4, leaves=4)
     values = np.random.default_rng(1).uniform(-1.0, 1.0, (len(tree.inputs), 6))
     options: Facts = {"rows": AuditRows("an array", values), "domain": unit(tree)}

@@ -100,7 +100,7 @@ def test_its_proofs_agree_with_the_engine() -> None:
             assert mine == isinstance(found, states.Witness), (seed, number)
 
 
-def test_roots_are_isolated_and_told_apart() -> None:
+def test_roots_are_isolated_and_distinguished() -> None:
     two = (Fraction(-2), Fraction(0), Fraction(1))  # x**2 - 2
     four = times(two, two)
     cubic = times(two, (Fraction(-3, 2), Fraction(1)))

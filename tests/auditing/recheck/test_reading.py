@@ -161,7 +161,7 @@ def test_json_that_is_none_is_refused(text: str, sentence: str) -> None:
     assert str(caught.value).startswith(sentence)
 
 
-def test_a_file_of_another_format_is_told_to_be_converted() -> None:
+def test_a_file_of_another_format_is_refused_with_the_conversion() -> None:
     with pytest.raises(CannotRunError) as refused:
         read_file(b"FUNCTION_BLOCK brake\n", "brake.fcl")
     assert str(refused.value) == (

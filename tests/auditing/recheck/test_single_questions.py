@@ -221,7 +221,7 @@ def disproved(grid: Grid, found: Audit) -> list[str]:
 def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
     strengths, rules = grid.strengths, grid.rules.rules
     numbers = [number - 1 for number in answer.rules]
-    told = [one.rules for one in found.answers if one.rules]
+    reported = [one.rules for one in found.answers if one.rules]
     fires = [bool((one > 0).any()) for one in strengths]
     if answer.code in ("FT104", "FT105") and numbers:
         weak, *strong = answer.rules
@@ -236,7 +236,7 @@ def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
             and fires[strong - 1]
         ]
         hidden = [pair for pair in pairs if grid.is_hidden(*pair)]
-        known = {frozenset((one[0], other)) for one in told for other in one[1:]}
+        known = {frozenset((one[0], other)) for one in reported for other in one[1:]}
         count = next(m.value for m in answer.measures if m.name == "pairs")
         return count == len(pairs) / 2 and all(frozenset(p) in known for p in hidden)
     if answer.code == "FT101":
@@ -262,7 +262,7 @@ def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
             for a, b in itertools.combinations(range(len(rules)), 2)
             if Counter(rules[a].when) == Counter(rules[b].when)
         ]
-        return all(pair in told for pair in same)
+        return all(pair in reported for pair in same)
     if answer.code == "FT107" and answer.terms:
         when = [*rules[numbers[0]].when]
         ends = [answer.subject.endswith(repr(clause_text(one))) for one in when]
@@ -272,9 +272,9 @@ def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
         return grid.decided(strengths) == grid.decided(other)
     if answer.code == "FT201":
         level = grid.one * Fraction(found.settings.level)
-        untold = next(m.value for m in answer.measures if "not told" in m.name)
-        return untold > 0 or all(
-            (a + 1, b + 1) in told
+        omitted = next(m.value for m in answer.measures if "not told" in m.name)
+        return omitted > 0 or all(
+            (a + 1, b + 1) in reported
             or np.minimum(strengths[a], strengths[b]).max() < level
             for a, b in itertools.combinations(range(len(rules)), 2)
             if rules[a].then != rules[b].then

@@ -214,7 +214,7 @@ def test_strengths_of_a_system_are_those_of_its_inference() -> None:
     assert checked > 9
 
 
-def test_edits_of_a_system_audit_are_told() -> None:
+def test_edits_of_a_system_audit_are_reported() -> None:
     text, content = audited(SMALL)
     for number, answer in enumerate(json.loads(text)["answers"]):
         if answer["state"]["state"] != "WITNESS":
@@ -228,7 +228,7 @@ def test_edits_of_a_system_audit_are_told() -> None:
     assert wrong_of(facts, content)
 
 
-def test_a_rule_that_is_left_out_without_need_is_told() -> None:
+def test_a_rule_that_is_left_out_without_need_is_reported() -> None:
     text, content = audited(system(*SMALL.blocks[0].rules[:2]))
     facts = json.loads(text)
     reason = "its weight of 0.5 has no exact method"
