@@ -205,9 +205,6 @@ _FAMILIES: Final = ("marker", "sentinel", "request", "text")
 def load_board(path: PathLike) -> Board:
     """Return the board of a file.
 
-    Args:
-        path: The file.
-
     Raises:
         ReadError: If the file cannot be read or is no board; it lists all mistakes
             with their places.
@@ -217,10 +214,6 @@ def load_board(path: PathLike) -> Board:
 
 def read_board(content: bytes, name: str) -> Board:
     """Return the board of a file's content.
-
-    Args:
-        content: The file.
-        name: What messages call it.
 
     Raises:
         ReadError: If it is no board; it lists all mistakes with their places.

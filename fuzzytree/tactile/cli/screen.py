@@ -45,14 +45,7 @@ def look_of(
 
 
 class Screen:
-    """Draws in a thread, at most 30 times a second, each time by one write.
-
-    Args:
-        live: What is shown.
-        stream: A terminal.
-        look: With which colours.
-        times: The most points for a cell on each side.
-    """
+    """Draws in a thread, at most 30 times a second, each time by one write."""
 
     def __init__(self, live: Live, stream: TextIO, look: Look, times: int) -> None:
         self._live, self._file = live, stream.fileno()

@@ -76,10 +76,6 @@ def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
     Where nothing presses, every feature is 0. Values within the noise of their
     rounding are exactly 0.
 
-    Args:
-        sensor: The sensor.
-        names: Of the features; see `fuzzytree.tactile.features.names`.
-
     Raises:
         TableError: If a name is no feature's.
         InvalidModelError: If a block or cell lies outside the sensor, or if sums for

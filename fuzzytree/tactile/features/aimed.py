@@ -37,11 +37,6 @@ def aimed_frames(sensor: Sensor, random: int = 24, seed: int = 0) -> Cells:
     at the largest number, symmetric shapes whose invariants are exactly 0, and made
     presses of all sizes.
 
-    Args:
-        sensor: The sensor.
-        random: How many presses are drawn.
-        seed: Of the presses.
-
     Returns:
         Shape (frames, rows, columns), of the type of `frame_type`.
 
@@ -178,13 +173,7 @@ def _mixed(one: Whole, two: Whole, places: npt.NDArray[np.intp]) -> Whole:
 
 
 def proving_frames(made: FrameProgram, model: Model, presses: int = 12) -> Cells:
-    """Return what a written file is tried with: aimed frames, and pairs at its cuts.
-
-    Args:
-        made: The program of the model's features.
-        model: The model.
-        presses: How many of the frames are drawn.
-    """
+    """Return what a written file is tried with: aimed frames, and pairs at its cuts."""
     frames = aimed_frames(made.sensor, presses)
 
     def values(some: Cells) -> npt.NDArray[np.float64]:

@@ -394,9 +394,6 @@ class RecordingFile:
 
     Iterating begins at the first record. What is damaged is left out and counted.
 
-    Args:
-        path: The file.
-
     Attributes:
         board: What sent the frames.
         started_ns: When the recording began, in nanoseconds since 1970 (UTC).

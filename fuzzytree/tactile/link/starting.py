@@ -56,10 +56,6 @@ def remarks(board: Board, frames: Cells) -> list[str]:
     Hot cells, something that lies on it or touches it, and cells that never move
     though both neighbours do: these may be dead, and are not masked.
 
-    Args:
-        board: What sent the frames.
-        frames: As for `measured`.
-
     Returns:
         Sentences; none if all is well.
 

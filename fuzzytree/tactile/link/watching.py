@@ -210,10 +210,6 @@ class Watch:
 
     All times are in seconds, and never go back.
 
-    Args:
-        board: What is expected.
-        now: When the port was opened.
-
     Example:
         >>> from fuzzytree.tactile.boards import Marker
         >>> from fuzzytree.tactile.sensor import Sensor

@@ -117,11 +117,7 @@ class Replayed(Paced):
 
 
 class FromPort:
-    """Gives the frames of a line out as they come.
-
-    Args:
-        line: An open line; it is closed with this.
-    """
+    """Gives the frames of a line out as they come."""
 
     def __init__(self, line: Connection) -> None:
         self._line = line
@@ -180,10 +176,6 @@ def simulated(
     """Give frames without end: the paper's objects, pressed one after another.
 
     Between two of them the sensor is empty for half a second.
-
-    Args:
-        seed: Of how each object is pressed.
-        names: Of the objects.
 
     Raises:
         ValueError: If there is no object of a name.

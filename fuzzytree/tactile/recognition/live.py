@@ -147,11 +147,6 @@ class Live:
     `answers` gives one for each frame as soon as there is one. Displays live in
     threads of their own: they `wait` for news and take a `view` when they have time,
     so that a slow one misses frames and never holds up an answer.
-
-    Args:
-        recogniser: The model and its sensor.
-        source: Where frames come from.
-        name: Of the source, for people.
     """
 
     def __init__(self, recogniser: Recogniser, source: FrameSource, name: str) -> None:

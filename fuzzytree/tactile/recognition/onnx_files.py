@@ -61,10 +61,6 @@ class FramesFile(msgspec.Struct, frozen=True, kw_only=True):
 def frames_file(content: bytes, name: str) -> FramesFile:
     """Return what an ONNX file of frames says about itself.
 
-    Args:
-        content: The file.
-        name: Of the file, for messages.
-
     Raises:
         ReadError: If it is no such file.
         MissingExtraError: If onnx or onnxruntime is not installed.

@@ -9,12 +9,7 @@ from fuzzytree.tactile.recognition.agreement import FramesAgreement
 
 
 def check_lines(found: FramesAgreement, *, is_full: bool = False) -> Iterator[str]:
-    """Yield a check of frames: the table, and what the frames show.
-
-    Args:
-        found: The check.
-        is_full: Whether to print the comparisons that agree, too.
-    """
+    """Yield a check of frames: the table, and what the frames show."""
     yield from agreement_lines(found, is_full=is_full)
     shown = found.shown
     yield (

@@ -204,15 +204,7 @@ def timing(view: LiveView) -> str:
 
 
 def screen(view: LiveView, columns: int, lines: int, *, look: Look, times: int) -> str:
-    """Return a whole screen: at most `lines` lines of at most `columns` signs.
-
-    Args:
-        view: What to show.
-        columns: The width of the terminal.
-        lines: Its height.
-        look: With which colours.
-        times: The most points for a cell on each side.
-    """
+    """Return a whole screen: at most `lines` lines of at most `columns` signs."""
     bold, dim = (_BOLD, _DIM) if look != "plain" else ("", "")
     end = _END if bold else ""
     head = f"{visible(view.source)} -> {visible(view.model)}"

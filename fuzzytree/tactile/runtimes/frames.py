@@ -43,10 +43,6 @@ class Features:
 class FramePlan:
     """What computing features of a sensor's frames needs, made once.
 
-    Args:
-        sensor: The sensor.
-        names: Of the features.
-
     Raises:
         TableError: As `fuzzytree.tactile.features.frame_program`.
         InvalidModelError: The same way.
