@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -29,6 +29,8 @@ from fuzzytree.tactile.cli.sensors import (
 )
 
 if TYPE_CHECKING:
+    from fuzzytree.tactile.recognition.agreement import FramesAgreement
+
     Form = Literal["onnx", "c"]
 
 _SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
@@ -72,25 +74,23 @@ def command(
     arithmetic. If one disagrees, nothing is written: exit 1. `-` is standard output.
     """
     from fuzzytree.report.text import verdict_text
-    from fuzzytree.tactile.recognition.agreement import (
-        check_frames_agree,
-        frames_export,
-    )
-    from fuzzytree.tactile.report.frames import check_lines
+    from fuzzytree.tactile.recognition.agreement import check_frames_agree
+    from fuzzytree.tactile.recognition.recogniser import check_inputs
 
     form = _form(output, to)
-    options = _options(form, settings)
+    write, options = _writer(form, settings)
     if output != "-":
         check_place(output)
     sensor = sensor_of_options(board, size, full, threshold)
-    asked = frames_model(model)
+    source = frames_model(model)
+    check_inputs(source)
     frames = frames_of_file(data, sensor, quiet=quiet)
     with wrong_options():
-        written = frames_export(asked, sensor, form, **options)
+        written = write(source, sensor, **options)
         found = check_frames_agree(
-            asked, sensor, frames, reject=options.get("reject", 0.0)
+            source, sensor, frames, reject=options.get("reject", 0.0)
         )
-    lines = check_lines(found)
+    lines = _lines(found)
     if output == "-":
         for line in lines:
             say(line, quiet=quiet)
@@ -122,8 +122,25 @@ def _form(output: str, to: Form | None) -> Form:
     return _SUFFIXES[suffix]
 
 
-def _options(form: Form, settings: Sequence[str]) -> dict[str, Any]:
-    """Return the values of the `--set` options."""
+def _lines(found: FramesAgreement) -> Iterator[str]:
+    """Yield a check of frames: its verdict, the comparisons, and what frames show."""
+    from fuzzytree.report.text import agreement_lines, counted
+
+    yield from agreement_lines(found)
+    shown = found.shown
+    yield (
+        f"{counted(shown.frames, 'frame')}: {shown.aimed} aimed at bounds and cuts, "
+        f"{shown.nothing} empty, {shown.unknown} of unknown objects, "
+        f"{shown.saturated} saturated, {shown.ties} tied"
+    )
+    yield (
+        f"largest error of a feature against {found.comparisons[0].against}: "
+        f"{found.largest_error:.2g} of its scale"
+    )
+
+
+def _writer(form: Form, settings: Sequence[str]) -> tuple[Any, dict[str, Any]]:
+    """Return the writer of a form, and its options from `--set`."""
     from fuzzytree.model.contracts import Format
     from fuzzytree.model.options import option_value
     from fuzzytree.tactile.exporters.c_frames import write_frames_c
@@ -135,7 +152,7 @@ def _options(form: Form, settings: Sequence[str]) -> dict[str, Any]:
     for text in settings:
         name, value = setting(text)
         if name in found:
-            raise click.UsageError(f"the option {name!r} is given twice")
+            raise click.UsageError(f"the option {name!r} is stated twice")
         with wrong_options():
             found[name] = option_value(known, name, value)
-    return found
+    return write, found

@@ -9,17 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
 from fuzzytree.errors import TableError
 from fuzzytree.model.agreement import Agreement, Comparison
-from fuzzytree.model.contracts import Model, Written
+from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import RuleBase, fingerprint
-from fuzzytree.tactile.exporters.c_frames import write_frames_c
-from fuzzytree.tactile.exporters.onnx_frames import USUAL, Output, write_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
 from fuzzytree.tactile.features.exact import exact_features
@@ -185,53 +183,6 @@ class FramesAgreement(Agreement, frozen=True, kw_only=True):
 
     shown: FrameCounts
     largest_error: float
-
-
-def frames_export(
-    model: Model,
-    sensor: Sensor,
-    form: Literal["onnx", "c"],
-    *,
-    outputs: Sequence[Output] = USUAL,
-    reject: float = 0.0,
-    name: str | None = None,
-    opset: int = 17,
-    ir: int = 8,
-    plain: bool = False,
-    verify: bool = True,
-) -> Written:
-    """Return a file that takes raw frames: a graph, or C.
-
-    Args:
-        model: A tree or a rule base whose inputs are names of features.
-        sensor: Whose frames come.
-        form: The format.
-        outputs: Of a graph; see `fuzzytree.tactile.exporters.onnx_frames.write_frames`.
-        reject: Of raw rules: what is weaker in the rule that decides is unknown.
-        name: Of C: the beginning of all names.
-        opset: Of a graph.
-        ir: Of a graph.
-        plain: Of a graph: whether a tree does without the operators of ai.onnx.ml.
-        verify: Of a graph: whether it is run before it counts as written.
-
-    Raises:
-        TableError: If an input of the model is no feature of a frame.
-        InvalidModelError: If a feature is beyond the sensor.
-        ValueError: If an option has no such value.
-    """
-    check_inputs(model)
-    if form == "c":
-        return write_frames_c(model, sensor, name=name, reject=reject)
-    return write_frames(
-        model,
-        sensor,
-        outputs=outputs,
-        reject=reject,
-        opset=opset,
-        ir=ir,
-        plain=plain,
-        verify=verify,
-    )
 
 
 def check_frames_agree(
