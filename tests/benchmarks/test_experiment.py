@@ -55,7 +55,7 @@ def bars(folder: Path) -> Path:
     return path
 
 
-def test_an_experiment_tells_rates_table_divisions_and_accuracy(
+def test_an_experiment_reports_rates_table_divisions_and_accuracy(
     bars: Path, call: Call
 ) -> None:
     code, out, err = call("bars.npz", "--no-peers")
@@ -146,7 +146,7 @@ def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "stated"),
     [
         (
             ["hands"],
@@ -169,12 +169,12 @@ def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_what_cannot_be_done_is_told_in_a_sentence(
-    words: list[str], told: str, bars: Path, call: Call
+def test_what_cannot_be_done_is_reported_in_a_sentence(
+    words: list[str], stated: str, bars: Path, call: Call
 ) -> None:
     code, out, err = call(*words)
     assert (code, out) == (2, "")
-    assert err.startswith(told)
+    assert err.startswith(stated)
     assert "Traceback" not in err
 
 

@@ -36,7 +36,7 @@ STUDY = Study(
 )
 
 
-def test_whatever_is_clipped_or_left_out_is_told() -> None:
+def test_whatever_is_clipped_or_left_out_is_reported() -> None:
     lines = [*experiment_lines(STUDY)]
     assert "clipped   1 reading above what a cell can take, read as that" in lines
     assert "clipped   2 readings below 0, read as 0" in lines
@@ -73,7 +73,7 @@ def test_names_with_commas_and_quotes_come_back_from_the_file() -> None:
 
 
 @pytest.mark.parametrize("count", [12, 13])
-def test_many_features_are_told_by_the_first_and_the_last(count: int) -> None:
+def test_many_features_are_reported_by_the_first_and_the_last(count: int) -> None:
     names = tuple(f"cell r0 c{k}" for k in range(count))
     study = msgspec.structs.replace(STUDY, features="cells", names=names)
     (line,) = [line for line in experiment_lines(study) if line.startswith("features")]

@@ -71,15 +71,13 @@ def test_what_is_mistaken_on_the_simulated_sensor_is_the_angle() -> None:
     assert 0.8 < study.accuracy < 0.99
 
 
-def test_orientation_features_tell_angles_apart_on_either_sensor() -> None:
+def test_orientation_features_distinguish_angles_on_either_sensor() -> None:
     for physics in (paper_task(repeats=2), paper_task(repeats=2, physics=IDEAL)):
         study = experiment(physics, features="log orientation / force").study
         assert study.accuracy > 0.97
 
 
-def test_on_an_even_sensor_invariants_tell_shapes_and_scatter_tells_some_angles() -> (
-    None
-):
+def test_on_an_even_sensor_invariants_distinguish_shapes_and_few_angles() -> None:
     task = paper_task(physics=IDEAL)
     plain = experiment(task).study
     assert 4 / 7 - 0.05 < plain.accuracy < 0.75  # 4 / 7: shapes, and no angle

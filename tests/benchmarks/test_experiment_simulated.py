@@ -36,14 +36,14 @@ def test_the_classes_are_those_of_table_3() -> None:
 
 
 def test_numbers_out_of_their_range_are_refused() -> None:
-    with pytest.raises(ValueError, match="seed") as told:
+    with pytest.raises(ValueError, match="seed") as stated:
         paper_task(repeats=0)
-    assert str(told.value) == (
+    assert str(stated.value) == (
         "the seed is at least 0, and repeats and presses at least 1, not 0, 0 and 50"
     )
 
 
-def test_few_presses_are_told_apart_much_better_than_by_chance() -> None:
+def test_few_presses_are_distinguished_much_better_than_by_chance() -> None:
     study = experiment(paper_task(repeats=1, presses=20)).study
     assert study.accuracy > 0.7
     assert study.unit == "press"

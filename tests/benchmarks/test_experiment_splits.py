@@ -31,9 +31,9 @@ def test_there_are_no_more_groups_than_subjects() -> None:
 
 
 def test_one_subject_cannot_be_left_out() -> None:
-    with pytest.raises(TableError) as told:
+    with pytest.raises(TableError) as stated:
         leave_one_out(np.array([3, 3]))
-    assert str(told.value) == (
+    assert str(stated.value) == (
         "all frames are of one subject; leaving one out needs two at least"
     )
 
@@ -42,9 +42,9 @@ def test_one_subject_cannot_be_left_out() -> None:
     ("test", "who"), [([2, 9], "subject 2 is"), ([2, 1], "2 subjects are")]
 )
 def test_a_subject_on_both_sides_is_refused(test: list[int], who: str) -> None:
-    with pytest.raises(TableError) as told:
+    with pytest.raises(TableError) as stated:
         check_apart(np.array([1, 2]), np.array(test), ("a.npz", "b.npz"))
-    assert str(told.value) == (
+    assert str(stated.value) == (
         f"{who} both in a.npz and in b.npz: frames of one subject are nearly alike, "
         "and what is tested must not have been learnt from"
     )

@@ -92,7 +92,7 @@ def test_the_tree_is_learnt_from_everyone_or_from_the_first_division() -> None:
     assert sum(leaf.support or 0 for leaf in part.leaves) == 16
 
 
-def test_the_cheaper_of_equal_features_is_asked() -> None:
+def test_the_cheaper_of_equal_features_is_requested() -> None:
     task = bars()
     loud = np.where(task.frames > 0, 60 + 90 * task.codes[:, None, None], 0)
     task = dataclasses.replace(task, frames=loud)
@@ -136,27 +136,29 @@ def test_the_settings_that_carry_over_to_other_people_are_chosen() -> None:
     assert chosen(values, codes, subject, LearningSettings(), few) == few[1]
 
 
-def test_frames_without_pressure_are_told_with_the_division() -> None:
+def test_frames_without_pressure_are_reported_with_the_division() -> None:
     task = bars()
-    with pytest.raises(LearningError) as told:
+    with pytest.raises(LearningError) as stated:
         experiment(dataclasses.replace(task, frames=0 * task.frames))
-    assert str(told.value) == ("without subject 1: nothing presses on any of 16 frames")
+    assert str(stated.value) == (
+        "without subject 1: nothing presses on any of 16 frames"
+    )
 
 
-def test_one_class_to_learn_from_is_told_with_the_division() -> None:
+def test_one_class_to_learn_from_is_reported_with_the_division() -> None:
     task = bars(subjects=2)
-    with pytest.raises(LearningError) as told:
+    with pytest.raises(LearningError) as stated:
         experiment(dataclasses.replace(task, codes=task.subject - 1))
-    assert str(told.value) == (
+    assert str(stated.value) == (
         "without subject 1: cannot learn from one class: every row is 'flat'"
     )
 
 
 def test_settings_are_not_chosen_where_subjects_are_not_known() -> None:
     task = dataclasses.replace(bars(), subject=np.zeros(0, np.int64))
-    with pytest.raises(TableError) as told:
+    with pytest.raises(TableError) as stated:
         experiment(task, choose=CANDIDATES)
-    assert str(told.value) == (
+    assert str(stated.value) == (
         "bars: settings are chosen by leaving subjects out twice, which needs 3 at "
         "least, not 0"
     )
@@ -186,7 +188,7 @@ def test_frames_that_a_peer_gives_no_class_are_counted() -> None:
 
 @has_sklearn
 @pytest.mark.parametrize("name", PEERS)
-def test_every_peer_tells_two_heaps_apart(name: str) -> None:
+def test_every_peer_distinguishes_two_heaps(name: str) -> None:
     codes = np.tile([0, 1], 20)
     values = np.random.default_rng(0).normal(0.0, 1.0, (2, 40)) + 1e6 * codes
     values = np.vstack([values, np.ones(40)])
@@ -198,9 +200,9 @@ def test_without_the_extra_a_peer_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(peers, "are_there", lambda: False)
-    with pytest.raises(MissingExtraError) as told:
+    with pytest.raises(MissingExtraError) as stated:
         peer_answers("LDA", np.ones((1, 2)), np.array([0, 1]), np.ones((1, 1)))
-    assert str(told.value) == (
+    assert str(stated.value) == (
         "comparing with other learners needs scikit-learn: "
         "pip install 'scikit-learn>=1.6'"
     )

@@ -59,18 +59,18 @@ def test_the_license_stands_beside_the_frames() -> None:
     assert "Copyright (c) 2018 Interaction Lab" in text
 
 
-def test_an_unknown_task_is_told_with_those_there_are() -> None:
-    with pytest.raises(ValueError, match="there is no task 'hands'") as told:
+def test_an_unknown_task_is_reported_with_those_there_are() -> None:
+    with pytest.raises(ValueError, match="there is no task 'hands'") as stated:
         known_task("hands")
-    assert str(told.value) == (
+    assert str(stated.value) == (
         "there is no task 'hands'; there is postures, postures-17, touch, touch-fingers"
     )
 
 
-def test_frames_that_are_not_there_are_told_with_what_to_do(tmp_path: Path) -> None:
-    with pytest.raises(ReadError) as told:
+def test_frames_that_are_not_there_are_reported_with_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(ReadError) as stated:
         known_task("touch", tmp_path)
-    assert str(told.value) == (
+    assert str(stated.value) == (
         f"{tmp_path}/capfinger_27x15.npz: is not there: the frames of 'touch' lie in "
         "examples/tactile/data; name the folder with --data"
     )
@@ -84,9 +84,9 @@ def test_another_file_of_that_name_is_refused(tmp_path: Path) -> None:
 
 def test_frames_without_subjects_are_not_divided_at_random(tmp_path: Path) -> None:
     path = saved(tmp_path / "a.npz", subject=None)
-    with pytest.raises(TableError) as told:
+    with pytest.raises(TableError) as stated:
         file_task(path)
-    assert str(told.value) == (
+    assert str(stated.value) == (
         f"{path}: has no array 'subject', and frames that follow one another are "
         "nearly alike, so they are not divided at random\n  name other frames to test "
         "on with --test, or add the subjects"
@@ -113,15 +113,15 @@ def test_other_frames_of_the_same_subject_are_refused(tmp_path: Path) -> None:
 def test_other_frames_with_other_classes_are_refused(tmp_path: Path) -> None:
     path = saved(tmp_path / "a.npz", subject=None)
     other = saved(tmp_path / "b.npz", subject=None, names="ac")
-    with pytest.raises(TableError) as told:
+    with pytest.raises(TableError) as stated:
         file_task(path, test=other)
-    assert str(told.value) == f"{other}: has other classes than {path}"
+    assert str(stated.value) == f"{other}: has other classes than {path}"
 
 
-def test_an_unknown_array_of_classes_is_told(tmp_path: Path) -> None:
+def test_an_unknown_array_of_classes_is_reported(tmp_path: Path) -> None:
     path = saved(tmp_path / "a.npz", subject=[1, 2, 1, 2])
-    with pytest.raises(TableError) as told:
+    with pytest.raises(TableError) as stated:
         file_task(path, label="kind")
-    assert str(told.value) == (
+    assert str(stated.value) == (
         f"{path}: no class is known; name the array with --label"
     )

@@ -82,7 +82,7 @@ def test_a_frame_can_be_made_to_hold_the_marker(
         (Marker("AA AA AA AA AA"), 255, "the cells of 'mat' can never hold "),
     ],
 )
-def test_cells_that_can_hold_no_marker_are_told(
+def test_cells_that_can_hold_no_marker_are_reported(
     protocol: Protocol, full: int, text: str
 ) -> None:
     board = Board("mat", Sensor(2, 2, full=full), protocol)

@@ -48,7 +48,7 @@ def test_the_boards_of_the_examples_send_what_is_read(path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", soak.CASES)
-def test_no_wrong_frame_comes_that_its_bytes_could_tell(name: str) -> None:
+def test_no_wrong_frame_comes_that_its_bytes_could_reveal(name: str) -> None:
     _check(name, soak.soak(soak.CASES[name], 300))
 
 
@@ -126,7 +126,7 @@ def test_a_frame_that_stands_nowhere_is_unexplained() -> None:
     assert soak_verdicts.explained(board, wrong, first) == "unexplained"
 
 
-def test_a_frame_is_late_if_only_the_next_marker_could_tell() -> None:
+def test_a_frame_is_late_if_only_the_next_marker_could_reveal() -> None:
     board = Board("mat", Sensor(2, 2), Marker("AA"))
     cells = np.array([[1, 2], [3, 4]])
     lost = np.array([[1, 2], [4, 0xAA]])

@@ -65,7 +65,7 @@ def test_what_a_protocol_cannot_be(protocol: Protocol, texts: list[str]) -> None
     assert [text for _, text in caught.value.mistakes] == texts
 
 
-def test_all_mistakes_of_a_board_are_told_at_once() -> None:
+def test_all_mistakes_of_a_board_are_reported_at_once() -> None:
     with pytest.raises(InvalidModelError) as caught:
         Board(
             "",

@@ -71,7 +71,10 @@ def learnt(classes: int, **settings: Any) -> FuzzyTree:
     table[:, 1] += 9.0 * (label // 5)
     target = [f"class {k}" for k in label]
     return ft.learn(
-        ft.table(table, columns=["a", "b", "c"]), target=target, name="grid", **settings
+        ft.table(table, columns=["a", "b", "c"]),
+        target=target,
+        name="grid",
+        settings=ft.LearningSettings(**settings),
     )
 
 
@@ -246,8 +249,8 @@ def test_a_class_has_one_colour_in_every_picture() -> None:
 
 def test_combinations_are_written_below_the_tree() -> None:
     tree = slanted()
-    asked = {node.variable for node in tree.nodes}
-    made = [v for v in tree.variables if v.parts and v.name in asked]
+    wanted = {node.variable for node in tree.nodes}
+    made = [v for v in tree.variables if v.parts and v.name in wanted]
     assert made
     notes = [text for text in said(plots.draw_tree(tree)) if " \u2248 " in text]
     assert {note.split(" \u2248 ")[0] for note in notes} == {v.name for v in made}

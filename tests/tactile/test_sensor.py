@@ -54,7 +54,7 @@ def test_frames_of_fractions_are_refused() -> None:
     assert str(caught.value) == "frames hold whole numbers, not float64"
 
 
-def test_all_mistakes_of_a_sensor_are_told_at_once() -> None:
+def test_all_mistakes_of_a_sensor_are_reported_at_once() -> None:
     with pytest.raises(InvalidModelError) as caught:
         Sensor(2, 2, full=0, threshold=9, baseline=(1, 2, 3), masked=((2, 0),))
     assert str(caught.value).splitlines() == [

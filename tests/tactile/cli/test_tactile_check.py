@@ -32,9 +32,9 @@ def test_a_shipped_file_agrees_with_its_model(
 ) -> None:
     capsys.readouterr()
     assert main(["tactile", "check", "one.yaml", "one.onnx", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["ok"]
-    assert [one["verdict"] for one in told["check"]["comparisons"]] == ["agrees"] * 3
+    stated = json.loads(capsys.readouterr().out)
+    assert stated["ok"]
+    assert [one["verdict"] for one in stated["check"]["comparisons"]] == ["agrees"] * 3
 
 
 def test_a_file_of_another_model_ends_with_1(

@@ -40,7 +40,7 @@ def test_a_graph_is_checked_and_written(capsys: Said) -> None:
     lines = out.splitlines()
     assert lines[0].startswith("tree: none of 9 comparisons disagrees (")
     assert lines[1].split()[:2] == ["compared", "with"]
-    assert "4 show nothing" in out  # three are made
+    assert "4 empty" in out  # three are made
     assert "exact arithmetic" in lines[2]
     assert all(line.endswith("agree") for line in lines[2:6])
     content = Path("pad.onnx").read_bytes()
@@ -48,15 +48,15 @@ def test_a_graph_is_checked_and_written(capsys: Said) -> None:
     onnx.checker.check_model(onnx.load_model_from_string(content))
 
 
-def test_frames_that_were_pressed_above_another_threshold_are_told(
+def test_frames_that_were_pressed_above_another_threshold_are_reported(
     capsys: Said,
 ) -> None:
     cells = np.ones((1, 6, 4), np.uint8)
     write_presses("six.npz", Presses(cells, 100, NONE, (), NONE, threshold=6))
     for threshold in (4, 6):
         frames_of_file("six.npz", Sensor(6, 4, 100, threshold))
-    told = capsys.readouterr().err
-    assert told == "differs  six.npz states the threshold 6, not 4\n"
+    stated = capsys.readouterr().err
+    assert stated == "differs  six.npz states the threshold 6, not 4\n"
 
 
 def test_c_goes_to_standard_output(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
@@ -104,7 +104,7 @@ def test_nothing_is_written_where_a_way_disagrees(
         (["pad.c", *SIZE, "--set", "opset=17"], "c has no option 'opset'; it has name, "
          "reject"),
         (["pad.onnx", *SIZE, "--set", "ir=8", "--set", "ir=9"], "the option 'ir' is "
-         "given twice"),
+         "stated twice"),
         (["pad.onnx", "--sensor", "4x6", "--data", "f.npz"], "f.npz: holds frames of "
          "6 x 4 cells, and the board has 4 x 6"),
     ],

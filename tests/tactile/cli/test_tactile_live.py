@@ -110,7 +110,7 @@ def test_lines_of_json_have_the_fields_of_lines_with_tabs(call: Call) -> None:
     assert [*rows[0]] == ["time", "frame", "state", "class", "strength", "saturated"]
 
 
-def test_live_ends_after_the_frames_asked_for_and_keeps_them(call: Call) -> None:
+def test_live_ends_after_the_frames_requested_and_keeps_them(call: Call) -> None:
     code, _, err = call(*REPLAY, "--frames", "5", "--record", "kept.ftr")
     assert code == 0
     assert "answered 5 frames" in err
@@ -134,7 +134,7 @@ def test_a_simulated_press_is_answered(call: Call) -> None:
     assert "\tobject\t" in out
 
 
-def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_asks(
+def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_requests(
     call: Call,
 ) -> None:
     words = ("simulator", "--model", "area.yaml", "--speed", "0", "--frames", "60")
@@ -169,7 +169,7 @@ def test_a_model_of_other_features_is_refused_by_name(call: Call) -> None:
         ),
     ],
 )
-def test_a_source_and_a_board_that_do_not_go_together_are_told(
+def test_a_source_and_a_board_that_do_not_go_together_are_reported(
     call: Call, words: tuple[str, ...], text: str
 ) -> None:
     code, _, err = call(*words, "--model", "area.yaml")
@@ -191,7 +191,7 @@ def test_what_is_no_number_is_no_speed_and_no_share(
     assert (code, err.splitlines()[0]) == (2, text)
 
 
-def test_a_port_that_is_not_there_is_told(call: Call) -> None:
+def test_a_port_that_is_not_there_is_reported(call: Call) -> None:
     words = ("./gone", "--board", "mat.yaml", "--model", "area.yaml")
     code, _, err = call(*words)
     assert code == 2

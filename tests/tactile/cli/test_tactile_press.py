@@ -111,7 +111,7 @@ def test_frames_on_standard_output_leave_no_room_for_more(
         ),
     ],
 )
-def test_what_cannot_be_pressed_is_told(
+def test_what_cannot_be_pressed_is_reported(
     call: Call, words: tuple[str, ...], text: str
 ) -> None:
     code, out, err = call("tactile", "press", *words)
@@ -122,7 +122,7 @@ def test_what_cannot_be_pressed_is_told(
 def test_the_documented_settings_are_those_that_there_are() -> None:
     page = Path(__file__).parents[3] / "docs" / "explanation" / "simulator.md"
     rows = [line for line in page.read_text().splitlines() if line.startswith("| `")]
-    told = {row.split("`")[1]: row.split("|")[2].strip() for row in rows}
+    stated = {row.split("`")[1]: row.split("|")[2].strip() for row in rows}
     for name in PhysicsSettings.__struct_fields__:
         value = getattr(PAPER, name)
-        assert told[name] == (f"{value:g}" if not isinstance(value, str) else value)
+        assert stated[name] == (f"{value:g}" if not isinstance(value, str) else value)

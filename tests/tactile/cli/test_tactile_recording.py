@@ -210,7 +210,7 @@ def test_ctrl_c_ends_a_recording_well(
     assert found["frames"] == len(read_recording("b.ftr").frames)
 
 
-def test_what_is_in_a_recording_is_told(call: Call, place: Path) -> None:
+def test_what_is_in_a_recording_is_reported(call: Call, place: Path) -> None:
     assert call("tactile", "replay", "a.ftr") == (
         0,
         "a.ftr: mat, 4 x 5 cells, full 255, marker, 115200 baud\n"
@@ -225,7 +225,9 @@ def test_what_is_in_a_recording_is_told(call: Call, place: Path) -> None:
     )
 
 
-def test_damage_baseline_masks_and_dead_cells_are_told(call: Call, place: Path) -> None:
+def test_damage_baseline_masks_and_dead_cells_are_reported(
+    call: Call, place: Path
+) -> None:
     sensor = Sensor(4, 5, baseline=tuple(range(20)), masked=((0, 1), (3, 4)))
     board = Board("mat", sensor, Marker("AA 55"))
     with Recorder("b.ftr", board, started_ns=0) as recorder:
@@ -254,7 +256,7 @@ def test_damage_baseline_masks_and_dead_cells_are_told(call: Call, place: Path) 
     assert (found["frames"], found["damaged"], found["cut_bytes"]) == (3, 1, 109)
 
 
-def test_an_empty_recording_is_told(call: Call, place: Path) -> None:
+def test_an_empty_recording_is_reported(call: Call, place: Path) -> None:
     Recorder("b.ftr", BOARD, started_ns=2**63 - 1).close()
     code, out, _ = call("tactile", "replay", "b.ftr")
     assert code == 0
@@ -373,7 +375,7 @@ def test_bytes_that_contradict_the_board_end_before_anything_is_written(
     assert not Path("b.ftr").exists()
 
 
-def test_a_board_that_is_silent_is_told_and_leaves_no_file(
+def test_a_board_that_is_silent_is_reported_and_leaves_no_file(
     call: Call, place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fuzzytree.tactile.link.watching.PATIENCE_S", 0.05)

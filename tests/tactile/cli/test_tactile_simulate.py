@@ -115,7 +115,7 @@ def test_a_port_that_is_there_is_left_alone(call: Call) -> None:
 
 @pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_it_ends_when_it_is_told_to_and_leaves_no_port(number: int) -> None:
+def test_it_ends_when_it_is_reported_to_and_leaves_no_port(number: int) -> None:
     words = [sys.executable, "-m", "fuzzytree", *SIMULATE, "--object", "all"]
     with subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -17,7 +17,7 @@ def text_of(sensor: Sensor, *names: str) -> str:
     return write_frames_c(learnt_tree(sensor, names), sensor).content.decode("ascii")
 
 
-def test_only_the_moments_that_the_model_asks_for_are_summed() -> None:
+def test_only_the_moments_that_the_model_uses_are_summed() -> None:
     found = [set(re.findall(r"sum_(\d\d) =", text_of(PLAIN, n))) for n in ("S1", "x")]
     assert found == [{"00", "10", "01", "20", "02"}, {"00", "10"}]
 
@@ -67,7 +67,7 @@ def test_the_same_model_gives_the_same_bytes() -> None:
     assert one == two
 
 
-def test_a_floor_is_held_against_the_rule_that_decides() -> None:
+def test_a_floor_is_kept_against_the_rule_that_decides() -> None:
     text = write_frames_c(raw_rules(TREE), PLAIN, reject=0.5).content.decode()
     assert "strengths[answer.rule - 1] < 0x1p-1" in text
 

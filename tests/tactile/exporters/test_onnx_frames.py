@@ -74,7 +74,7 @@ def test_no_frames_give_no_answers() -> None:
     assert [found[name].shape for name in ALL] == [(0,), (0,), (0,), (0, 2)]
 
 
-def test_only_the_moments_that_the_model_asks_for_have_weights() -> None:
+def test_only_the_moments_that_the_model_uses_have_weights() -> None:
     sizes = {}
     for names in (("S1", "S9"), ("S1",), ("force",)):
         content = write_frames(learnt_tree(PLAIN, names), PLAIN).content
@@ -156,7 +156,7 @@ def test_operator_sets_give_the_same_answers(opset: int) -> None:
     write_frames(tree, SMALL, opset=opset, ir=8 if opset < 20 else 10, outputs=ALL)
 
 
-def test_a_model_of_one_leaf_tells_something_from_nothing() -> None:
+def test_a_model_of_one_leaf_reports_something_from_nothing() -> None:
     tree = _one_leaf()
     content = write_frames(tree, SMALL).content
     frames = np.zeros((2, 6, 4), np.uint8)

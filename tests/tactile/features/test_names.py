@@ -20,7 +20,7 @@ def test_every_feature_has_itself_and_its_logarithm() -> None:
         assert feature_of(f"log {name}").is_log
 
 
-def test_a_name_tells_what_is_done() -> None:
+def test_a_name_reports_what_is_done() -> None:
     feature = feature_of("log block r2 c3 of 16x8 / force")
     assert (feature.kind, feature.row, feature.column) == ("block", 2, 3)
     assert (feature.rows, feature.columns) == (16, 8)

@@ -29,10 +29,10 @@ def test_what_occurs_twice_is_taken_once() -> None:
     assert names_of("x, place,x") == ("x", "y")
 
 
-def test_an_unknown_set_is_told_with_those_there_are() -> None:
-    with pytest.raises(TableError) as told:
+def test_an_unknown_set_is_reported_with_those_there_are() -> None:
+    with pytest.raises(TableError) as stated:
         names_of("papers")
-    assert str(told.value) == (
+    assert str(stated.value) == (
         "'papers' is no feature of a frame; there is S1 to S11, angle, cos2, sin2, "
         "Re C20 to Im C40, force, area, peak, x, y, cell r0 c0, block r0 c0 of 4x4, "
         "each also behind 'log ' and before ' / force'; sets are paper, orientation, "
@@ -42,6 +42,6 @@ def test_an_unknown_set_is_told_with_those_there_are() -> None:
 
 @pytest.mark.parametrize("text", ["blocks:0x4", "blocks:256x256"])
 def test_too_many_or_no_blocks_are_refused(text: str) -> None:
-    with pytest.raises(TableError) as told:
+    with pytest.raises(TableError) as stated:
         names_of(text)
-    assert str(told.value) == f"{text!r}: 1 to 4096 blocks are possible"
+    assert str(stated.value) == f"{text!r}: 1 to 4096 blocks are possible"

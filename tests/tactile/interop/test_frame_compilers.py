@@ -71,7 +71,7 @@ def test_a_microcontroller_holds_it(
     gcc, size = program("arm-none-eabi-gcc"), program("arm-none-eabi-size")
     words = [gcc, "-Os", "-mcpu=cortex-m4", "-mthumb", "-std=c99", "-c"]
     subprocess.run([*words, "-o", made, source], check=True)
-    told = subprocess.run([size, made], capture_output=True, text=True, check=True)
-    text, data, bss = map(int, told.stdout.splitlines()[1].split()[:3])
+    stated = subprocess.run([size, made], capture_output=True, text=True, check=True)
+    text, data, bss = map(int, stated.stdout.splitlines()[1].split()[:3])
     assert (data, bss) == (0, 0)
     assert text < most

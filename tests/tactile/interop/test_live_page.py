@@ -155,7 +155,7 @@ def test_the_picture_is_not_blank_and_smooth_between_the_cells(seen: Seen) -> No
     assert smooth > seen.colours() >= 2
 
 
-def test_the_browser_asks_no_other_host(seen: Seen) -> None:
+def test_the_browser_requests_no_other_host(seen: Seen) -> None:
     seen.show(SMALL)
     seen.until_text("label", "s")
     assert seen.hosts() == {seen.page.url.split("/")[2]}

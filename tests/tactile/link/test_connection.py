@@ -174,7 +174,7 @@ def test_a_line_waits_for_a_plug_that_was_pulled() -> None:
     assert line.counters.frames == line.counters.dropped + len(found)
 
 
-def test_a_line_ends_with_the_port_if_told(terminal: Terminal) -> None:
+def test_a_line_ends_with_the_port_if_reported(terminal: Terminal) -> None:
     with open_connection(BOARD, terminal.name, wait=False) as line:
         terminal.write(encoded(BOARD, _frames(1)[0], 0))
         assert line.take(5) is not None
@@ -211,7 +211,7 @@ def test_silence_is_counted_once_and_ends_with_the_next_frame(
         assert line.counters.stalls == 1
 
 
-def test_a_board_that_does_not_answer_is_asked_again(
+def test_a_board_that_does_not_answer_is_requested_again(
     terminal: Terminal,
 ) -> None:
     board = Board("mat", Sensor(2, 2), Request("3F 0A", timeout_s=0.03))
@@ -226,7 +226,7 @@ def test_a_board_that_does_not_answer_is_asked_again(
     assert line.counters.damaged == 1
 
 
-def test_bytes_that_are_no_frames_are_told_and_the_line_goes_on(
+def test_bytes_that_are_no_frames_are_reported_and_the_line_goes_on(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fuzzytree.tactile.link.watching.PATIENCE_S", 0.2)

@@ -200,7 +200,7 @@ def test_frames_stay_when_others_come() -> None:
     assert first.tolist() == one.tolist()
 
 
-def test_only_boards_that_answer_are_asked() -> None:
+def test_only_boards_that_answer_are_requested() -> None:
     asks = {name: decoder_of(board).ask for name, board in FAMILIES.items()}
     assert asks.pop("request") == b"A"
     assert asks.pop("request, crc16") == b"\x10"

@@ -111,7 +111,7 @@ def test_a_file_cut_anywhere_loses_only_what_was_cut(tmp_path: Path) -> None:
         assert (found.damaged, found.cut_bytes) == (0, -cut % RECORD)
 
 
-def test_a_flipped_byte_costs_its_record_or_tells_that_the_header_is_damaged(
+def test_a_flipped_byte_costs_its_record_or_reports_that_the_header_is_damaged(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "a.ftr"
@@ -265,7 +265,7 @@ def test_a_recording_with_fewer_or_more_counters_is_read(
     assert found.counters == Counters(*range(min(counters, 9)))
 
 
-def test_a_file_that_is_there_is_kept_unless_told(tmp_path: Path) -> None:
+def test_a_file_that_is_there_is_kept_unless_reported(tmp_path: Path) -> None:
     path = tmp_path / "a.ftr"
     before = _record(path, 2)
     with pytest.raises(WriteError) as caught:
@@ -331,7 +331,7 @@ def test_who_dies_at_the_beginning_leaves_no_file_or_a_recording(
         assert len(read_recording(path).frames) == moment - 2
 
 
-def test_a_full_disk_is_told_and_keeps_what_came_before(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_and_keeps_what_came_before(tmp_path: Path) -> None:
     """A limit on the size of a file stands for the full disk."""
     path = tmp_path / "a.ftr"
     program = (
@@ -355,7 +355,7 @@ def test_a_full_disk_is_told_and_keeps_what_came_before(tmp_path: Path) -> None:
     assert found.cut_bytes > 0
 
 
-def test_a_disk_that_keeps_nothing_is_told(
+def test_a_disk_that_keeps_nothing_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a.ftr"

@@ -39,7 +39,7 @@ def test_a_median_is_rounded_down_and_lies_within_full(
     assert measured(board, frames).sensor.baseline == (median,)
 
 
-def test_a_hot_cell_is_masked_once_and_told() -> None:
+def test_a_hot_cell_is_masked_once_and_reported() -> None:
     frames = _resting()
     frames[:, 1, 2] = 200
     board = measured(BOARD, frames)
@@ -52,7 +52,7 @@ def test_a_hot_cell_is_masked_once_and_told() -> None:
     assert remarks(board, frames) == []
 
 
-def test_something_that_lies_on_the_sensor_is_told() -> None:
+def test_something_that_lies_on_the_sensor_is_reported() -> None:
     frames = _resting()
     frames[:, :, 1:] += 150
     assert remarks(BOARD, frames) == [
@@ -62,7 +62,7 @@ def test_something_that_lies_on_the_sensor_is_told() -> None:
     ]
 
 
-def test_a_touch_while_the_baseline_is_taken_is_told() -> None:
+def test_a_touch_while_the_baseline_is_taken_is_reported() -> None:
     frames = _resting()
     frames[3, 0, 0] = 100
     assert remarks(BOARD, frames) == [
@@ -71,7 +71,7 @@ def test_a_touch_while_the_baseline_is_taken_is_told() -> None:
     assert measured(BOARD, frames).sensor.baseline[0] == 11
 
 
-def test_a_dead_cell_is_told_and_not_masked() -> None:
+def test_a_dead_cell_is_reported_and_not_masked() -> None:
     frames = _resting()
     frames[:, 2, 2] = 0
     assert remarks(BOARD, frames) == [

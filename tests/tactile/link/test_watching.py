@@ -134,11 +134,11 @@ CASES: list[tuple[Protocol, Protocol, tuple[int, int], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("told", "true", "size", "text"), CASES)
-def test_what_came_is_told_beside_what_was_expected(
-    told: Protocol, true: Protocol, size: tuple[int, int], text: str
+@pytest.mark.parametrize(("stated", "true", "size", "text"), CASES)
+def test_what_came_is_reported_beside_what_was_expected(
+    stated: Protocol, true: Protocol, size: tuple[int, int], text: str
 ) -> None:
-    assert described(_board(told), _sent(true, *size), requests=20) == text
+    assert described(_board(stated), _sent(true, *size), requests=20) == text
 
 
 def test_two_bytes_are_enough_to_say_something() -> None:
@@ -183,7 +183,7 @@ def test_a_board_may_be_silent_for_ten_of_its_own_frame_times() -> None:
     assert not watch.is_quiet(now + 2)
 
 
-def test_the_pace_of_a_board_tells_more_than_its_baud_rate() -> None:
+def test_the_pace_of_a_board_reports_more_than_its_baud_rate() -> None:
     watch = Watch(_board(Text()), 0.0)
     assert watch.stall_s == 3.0
     watch.came(b"x", 1, 0.0)
@@ -194,16 +194,16 @@ def test_the_pace_of_a_board_tells_more_than_its_baud_rate() -> None:
     assert watch.stall_s == pytest.approx(10 * (0.05 + (0.005 - 0.05) / 8))
 
 
-def test_bytes_are_told_once_in_each_time_of_patience() -> None:
+def test_bytes_are_reported_once_in_each_time_of_patience() -> None:
     watch = Watch(_board(Marker("AA")), 0.0)
-    told = []
+    stated = []
     for tick in range(100):
         watch.came(b"\x01\x02", 0, tick / 10)
         if text := watch.contradiction(tick / 10):
-            told.append((tick, text))
+            stated.append((tick, text))
     text = "the marker AA never came: is the baud rate right?"
     head = "for 3 s bytes came but no frame of 'mat'"
-    assert told == [(tick, f"{head}: {text}") for tick in (31, 63, 95)]
+    assert stated == [(tick, f"{head}: {text}") for tick in (31, 63, 95)]
 
 
 def test_noise_that_is_over_contradicts_nothing() -> None:
@@ -231,5 +231,5 @@ def test_a_late_answer_is_waited_for_until_it_is_over() -> None:
     assert questions.is_due(0.7)
 
 
-def test_a_board_that_speaks_by_itself_is_never_asked() -> None:
+def test_a_board_that_speaks_by_itself_is_never_requested() -> None:
     assert not RequestTimer(_board(Text())).is_due(9.0)

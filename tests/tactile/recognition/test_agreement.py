@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import TableError
-from fuzzytree.tactile.exporters.c_frames import write_frames_c
-from fuzzytree.tactile.exporters.onnx_frames import write_frames
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.names import FEATURES
@@ -16,7 +14,6 @@ from fuzzytree.tactile.recognition import agreement
 from fuzzytree.tactile.recognition.agreement import (
     check_frames_agree,
     errors,
-    frames_export,
 )
 from fuzzytree.tactile.recognition.runners import Runner, RunnerResult, as_sent, runners
 from fuzzytree.tactile.runtimes.frames import features_of
@@ -84,7 +81,7 @@ def turned(one: Runner) -> Runner:
     return replace(one, answer=answer)
 
 
-def test_a_bit_that_differs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bit_that_differs_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     tree = learnt_tree(SMALL, ("area",))
 
     def broken(*given: object) -> tuple[list[Runner], list[str]]:
@@ -117,14 +114,7 @@ def test_frames_become_what_a_sensor_sends() -> None:
     assert found.tolist() == [[[0, 7, 1000]]]
 
 
-def test_files_are_those_of_the_writers() -> None:
-    tree = learnt_tree(SMALL, ("area",))
-    assert frames_export(tree, SMALL, "onnx") == write_frames(tree, SMALL)
-    made = frames_export(tree, SMALL, "c", name="pad")
-    assert made == write_frames_c(tree, SMALL, name="pad")
-
-
 def test_a_model_for_other_features_is_refused_by_its_name() -> None:
     model = random_tree(1)
     with pytest.raises(TableError, match=f"^{model.name} uses other features: "):
-        frames_export(model, SMALL, "onnx")
+        check_frames_agree(model, SMALL)

@@ -64,7 +64,7 @@ def test_before_the_first_frame_there_is_nothing_to_see() -> None:
     assert (view.rate, view.trouble, view.is_over) == (0.0, "", False)
 
 
-def test_live_ends_after_as_many_frames_as_are_asked_for() -> None:
+def test_live_ends_after_as_many_frames_as_are_requested() -> None:
     found = live(itertools.repeat(SMALL))
     assert len(list(found.answers(5))) == 5
     assert found.view().is_over
@@ -82,7 +82,7 @@ def test_a_frame_of_another_size_is_said_and_the_next_one_is_answered() -> None:
     assert found.view().trouble == first.trouble
 
 
-def test_a_saturated_frame_is_told_and_still_answered() -> None:
+def test_a_saturated_frame_is_reported_and_still_answered() -> None:
     full = LARGE.copy()
     full[0, :2] = 255
     found = live([full])
@@ -141,7 +141,7 @@ def test_the_strength_is_that_of_the_class_or_the_largest_one() -> None:
         assert answer.strength == own
 
 
-def test_what_flickers_is_not_told_before_it_holds() -> None:
+def test_what_flickers_is_not_reported_before_it_holds() -> None:
     is_new = Hold(3)
     assert [is_new(seen) for seen in "abababbb"] == [False] * 7 + [True]
     assert [is_new(seen) for seen in "aabbb"] == [False] * 5

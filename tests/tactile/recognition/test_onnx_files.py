@@ -44,7 +44,7 @@ def test_a_file_of_the_model_agrees_in_every_way(plain: bool) -> None:
     assert known.features == tree().inputs
 
 
-def test_frames_of_ones_own_are_asked_as_well() -> None:
+def test_frames_of_ones_own_are_requested_as_well() -> None:
     rules = rules_from_tree(tree(), "raw")
     content = write_frames(rules, SENSOR, reject=0.2, outputs=("strengths",)).content
     frames = np.random.default_rng(0).integers(0, 256, (9, 4, 4))
@@ -64,7 +64,7 @@ def test_a_changed_constant_is_found_by_the_graph_and_by_the_answers() -> None:
     assert found == ["agrees", "DISAGREES", "DISAGREES"]
 
 
-def test_a_file_of_another_model_is_told() -> None:
+def test_a_file_of_another_model_is_reported() -> None:
     other = learn(table(AREAS[:, :1], columns=["peak"]), target=["s", "s", "l", "l"])
     content = write_frames(other, SENSOR).content
     found = check_onnx_files(tree(), {"pad.onnx": content})
@@ -104,8 +104,8 @@ def test_metadata_that_cannot_be_is_refused(key: str, value: str, text: str) -> 
 
 def test_the_metadata_say_which_sensor_it_is() -> None:
     proto = onnx.load_model_from_string(write_frames(tree(), SENSOR).content)
-    told = {entry.key: entry.value for entry in proto.metadata_props}
-    assert json.loads(told["fuzzytree.sensor"])["threshold"] == 3
+    stated = {entry.key: entry.value for entry in proto.metadata_props}
+    assert json.loads(stated["fuzzytree.sensor"])["threshold"] == 3
 
 
 def test_a_file_that_another_version_wrote_is_compared_as_any() -> None:

@@ -15,7 +15,7 @@ from fuzzytree.tactile.simulation.physics import press
 
 
 @pytest.mark.heavy
-def test_the_usual_floor_tells_blobs_from_presses_of_known_objects() -> None:
+def test_the_usual_floor_reports_blobs_from_presses_of_known_objects() -> None:
     known = {name: press(name, 60, seed=0) for name in OBJECTS}
     sensor = known["circle"].sensor
     frames = np.concatenate([found.frames for found in known.values()])

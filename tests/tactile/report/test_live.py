@@ -118,7 +118,7 @@ def test_shades_are_shares_of_full() -> None:
     assert shades(cells, 1000, 1).tolist() == [[0, 128, 255, 255]]
 
 
-def test_a_status_tells_of_trouble_of_silence_and_of_the_end() -> None:
+def test_a_status_reports_of_trouble_of_silence_and_of_the_end() -> None:
     assert status(VIEW) == ""
     silent = dataclasses.replace(VIEW, trouble="the board is silent", silent_s=7.4)
     assert status(silent) == "the board is silent; no frame for 7 s"
@@ -133,7 +133,7 @@ def test_before_the_first_frame_a_screen_says_that_it_waits() -> None:
     assert timing(view) == ""
 
 
-def test_counters_of_failures_are_told_above_zero_only() -> None:
+def test_counters_of_failures_are_reported_above_zero_only() -> None:
     assert counts(VIEW) == "56 frames, 900 B, 2 damaged"
     assert counts(dataclasses.replace(VIEW, refused=3)).endswith("2 damaged, 3 refused")
 

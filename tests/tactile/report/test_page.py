@@ -50,7 +50,7 @@ def page(live: Live) -> Iterator[LivePage]:
         yield found
 
 
-def asked(
+def wanted(
     page: LivePage,
     path: str = "/",
     method: str = "GET",
@@ -82,10 +82,10 @@ def test_the_page_listens_on_this_computer_only(page: LivePage) -> None:
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", page.url)
 
 
-def test_the_page_is_one_file_that_asks_for_nothing_from_outside(
+def test_the_page_is_one_file_that_uses_nothing_from_outside(
     page: LivePage,
 ) -> None:
-    found = asked(page)
+    found = wanted(page)
     content = found.read().decode()
     assert found.status == 200
     assert found.headers["Content-Type"] == "text/html; charset=utf-8"
@@ -98,7 +98,7 @@ def test_the_page_is_one_file_that_asks_for_nothing_from_outside(
 def test_the_policy_allows_the_own_script_and_style_and_nothing_else(
     page: LivePage,
 ) -> None:
-    found = asked(page)
+    found = wanted(page)
     policy = found.headers["Content-Security-Policy"]
     sha = "'sha256-[A-Za-z0-9+/]{43}='"
     assert re.fullmatch(
@@ -118,32 +118,32 @@ def test_the_policy_allows_the_own_script_and_style_and_nothing_else(
 def test_a_name_of_another_host_is_refused(
     page: LivePage, host: str, path: str
 ) -> None:
-    found = asked(page, path, host=host)
+    found = wanted(page, path, host=host)
     assert (found.status, found.read()) == (421, b"this is another host\n")
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost"])
 def test_a_page_of_another_place_is_refused(page: LivePage, origin: str) -> None:
-    found = asked(page, "/events", origin=origin)
+    found = wanted(page, "/events", origin=origin)
     assert (found.status, found.read()) == (403, b"only this page is answered\n")
-    assert asked(page, origin=page.url.rstrip("/")).status == 200
+    assert wanted(page, origin=page.url.rstrip("/")).status == 200
 
 
 def test_the_name_localhost_is_this_host(page: LivePage) -> None:
     port = urlsplit(page.url).port
-    assert asked(page, host=f"localhost:{port}").status == 200
+    assert wanted(page, host=f"localhost:{port}").status == 200
 
 
 @pytest.mark.parametrize("method", ["POST", "HEAD", "PUT", "DELETE", "OPTIONS", "X"])
 def test_only_get_is_answered(page: LivePage, method: str) -> None:
-    found = asked(page, method=method)
+    found = wanted(page, method=method)
     assert found.status == 405
     assert found.headers["Allow"] == "GET"
 
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "/../x", "/events/", "/?x"])
 def test_there_are_no_other_paths(page: LivePage, path: str) -> None:
-    found = asked(page, path)
+    found = wanted(page, path)
     assert (found.status, found.read()) == (404, b"there is / and nothing else\n")
 
 
@@ -153,7 +153,7 @@ def test_what_is_no_http_is_refused_and_the_page_goes_on(page: LivePage) -> None
         with socket.create_connection((place.hostname, place.port), 10) as line:
             line.sendall(content + b"\r\n\r\n")
             line.shutdown(socket.SHUT_WR)
-    assert asked(page).status == 200
+    assert wanted(page).status == 200
 
 
 def test_events_bring_the_names_then_the_picture_and_the_answer(
@@ -161,7 +161,7 @@ def test_events_bring_the_names_then_the_picture_and_the_answer(
 ) -> None:
     answers = live.answers()
     next(answers), next(answers)
-    found = events(asked(page, "/events"))
+    found = events(wanted(page, "/events"))
     name, hello = next(found)
     assert name == "hello"
     assert hello["classes"] == [EVIL, "s"]
@@ -177,10 +177,10 @@ def test_events_bring_the_names_then_the_picture_and_the_answer(
     assert view["over"] is False
 
 
-def test_the_last_event_tells_that_the_source_is_gone() -> None:
+def test_the_last_event_reports_that_the_source_is_gone() -> None:
     live = shown(3)
     with LivePage(live) as page:
-        found = events(asked(page, "/events"))
+        found = events(wanted(page, "/events"))
         next(found)
         list(live.answers())
         views = [view for _, view in found]
@@ -188,9 +188,9 @@ def test_the_last_event_tells_that_the_source_is_gone() -> None:
     assert views[-1]["status"] == "the source is gone: no more frames"
 
 
-def test_closing_the_page_tells_browsers_that_it_is_over(live: Live) -> None:
+def test_closing_the_page_reports_browsers_that_it_is_over(live: Live) -> None:
     page = LivePage(live)
-    found = events(asked(page, "/events"))
+    found = events(wanted(page, "/events"))
     next(found)
     page.close()
     assert [view["over"] for _, view in found][-1] is True
@@ -204,11 +204,11 @@ def test_too_many_browsers_are_turned_away_and_room_is_found_again(
         socket.create_connection((place.hostname, place.port), 10)
         for _ in range(MOST_BROWSERS)
     ]
-    refused = asked(page)
+    refused = wanted(page)
     assert (refused.status, refused.reason) == (503, "too many browsers")
     for line in held:
         line.close()
-    statuses = {asked(page).status for _ in range(50)}
+    statuses = {wanted(page).status for _ in range(50)}
     assert 200 in statuses
 
 
@@ -223,7 +223,7 @@ def test_a_browser_that_reads_nothing_holds_up_no_answer(
     assert threading.active_count() < 10
 
 
-def test_a_port_that_is_taken_is_told(page: LivePage, live: Live) -> None:
+def test_a_port_that_is_taken_is_reported(page: LivePage, live: Live) -> None:
     port = urlsplit(page.url).port
     assert port is not None
     with pytest.raises(PortError) as caught:

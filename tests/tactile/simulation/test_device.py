@@ -81,7 +81,7 @@ def test_a_board_sends_its_banner_and_its_frames(protocol: Protocol) -> None:
     assert not Path(device.port).exists()
 
 
-def test_a_request_board_answers_as_often_as_it_is_asked() -> None:
+def test_a_request_board_answers_as_often_as_it_is_requested() -> None:
     board = Board("mat", Sensor(4, 4), Request("41 42", checksum="xor8"))
     frames = _frames(board, 9)
     with Device(board, frames, rate=None) as device, _host(device) as host:
@@ -190,7 +190,7 @@ def test_a_second_host_finds_the_board_as_after_its_start() -> None:
         assert device.counts.opens == 2
 
 
-def test_a_frame_that_cannot_be_sent_is_told_when_the_device_closes() -> None:
+def test_a_frame_that_cannot_be_sent_is_reported_when_the_device_closes() -> None:
     def frames() -> Iterator[Cells]:
         yield np.zeros((2, 2), np.int64)
 

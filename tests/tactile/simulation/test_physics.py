@@ -114,7 +114,7 @@ def test_a_bar_has_the_radius_of_gyration_of_the_text_book() -> None:
     assert radius_of(bar) == pytest.approx(math.sqrt(40 / 12), rel=1e-14)
 
 
-def test_a_finger_points_where_it_is_told() -> None:
+def test_a_finger_points_where_it_is_reported() -> None:
     straight = finger((1.0, 2.0), 90.0, 4.0, 1.0)
     corners = np.array(straight.corners)
     assert corners.max(axis=0) == pytest.approx((1.5, 6.0))
@@ -301,13 +301,13 @@ def test_an_object_lies_whole_on_the_sensor_wherever_it_roams(name: str) -> None
     assert np.all((found.frames > found.sensor.threshold).any(axis=(1, 2)))
 
 
-def test_what_hangs_over_the_edge_is_told() -> None:
+def test_what_hangs_over_the_edge_is_reported() -> None:
     large = Object("board", (rectangle(20.0, 16.0),), 10.0)
     found = press_object(large, 2, settings=IDEAL)
     np.testing.assert_allclose(found.outside, 0.2)
 
 
-def test_numbers_out_of_range_are_told_all_at_once() -> None:
+def test_numbers_out_of_range_are_reported_all_at_once() -> None:
     with pytest.raises(InvalidModelError) as caught:
         PhysicsSettings(roam=1.5, aperture=0.0, wiring="crossed")  # type: ignore[arg-type] # wrong on purpose
     assert str(caught.value) == (
@@ -322,7 +322,7 @@ def test_no_number_is_no_setting() -> None:
         PhysicsSettings(tilt=math.nan)
 
 
-def test_an_object_that_is_not_there_is_told() -> None:
+def test_an_object_that_is_not_there_is_reported() -> None:
     with pytest.raises(ValueError, match=r"^no object 'foot'; the objects are ") as one:
         press("foot", 1)
     assert str(one.value) == (
@@ -332,7 +332,7 @@ def test_an_object_that_is_not_there_is_told() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 100_001])
-def test_a_count_out_of_range_is_told(count: int) -> None:
+def test_a_count_out_of_range_is_reported(count: int) -> None:
     with pytest.raises(ValueError, match="presses can be made") as caught:
         press("circle", count)
     text = f"1 to 100000 presses can be made at a time, not {count}"
