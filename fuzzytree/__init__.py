@@ -1,7 +1,7 @@
 """Learn fuzzy decision trees, read them as rules, run them anywhere, prove them equal.
 
 Nothing heavy is loaded before it is used: each name below comes from the module that
-stands beside it when it is first asked for.
+stands beside it at its first use.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ class Rows(msgspec.Struct, frozen=True, eq=False):
         """Return where quotes open and close, by turns; a doubled one does both.
 
         Where every quote stands at the end of a cell, or beside another one, their
-        order tells which is which. Elsewhere each is looked at.
+        order decides which is which. Elsewhere each is examined.
 
         Raises:
             TableError: If text follows a closing quote.

@@ -240,7 +240,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         outcome = self._answers(self._values(X), "rules")
         owner = self._class_of_rule()
         strengths = outcome.strengths
-        assert strengths is not None  # asked of a rule base, native returns them
+        assert strengths is not None  # the native runtime returns them for a rule base
         strongest = np.zeros((len(self.classes_), strengths.shape[1]))
         np.maximum.at(strongest, owner, strengths)
         shares = strongest / strongest.sum(axis=0)
@@ -319,7 +319,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 def _prepared(tree: FuzzyTree) -> Callable[[ModelKind], Run]:
     """Return a function that gives the native runtime's run of the tree or its rules.
 
-    Each is prepared when it is first asked for.
+    Each is prepared at its first use.
     """
 
     @functools.cache

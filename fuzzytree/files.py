@@ -16,7 +16,7 @@ from typing import BinaryIO
 from fuzzytree.errors import ReadError, WriteError
 
 LIMIT = 256 * 2**20
-"""The most bytes that a model file may have, unless told otherwise."""
+"""The most bytes that a model file may have by default."""
 
 _PART = re.compile(r"[0-9a-f]{16}\.part")
 
@@ -68,8 +68,8 @@ def write_atomically(path: PathLike, content: bytes, *, replace: bool = True) ->
     Args:
         path: The file.
         content: All of it.
-        replace: Whether a file may be there; without it, whoever comes second fails,
-            whatever the moment.
+        replace: Whether a file may be there; without it, the second of two writers
+            fails, even if both write at the same time.
 
     Raises:
         WriteError: If it cannot be written; nothing is left behind.
@@ -82,7 +82,7 @@ def check_place(path: PathLike) -> None:
     """Refuse a place that is a folder or has none, before long work is done for it.
 
     Raises:
-        WriteError: If a file cannot be written there, as far as can be told.
+        WriteError: If a file cannot be written there, as far as can be checked before.
     """
     name, target = os.fspath(path), Path(path)
     if target.is_dir():

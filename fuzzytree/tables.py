@@ -662,7 +662,7 @@ def _needed_columns(
     if not piece.is_named and not set(inputs) <= set(columns):
         wanted = trained or inputs
         if len(columns) != len(wanted):
-            verb = "was learnt from" if trained else "asks for"
+            verb = "was learnt from" if trained else "needs"
             raise TableError(
                 f"{piece.name} has {len(columns)} columns without names, and the "
                 f"model {verb} {len(wanted)}: {', '.join(wanted)}"

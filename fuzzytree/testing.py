@@ -250,18 +250,18 @@ def random_tree(
         leaves: How many leaves; 1 gives a tree without nodes.
         inputs: How many input columns, on scales from 1e-3 to 1e6.
         classes: How many classes; every class that has a leaf can win.
-        combinations: The share of nodes that ask a combination of inputs.
+        combinations: The share of nodes that test a combination of inputs.
         semantics: The defaults unless given.
     """
     chance = random.Random(seed)
     columns = tuple(f"x{number}" for number in range(1, inputs + 1))
     labels = tuple(f"class {number}" for number in range(1, classes + 1))
     scale = {name: 10.0 ** chance.randint(-3, 6) for name in columns}
-    asked: list[tuple[str, tuple[float, ...], tuple[int, ...]]] = []
+    tests: list[tuple[str, tuple[float, ...], tuple[int, ...]]] = []
     derived: list[Variable] = []
     plan = _grow(chance, leaves, [])
 
-    def ask(branches: int) -> None:
+    def add_test(branches: int) -> None:
         if len(columns) > 1 and chance.random() < combinations:
             chosen = chance.sample(columns, chance.randint(2, len(columns)))
             parts = tuple(
@@ -281,12 +281,12 @@ def random_tree(
         if branches == 2 and chance.random() < 0.25:
             owners = [0, 1, 0]
         cuts = sorted(chance.uniform(-2.0, 2.0) * unit for _ in owners[1:])
-        asked.append((name, tuple(cuts), tuple(owners)))
+        tests.append((name, tuple(cuts), tuple(owners)))
 
     for children in plan:
-        ask(len(children))
+        add_test(len(children))
     return _assemble(
-        chance, columns, labels, derived, asked, plan, semantics or Semantics()
+        chance, columns, labels, derived, tests, plan, semantics or Semantics()
     )
 
 
@@ -358,7 +358,7 @@ def _assemble(
     columns: tuple[str, ...],
     labels: tuple[str, ...],
     derived: list[Variable],
-    asked: list[tuple[str, tuple[float, ...], tuple[int, ...]]],
+    tests: list[tuple[str, tuple[float, ...], tuple[int, ...]]],
     plan: Plan,
     semantics: Semantics,
 ) -> FuzzyTree:
@@ -370,12 +370,12 @@ def _assemble(
     below = _leaves_below(plan)
     terms: dict[str, list[Term]] = {}
     names: dict[int, list[str]] = {}
-    for variable in dict.fromkeys(name for name, _, _ in asked):
-        here = [i for i, entry in enumerate(asked) if entry[0] == variable]
-        texts = interval_names([asked[i][1] for i in here])
+    for variable in dict.fromkeys(name for name, _, _ in tests):
+        here = [i for i, entry in enumerate(tests) if entry[0] == variable]
+        texts = interval_names([tests[i][1] for i in here])
         names.update(zip(here, texts, strict=True))
     nodes: list[Node] = []
-    for position, (variable, cuts, owners) in enumerate(asked):
+    for position, (variable, cuts, owners) in enumerate(tests):
         own = names[position]
         bare = Node(variable, cuts, owners, ())
         known = terms.setdefault(variable, [])
@@ -392,14 +392,14 @@ def _assemble(
             for index, (kind, number) in enumerate(plan[position])
         )
         nodes.append(Node(variable, cuts, owners, branches))
-    used = {name for name, _, _ in asked}
+    used = {name for name, _, _ in tests}
     parts = {part.input for v in derived for part in v.parts}
     variables = tuple(
         Variable(n, tuple(terms.get(n, ())), unit="cm", low=-9.5e6, high=9.5e6)
         for n in columns
         if n in used | parts
     ) + tuple(Variable(v.name, tuple(terms[v.name]), parts=v.parts) for v in derived)
-    spans = {name: cuts for name, cuts, _ in asked}
+    spans = {name: cuts for name, cuts, _ in tests}
     sets = tuple(
         Sets(
             name,

@@ -105,7 +105,7 @@ def test_two_points_have_a_law_without_an_interval() -> None:
         power([10], [5])
 
 
-def test_growth_is_named_only_as_far_as_the_interval_tells() -> None:
+def test_growth_is_named_only_as_far_as_the_interval_shows() -> None:
     assert growth(power([1, 10, 100], [1, 10**1.3, 100])) == "like n"
     assert growth(power([1, 10, 100], [1, 20.1, 400])) == "faster than n"
     assert growth(power([1, 10, 100], [1, 3.1, 10])) == "slower than n"
@@ -267,7 +267,7 @@ def test_what_there_is_no_time_for_is_an_omission() -> None:
 
 
 @pytest.mark.usefixtures("only_native")
-def test_a_carrier_with_other_answers_stops_the_measurement(
+def test_a_representation_with_other_predictions_stops_the_measurement(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def cross(tree: FuzzyTree, kind: str = "raw") -> object:
@@ -374,7 +374,7 @@ def test_a_winner_needs_votes_that_survive_the_correction() -> None:
     assert in_all[0].p == 2 / 512
 
 
-def test_counted_work_is_told_alone_and_shared() -> None:
+def test_counted_work_is_reported_alone_and_shared() -> None:
     assert counted(Size("grown", 4, 2.0, 8, 6, 1, ())) == (4.0, 3.0)
 
 
@@ -408,7 +408,7 @@ def test_the_page_is_made_of_a_stored_result_byte_for_byte() -> None:
     assert _stored().to_json() == (GOLDEN / "claims.json").read_text("utf-8")
 
 
-def test_the_committed_page_tells_the_committed_numbers() -> None:
+def test_the_committed_page_shows_the_committed_numbers() -> None:
     folder = ROOT / "docs" / "explanation"
     claims = from_json((folder / "claims.json").read_bytes())
     assert not claims.is_quick

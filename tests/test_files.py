@@ -223,7 +223,7 @@ def test_a_file_that_comes_meanwhile_is_not_replaced(
     assert _names(tmp_path) == ["out.csv"]
 
 
-def test_a_name_that_no_file_can_have_is_told(tmp_path: Path) -> None:
+def test_a_name_that_no_file_can_have_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "nul\0"
     with pytest.raises(WriteError) as caught:
         write_atomically(path, b"new")

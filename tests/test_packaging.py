@@ -123,8 +123,8 @@ def test_wheel_and_source_archive_hold_every_module_and_every_data_file(
         inside = {n for n in zipfile.ZipFile(built).namelist() if ".dist-info" not in n}
         assert inside == expected
     archive = next((tmp_path / "again").glob("*.tar.gz"))
-    with tarfile.open(archive) as held:
-        names = {name.split("/", 1)[-1] for name in held.getnames()}
+    with tarfile.open(archive) as packed:
+        names = {name.split("/", 1)[-1] for name in packed.getnames()}
     assert {"LICENSE", "README.md", "exporters/__init__.py"} <= names
 
 
@@ -147,7 +147,7 @@ def _copy_of_the_project(target: Path) -> Path:
 
 
 def _wheel(source: Path, folder: Path, *, from_sdist: bool) -> Path:
-    """Build a wheel, and first a source archive to build it from if asked for."""
+    """Build a wheel, and first a source archive to build it from if requested."""
     kinds = ["--sdist"] if from_sdist else ["--wheel"]
     command = [sys.executable, "-m", "build", *kinds, "--outdir", str(folder)]
     if from_sdist:

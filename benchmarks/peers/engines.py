@@ -20,7 +20,7 @@ from fuzzytree.model.contracts import Outcome
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape
 from fuzzytree.runtimes.axes import plan_axes
 from fuzzytree.runtimes.rows import checked, winners
-from fuzzytree.runtimes.sampling import asked_shapes, line_error, samples, universe
+from fuzzytree.runtimes.sampling import clause_shapes, line_error, samples, universe
 from peers.crisp import lines_of
 
 if TYPE_CHECKING:
@@ -77,13 +77,13 @@ Terms = Mapping[tuple[str, str], Knots]
 def names_of(rules: RuleBase) -> dict[tuple[str, str], tuple[str, str]]:
     """Return plain words for variables and terms that clauses ask: v1 and t1 ..."""
     variables = {v.name: f"v{n}" for n, v in enumerate(rules.variables, 1)}
-    asked = enumerate(asked_shapes(rules), 1)
+    asked = enumerate(clause_shapes(rules), 1)
     return {key: (variables[key[0]], f"t{number}") for number, key in asked}
 
 
 def asked_terms(rules: RuleBase, points: int) -> dict[tuple[str, str], Knots]:
     """Return the points of every term that a clause names."""
-    shapes = asked_shapes(rules).items()
+    shapes = clause_shapes(rules).items()
     return {key: knots(shape, points) for key, shape in shapes}
 
 

@@ -42,7 +42,7 @@ _FEWEST = 2 * FOLDS  # rows
 
 
 class Accuracy(msgspec.Struct, frozen=True):
-    """The share of rows that were answered right, for each fold.
+    """The share of rows that were predicted right, for each fold.
 
     Attributes:
         folds: The share in each fold that was tried. A row that gets no class counts
@@ -129,7 +129,7 @@ def accuracy(
         report: Of learning from the whole table.
         folds: How many folds.
         seed: Of the shuffle.
-        progress: Told what is done and which share of it.
+        progress: Called with what is done and which share of it.
 
     Returns:
         The accuracies; None if the table has fewer than ten rows, or if some fold
@@ -148,7 +148,7 @@ def accuracy(
     for number in range(tried):
         if progress:
             progress(f"testing fold {number + 1} of {tried}", number / tried)
-        kept, held = rows[fold != number], rows[fold == number]
+        kept, test = rows[fold != number], rows[fold == number]
         present, known = np.unique(table.codes[kept], return_inverse=True)
         if len(present) < 2:
             return None
@@ -160,9 +160,9 @@ def accuracy(
             classes=classes,
             settings=_of_fold(settings, None if is_nested else report, classes),
         )
-        answered = _answered(learnt.tree, table, held)
-        right = answered == table.codes[held]
-        shares.append(float(np.count_nonzero(right)) / len(held))
+        predicted = _answered(learnt.tree, table, test)
+        right = predicted == table.codes[test]
+        shares.append(float(np.count_nonzero(right)) / len(test))
     return Accuracy(tuple(shares), len(rows), len(table.codes), is_nested)
 
 

@@ -775,7 +775,7 @@ def diff(
         budget_s: After so many seconds what is not decided stays open.
         settings: How many points are drawn from the domain, and their seed.
         allow_loss: As in `load`, for both files.
-        progress: Told what is done and which share of it.
+        progress: Called with what is done and which share of it.
 
     Raises:
         ReadError: If a file cannot be read, or the two are about different inputs, or
@@ -967,7 +967,7 @@ def stability(
         data: A table with rows of one's own, beside the probes.
         only: The codes of criteria, such as `N3`; all unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
-        progress: Told what is done and which share of it.
+        progress: Called with what is done and which share of it.
 
     Raises:
         ReadError: If the file cannot be read.

@@ -333,7 +333,7 @@ def _compared(
             float(margin[flips].max()) if margin is not None and flips.any() else None
         ),
         detail=tuple(detail),
-        told=tuple(rows.numbers[told].tolist()),
+        row_numbers=tuple(rows.numbers[told].tolist()),
     )
 
 

@@ -25,11 +25,11 @@ def version() -> str:
 
 
 class Comparison(msgspec.Struct, frozen=True):
-    """One representation of a model held against another.
+    """One representation of a model compared with another.
 
     Attributes:
         representation: What was examined.
-        against: What it was held against.
+        against: What it was compared with.
         basis: `file` compares content, `proof` covers every input, `all cells` every
             cell of the input space with its edges, `rows` the rows counted, `calls`
             ways of calling (no rows, one row, another memory order, a wrong width).
@@ -44,7 +44,7 @@ class Comparison(msgspec.Struct, frozen=True):
             row that flipped; None without a flip or without strengths.
         verdict: The result.
         detail: What differed, worst first, in sentences.
-        told: The numbers of the rows in `detail`, from 0 in the whole of the rows.
+        row_numbers: Of the rows in `detail`, from 0 in the whole of the rows.
         unbounded: Rows in which the contract bounds no difference of strengths.
         largest_unbounded: The largest difference of any two strengths in them.
     """
@@ -61,7 +61,7 @@ class Comparison(msgspec.Struct, frozen=True):
     flips: int = 0
     largest_flip_margin: float | None = None
     detail: tuple[str, ...] = ()
-    told: tuple[int, ...] = ()
+    row_numbers: tuple[int, ...] = msgspec.field(name="told", default=())
     unbounded: int = 0
     largest_unbounded: float = 0.0
 
@@ -175,7 +175,7 @@ class Agreement(msgspec.Struct, frozen=True):
     Attributes:
         model: The model's name.
         fingerprint: The SHA-256 of its content.
-        comparisons: Everything that was held against something.
+        comparisons: All comparisons.
         counts: Ties, uncovered and missing rows, for each representation.
         skipped: What was not examined and why, in sentences.
         cells: The number of cells of the tree, or None for a rule base.

@@ -147,7 +147,7 @@ class Outcome(msgspec.Struct, frozen=True):
         rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
         status: A `fuzzytree.semantics.reference.Status` for each row.
         strengths: Shape (rules, rows), or None where only the path was followed or
-            the strengths were not asked for. NaN in rows with missing values.
+            strengths were not requested. NaN in rows with missing values.
     """
 
     rule: IntArray
@@ -175,7 +175,7 @@ class SystemOutcome(msgspec.Struct, frozen=True):
         status: A `fuzzytree.semantics.reference.Status` for each row: decided,
             uncovered (a default or NaN answers an output) or missing.
         activations: Shape (rules, rows), of the rules of all blocks; None where they
-            were not asked for. NaN in rows with missing values.
+            were not requested. NaN in rows with missing values.
     """
 
     outputs: FloatArray

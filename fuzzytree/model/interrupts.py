@@ -10,14 +10,14 @@ from contextvars import ContextVar
 from types import FrameType
 from typing import Final
 
-_ASKED: Final[ContextVar[Callable[[], None] | None]] = ContextVar("asked", default=None)
+_CHECK: Final[ContextVar[Callable[[], None] | None]] = ContextVar("check", default=None)
 
 
 @contextlib.contextmanager
-def watched(ask: Callable[[], None]) -> Generator[None]:
-    """Have `checkpoint` ask a function, in this thread and what it calls.
+def watched(check: Callable[[], None]) -> Generator[None]:
+    """Have `checkpoint` call a function, in this thread, until the block ends.
 
-    It holds until the block ends: a generator must not yield within it.
+    A generator must not yield within the block.
 
     Example:
         >>> def stop() -> None:
@@ -27,38 +27,36 @@ def watched(ask: Callable[[], None]) -> Generator[None]:
         ...     print("not reached")
         >>> checkpoint()
     """
-    token = _ASKED.set(ask)
+    token = _CHECK.set(check)
     try:
         yield
     finally:
-        _ASKED.reset(token)
+        _CHECK.reset(token)
 
 
 def checkpoint() -> None:
-    """Ask whether to go on; who works long does so between two steps.
+    """Call the function of `watched`, if there is one, between two steps of long work.
 
-    Nothing happens unless someone watches: it takes no time to speak of. What `watched`
-    was given may raise, so nothing may be left half done here.
+    The function may raise, so nothing may be half done here.
     """
-    ask = _ASKED.get()
-    if ask is not None:
-        ask()
+    check = _CHECK.get()
+    if check is not None:
+        check()
 
 
 @contextlib.contextmanager
 def noticed() -> Generator[Callable[[], None]]:
     """Give a function that raises KeyboardInterrupt if there was a Ctrl-C before.
 
-    A Ctrl-C raises where it arrives, as always; but where that is in a library with an
-    `except:` of its own, nothing comes of it. Whoever calls the function between its
-    steps hears of it all the same. Outside the main thread nothing is changed; a
-    handler of the program's own decides what a Ctrl-C is.
+    A library with a bare `except:` swallows the KeyboardInterrupt of a Ctrl-C; a call
+    of the function between two steps raises it again. Outside the main thread nothing
+    is changed; a handler of the program's own decides what a Ctrl-C is.
     """
-    seen: list[int] = []
+    signals: list[int] = []
     before = signal.getsignal(signal.SIGINT)
 
     def check() -> None:
-        if seen:
+        if signals:
             raise KeyboardInterrupt
 
     is_main = threading.current_thread() is threading.main_thread()
@@ -71,7 +69,7 @@ def noticed() -> Generator[Callable[[], None]]:
         try:
             raising(number, frame)
         except KeyboardInterrupt:
-            seen.append(number)
+            signals.append(number)
             raise
 
     signal.signal(signal.SIGINT, note)

@@ -181,7 +181,7 @@ def numbered(name: str, taken: dict[str, int]) -> str:
 
     Args:
         name: The name.
-        taken: The names so far, each with how often it was asked for.
+        taken: The names so far, each with how often it was used.
 
     Example:
         >>> taken = {}

@@ -1,4 +1,4 @@
-"""The options of a writer, as its signature and its docstring tell them."""
+"""The options of a writer, from its signature and its docstring."""
 
 from __future__ import annotations
 

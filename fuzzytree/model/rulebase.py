@@ -58,7 +58,7 @@ class Flank(Value, frozen=True):
     """How a degree falls from `start` (towards 1) to `end` (exactly 0).
 
     With `q = clip((x - end) / (start - end), 0, 1)` the degree is
-    `q * (c0 + q * (c1 + ...))`, held in [0, largest number below 1]. `end` may lie
+    `q * (c0 + q * (c1 + ...))`, clamped to [0, largest number below 1]. `end` may lie
     on either side of `start`.
 
     Attributes:
@@ -127,9 +127,9 @@ class Points(Value, frozen=True, tag="points"):
 
     Between two neighbours `(a, p)` and `(b, r)`, for `a < x <= b`, the degree is
     `r + (x - b) / (a - b) * (p - r)`, or `(x - a) / (b - a) * r` if p is 0, each
-    operation rounded once, held between p and r: so it is exact at the points and where
-    p = r, and monotone between them. Before the first point its degree holds, behind
-    the last one the last one's.
+    operation rounded once, clamped between p and r: so it is exact at the points and
+    where p = r, and monotone between them. Before the first point its degree holds,
+    behind the last one the last one's.
 
     A value that occurs twice is a step: at the value itself the first degree holds,
     above it the second.

@@ -109,7 +109,7 @@ class FuzzyTree(Value, frozen=True):
             stands after its inputs.
         nodes: Numbered from 1 in depth-first order; none if there is one leaf only.
         leaves: Numbered from 1 in the order in which a depth-first walk meets them.
-        sets: The paper's fitted sets on each variable that a node asks; may be empty.
+        sets: The paper's fitted sets on each variable that a node tests; may be empty.
         semantics: How missing values are answered, and the AND of the tree's rules.
         columns: The columns of the training table, of which the inputs are some.
 
@@ -198,21 +198,21 @@ def _expand(
         pattern = f" ({end.pattern})" if end.pattern not in ("", end.label) else ""
         yield f"{indent}{label}{end.label}{pattern} [{leaf}]"
         return
-    asked = tree.nodes[node - 1]
-    cuts = ", ".join(f"{cut:.6g}" for cut in asked.cuts)
-    yield f"{indent}{label}{asked.variable}? (cut at {cuts})"
-    todo.extend((depth + 1, branch) for branch in reversed(asked.branches))
+    current = tree.nodes[node - 1]
+    cuts = ", ".join(f"{cut:.6g}" for cut in current.cuts)
+    yield f"{indent}{label}{current.variable}? (cut at {cuts})"
+    todo.extend((depth + 1, branch) for branch in reversed(current.branches))
 
 
 def interval_names(nodes_cuts: Sequence[Sequence[float]]) -> list[list[str]]:
-    """Return a name for each interval of each node that asks one variable.
+    """Return a name for each interval of each node that tests one variable.
 
-    A variable that one node asks, with two or three intervals, has the terms low,
+    A variable that one node tests, with two or three intervals, has the terms low,
     (medium) and high. Otherwise a term is named by its bounds, with as few digits
     (three at least) as tell all the cuts apart.
 
     Args:
-        nodes_cuts: The cuts of each node that asks the variable.
+        nodes_cuts: The cuts of each node that tests the variable.
 
     Example:
         >>> interval_names([[2.45]])

@@ -45,7 +45,7 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         status: A `fuzzytree.semantics.reference.Status` for each row.
         owners: The position in `choices` of each rule's class; empty if not known.
         strengths: Shape (rules, rows), NaN in rows with missing values; None if they
-            were not asked for or if only one path of a tree was followed.
+            were not requested or if only one path of a tree was followed.
         label_type: What the names of classes stand for, if not text.
     """
 
@@ -103,12 +103,12 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         return found | ({"no class": counts[0]} if counts[0] else {})
 
     def to_csv(self, strengths: By | None = None) -> str:
-        """Return the answers as CSV: class, rule, status and, if asked, strengths.
+        """Return the answers as CSV: class, rule, status and, if requested, strengths.
 
         No class and an unknown strength are empty cells.
 
         Raises:
-            ValueError: If strengths are asked for that are not there.
+            ValueError: If strengths are requested that are not there.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -121,7 +121,7 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         """Return the columns that `to_csv` writes, by name.
 
         Raises:
-            ValueError: If strengths are asked for that are not there.
+            ValueError: If strengths are requested that are not there.
         """
         words = [status.name.lower() for status in Status]
         found: dict[str, Sequence[object]] = {
@@ -149,7 +149,7 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         Classes are of the type of `classes`; what would be an empty cell is null.
 
         Raises:
-            ValueError: If strengths are asked for that are not there.
+            ValueError: If strengths are requested that are not there.
         """
         return arrow_table({**self.columns(strengths), "class": self.classes})
 
@@ -159,7 +159,7 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         Classes are of the type of `classes`.
 
         Raises:
-            ValueError: If strengths are asked for that are not there.
+            ValueError: If strengths are requested that are not there.
         """
         return pandas_frame({**self.columns(strengths), "class": self.classes})
 

@@ -1,10 +1,10 @@
 """Following one path of a tree for many rows, in numpy.
 
-A node of several cuts becomes a balanced cascade of questions `x > cut`. The questions
-at the top, which nearly every row meets, are asked of all rows at once and joined to a
-one-byte answer, with one wide comparison and at most three byte operations each. The
-rows that are not at a leaf by then walk on together, one question a round, and leave
-the walk when they arrive. A single row is walked in plain Python.
+A node of several cuts becomes a balanced cascade of tests `x > cut`. The tests at the
+top, which nearly every row meets, are evaluated on all rows at once and joined to a
+one-byte result, with one wide comparison and at most three byte operations each. The
+rows that are not at a leaf by then walk on together, one test a round, and leave the
+walk when they arrive. A single row is walked in plain Python.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     Reals = npt.NDArray[np.floating[Any]]
     Bytes = npt.NDArray[np.uint8]
 
-_SMALL = 24  # questions up to which all of them are asked of all rows
-_SHARE = 0.05  # of the leaves: what a question at the top must decide to pay
+_SMALL = 24  # tests up to which all of them are evaluated on all rows
+_SHARE = 0.05  # of the leaves: what a test at the top must decide to pay
 _MOST_EXITS = 255
 _LIVE = 0.6  # share of rows still walking below which the others leave
 CHUNK = 1 << 15
@@ -52,15 +52,15 @@ class Split:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """Questions and leaves at numbered places, breadth-first, a list for each field.
+    """Tests and leaves at numbered places, breadth-first, a list for each field.
 
     Attributes:
         line: The line of the variable; any at a leaf.
-        cut: Asked is `x > cut`; infinity at a leaf.
+        cut: The test is `x > cut`; infinity at a leaf.
         child: The place that no leads to; yes leads to the one after it. A leaf leads
             to itself.
-        leaf: The number of the leaf, or 0 at a question.
-        sure: How many questions nearly every row meets after those of the top.
+        leaf: The number of the leaf, or 0 at a test.
+        sure: How many tests nearly every row meets after those of the top.
     """
 
     line: IntArray
@@ -71,8 +71,8 @@ class Walk:
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
-    """One question of the top: `x > cut`, and what its answers give.
+class CutTest:
+    """One test of the top: `x > cut`, and what its results give.
 
     Attributes:
         line: The line of its variable.
@@ -94,21 +94,21 @@ class Descent:
     Attributes:
         splits: The nodes, for a single row; the first is the root, none if there is
             one leaf only.
-        walk: All questions.
-        top: The questions asked of all rows, in the order of evaluation.
+        walk: All tests.
+        top: The tests evaluated on all rows, in the order of evaluation.
         exits: Where each answer of the top leads: places; leaves if it is the whole.
-        is_whole: Whether the top asks every question.
+        is_whole: Whether the top has every test.
     """
 
     splits: tuple[Split, ...]
     walk: Walk
-    top: tuple[Ask, ...]
+    top: tuple[CutTest, ...]
     exits: IntArray
     is_whole: bool
 
 
 def plan_descent(splits: Sequence[Split], kind: Real) -> Descent:
-    """Return a tree as lists of questions.
+    """Return a tree as lists of tests.
 
     Args:
         splits: The nodes, a parent before its children; none for a single leaf.
@@ -150,13 +150,13 @@ class _Draft:
         return len(self.line) - 1
 
     def copy(self, source: int, place: int) -> None:
-        """Make a place ask what another asks: both then lead to the same answers."""
+        """Make a place test what another tests: both then lead to the same leaves."""
         self.line[place], self.cut[place] = self.line[source], self.cut[source]
         self.child[place], self.weight[place] = self.child[source], self.weight[source]
 
 
 def _plan_walk(splits: Sequence[Split]) -> _Draft:
-    """Lay the questions out breadth-first, so that early rounds touch few lines."""
+    """Lay the tests out breadth-first, so that early rounds touch few lines."""
     weights = _leaves_below(splits)
     draft = _Draft([], [], [], [], [])
     draft.add()
@@ -199,8 +199,8 @@ def _leaves_below(splits: Sequence[Split]) -> list[int]:
     return weights
 
 
-def _plan_top(draft: _Draft, kind: Real) -> tuple[tuple[Ask, ...], list[int]]:
-    """Choose the questions that most leaves lie below; return them and their exits."""
+def _plan_top(draft: _Draft, kind: Real) -> tuple[tuple[CutTest, ...], list[int]]:
+    """Choose the tests that most leaves lie below; return them and their exits."""
     count = draft.leaf.count(0)
     least = 0.0 if count <= _SMALL else _SHARE * draft.weight[0]
     chosen: set[int] = set()
@@ -219,27 +219,27 @@ def _plan_top(draft: _Draft, kind: Real) -> tuple[tuple[Ask, ...], list[int]]:
 
 def _order_top(
     draft: _Draft, chosen: set[int], kind: Real
-) -> tuple[tuple[Ask, ...], list[int]]:
-    """Put the chosen questions in an order in which answers come before their use."""
-    asks: list[Ask] = []
+) -> tuple[tuple[CutTest, ...], list[int]]:
+    """Put the chosen tests in an order in which answers come before their use."""
+    tests: list[CutTest] = []
     code: dict[int, int] = {}  # of each exit
-    given: dict[int, Bytes] = {}  # an answer that is an exit, until it is used
-    visits = min(2 * len(chosen), _MOST_EXITS - 1)  # shared places are asked again
+    results: dict[int, Bytes] = {}  # an answer that is an exit, until it is used
+    visits = min(2 * len(chosen), _MOST_EXITS - 1)  # shared places are tested again
     todo: list[tuple[int, bool]] = [(0, False)]
     while todo:
         place, is_done = todo.pop()
         child = draft.child[place]
         if is_done:
             cut = np.array(draft.cut[place], kind)
-            no, yes = given.pop(child, None), given.pop(child + 1, None)
-            asks.append(Ask(draft.line[place], cut, no, yes))
+            no, yes = results.pop(child, None), results.pop(child + 1, None)
+            tests.append(CutTest(draft.line[place], cut, no, yes))
         elif place not in chosen or not visits:
             number = code.setdefault(place, len(code))
-            given[place] = np.array(number, np.uint8)
+            results[place] = np.array(number, np.uint8)
         else:
             visits -= 1
             todo += [(place, True), (child + 1, False), (child, False)]
-    return tuple(asks), list(code)
+    return tuple(tests), list(code)
 
 
 def _sure_rounds(draft: _Draft, exits: Sequence[int]) -> int:
@@ -250,8 +250,8 @@ def _sure_rounds(draft: _Draft, exits: Sequence[int]) -> int:
         early += sum(1 for place in here if draft.leaf[place])
         if early > 0.1 * draft.weight[0]:
             return rounds
-        asked = [draft.child[place] for place in here if not draft.leaf[place]]
-        here = [place for child in asked for place in (child, child + 1)]
+        children = [draft.child[place] for place in here if not draft.leaf[place]]
+        here = [place for child in children for place in (child, child + 1)]
         rounds += 1
 
 
@@ -287,7 +287,7 @@ def descend_rows(
     if not descent.top:
         out[:] = 1
         return
-    code = _ask_top(descent.top, lines[:, start : start + len(out)])
+    code = _test_top(descent.top, lines[:, start : start + len(out)])
     if descent.is_whole:
         descent.exits.take(code, out=out, mode="clip")
         return
@@ -297,31 +297,31 @@ def descend_rows(
     descent.walk.leaf.take(here, out=out, mode="clip")
 
 
-def _ask_top(top: Sequence[Ask], lines: Reals) -> Bytes:
+def _test_top(top: Sequence[CutTest], lines: Reals) -> Bytes:
     """Return a byte for each row: which exit of the top it takes."""
     rows = lines.shape[1]
     answer = np.empty(rows, np.bool_)
     bit = answer.view(np.uint8)
     stack: list[Bytes] = []
     spare: list[Bytes] = []
-    for ask in top:
-        np.greater(lines[ask.line], ask.cut, answer)
-        if ask.no is not None and ask.yes is not None:
+    for test in top:
+        np.greater(lines[test.line], test.cut, answer)
+        if test.no is not None and test.yes is not None:
             out = spare.pop() if spare else np.empty(rows, np.uint8)
-            np.multiply(bit, ask.no ^ ask.yes, out)
-            if ask.no:
-                np.bitwise_xor(out, ask.no, out)
-        elif ask.no is not None:
+            np.multiply(bit, test.no ^ test.yes, out)
+            if test.no:
+                np.bitwise_xor(out, test.no, out)
+        elif test.no is not None:
             out = stack.pop()
-            np.bitwise_xor(out, ask.no, out)
+            np.bitwise_xor(out, test.no, out)
             np.multiply(out, bit, out)
-            np.bitwise_xor(out, ask.no, out)
-        elif ask.yes is not None:
+            np.bitwise_xor(out, test.no, out)
+        elif test.yes is not None:
             out = stack.pop()
             np.logical_not(answer, answer)
-            np.bitwise_xor(out, ask.yes, out)
+            np.bitwise_xor(out, test.yes, out)
             np.multiply(out, bit, out)
-            np.bitwise_xor(out, ask.yes, out)
+            np.bitwise_xor(out, test.yes, out)
         else:
             yes, out = stack.pop(), stack.pop()
             np.bitwise_xor(yes, out, yes)
@@ -342,7 +342,7 @@ def _walk_on(
     flat = lines.reshape(-1)
 
     def step(rows: IntArray, here: IntArray, out: IntArray) -> None:
-        """Answer one question for each row: write the place that it leads to."""
+        """Answer one test for each row: write the place that it leads to."""
         count = len(here)
         yes, value, cut = desk.yes[:count], desk.value[:count], desk.cut[:count]
         offsets.take(here, out=out, mode="clip")

@@ -14,7 +14,7 @@ The bounds hold for the degrees as computed, not only for the formula:
   its second derivative; it need not be monotone. M is a sum over the coefficients.
   Evaluating it, v included, costs less than 32 eps (1 + sum |c|), twice (at an end and
   at the value): that is the margin.
-- The degree on a line between points is monotone, in rounded numbers too, and held
+- The degree on a line between points is monotone, in rounded numbers too, and clamped
   between those of its ends: all over a cell it lies between those at the cell's ends
   and at the points inside.
 - Bounds are kept in float32, rounded outwards.

@@ -33,7 +33,7 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
             uncovered, if an output got no conclusion and answers its default; or
             missing.
         activations: The degree of activation of each rule, shape (rules, rows); None
-            if they were not asked for.
+            if they were not requested.
     """
 
     names: tuple[str, ...]
@@ -61,7 +61,7 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
             with_activations: Whether each rule has a column.
 
         Raises:
-            ValueError: If activations are asked for that are not there.
+            ValueError: If activations are requested that are not there.
         """
         found: dict[str, Sequence[object]] = {
             name: _cells(row) for name, row in zip(self.names, self.values, strict=True)
@@ -95,7 +95,7 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         """Return the answers as CSV: each output and the status; NaN is an empty cell.
 
         Raises:
-            ValueError: If activations are asked for that are not there.
+            ValueError: If activations are requested that are not there.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -108,7 +108,7 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
 
         Raises:
-            ValueError: If activations are asked for that are not there.
+            ValueError: If activations are requested that are not there.
         """
         return arrow_table(self.columns(with_activations=with_activations))
 
@@ -116,7 +116,7 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         """Return the columns of `to_csv` as a frame of pandas; needs pandas.
 
         Raises:
-            ValueError: If activations are asked for that are not there.
+            ValueError: If activations are requested that are not there.
         """
         return pandas_frame(self.columns(with_activations=with_activations))
 

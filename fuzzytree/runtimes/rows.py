@@ -1,4 +1,4 @@
-"""Rows as runtimes take them, and what every runtime asks of them."""
+"""Checks of the rows that a runtime gets, and the winner of each."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ HIGHEST = 1.0 - 2.0**-50
 _ROUNDING = 2.0**-40  # relative to a curve's coefficients; covers far more than it must
 
 
-def asked_shapes(rules: RuleBase) -> dict[tuple[str, str], Shape]:
+def clause_shapes(rules: RuleBase) -> dict[tuple[str, str], Shape]:
     """Return the shapes that clauses name, in the order of the rules."""
     shapes = shapes_of(rules.variables)
     clauses = (clause for rule in rules.rules for clause in rule.when)
@@ -74,8 +74,8 @@ def line_error(shape: Shape, values: FloatArray) -> float:
     """Return how far lines between the samples can be from the shape's degrees.
 
     On a piece where the degree is a polynomial p of u, a line between two points that
-    are h apart in u is within `max |p''| h**2 / 8` of p. Where p is held between 0 and
-    1, the line between the held ends adds at most by how much p exceeds the range at
+    are h apart in u is within `max |p''| h**2 / 8` of p. Where p is clamped to 0 and
+    1, the line between the clamped ends adds at most by how much p exceeds the range at
     them. Both are computed for every pair of neighbours.
 
     Args:
@@ -173,7 +173,7 @@ def _at_one(curve: Sequence[float]) -> float:
 
 
 def _curve_error(curve: FloatArray, position: FloatArray) -> float:
-    """Return the error of lines on a polynomial held in [0, 1]; positions in [0, 1]."""
+    """Return the error of lines on a polynomial clamped to [0, 1], over [0, 1]."""
     powers = np.arange(len(curve))
     bend = float(np.sum(np.abs(curve) * powers * (powers - 1)))
     gaps = np.abs(np.diff(position))

@@ -32,7 +32,7 @@ _CANNOT = (
     "rules without a clause: it needs a condition",
     f"more than {_MOST_RULES} rules: each term is a list of many points",
     "curves: they are points joined by lines, within a stated bound",
-    "missing values: they are answered before it is asked",
+    "missing values: they are answered before it is called",
     "combinations: they are computed before and given to it as inputs",
 )
 
@@ -110,12 +110,12 @@ def _carried(model: Model) -> RuleBase:
     return model
 
 
-def _asked(rules: RuleBase) -> dict[str, dict[str, Shape]]:
+def _clause_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
     """Return the shapes that clauses name: those of each variable, by term."""
-    from fuzzytree.runtimes.sampling import asked_shapes
+    from fuzzytree.runtimes.sampling import clause_shapes
 
     found: dict[str, dict[str, Shape]] = {}
-    for (variable, term), shape in asked_shapes(rules).items():
+    for (variable, term), shape in clause_shapes(rules).items():
         found.setdefault(variable, {})[term] = shape
     return found
 
@@ -138,7 +138,7 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
     is_product = rules.semantics.conjunction == "product"
     conjunction = np.multiply if is_product else np.fmin
     antecedents: dict[str, Any] = {}
-    for name, shapes in _asked(rules).items():
+    for name, shapes in _clause_shapes(rules).items():
         points = _universe(list(shapes.values()))
         antecedents[name] = control.Antecedent(points, name)
         for term, shape in shapes.items():
@@ -162,7 +162,7 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
 
 
 def _is_too_steep(points: FloatArray, degrees: FloatArray) -> bool:
-    """Return whether a line's slope overflows where there are values to be asked."""
+    """Return whether a line's slope overflows between two samples."""
     import numpy as np
 
     with np.errstate(over="ignore"):
@@ -190,7 +190,7 @@ def bound(model: Model) -> tuple[float, str]:
 
     rules = _carried(model)
     errors: dict[tuple[str, str], float] = {}
-    for name, shapes in _asked(rules).items():
+    for name, shapes in _clause_shapes(rules).items():
         points = _universe(list(shapes.values()))
         for term, shape in shapes.items():
             errors[name, term] = line_error(shape, points)

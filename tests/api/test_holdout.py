@@ -49,7 +49,7 @@ def test_a_sample_keeps_the_shares_of_the_classes() -> None:
     assert len(set(rows.tolist())) == 100
 
 
-def test_classes_far_apart_are_told_apart() -> None:
+def test_classes_far_apart_are_predicted_without_error() -> None:
     found = _accuracy(_table(60))
     assert found is not None
     assert found.mean == 1.0
@@ -121,14 +121,14 @@ def test_a_class_of_one_row_is_answered_wrong_and_not_an_error() -> None:
     assert found.mean < 1.0
 
 
-def test_progress_is_told_fold_by_fold() -> None:
-    told: list[str] = []
+def test_progress_is_reported_fold_by_fold() -> None:
+    steps: list[str] = []
     table = _table(20)
     report = learn_table(table, name="t", units={}, settings=LearningSettings()).report
     accuracy(
-        table, LearningSettings(), report, progress=lambda text, _: told.append(text)
+        table, LearningSettings(), report, progress=lambda text, _: steps.append(text)
     )
-    assert told == [f"testing fold {k} of 5" for k in range(1, 6)]
+    assert steps == [f"testing fold {k} of 5" for k in range(1, 6)]
 
 
 def test_with_many_classes_fewer_folds_are_tried(

@@ -156,7 +156,7 @@ def test_rules_are_refused_where_a_tree_is_needed(verb: str) -> None:
     assert str(caught.value) == f"{verb} takes a tree, and {rules.name} is a rule base"
 
 
-def test_needs_leaves_out_what_it_is_told_to_and_proves_it() -> None:
+def test_needs_drops_what_is_requested_and_proves_it() -> None:
     found = ft.needs(TREE, data=ROWS, uses=["tree"])
     assert found.ok
     assert found.needs.inputs == TREE.inputs
@@ -255,7 +255,7 @@ def test_units_are_kept_and_must_belong_to_a_column() -> None:
 
 
 @pytest.mark.parametrize("rows", [ROWS, ROWS[:0], np.asfortranarray(ROWS)])
-def test_every_carrier_of_a_tree_answers_alike(
+def test_every_representation_of_a_tree_predicts_alike(
     tmp_path: Path, rows: FloatArray
 ) -> None:
     path = tmp_path / "tree.onnx"

@@ -40,7 +40,7 @@ def test_an_accepted_name_keeps_itself_though_another_one_comes_first() -> None:
     assert made("a b", "a_b", "a-b") == ["a_b_2", "a_b", "a_b_3"]
 
 
-def test_names_that_differ_only_in_case_are_told_apart_where_asked() -> None:
+def test_names_that_differ_only_in_case_are_numbered_where_case_is_ignored() -> None:
     assert made("Low", "low", ignores_case=True) == ["Low", "low_2"]
     assert made("Low", "low") == ["Low", "low"]
 
@@ -109,7 +109,7 @@ def test_all_names_are_accepted_unlike_and_restored(
 
 
 @pytest.mark.heavy
-def test_many_names_that_become_alike_are_told_apart_at_once() -> None:
+def test_many_names_that_become_alike_are_numbered_at_once() -> None:
     start = time.process_time()
     found = Names.of("%" * count for count in range(1, 3000))
     assert len(set(found.accepted.values())) == 2999
@@ -119,9 +119,9 @@ def test_many_names_that_become_alike_are_told_apart_at_once() -> None:
 def test_all_changed_inputs_are_shown_and_other_names_are_counted() -> None:
     assert changes_text({}, []) == ""
     changed = {f"x {k}": f"x_{k}" for k in range(14)}
-    told = changes_text(changed, ["x 13"])
-    assert told.startswith("names were changed: 'x 13' is x_13, 'x 0' is x_0, ")
-    assert told.endswith(", 'x 10' is x_10, and 2 more")
-    told = changes_text({**changed, "low %": "low"}, changed)
-    assert told.startswith("names were changed: 'x 0' is x_0, 'x 1' is x_1, ")
-    assert told.endswith(", 'x 13' is x_13, and 1 more")
+    text = changes_text(changed, ["x 13"])
+    assert text.startswith("names were changed: 'x 13' is x_13, 'x 0' is x_0, ")
+    assert text.endswith(", 'x 10' is x_10, and 2 more")
+    text = changes_text({**changed, "low %": "low"}, changed)
+    assert text.startswith("names were changed: 'x 0' is x_0, 'x 1' is x_1, ")
+    assert text.endswith(", 'x 13' is x_13, and 1 more")

@@ -43,7 +43,7 @@ def _write(
 FORM = replace(find_format("yaml"), name="turtle", write=_write)
 
 
-def test_options_are_told_with_defaults_choices_and_help() -> None:
+def test_options_are_listed_with_defaults_choices_and_help() -> None:
     found = options_of(FORM)
     names = ["dialect", "tolerance", "count", "names", "verbose", "title"]
     assert [one.name for one in found] == names

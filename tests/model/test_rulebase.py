@@ -78,7 +78,7 @@ def test_one_ulp_changes_the_fingerprint() -> None:
     assert fingerprint(other) != fingerprint(same)
 
 
-def test_all_mistakes_of_a_rule_base_are_told_at_once() -> None:
+def test_all_mistakes_of_a_rule_base_are_reported_at_once() -> None:
     with pytest.raises(InvalidModelError) as caught:
         RuleBase(
             "",

@@ -82,7 +82,7 @@ def test_a_whole_system_names_its_columns_variables_and_rules() -> None:
     assert found.rules == (RULE,)
 
 
-def test_all_mistakes_of_a_system_are_told_at_once() -> None:
+def test_all_mistakes_of_a_system_are_reported_at_once() -> None:
     assert mistakes(
         name="",
         inputs=(
@@ -129,11 +129,11 @@ def test_all_mistakes_of_a_system_are_told_at_once() -> None:
             "'a' has no term 'lo'; there is low (did you mean 'low'?)",
         ),
         (replace(RULE, when=Is("b", "low")), "when", "no variable 'b'; there is a, y"),
-        (replace(RULE, when=Is("a", None)), "when", "'a' is asked without a term"),
+        (replace(RULE, when=Is("a", None)), "when", "'a' is used without a term"),
         (
             replace(RULE, when=Is("a", None, ("any", "very"))),
             "when",
-            "'a' is asked without a term",
+            "'a' is used without a term",
         ),
         (
             replace(RULE, when=Is("b", None, ("any",))),
@@ -172,7 +172,7 @@ def test_a_rule_that_is_wrong_is_refused(
     assert found == [(("blocks", 0, "rules", 1, place), f"rule 2: {text}")]
 
 
-def test_rules_of_several_blocks_are_told_apart() -> None:
+def test_mistakes_name_the_block_of_a_rule() -> None:
     wrong = RuleBlock((replace(RULE, then=()),))
     found = mistakes(blocks=(RuleBlock((RULE,)), wrong))
     assert found == [

@@ -38,7 +38,7 @@ RULES = RuleBase(
 VALUES = np.array([[2.0], [9.0], [math.nan]])
 
 
-def test_ties_uncovered_and_missing_rows_are_told_apart() -> None:
+def test_ties_uncovered_and_missing_rows_are_counted_apart() -> None:
     answers = ft.run(RULES, VALUES, columns=["force"])
     assert answers.classes == ["soft", "hard", None]
     assert answers.rule.tolist() == [1, 0, 0]
@@ -102,7 +102,7 @@ def test_batches_join_to_the_answers_of_the_whole() -> None:
     assert parts.to_csv("rule") == whole.to_csv("rule")
 
 
-def test_why_tells_ties_gaps_and_missing_values() -> None:
+def test_reasons_show_ties_gaps_and_missing_values() -> None:
     answers = ft.run(RULES, VALUES, columns=["force"])
     assert reasons(RULES, VALUES.T, answers) == [
         "IF force is low (0.5) THEN soft; as strong: rule 2",

@@ -241,7 +241,7 @@ def _changed(change: object, model: Model | None = None) -> bytes:
     return content
 
 
-def test_a_shipped_file_tells_what_it_is_and_answers_alone() -> None:
+def test_a_shipped_file_describes_itself_and_predicts_alone() -> None:
     tree = random_tree(7, leaves=9, inputs=3, semantics=Semantics(missing="class 2"))
     values = probe_values(tree, 1500)
     for model in (tree, rules_from_tree(tree, "raw", conjunction="product")):
@@ -265,7 +265,7 @@ def test_a_shipped_file_tells_what_it_is_and_answers_alone() -> None:
         assert found.labels(values) == tuple(answer.label for answer in answers)
 
 
-def test_a_file_without_status_tells_missing_from_uncovered() -> None:
+def test_a_file_without_status_separates_missing_from_uncovered() -> None:
     low = Term("low", Band(high=0.0))
     rules = RuleBase(
         "r", ("a",), (Variable("x", (low,)),), (Rule((Clause("x", ("low",)),), "a"),)

@@ -62,7 +62,7 @@ def test_what_was_out_of_the_ordinary_is_counted() -> None:
     assert FOUND.spans() == {"fan": (1.0, 2.5), "status": (0.0, 0.0)}
 
 
-def test_activations_that_were_not_asked_for_are_not_there() -> None:
+def test_activations_are_absent_unless_requested() -> None:
     bare = Outputs(("y",), np.array([[1.0]]), np.array([0]))
     with pytest.raises(ValueError, match="ask for them"):
         bare.columns(with_activations=True)
@@ -108,11 +108,11 @@ def test_reasons_tell_what_fired_and_what_did_not() -> None:
     system = SYSTEMS[0]
     table = np.array([[1.0, 1.0], [5.0, 9.9], [math.nan, 1.0], [3.0, 20.0]])
     found = ft.run(system, table, columns=system.columns)
-    told = system_reasons(system, found)
-    assert told[0] == ("rule 1 (1): IF heat is low and damp is dry THEN fan is slow")
-    assert told[1].startswith("rule 2 (0.25): IF heat is high")
-    assert told[2] == "a value is missing or not finite"
-    assert told[3] == "no rule fires"
+    reasons = system_reasons(system, found)
+    assert reasons[0] == ("rule 1 (1): IF heat is low and damp is dry THEN fan is slow")
+    assert reasons[1].startswith("rule 2 (0.25): IF heat is high")
+    assert reasons[2] == "a value is missing or not finite"
+    assert reasons[3] == "no rule fires"
 
 
 def test_an_array_as_wide_as_a_system_has_its_columns() -> None:
@@ -127,5 +127,5 @@ def test_an_array_as_wide_as_a_system_has_its_columns() -> None:
     with pytest.raises(ft.FuzzyTreeError) as caught:
         ft.run(tipper, np.zeros((1, 3)))
     assert str(caught.value) == (
-        "the array has 3 columns without names, and the model asks for 2: service, food"
+        "the array has 3 columns without names, and the model needs 2: service, food"
     )

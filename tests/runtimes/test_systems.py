@@ -102,7 +102,7 @@ def test_chunks_and_single_rows_do_not_change_bits(runtime: Runtime) -> None:
 
 
 @pytest.mark.parametrize("runtime", RUNTIMES, ids=lambda one: one.name)
-def test_missing_rows_are_nan_and_told(runtime: Runtime) -> None:
+def test_missing_rows_are_nan_and_have_that_status(runtime: Runtime) -> None:
     system = random_system(5, formulas="none")
     assert runtime.load_system is not None
     values = np.array([[0.0, math.nan], [0.0, 1.0], [math.inf, 0.0]])

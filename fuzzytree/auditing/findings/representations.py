@@ -135,12 +135,12 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answ
         f"{one.rows} {noun}"
     )
     state: State = Proved(f"both were run or read; {facts}")
-    if subject.system is None and one.told:
+    if subject.system is None and one.row_numbers:
         model = _model(subject)
         made = {str(name): form for name, form in forms(model).items()}
         form = made.get(_form(one), model)
         rows = probed(model, values, PROBES).values
-        witness = conventions.witness(subject, form, rows[:, [*one.told]])
+        witness = conventions.witness(subject, form, rows[:, [*one.row_numbers]])
         state = witness or state
     return Answer(
         "FT601",

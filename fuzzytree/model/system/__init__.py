@@ -305,7 +305,7 @@ class FuzzySystem(Value, frozen=True):
         name: For people and files.
         inputs: The inputs; combinations stand after their columns.
         outputs: The outputs.
-        blocks: Run in order; an output may be asked about after it was concluded.
+        blocks: Run in order; conditions may use an output after it was concluded.
         note: For people.
 
     Raises:

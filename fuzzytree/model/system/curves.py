@@ -186,7 +186,7 @@ class Number(Value, frozen=True, tag="number"):
 class Name(Value, frozen=True, tag="name"):
     """A variable of a formula: an input, an output before this one, or `x` itself.
 
-    `x` is the value whose degree is asked for; in a weighted conclusion it is the
+    `x` is the value whose degree is computed; in a weighted conclusion it is the
     conclusion's degree. A term of an input may name inputs only.
     """
 
@@ -222,7 +222,7 @@ FUNCTIONS: Final[Mapping[str, int]] = MappingProxyType(
 
 
 class Formula(Value, frozen=True, tag="formula"):
-    """An arithmetic expression; `x` is the value whose degree is asked for."""
+    """An arithmetic expression; `x` is the value whose degree is computed."""
 
     expression: Expression
 

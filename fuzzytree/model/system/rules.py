@@ -109,7 +109,7 @@ class SystemRule(Value, frozen=True):
     """IF a condition holds THEN some conclusions are activated.
 
     Attributes:
-        when: The condition; None holds always. It may ask an output: of a label of it
+        when: The condition; None is always true. It may use an output: of a label of it
             the degrees concluded so far, joined by the output's aggregation (summed if
             None), by earlier blocks, and by rules of this block that were run before,
             unless its activation must know all degrees first (`highest`, `lowest`,
@@ -174,7 +174,7 @@ class RuleBlock(Value, frozen=True):
 
 
 def questions(condition: Condition | None) -> Iterator[Is]:
-    """Yield what a condition asks, from left to right."""
+    """Yield the propositions of a condition, from left to right."""
     match condition:
         case Is():
             yield condition
@@ -220,11 +220,11 @@ def condition_mistakes(
         return
     if _is_empty(condition):
         yield "it joins no conditions at all"
-    for asked in questions(condition):
-        if asked.label is not None or asked.variable not in terms:
-            yield from reference_mistakes(asked.variable, asked.label, terms)
-        elif not asked.hedges or asked.hedges[-1] != "any":
-            yield f"{asked.variable!r} is asked without a term"
+    for one in questions(condition):
+        if one.label is not None or one.variable not in terms:
+            yield from reference_mistakes(one.variable, one.label, terms)
+        elif not one.hedges or one.hedges[-1] != "any":
+            yield f"{one.variable!r} is used without a term"
     if block.conjunction is None and _uses(condition, And):
         yield "it needs a conjunction, and its block has none"
     if block.disjunction is None and _uses(condition, Or):
