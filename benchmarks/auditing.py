@@ -255,7 +255,7 @@ def whole(name: str, budget_s: float) -> str:
     )
     taken, wall = time.process_time() - start, time.perf_counter() - wall
     states = Counter(type(one.state).__name__ for one in found.answers)
-    left = sum(": not asked: the budget" in text for text in found.unasked)
+    left = sum(": not run: the budget" in text for text in found.unasked)
     cut = sum(": cut short" in text for text in found.unasked)
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     known = states["Witness"] + states["Proved"] + states["Sampled"]

@@ -177,7 +177,7 @@ def annotation_lines(audit: Audit) -> Iterator[str]:
         yield _annotation(answer, audit)
     if not audit.is_complete:
         cut = [text for text in audit.unasked if ": cut short" in text]
-        cut += [text for text in audit.unasked if ": not asked: " in text]
+        cut += [text for text in audit.unasked if ": not run: " in text]
         yield f"::notice title=audit not complete::{_escaped('; '.join(cut), _IN_TEXT)}"
     declined = [one for one in audit.answers if isinstance(one.state, Declined)]
     if declined and len(declined) == len(audit.answers):

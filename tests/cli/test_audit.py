@@ -339,7 +339,7 @@ def test_a_ctrl_c_keeps_what_is_answered_and_reports_the_rest() -> None:
     )
     assert found.was_interrupted
     assert not found.is_complete
-    assert any(text.endswith(": not asked: interrupted") for text in found.unasked)
+    assert any(text.endswith(": not run: interrupted") for text in found.unasked)
     codes = {one.code for one in found.answers}
     assert codes
     assert codes < {one.code for one in ft.audit("grip.yaml").answers}

@@ -62,7 +62,7 @@ def test_a_changed_class_is_shown_with_a_witness_and_its_box(call: Call) -> None
         "           at force = 1.5, slip = 0.0\n"
         "           everywhere in the box of force 0 to 2\n"
     ) in out
-    assert "  SAMPLED  1 of 4 rows of grasps.csv are answered otherwise" in out
+    assert "  SAMPLED  1 of 4 rows of grasps.csv are classified differently" in out
     assert (
         "  breaking     rule 1 has changed: its class is 'loose', and was 'soft'" in out
     )
@@ -131,8 +131,8 @@ def test_damaged_and_foreign_files_are_refused(call: Call) -> None:
     code, _, err = call("diff", "grip.yaml", "other.yaml")
     assert code == 2
     assert err == (
-        "other.yaml: has no input in common with grip.yaml: it asks 'wind', and that "
-        "asks 'force', 'slip'\n"
+        "other.yaml: has no input in common with grip.yaml: it uses 'wind', and that "
+        "uses 'force', 'slip'\n"
     )
 
 

@@ -10,7 +10,7 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.system import FuzzySystem
-from tests.auditing.findings.grids import told_rightly
+from tests.auditing.findings.grids import check_on_grid
 from tests.interop.audits import CORPORA, LEFT_OUT
 
 Need = Callable[[str], str]
@@ -40,7 +40,7 @@ def test_what_is_told_of_real_files_holds_on_a_grid(
             continue
         files += 1
         found = audit(system, ignore=LEFT_OUT, select=["FT1", "FT2", "FT3"])
-        checked += told_rightly(
+        checked += check_on_grid(
             system, found, seen, STEPS.get(len(found.domain.sides), 3)
         )
     assert files > 10

@@ -118,7 +118,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
         Answer(
             "FT403",
             pressure,
-            f"'low' and 'medium' of {pressure!r} are hard to tell apart",
+            f"'low' and 'medium' of {pressure!r} are hard to distinguish",
             Sampled("rows in both", 3, 40, 0.02, 0.2, 0.95, "the rows of the table"),
             is_finding=True,
             terms=(TermName(pressure, "low"), TermName(pressure, "medium")),

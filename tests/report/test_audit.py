@@ -61,7 +61,7 @@ declined
 not examined, or not to the end
 - FT102 marginal rule: cut short: the budget of 60 s is spent
 - FT103, FT104: left out by the user
-- FT107 irrelevant clause: not asked: the budget of 60 s is spent
+- FT107 irrelevant clause: not run: the budget of 60 s is spent
 
 """
 
@@ -97,7 +97,7 @@ def test_what_is_alike_is_said_once() -> None:
     audit = every_state()
     state = Declined("FTD02", "its curve (gaussian) has no exact method")
     answer = replace(audit.answers[3], code="FTD02", state=state)
-    reason = "not asked: every rule takes part in the answer"
+    reason = "not run: every rule takes part in the answer"
     unasked = (f"FT102 marginal rule: {reason}", f"FT105 a: {reason}", "FT204 b: c")
     text = "\n".join(audit_lines(replace(audit, answers=(answer,), unasked=unasked)))
     assert "\n- FTD02 term 'low' of 'force': its curve (gaussian) has no" in text

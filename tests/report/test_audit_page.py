@@ -111,12 +111,12 @@ def test_an_audit_that_found_nothing_so_far_does_not_look_calm() -> None:
     assert 'class="said calm"' not in content
 
 
-def test_an_audit_that_was_cut_short_says_so_and_what_was_not_examined() -> None:
-    unasked = ("FT501 complexity: not asked: the budget of 1 s is spent",)
+def test_an_audit_that_was_cut_short_says_so_and_what_was_not_asked() -> None:
+    unasked = ("FT501 complexity: not run: the budget of 1 s is spent",)
     text = shown(is_complete=False, unasked=unasked).text
     assert "The audit was cut short by its budget: 10 questions examined" in text
     assert unasked[0] in text
-    by_hand = ("FT501 complexity: not asked: interrupted",)
+    by_hand = ("FT501 complexity: not run: interrupted",)
     text = shown(is_complete=False, unasked=by_hand).text
     assert "The audit was cut short by hand" in text
 

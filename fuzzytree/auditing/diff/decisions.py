@@ -1,4 +1,4 @@
-"""Where two models decide otherwise, and how that comes about.
+"""Where two models decide differently, and how that comes about.
 
 The same operations on the same numbers prove decisions equal on any input. Otherwise
 rows of data, probes of both models, points drawn from the domain and points beside
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 _PROBES = 4_000  # of each model
 _SEGMENTS = 64  # between points of different decisions, halved down to doubles
 _HALVINGS = 70
-_MOST_TOLD = 24  # pairs of classes with a witness each
+_MOST_LISTED = 24  # pairs of classes with a witness each
 _POINTS = 0.5  # of the budget is for single points, the rest for proofs
 _PORTION = 64  # rows between two looks at the clock, at first
 _MOST_REGIONS = 4  # of which the box is looked for
@@ -111,7 +111,7 @@ def all_inputs(old: Document, new: Document) -> tuple[str, ...]:
 
 
 def union(old: Document, new: Document) -> RuleBase:
-    """Return rules that ask nothing of the inputs of both models."""
+    """Return a rule base with the inputs of both models, and no clause."""
     inputs = tuple(Variable(name) for name in all_inputs(old, new))
     return RuleBase("both", ("x",), inputs, (Rule((), "x"),))
 
@@ -199,8 +199,10 @@ def _on_rows(rows: AuditRows, found: _Found) -> Answer:
     of = f"{count} rows"
     if count < rows.values.shape[1]:
         of = f"the first {count} of {rows.values.shape[1]} rows"
-    sentence = f"{hits} of {of} of {rows.name} are answered otherwise"
-    state = sampled_share("rows that are answered otherwise", hits, count, rows.name)
+    sentence = f"{hits} of {of} of {rows.name} are classified differently"
+    state = sampled_share(
+        "rows that are classified differently", hits, count, rows.name
+    )
     return Answer(
         "FT801", "rows", sentence, state, is_finding=hits > 0, severity="error"
     )
@@ -208,8 +210,10 @@ def _on_rows(rows: AuditRows, found: _Found) -> Answer:
 
 def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
     how = f"{rows} points drawn evenly from the domain, seed {seed}"
-    state = sampled_share("the domain that is answered otherwise", hits, rows, how)
-    sentence = f"{hits} of {rows} points drawn from the domain are answered otherwise"
+    state = sampled_share("the domain that is classified differently", hits, rows, how)
+    sentence = (
+        f"{hits} of {rows} points drawn from the domain are classified differently"
+    )
     return Answer("FT801", "domain", sentence, state, is_finding=hits > 0)
 
 
@@ -223,8 +227,8 @@ def _left_answer(count: int) -> Answer:
 
 def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
     """Yield a witness for each pair of classes, the clearest one that is known."""
-    told = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
-    for number, (labels, (_, name, found_at)) in enumerate(told[:_MOST_TOLD]):
+    known = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
+    for number, (labels, (_, name, found_at)) in enumerate(known[:_MOST_LISTED]):
         point = found_at if name else _simple(pair, labels, found_at)
         one, other = prediction_at(pair.old, point), prediction_at(pair.new, point)
         state = difference_at(pair.old, pair.new, point)
@@ -246,11 +250,11 @@ def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
             severity="error",
             region=spans,
         )
-    if len(told) > _MOST_TOLD:
-        left = len(told) - _MOST_TOLD
+    if len(known) > _MOST_LISTED:
+        left = len(known) - _MOST_LISTED
         sentence = f"{left} more pairs of classes are answered one for the other"
-        known = told[_MOST_TOLD][1][2]
-        state = difference_at(pair.old, pair.new, known)
+        point = known[_MOST_LISTED][1][2]
+        state = difference_at(pair.old, pair.new, point)
         assert state is not None
         yield Answer("FT801", "more", sentence, state, is_finding=True)
 
@@ -275,13 +279,7 @@ def _answered(one: ExactPrediction) -> str:
 
 
 class _Found:
-    """Points at which two models answer otherwise, and how that comes about.
-
-    Args:
-        pair: The two models.
-        clock: How long points are looked at; `left` counts those for which it was over,
-            and `is_cut` tells whether some were not even made.
-    """
+    """Points at which two models answer differently, and how that comes about."""
 
     def __init__(self, pair: RulePair, clock: Clock) -> None:
         self.pair, self.clock, self.left, self.is_cut = pair, clock, 0, False
@@ -389,7 +387,7 @@ def _probes(pair: RulePair) -> FloatArray:
     made: list[FloatArray] = []
     for model in (pair.old, pair.new):
         known = probe_values(model, _PROBES)
-        # An input that this model does not ask stays in the middle of its side.
+        # An input that this model does not use stays in the middle of its side.
         values = np.repeat((low / 2 + high / 2)[:, None], known.shape[1], axis=1)
         values[[pair.inputs.index(name) for name in model.inputs]] = known
         made.append(values)
@@ -403,7 +401,7 @@ def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
     """Return points beside the old model's decision boundaries, to the last double.
 
     Points of different decisions are joined, and the line is halved as long as its
-    ends are decided otherwise by the old model, or until the clock is over.
+    ends are decided differently by the old model, or until the clock is over.
     """
     if not values.shape[1]:
         return values

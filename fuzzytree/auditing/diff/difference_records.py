@@ -24,10 +24,10 @@ Verdict = Literal["equal", "changed", "open"]
 
 
 class Change(Value, frozen=True):
-    """One thing that the new model says otherwise than the old one.
+    """One change from the old model to the new one.
 
     Attributes:
-        grade: `breaking`: a decision is known to change by it, or whoever calls the
+        grade: `breaking`: a decision is known to change by it, or callers of the
             model must change. `non-breaking`: none is known to, although strengths
             may. `cosmetic`: it is for people only.
         is_proved: Whether the grade is certain; it is not for a non-breaking change

@@ -43,8 +43,8 @@ def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) ->
     one, other = inputs_of(old), inputs_of(new)
     if one and other and not set(one) & set(other):
         raise ReadError(
-            f"{names[1]}: has no input in common with {names[0]}: it asks "
-            f"{', '.join(map(repr, other))}, and that asks "
+            f"{names[1]}: has no input in common with {names[0]}: it uses "
+            f"{', '.join(map(repr, other))}, and that uses "
             f"{', '.join(map(repr, one))}"
         )
 
@@ -91,11 +91,11 @@ def joined_domain(
             )
     sides: dict[str, DomainSide] = {}
     for model in (old, new):
-        asked = None
+        own_rows = None
         if rows is not None:
             places = [inputs.index(name) for name in inputs_of(model)]
-            asked = AuditRows(rows.name, rows.values[places])
-        for side in domain_of(model, rows=asked, limited=limits).sides:
+            own_rows = AuditRows(rows.name, rows.values[places])
+        for side in domain_of(model, rows=own_rows, limited=limits).sides:
             known = sides.get(side.variable)
             origins = (known.origin if known else "unused", side.origin)
             if origins[0] == "unused" or origins == ("curves", "model"):
@@ -149,7 +149,7 @@ def difference(
     if _give_numbers(old) and _give_numbers(new):
         assert isinstance(old, FuzzySystem)  # no other model gives numbers
         assert isinstance(new, FuzzySystem)
-        told, answers = system_changes(old, new, domain, rows, settings, clock)
+        changes, answers = system_changes(old, new, domain, rows, settings, clock)
     else:
         titles = [
             file.name if file else model.name
@@ -161,8 +161,8 @@ def difference(
         found = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
         clock.report("comparing decisions", 0.1)
         answers, evidence = decisions(pair, rows, settings, clock)
-        told = [(grade(one, evidence), one.old, one.new) for one in found]
-    changes = [_placed(change, paths, both, files) for change, *paths in told]
+        changes = [(grade(one, evidence), one.old, one.new) for one in found]
+    located = [_placed(change, paths, both, files) for change, *paths in changes]
     order = {"breaking": 0, "non-breaking": 1, "cosmetic": 2}
     one, other = (
         ComparedModel(
@@ -181,7 +181,7 @@ def difference(
         0 if rows is None else rows.values.shape[1],
         domain,
         settings,
-        tuple(sorted(changes, key=lambda change: order[change.grade])),
+        tuple(sorted(located, key=lambda change: order[change.grade])),
         tuple(answers),
     )
 

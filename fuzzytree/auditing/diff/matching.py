@@ -1,8 +1,9 @@
-"""Which rule of one rule base is which rule of another: by what they say, not by order.
+"""Match the rules of two rule bases by what they mean, and not by their order.
 
-Rules are the same if they ask the same curves of the same inputs and conclude the same
-class, whatever terms are called. Others are matched, the nearest first: equal clauses
-and another class; equal words, with curves that changed; some clauses in common.
+Rules are the same if their clauses have equal curves of the same inputs and their
+classes are equal, whatever terms are called. Others are matched, the nearest first:
+equal clauses and another class; equal words, with curves that changed; some clauses in
+common.
 """
 
 from __future__ import annotations
@@ -81,13 +82,7 @@ def _joined(laid: Sequence[PolynomialPiece]) -> Iterable[PolynomialPiece]:
 
 
 class RuleKeys:
-    """What the rules of a rule base say, as keys that can be compared.
-
-    Args:
-        rules: The rule base.
-        curves: Numbers its curves.
-        names: What the classes are called in the other rule base.
-    """
+    """Keys of the rules of a rule base, equal for rules that mean the same."""
 
     def __init__(
         self, rules: RuleBase, curves: Curves, names: Mapping[str, str] | None = None
@@ -99,11 +94,11 @@ class RuleKeys:
         self.names = names or {}
         self._clauses: dict[Clause, ClauseKey] = {}
         for clause in {clause for rule in rules.rules for clause in rule.when}:
-            asked = frozenset(numbers[clause.variable, term] for term in clause.terms)
-            self._clauses[clause] = (keys[clause.variable], clause.negated, asked)
+            terms = frozenset(numbers[clause.variable, term] for term in clause.terms)
+            self._clauses[clause] = (keys[clause.variable], clause.negated, terms)
 
     def clause(self, clause: Clause) -> ClauseKey:
-        """Return what a clause asks."""
+        """Return the key of a clause."""
         return self._clauses[clause]
 
     def then(self, rule: Rule) -> str:
@@ -112,10 +107,10 @@ class RuleKeys:
 
     def same(self, rule: Rule) -> Hashable:
         """Return what rules have in common that say the same."""
-        return self.asked(rule), self.then(rule)
+        return self.antecedent(rule), self.then(rule)
 
-    def asked(self, rule: Rule) -> Hashable:
-        """Return what rules have in common that ask the same."""
+    def antecedent(self, rule: Rule) -> Hashable:
+        """Return what rules have in common with the same antecedent."""
         return frozenset(map(self.clause, rule.when))
 
     def words(self, rule: Rule) -> Hashable:
@@ -143,7 +138,7 @@ def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
     if (one.conjunction, one.uncovered) != (other.conjunction, other.uncovered):
         return False
     curves = Curves()
-    asked: list[set[Hashable]] = []
+    keys: list[set[Hashable]] = []
     for rules in (old, new):
         said = RuleKeys(rules, curves)
         known: set[Hashable] = set()
@@ -152,8 +147,8 @@ def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
             if one.conjunction == "min":  # a clause that stands twice counts once
                 counts = Counter({*counts})
             known.add((frozenset(counts.items()), rule.then))
-        asked.append(known)
-    return asked[0] == asked[1]
+        keys.append(known)
+    return keys[0] == keys[1]
 
 
 def words_of(clause: Clause) -> NamedKey:
@@ -176,7 +171,7 @@ def matching(one: RuleKeys, other: RuleKeys) -> Matching:
     found: list[Match] = []
     steps: tuple[tuple[How, Callable[[RuleKeys, Rule], Hashable]], ...] = (
         ("same", RuleKeys.same),
-        ("class", RuleKeys.asked),
+        ("class", RuleKeys.antecedent),
         ("curves", RuleKeys.words),
     )
     for how, key in steps:

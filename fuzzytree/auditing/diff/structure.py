@@ -41,14 +41,7 @@ def draft_changes(
     domain: Domain,
     trees: tuple[FuzzyTree, FuzzyTree] | None = None,
 ) -> Iterator[Draft]:
-    """Yield what a new rule base says otherwise than an old one.
-
-    Args:
-        old: The old rules.
-        new: The new rules.
-        domain: Where curves are compared; a side for each input of either.
-        trees: The trees that the rules come from, if both are trees.
-    """
+    """Yield the changes from an old rule base to a new one."""
     curves = Curves()
     names = _renamed_classes(old, new, curves)
     yield from _class_drafts(old, new, names)
@@ -109,20 +102,20 @@ def _head_drafts(old: RuleBase, new: RuleBase, found: Matching) -> Iterator[Draf
 
 
 def _renamed_classes(old: RuleBase, new: RuleBase, curves: Curves) -> dict[str, str]:
-    """Return which classes are called otherwise: their rules ask the same."""
+    """Return which classes have a new name: those whose antecedents are the same."""
     gone = [label for label in old.classes if label not in new.classes]
     come = [label for label in new.classes if label not in old.classes]
     if not gone or not come:
         return {}
     one, other = RuleKeys(old, curves), RuleKeys(new, curves)
-    asked = {
-        label: {other.asked(rule) for rule in new.rules if rule.then == label}
+    antecedents = {
+        label: {other.antecedent(rule) for rule in new.rules if rule.then == label}
         for label in come
     }
     found: dict[str, str] = {}
     for label in gone:
-        mine = {one.asked(rule) for rule in old.rules if rule.then == label}
-        match = next((k for k in come if mine and asked[k] == mine), None)
+        mine = {one.antecedent(rule) for rule in old.rules if rule.then == label}
+        match = next((k for k in come if mine and antecedents[k] == mine), None)
         if match is not None and match not in found.values():
             found[label] = match
     return found
@@ -150,11 +143,11 @@ def _answer_drafts(
     old: RuleBase, new: RuleBase, names: Mapping[str, str]
 ) -> Iterator[Draft]:
     one, other = old.semantics, new.semantics
-    asked: tuple[tuple[str, str, Shown], ...] = (
+    fields: tuple[tuple[str, str, Shown], ...] = (
         ("uncovered", "where no rule fires", "uncovered"),
         ("missing", "where a value is missing", "always"),
     )
-    for field, where, shown in asked:
+    for field, where, shown in fields:
         was: str | None = getattr(one, field)
         now: str | None = getattr(other, field)
         if (names.get(was, was) if was is not None else None) != now:
@@ -201,7 +194,7 @@ def _rule_drafts(
 
 def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Iterator[Draft]:
     if match.how in ("same", "curves"):
-        return  # what the curves do is told of the terms
+        return  # changed curves are reported with their terms
     was, now = one.rules[match.old - 1], other.rules[match.new - 1]
     texts = [*_clause_texts(was, now, one, other)]
     if one.then(was) != now.then:
@@ -224,25 +217,25 @@ def _clause_texts(
     was: Rule, now: Rule, one: RuleKeys, other: RuleKeys
 ) -> Iterator[str]:
     """Yield which clauses a rule has lost and gained."""
-    asked, read = {other.clause(c) for c in now.when}, {words_of(c) for c in now.when}
-    gone = [c for c in was.when if one.clause(c) not in asked]
+    keys, read = {other.clause(c) for c in now.when}, {words_of(c) for c in now.when}
+    gone = [c for c in was.when if one.clause(c) not in keys]
     gone = [c for c in gone if words_of(c) not in read]
-    known, told = {one.clause(c) for c in was.when}, {words_of(c) for c in was.when}
+    known, words = {one.clause(c) for c in was.when}, {words_of(c) for c in was.when}
     come = [c for c in now.when if other.clause(c) not in known]
-    come = [c for c in come if words_of(c) not in told]
+    come = [c for c in come if words_of(c) not in words]
     for clause in gone:
         match = next((c for c in come if c.variable == clause.variable), None)
         if match is None:
-            yield f"it no longer asks {clause_text(clause)!r}"
+            yield f"it no longer has {clause_text(clause)!r}"
         else:
             come.remove(match)
-            yield f"it asks {clause_text(match)!r} in place of {clause_text(clause)!r}"
+            yield f"it has {clause_text(match)!r} in place of {clause_text(clause)!r}"
     for clause in come:
-        yield f"it asks {clause_text(clause)!r} as well"
+        yield f"it also has {clause_text(clause)!r}"
 
 
 def _order_drafts(matches: Sequence[Match]) -> Iterator[Draft]:
-    """Yield that rules stand in another order, told by those that were overtaken."""
+    """Yield that rules stand in another order, as many as were overtaken."""
     moved = [(a, b) for (a, b) in itertools.pairwise(matches) if b.new < a.new]
     if moved:
         kept = _longest_run([match.new for match in matches])
@@ -274,7 +267,7 @@ Users = Mapping[tuple[str, str], tuple[int, ...]]
 def variable_drafts(
     old: RuleBase, new: RuleBase, curves: Curves, domain: Domain
 ) -> Iterator[Draft]:
-    """Yield what a new rule base says otherwise of its variables.
+    """Yield the changes of the variables of a rule base.
 
     Inputs are known by their names, combinations by what they sum.
     """
@@ -334,7 +327,7 @@ def _summed(
 ) -> Draft:
     """Return that a variable of one name looks at something else."""
     (place, old), (at, new) = was, now
-    text = f"{new.name!r} sums otherwise"
+    text = f"{new.name!r} sums other inputs or weights"
     one, other = ([part.input for part in variable.parts] for variable in (old, new))
     gone = [name for name in one if name not in other]
     come = [name for name in other if name not in one]
@@ -356,7 +349,7 @@ def _summed(
 
 
 def _asking(variable: Variable, users: Users) -> tuple[int, ...]:
-    """Return the numbers of the rules that ask a variable."""
+    """Return the numbers of the rules that use a variable."""
     return tuple(
         sorted({n for (name, _), rules in users.items() if name == variable.name
                 for n in rules})
@@ -450,7 +443,7 @@ def _terms(
     rules = sorted({n for name in names for n in users.get((variable, name), ())})
     verb = "term was" if len(names) == 1 else "terms were"
     text = f"of {variable!r} {len(names)} {verb} {what}: {listed(names)}"
-    text += "" if rules else ", which no rule asks"
+    text += "" if rules else ", which no rule uses"
     old, new = (tuple(rules), ()) if what == "removed" else ((), tuple(rules))
     here, there = (path, None) if what == "removed" else (None, path)
     return Draft("term", text, "rules", here, there, old, new, is_harmless=not rules)
@@ -492,7 +485,7 @@ def _changed_term(
 
 
 def set_drafts(old: FuzzyTree, new: FuzzyTree, curves: Curves) -> Iterator[Draft]:
-    """Yield which fitted sets of trees differ: raw rules alone ask them."""
+    """Yield which fitted sets of trees differ: only raw rules use them."""
     mine, theirs = (
         {
             (group.variable, term.name): (("sets", g, "terms", t), term.shape)
@@ -508,7 +501,7 @@ def set_drafts(old: FuzzyTree, new: FuzzyTree, curves: Curves) -> Iterator[Draft
         elif curves.number(shape) != curves.number(theirs[key][1]):
             counts["changed"] += 1
     counts["new"] = sum(key not in mine for key in theirs)
-    told = [f"{count} {what}" for what, count in counts.items() if count]
-    if told:
-        text = f"of the fitted sets {', '.join(told)}; raw rules alone ask them"
+    changes = [f"{count} {what}" for what, count in counts.items() if count]
+    if changes:
+        text = f"of the fitted sets {', '.join(changes)}; only raw rules use them"
         yield Draft("term", text, "never", ("sets",), ("sets",))

@@ -67,14 +67,9 @@ class NotExactError(Exception):
 def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None:
     """Return the number of an output at a point, None where it is no number.
 
-    Args:
-        system: The system.
-        output: The name of one of its outputs.
-        point: A value for each column.
-
     Raises:
         NotExactError: If the output looks at a curve, or some curve, norm, hedge or
-            activation is none of fractions, or a rule asks an output.
+            activation is none of fractions, or a rule uses an output.
     """
     one = next(each for each in system.outputs if each.name == output)
     how = one.defuzzifier
@@ -119,11 +114,11 @@ def _values(inputs: Sequence[SystemInput], point: Point) -> dict[str, Fraction]:
                 Fraction(0),
             )
         )
-        values[one.name] = _held(one, value) if one.clips else value
+        values[one.name] = _clamped(one, value) if one.clips else value
     return values
 
 
-def _held(one: SystemInput | SystemOutput, value: Fraction) -> Fraction:
+def _clamped(one: SystemInput | SystemOutput, value: Fraction) -> Fraction:
     value = value if one.low is None else max(value, Fraction(one.low))
     return value if one.high is None else min(value, Fraction(one.high))
 
@@ -131,7 +126,7 @@ def _held(one: SystemInput | SystemOutput, value: Fraction) -> Fraction:
 def _answered(one: SystemOutput, number: Fraction | None) -> Fraction | None:
     if number is None and one.default is not None:
         number = Fraction(one.default)
-    return _held(one, number) if one.clips and number is not None else number
+    return _clamped(one, number) if one.clips and number is not None else number
 
 
 def _label(one: SystemInput | SystemOutput, name: str) -> SystemTerm:
@@ -198,12 +193,6 @@ def most(
 
     It holds in real numbers, for points of the domain at which both answer a number.
 
-    Args:
-        old: A system.
-        new: Another one with an output of that name.
-        output: The name.
-        domain: A side for each column of either.
-
     Returns:
         None where nothing bounds the output, such as a formula.
     """
@@ -214,8 +203,8 @@ def most(
     known = contributions(old, output, domain), contributions(new, output, domain)
     found = _moved(old, new, (one, other), known, domain)
     spans = [
-        _span(system, each, asked, domain)
-        for system, each, asked in zip((old, new), (one, other), known, strict=True)
+        _span(system, each, known_one, domain)
+        for system, each, known_one in zip((old, new), (one, other), known, strict=True)
     ]
     if found is None and (spans[0] is None or spans[1] is None):
         return None
@@ -347,4 +336,4 @@ def _span(
     if not found:
         return None
     low, high = min(low for low, _ in found), max(high for _, high in found)
-    return (_held(one, low), _held(one, high)) if one.clips else (low, high)
+    return (_clamped(one, low), _clamped(one, high)) if one.clips else (low, high)

@@ -35,7 +35,7 @@ def system_changes(
     settings: AuditSettings,
     clock: Clock,
 ) -> Found:
-    """Return what a new system says otherwise, with places, and how numbers differ.
+    """Return the changes of a system with their places, and how its numbers differ.
 
     A change that can move a number counts as breaking where some number was seen to
     move; which of several changes moved it is not looked for.
@@ -114,8 +114,10 @@ def _variable_drafts(noun: str, old: _Variables, new: _Variables) -> Iterator[_D
             shown = "cosmetic" if key == "unit" else "moves"
             text = f"the {key} of {name!r} is {_text(now)}, and was {_text(was)}"
             if key == "clips":
-                text = f"values of {name!r} are {'now' if now else 'no longer'} held "
-                text += "in its range"
+                text = (
+                    f"values of {name!r} are {'now' if now else 'no longer'} clamped "
+                )
+                text += "to its range"
             yield shown, "unit" if key == "unit" else noun, text, here, there
         yield from _label_drafts(one, other, here, there)
     for name, (place, _) in theirs.items():
@@ -194,7 +196,7 @@ def _in_block(old: RuleBlock, new: RuleBlock, place: int) -> Iterator[_Draft]:
             yield "moves", "rule", f"rule {k + 1}{of} was removed", here, None
             continue
         come.remove(match)
-        text = f"rule {k + 1}{of} concludes otherwise, or has another weight"
+        text = f"rule {k + 1}{of} has another conclusion or weight"
         yield "moves", "rule", text, here, (*path, "rules", match)
     for k in come:
         yield "moves", "rule", f"rule {k + 1}{of} is new", None, (*path, "rules", k)
@@ -204,7 +206,7 @@ def _in_block(old: RuleBlock, new: RuleBlock, place: int) -> Iterator[_Draft]:
 
 
 def _taken(left: dict[Hashable, int], key: Hashable) -> bool:
-    """Return whether a key is still to be told of, and count it as told."""
+    """Return True as often as a key is left, and count it down."""
     if not left[key]:
         return False
     left[key] -= 1

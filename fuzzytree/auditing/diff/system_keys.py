@@ -3,7 +3,7 @@
 Equal keys prove that two systems give an output the same number: `computed` by the same
 operations on the same numbers, `meant` as the same function of real numbers, so that
 they differ by rounding at most. Names, units, notes, the order of terms, inputs and
-outputs, rules of weight 0 and terms that nothing asks are no part of a key.
+outputs, rules of weight 0 and terms that no rule uses are no part of a key.
 """
 
 from __future__ import annotations
@@ -82,11 +82,6 @@ def function_keys(
 ) -> dict[str, Hashable]:
     """Return for each output the function of real numbers that it is.
 
-    Args:
-        system: The system.
-        curves: Numbers curves, equal ones for those of equal degrees.
-        domain: As for `computed`.
-
     Returns:
         Nothing of those that jump, so that rounding may change them by much.
     """
@@ -143,13 +138,13 @@ class _Read:
         self.is_chained = not named.isdisjoint(self.outputs)
 
     def _source(self, one: SystemInput) -> Hashable:
-        held = (one.low, one.high) if one.clips and not self._holds(one) else None
+        ends = (one.low, one.high) if one.clips and not self._contains(one) else None
         parts = tuple(
             (part.weight, part.centre, self.sources[part.input]) for part in one.parts
         )
-        return (parts or one.name, held)
+        return (parts or one.name, ends)
 
-    def _holds(self, one: SystemInput) -> bool:
+    def _contains(self, one: SystemInput) -> bool:
         """Return whether the range of an input holds its part of the domain."""
         side = self.domain.side(one.name) if self.domain and not one.parts else None
         return side is not None and (
@@ -195,11 +190,11 @@ class _Read:
         return key, same.index(label.name)
 
     def _term(self, variable: str, label: str) -> Hashable:
-        """Return a term of an input, or of an output that a rule asks."""
-        asked = self.labels[variable, label]
+        """Return a term of an input, or of an output that a rule uses."""
+        term = self.labels[variable, label]
         if variable in self.outputs:
-            return variable, self._concluded(self.outputs[variable], asked)
-        return self.sources[variable], self._curve(asked)
+            return variable, self._concluded(self.outputs[variable], term)
+        return self.sources[variable], self._curve(term)
 
     def _curve(self, label: SystemTerm, *, is_number: bool = False) -> Hashable:
         curve = label.curve
@@ -295,7 +290,7 @@ class _Read:
 def facts_of(one: SystemOutput) -> tuple[Hashable, ...]:
     """Return how an output becomes a number, its default first."""
     how = one.defuzzifier
-    held = (one.low, one.high) if one.clips else None
+    ends = (one.low, one.high) if one.clips else None
     if how.is_weighted:
-        return one.default, how.method, held
-    return one.default, how, held, one.low, one.high
+        return one.default, how.method, ends
+    return one.default, how, ends, one.low, one.high

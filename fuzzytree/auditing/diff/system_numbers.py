@@ -2,9 +2,9 @@
 
 Outputs that are computed by the same operations, or are the same function of real
 numbers, are proved alike. The others are compared on probes of both systems, on points
-drawn from the domain and on rows of data; the point where one differs most is told with
-all digits, in fractions where the systems allow it, and a bound says how far the two
-can be apart at most.
+drawn from the domain and on rows of data; the point where one differs most is reported
+with all digits, in fractions where the systems allow it, and a bound says how far the
+two can be apart at most.
 """
 
 from __future__ import annotations
@@ -168,21 +168,21 @@ def _sampled(
     )
     chance = np.random.default_rng(settings.seed)
     u = chance.random((len(pair.columns), min(settings.rows, _DRAWN)))
-    asked: list[tuple[str, FloatArray, str]] = []
+    samples: list[tuple[str, FloatArray, str]] = []
     if rows is not None:
-        asked.append(("rows", rows.values, f"rows of {rows.name}"))
+        samples.append(("rows", rows.values, f"rows of {rows.name}"))
     probes = np.hstack(
         [_probes(one, pair.columns, low, high) for one in (pair.old, pair.new)]
     )
-    asked.append(("probes", probes, "probes of both systems within the domain"))
+    samples.append(("probes", probes, "probes of both systems within the domain"))
     drawn = f"points drawn evenly from the domain, seed {settings.seed}"
-    asked.append(("domain", low * (1.0 - u) + high * u, drawn))
+    samples.append(("domain", low * (1.0 - u) + high * u, drawn))
     left = 0
-    for place, (subject, values, how) in enumerate(asked):
-        clock.report("comparing numbers", place / len(asked))
+    for place, (subject, values, how) in enumerate(samples):
+        clock.report("comparing numbers", place / len(samples))
         count = values.shape[1]
         if count:
-            hits, seen = found.add(values, clock.share(1.0 / (len(asked) - place)))
+            hits, seen = found.add(values, clock.share(1.0 / (len(samples) - place)))
             left += count - seen
             if seen:
                 yield _counted(found, subject, hits, seen, how)
@@ -237,14 +237,7 @@ class _Largest(NamedTuple):
 
 
 class _Found:
-    """Where outputs were seen to differ.
-
-    Args:
-        pair: The systems.
-        outputs: The outputs that are compared.
-        rounded: Those that are one function, so that rounding is no difference.
-        runs: What runs each system.
-    """
+    """Where outputs were seen to differ."""
 
     def __init__(
         self,

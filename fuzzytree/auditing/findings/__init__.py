@@ -9,8 +9,8 @@ An audit
     - `audit`: runs all families within the budget
     - `domains`, `views`, `system_conditions`: the domain; the rules of a model as a
       rule base; terms and conditions of fuzzy systems as clauses
-    - `curve_bounds`, `rule_bounds`, `strength_bounds`: curves that are not polynomial,
-      and rules with them or with weights, between lower and upper bounds
+    - `curve_bounds`, `rule_bounds`, `bounded_arrangement`: lower and upper bounds of
+      curves that are not polynomial, and of rules with them or with weights
     - `locations`: where rules stand in a file; ids that do not depend on their order
     - `results`, `baselines`, `configuration`: results of other verbs, accepted findings
       and settings, from files

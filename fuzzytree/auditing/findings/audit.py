@@ -1,4 +1,4 @@
-"""An audit: every family of questions is asked, and what is known is kept."""
+"""An audit: run every family of questions within a budget, and keep the answers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import RuleBase, fingerprint, name_choice
 from fuzzytree.model.tree import FuzzyTree
 
-Asking = Callable[[Subject], Iterator[Answer]]
+FamilyFunction = Callable[[Subject], Iterator[Answer]]
 
 
 _OF_A_ROW = "FT204"
@@ -64,24 +64,24 @@ def audit(
     accepted: Collection[str] = (),
     repeat: str = "",
 ) -> Audit:
-    """Ask everything of a model, and return what is known.
+    """Answer every question about a model.
 
     When the budget is spent, or at a Ctrl-C, nothing new is begun: what is proved is
-    kept, and the rest stands among what was not asked.
+    kept, and `unasked` lists the rest.
 
     Args:
         model: The model.
         rows: The user's rows.
-        domain: Where everything is asked; the model's ranges unless given.
-        settings: What is taken for small.
-        select: Beginnings of codes that are asked; all if none.
-        ignore: Beginnings of codes that are left out.
-        clock: The budget; that of the settings unless given.
+        domain: The domain; the model's ranges by default.
+        settings: The thresholds.
+        select: Prefixes of the codes to answer; all by default.
+        ignore: Prefixes of codes to leave out.
+        clock: The budget; that of the settings by default.
         file: The file of the model, for places.
         data: The table that the rows come from.
-        row: A row whose nearest other decision is looked for besides.
+        row: A row whose nearest other decision is also sought.
         accepted: Ids of findings that a baseline accepts.
-        repeat: The command that asks all of this again.
+        repeat: The command that repeats this audit.
 
     Raises:
         ValueError: If a code or a setting is none, or the domain is not known.
@@ -99,9 +99,10 @@ def audit(
     if row is not None:
         _check_row(row, inputs_of(model))
     viewed = view(model, domain)
-    asked = _ask_view(viewed, rows, row, settings, clock, wanted)
+    progress = _run_view(viewed, rows, row, settings, clock, wanted)
     kept = sorted(
-        (one for one in asked.answers if one.code in wanted), key=lambda one: one.code
+        (one for one in progress.answers if one.code in wanted),
+        key=lambda one: one.code,
     )
     bounds = viewed.bounds
     whole = (viewed.rules, viewed.raw) if bounds is None else (bounds.lower,)
@@ -124,9 +125,9 @@ def audit(
         domain=viewed.domain,
         settings=settings,
         answers=answers,
-        unasked=tuple(_unasked(viewed.policy, wanted, asked)),
+        unasked=tuple(_unasked(viewed.policy, wanted, progress)),
         limits=LIMITS,
-        is_complete=not asked.cut,
+        is_complete=not progress.cut,
         accepted=tuple(sorted(ids.intersection(accepted))),
         numbers=() if _is_plain(viewed.numbers) else viewed.numbers,
     )
@@ -154,18 +155,18 @@ def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
         raise ValueError(f"the row has no value of {', '.join(map(repr, absent))}")
 
 
-def _ask_view(
+def _run_view(
     found: AuditView,
     rows: AuditRows | None,
     row: Mapping[str, float] | None,
     settings: AuditSettings,
     clock: Clock,
     wanted: set[str],
-) -> _Asked:
-    """Ask all families about a view; nothing if it holds no rule."""
-    asked = _Asked([*found.declined])
+) -> _Progress:
+    """Run all families on a view; none if it has no rule."""
+    progress = _Progress([*found.declined])
     if found.rules is None:
-        return asked
+        return progress
     subject = Subject(
         rules=found.rules,
         policy=found.policy,
@@ -181,8 +182,8 @@ def _ask_view(
         is_whole=found.is_whole,
         bounds=found.bounds,
     )
-    _ask_all([*_tasks(wanted, row)], subject, clock, asked)
-    return asked
+    _run_all([*_tasks(wanted, row)], subject, clock, progress)
+    return progress
 
 
 def source_of(name: str, content: bytes) -> SourceFile:
@@ -190,8 +191,8 @@ def source_of(name: str, content: bytes) -> SourceFile:
     return SourceFile(writable(name), hashlib.sha256(content).hexdigest())
 
 
-class _Asked:
-    """What came of the families so far.
+class _Progress:
+    """The answers so far, and the codes that were cut short.
 
     Attributes:
         answers: All of them.
@@ -204,22 +205,22 @@ class _Asked:
 
 
 class _Task(NamedTuple):
-    """Questions that are asked together, and what asks them."""
+    """Questions that one function answers together."""
 
     codes: Sequence[str]
-    ask: Asking
+    run: FamilyFunction
     part: float
 
 
 def _tasks(wanted: set[str], row: Mapping[str, float] | None) -> Iterator[_Task]:
-    """Yield what is asked, in order: the user's row first, then the families."""
+    """Yield the tasks in order: the user's row first, then the families."""
     if row is not None and _OF_A_ROW in wanted:
         yield _Task([_OF_A_ROW], functools.partial(_row_answers, row), 0.5)
     for family in FAMILIES:
         codes = [code for code in family.codes if code in wanted]
         if codes:
-            ask = functools.partial(_answers, family.function)
-            yield _Task(codes, ask, family.part)
+            run = functools.partial(_answers, family.function)
+            yield _Task(codes, run, family.part)
 
 
 def _answers(place: str, subject: Subject) -> Iterator[Answer]:
@@ -227,7 +228,7 @@ def _answers(place: str, subject: Subject) -> Iterator[Answer]:
     module, _, name = place.partition(":")
     family = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
     # Every function of the table has this type; a test calls each.
-    return cast("Asking", getattr(family, name))(subject)
+    return cast("FamilyFunction", getattr(family, name))(subject)
 
 
 def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[Answer]:
@@ -236,29 +237,29 @@ def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[Answer]
     return row_answers(subject, row)
 
 
-def _ask_all(
-    tasks: Sequence[_Task], subject: Subject, clock: Clock, asked: _Asked
+def _run_all(
+    tasks: Sequence[_Task], subject: Subject, clock: Clock, progress: _Progress
 ) -> None:
-    """Ask everything, each task within its part of the budget."""
+    """Run all tasks, each within its part of the budget."""
     why = f"the budget of {subject.settings.budget_s:g} s is spent"
     for position, task in enumerate(tasks):
         part = 1.0 if position == len(tasks) - 1 else task.part
-        own = clock.share(part, report=_telling(clock, position, len(tasks)))
+        share = clock.share(part, report=_reporter(clock, position, len(tasks)))
         try:
             clock.check()
-            own.report(CODES[task.codes[0]].title, 0.0)
-            with enforced(own):
-                for answer in task.ask(msgspec.structs.replace(subject, clock=own)):
-                    asked.answers.append(answer)
+            share.report(CODES[task.codes[0]].title, 0.0)
+            with enforced(share):
+                for answer in task.run(msgspec.structs.replace(subject, clock=share)):
+                    progress.answers.append(answer)
                     if _is_late(answer):
-                        asked.cut[answer.code] = why
+                        progress.cut[answer.code] = why
         except OutOfTimeError:
-            asked.cut |= dict.fromkeys(task.codes, why)
+            progress.cut |= dict.fromkeys(task.codes, why)
         except MemoryError:
-            asked.cut |= dict.fromkeys(task.codes, _TOO_LARGE)
+            progress.cut |= dict.fromkeys(task.codes, _TOO_LARGE)
         except KeyboardInterrupt:
             rest = [code for one in tasks[position:] for code in one.codes]
-            asked.cut |= dict.fromkeys(rest, INTERRUPTED)
+            progress.cut |= dict.fromkeys(rest, INTERRUPTED)
             return
 
 
@@ -266,31 +267,31 @@ def _is_late(answer: Answer) -> bool:
     return isinstance(answer.state, Declined) and answer.state.code == _LATE
 
 
-def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
-    """Return a function that tells a family's progress as part of all."""
+def _reporter(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
+    """Return a function that reports a family's progress as part of the whole."""
     return lambda text, share: clock.report(text, (position + share) / count)
 
 
-def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
-    """Yield what was not asked and why, in order of the codes."""
-    answered = Counter(one.code for one in asked.answers)
+def _unasked(policy: Policy, wanted: set[str], progress: _Progress) -> Iterator[str]:
+    """Yield which codes have no answer and why, in order."""
+    answered = Counter(one.code for one in progress.answers)
     for code in sorted(AUDITED):
         name = f"{code} {CODES[code].title}"
         if code not in wanted:
             yield f"{name}: left out by the user"
-        elif code in asked.cut:
-            begun = "not asked"
+        elif code in progress.cut:
+            begun = "not run"
             if answered[code]:
                 begun = f"cut short after {counted(answered[code], 'answer')}"
-            yield f"{name}: {begun}: {asked.cut[code]}"
+            yield f"{name}: {begun}: {progress.cut[code]}"
         elif code in answered:
             continue
         elif policy.decision == "all" and CODES[code].decision == "strongest":
-            yield f"{name}: not asked: every rule takes part in the answer"
+            yield f"{name}: not run: every rule takes part in the answer"
         elif answered and all(one.startswith("FTD") for one in answered):
-            yield f"{name}: nothing is left to ask it of, beside what was declined"
+            yield f"{name}: all that it applies to was declined"
         else:
-            yield f"{name}: nothing in this model to ask it of"
+            yield f"{name}: nothing in this model that it applies to"
 
 
 def _placed(

@@ -63,7 +63,7 @@ def baseline_of(audit: Audit) -> bytes:
 def resolved_ids(baseline: Mapping[str, str], audit: Audit) -> Iterator[str]:
     """Yield the accepted ids that an audit no longer finds, in order.
 
-    Of a code that was not asked, or not to its end, nothing is said.
+    Codes that were not run, or were cut short, are left out.
     """
     found = {answer.id for answer in audit.findings}
     unasked = {text.partition(" ")[0] for text in audit.unasked}

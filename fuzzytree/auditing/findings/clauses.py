@@ -1,4 +1,4 @@
-"""Is a clause needed? It is if some input is decided otherwise without it."""
+"""Is a clause needed? It is if some input is classified differently without it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ MOST_ROWS: Final = 4096
 """The most rows that are drawn to find an input where a clause matters."""
 
 MOST_SHOWN: Final = 100
-"""The most clauses that matter which are told one by one."""
+"""The most clauses that matter that are listed one by one."""
 
 _MOST_STRENGTHS = 1 << 24  # of all rules with and without each clause, at all rows
 _MOST_TRIED = 4  # rows that are evaluated in fractions for one clause
@@ -67,7 +67,7 @@ class _Dropped(NamedTuple):
 
 
 def clause_answers(subject: Subject) -> Iterator[Answer]:
-    """Answer for each clause whether some input is decided otherwise without it."""
+    """Answer for each clause whether some decision changes without it."""
     every = [*_dropped(subject.rules)]
     if not every:
         return
@@ -82,28 +82,28 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
     silent = [
         number for number in range(1, count + 1) if not compared.fires[number - 1]
     ]
-    needed, turns = 0, TimeSlices(subject.clock, 0.9)
+    needed, slices = 0, TimeSlices(subject.clock, 0.9)
     for number, one in enumerate(every, count + 1):
         if one.rule in silent:
             continue
         subject.clock.check()
         subject.clock.report("irrelevant clause", (number - count) / len(every))
-        state = _state(subject, compared, seen, one, number, turns)
+        state = _state(subject, compared, seen, one, number, slices)
         if state is None:
-            turns.left_out += 1
+            slices.left_out += 1
             continue
         if isinstance(state, Witness):
             needed += 1
             if needed > MOST_SHOWN:
                 continue
         yield _answer(subject, one, state)
-    yield from turns.rest("FT107", "clause", "whether they are needed")
+    yield from slices.rest("FT107", "clause", "whether they are needed")
     for number in silent:
         name = subject.rule_name(number)
         yield Answer(
             "FT107",
             name,
-            f"{name} never fires, so that its clauses are not asked one by one",
+            f"{name} never fires, so its clauses are not tested one by one",
             Proved("one of its clauses is 0 on all of the domain"),
             is_finding=False,
             rules=(number,),
@@ -135,7 +135,7 @@ def _state(
     seen: _Seen,
     one: _Dropped,
     number: int,
-    turns: TimeSlices,
+    slices: TimeSlices,
 ) -> State | None:
     left = len(compared.base.rules.rules) - number + 1
     if compared.never_weaker(one.rule, number) == "always":
@@ -148,7 +148,7 @@ def _state(
         return found
     shorter = one.of(subject.rules)
     turn = partial(equivalence, subject.rules, shorter, subject.domain)
-    state = turns.ask(left, turn)
+    state = slices.run(left, turn)
     if isinstance(state, Witness):
         point = point_of(state.point)
         return _witness(subject.rules, point)
@@ -194,7 +194,7 @@ class _Seen:
             subject.rules, subject.domain, min(rows, most), seed
         )
         strengths = decide(both, self.values).strengths
-        assert strengths is not None  # they were asked for
+        assert strengths is not None  # the default
         self.strengths: FloatArray = strengths
         numbers = {label: n for n, label in enumerate(subject.rules.classes)}
         self.classes: IntArray = np.array(
@@ -219,7 +219,7 @@ class _Seen:
         return self.rules.rules[strengths.index(best)].then
 
     def witness(self, one: _Dropped, number: int) -> Witness | None:
-        """Return a row that is decided otherwise without a clause, if one is seen."""
+        """Return a row whose class changes without a clause, if there is one."""
         own, strengths = one.rule - 1, self.strengths[number]
         # A rule only gains without a clause: it wins, or everything stays the same.
         wins = (strengths > self.best) | ((strengths == self.best) & (own < self.first))

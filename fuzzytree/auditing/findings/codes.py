@@ -16,7 +16,7 @@ class Code(Value, frozen=True):
         code: Its name in every output, which never changes its meaning.
         title: What a finding says, in a few words.
         severity: Of a finding, unless it says otherwise.
-        decision: `strongest` if it is asked only where the strongest rule decides.
+        decision: `strongest` if it applies only where the strongest rule decides.
         what: What a finding means, exactly.
         why: Why a reader should care.
         example: A small case.
@@ -41,14 +41,14 @@ _CODES = (
         what="The rule never gives the answer. Nowhere on the domain is it stronger "
         "than every rule of another class; where all rules take part in the answer, "
         "it never fires. For a tree: no value leads to the leaf.",
-        why="Whoever reads the rule believes that it does something. Either it is "
-        "superfluous, or the case that it was written for is decided otherwise.",
+        why="A reader of the rule expects that it does something. Either it is "
+        "superfluous, or the case that it was written for is decided differently.",
         example="1. IF force is high THEN firm\n"
         "2. IF slip is much THEN loose\n"
         "3. IF force is high AND slip is much THEN soft\n"
         "Rule 3 is never stronger than rule 1 or than rule 2, and never answers.",
         remedy="Delete the rule; or narrow those that hide it; or, if they are right, "
-        "ask what the rule was meant for. If the domain is too small for it, give "
+        "find out what the rule was meant for. If the domain is too small for it, give "
         "wider limits (--limits NAME=LOW:HIGH).",
     ),
     Code(
@@ -100,8 +100,8 @@ _CODES = (
         "strongest",
         what="One rule of another class is at least as strong everywhere on the domain "
         "and goes before it in a tie: the rule is never answered.",
-        why="The two rules contradict each other, and one always wins. Which of them "
-        "is right, the rule base does not tell.",
+        why="The two rules contradict each other, and one always wins. The "
+        "rule base does not say which of them is right.",
         example="1. IF force is high THEN firm\n"
         "2. IF force is high AND slip is much THEN loose\n"
         "Rule 2 is the special case, but rule 1 is at least as strong and stands "
@@ -113,8 +113,8 @@ _CODES = (
         "FT106",
         "duplicate antecedent",
         "warning",
-        what="Two rules ask the same: their clauses have equal curves, or curves that "
-        "differ nowhere by more than a tolerance, which is told. With different "
+        what="Two rules have the same antecedent: equal curves, or curves that differ "
+        "nowhere by more than a tolerance, which the sentence states. With different "
         "classes they contradict each other, and the finding is an error; where all "
         "rules take part, one case may well have two conclusions: a note.",
         why="Of two equal rules one is superfluous; of two contradicting ones the "
@@ -188,7 +188,7 @@ _CODES = (
         "decides otherwise; of rules, places where the strengths of two classes only "
         "touch are left aside where that matters, and the sentence says so.",
         why="A row with a small radius is decided by noise.",
-        example="fuzzytree audit grip.yaml --row force=2.1,slip=0 tells that at a "
+        example="fuzzytree audit grip.yaml --row force=2.1,slip=0 shows that at a "
         "distance of 0.02 widths, at force 2.0, the class is another.",
         remedy="Compare the radius with the noise of the sensors. Where it is smaller, "
         "show the class together with its rival, or measure again.",
@@ -244,7 +244,7 @@ _CODES = (
     ),
     Code(
         "FT403",
-        "terms hard to tell apart",
+        "terms hard to distinguish",
         "info",
         what="Two terms of a variable share at least the setting `overlap` of their "
         "area: the integral of their minimum by that of their maximum (Jaccard).",
@@ -258,10 +258,10 @@ _CODES = (
         "FT404",
         "unused term or variable",
         "info",
-        what="No rule asks the term, or the variable at all.",
-        why="An input that nobody asks must be measured all the same; a forgotten term "
+        what="No rule uses the term, or the variable at all.",
+        why="An unused input must be measured all the same; a forgotten term "
         "may be a forgotten rule.",
-        example="`force` has low, medium and high, and no rule asks for medium.",
+        example="`force` has low, medium and high, and no rule uses medium.",
         remedy="Delete it, or write the rule that was forgotten.",
     ),
     Code(
@@ -270,7 +270,7 @@ _CODES = (
         "info",
         what="Counts: rules, clauses, terms in use, the depth of a tree, and the index "
         "of Nauck (complexity times coverage times partition).",
-        why="They tell whether a person can still read the rules, and compare two "
+        why="They show whether a person can still read the rules, and compare two "
         "versions of a rule base.",
         example="12 rules of 2.4 clauses, 9 terms in use, index 0.11",
         remedy="Nothing; watch the numbers from release to release.",
@@ -324,7 +324,7 @@ _CODES = (
         "structure changed",
         "info",
         what="Two versions of a model differ in a rule, a term, a range or a name; "
-        "rules are told apart by what they say, and not by their order.",
+        "rules are matched by what they mean, and not by their order.",
         why="A change of structure explains a change of decisions, or is harmless.",
         example="rule `IF force is high THEN firm` was removed",
         remedy="Nothing, where FT801 finds no change of decisions.",
@@ -345,26 +345,26 @@ _CODES = (
         "declined: a curve without an exact method",
         "info",
         what="A term's curve is no piecewise polynomial, such as a gaussian. It is "
-        "held between two lines of points, about 0.001 apart, and rules that ask it "
-        "are asked of both: what is proved or has a witness holds for the curve "
+        "bounded by two lines of points, about 0.001 apart, and rules that use it are "
+        "evaluated with both: what is proved or has a witness is true of the curve "
         "itself, and what lies between the lines is a BRACKET. Its shape and its "
-        "overlaps are not asked. A formula has no such lines: what depends on it is "
+        "overlaps are not checked. A formula has no such lines: what depends on it is "
         "not decided.",
         why="Its degrees are no fractions, so not every question has an exact answer.",
         example="gaussian: {mean: 20, deviation: 3}",
         remedy="Nothing, where the answers suffice. `fuzzytree convert --allow-loss` "
-        "writes curves as points within a tolerance that it states; all is asked of "
-        "that file.",
+        "writes curves as points within a tolerance that it states; that file can "
+        "be audited in full.",
     ),
     Code(
         "FTD03",
         "declined: the budget was spent",
         "info",
         what="The question would have taken longer than the time that was left.",
-        why="An answer that is not known is told as such.",
+        why="An unknown answer is reported as unknown.",
         example="40 rules over 11 inputs with --budget 10",
-        remedy="Give more time (--budget SECONDS), ask less at once (--select), or ask "
-        "on a smaller domain (--limits).",
+        remedy="Give more time (--budget SECONDS), select fewer codes (--select), or "
+        "take a smaller domain (--limits).",
     ),
     Code(
         "FTD04",
@@ -373,9 +373,8 @@ _CODES = (
         what="Two variables share inputs, as combinations do, and the question needs "
         "them to be free of each other.",
         why="A point may exist on the variables' axes and at no input.",
-        example="`flow` = 0.3 * force + 0.7 * slip, asked together with `force`",
-        remedy="Read the answers that do not need it; a proof of `never` holds all the "
-        "same.",
+        example="`flow` = 0.3 * force + 0.7 * slip, in one rule with `force`",
+        remedy="Read the answers that do not need it; a proof of `never` is valid.",
     ),
     Code(
         "FTD05",
@@ -391,7 +390,7 @@ _CODES = (
         "FTD06",
         "declined: needs rows",
         "info",
-        what="The question is about rows, and none were given.",
+        what="The question is about rows, and there are none.",
         why="Without rows nothing can be counted.",
         example="fuzzytree audit wine.yaml",
         remedy="Give rows: --data TABLE, and --target COLUMN for their classes.",
@@ -400,12 +399,12 @@ _CODES = (
         "FTD07",
         "declined: a condition without an exact method",
         "info",
-        what="A rule's condition asks what the exact method does not hold: an output, "
-        "or not what a product or an OR under products says.",
+        what="A rule's condition uses what the exact method does not support: an "
+        "output, or the negation of a product or of an OR under products.",
         why="The rule is left out of what is proved, and that is said.",
         example="IF power is low AND force is high THEN brake is on, where power is "
         "an output of the rules before",
-        remedy="Ask inputs alone, or audit the rules before and those behind as two "
+        remedy="Use inputs alone, or audit the rules before and those behind as two "
         "systems.",
     ),
     Code(

@@ -29,7 +29,7 @@ from fuzzytree.model.tree import FuzzyTree
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
-    """Tell how many rules, clauses and terms there are, and the index of Nauck."""
+    """Count rules, clauses and terms, and compute the index of Nauck."""
     rules = subject.rules
     clauses = [len(rule.when) for rule in rules.rules]
     measures = [
@@ -70,7 +70,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
 
 def depth(tree: FuzzyTree) -> int:
-    """Return how many nodes the longest path of a tree asks.
+    """Return how many nodes the longest path of a tree has.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -105,10 +105,10 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
         None if no rule uses a variable, a range is a point, or a term has no exact
         shape.
     """
-    asked = _terms(subject.rules)
-    if subject.bounds and not asked.isdisjoint(subject.bounds.terms):
+    used_terms = _terms(subject.rules)
+    if subject.bounds and not used_terms.isdisjoint(subject.bounds.terms):
         return None
-    names = {variable for variable, _ in asked}
+    names = {variable for variable, _ in used_terms}
     used = [of for of in ranges(subject) if of.variable.name in names]
     lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]
     if not used or any(of.low == of.high for of in used):

@@ -1,6 +1,6 @@
-"""Which questions are asked, by their codes, and with which settings.
+"""Which codes an audit answers, and with which settings.
 
-What an audit is asked to do, from a file beside the model: `fuzzytree-audit.yaml`.
+Both can stand in a file beside the model, `fuzzytree-audit.yaml`:
 
 ```yaml
 select: [FT1, FT301]
@@ -48,18 +48,14 @@ _COUNTS: Mapping[str, tuple[int, int]] = {
 
 
 def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[str]:
-    """Return the codes that are asked, and all reasons for declining.
+    """Return the selected codes, and all reasons for declining.
 
-    What is left out of every question is told whatever is chosen: without that the
-    other answers seem to be about more than they are.
-
-    Args:
-        select: Beginnings of codes, such as `FT1`; all codes if none.
-        ignore: Beginnings of codes that are left out.
+    The reasons are always included: without them the other answers seem to be about
+    more than they are.
 
     Raises:
         ValueError: If one is the beginning of no code, a reason for declining is to be
-            left out, or nothing is left to ask.
+            left out, or no code is left.
 
     Example:
         >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103"]))[:5]
@@ -74,7 +70,7 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
     for text in ignore:
         if text.startswith("FTD"):
             raise ValueError(
-                f"the code {text!r} cannot be left out: it tells what was not asked"
+                f"the code {text!r} cannot be left out: it reports what was declined"
             )
     taken = select or ("FT",)
     found = {
@@ -84,7 +80,7 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
         or (code.startswith(taken) and not code.startswith(ignore))
     }
     if all(code.startswith("FTD") for code in found):
-        raise ValueError("select and ignore leave no code of which anything is asked")
+        raise ValueError("select and ignore leave no code to answer")
     return found
 
 
@@ -182,10 +178,10 @@ class Configuration(msgspec.Struct, frozen=True):
     """What a file of configuration says.
 
     Attributes:
-        select: Beginnings of codes that are asked.
-        ignore: Beginnings of codes that are left out.
+        select: Prefixes of codes to answer.
+        ignore: Prefixes of codes to leave out.
         limits: The ends of variables, by name.
-        settings: What is taken for small.
+        settings: The thresholds.
         baseline: The path of a baseline; in a file, from the folder of that file.
         fail_on: The least severity of a finding that fails.
     """
@@ -264,11 +260,11 @@ def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
 
 
 def _settings(
-    given: SettingsOfFile, root: MappingNode, found: list[FileMistake]
+    values: SettingsOfFile, root: MappingNode, found: list[FileMistake]
 ) -> AuditSettings:
     """Return settings, the defaults where a value is left out or wrong."""
     made = AuditSettings()
-    for key, value in msgspec.structs.asdict(given).items():
+    for key, value in msgspec.structs.asdict(values).items():
         if value is None:
             continue
         name = "budget_s" if key == "budget" else key

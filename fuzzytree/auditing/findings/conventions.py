@@ -1,4 +1,4 @@
-"""Where runtimes usually part: ties, missing values, ends of curves, far outside.
+"""Where runtimes usually differ: ties, missing values, ends of curves, far outside.
 
 Each question is a finite list of probes, answered by every form of a model in every
 runtime at hand, and all answers must be alike.
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
 
     BoolArray = npt.NDArray[np.bool_]
 
+RUNTIMES: Final = ("native", "reference", "onnxruntime float64")
+"""The runtimes to run, if installed; the others are compared with the first."""
+
 MOST: Final = 240
 """The most probes of one question."""
 
@@ -54,13 +57,13 @@ _FAR = (-1e300, -1e30, 1e30, 1e300)
 
 
 class Convention(NamedTuple):
-    """A convention, and the probes that ask for it.
+    """A convention, and the probes that test it.
 
     Attributes:
-        name: What is asked, such as `missing values`.
+        name: The convention, such as `missing values`.
         values: Shape (inputs, probes).
-        left_out: How many probes were too many. Of ends and cuts a spread is asked;
-            `fuzzytree check` asks all.
+        left_out: How many probes were too many. Ends and cuts are tested
+            by a selection; `fuzzytree check` tests all.
     """
 
     name: str
@@ -69,7 +72,7 @@ class Convention(NamedTuple):
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
-    """Ask whether all forms and runtimes answer alike where these usually part.
+    """Compare all forms and runtimes where these usually differ.
 
     Raises:
         OutOfTimeError: If the budget is spent.
@@ -92,7 +95,9 @@ def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
         kind = "tree" if isinstance(form, FuzzyTree) else "rules"
         for runtime in _runtimes():
             if kind in runtime.runs and is_installed(runtime):
-                with contextlib.suppress(LossError):  # told by the other comparisons
+                with contextlib.suppress(
+                    LossError
+                ):  # reported by the other comparisons
                     yield f"{runtime.name}: {name}", form, runtime.load(form)
 
 
@@ -189,7 +194,7 @@ def convention_answers(
     Args:
         subject: The model.
         question: The question.
-        found: Answers of each representation; the first of a form is held against the
+        found: Answers of each representation; the first of a form is compared with the
             first of all, the others against the first of their form. Raw rules are a
             model of their own.
     """
@@ -267,7 +272,7 @@ def _said(answers: Answers, row: int) -> str:
 
 
 def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
-    """Ask a system's runtimes where values are missing, infinite or far away.
+    """Compare a system's runtimes where values are missing, infinite or far away.
 
     How an answer came about must be alike, and which outputs have a number. Numbers
     are compared among the representations, within what rounding may do to them.
@@ -275,7 +280,7 @@ def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
     runs: list[tuple[str, SystemRun]] = []
     for runtime in _runtimes():
         if runtime.load_system is not None and is_installed(runtime):
-            with contextlib.suppress(LossError):  # told by the other comparisons
+            with contextlib.suppress(LossError):  # reported by the other comparisons
                 runs.append((runtime.name, runtime.load_system(system)))
     for question in questions(subject):
         if question.name not in _OF_SYSTEMS:

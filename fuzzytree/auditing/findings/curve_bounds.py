@@ -247,13 +247,7 @@ def _least(curve: Curve, of: Interval) -> Fraction:
 
 
 def clip(knots: Sequence[Knot], limit: Fraction, side: Side) -> Iterator[Knot]:
-    """Yield a line held at a limit; where it meets it, the limit lasts longer.
-
-    Args:
-        knots: The points of the line.
-        limit: What a lower line does not go below, an upper one not above.
-        side: Which of the two it is.
-    """
+    """Yield a line clamped at a limit; crossings are rounded to the safe side."""
     sign = 1 if side == "lower" else -1
     previous: Knot | None = None
     for x, degree in knots:

@@ -22,15 +22,18 @@ from fuzzytree.auditing.engine.states import (
     counted,
 )
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
+from fuzzytree.auditing.findings.bounded_arrangement import (
+    BoundedArrangement,
+    bounded_arrangement,
+)
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
-from fuzzytree.auditing.findings.strength_bounds import StrengthBounds, strength_bounds
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.arrangement import BoolArray
 
 MOST_SHOWN: Final = 20
-"""The most ties that are told one by one."""
+"""The most ties that are listed one by one."""
 
 _PART = 0.25  # of the time that is left, for one question
 _APART = Proved("they share no curve, and no constant")
@@ -39,9 +42,9 @@ _APART = Proved("they share no curve, and no constant")
 def answers(subject: Subject) -> Iterator[Answer]:
     """Answer whether rules win, lead, are needed, and tie.
 
-    Where every rule that fires takes part in the answer, it is asked whether it fires.
+    Where every rule that fires takes part in the answer: whether it fires.
     """
-    sides = strength_bounds(subject)
+    sides = bounded_arrangement(subject)
     given = sides.lower
     if given.is_empty:
         return
@@ -57,7 +60,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield from ties.answers()
 
 
-def _firing(subject: Subject, sides: StrengthBounds) -> Iterator[Answer]:
+def _firing(subject: Subject, sides: BoundedArrangement) -> Iterator[Answer]:
     """Answer whether each rule fires; a rule of several ways, whether one of them."""
     ways: dict[str, list[int]] = {}
     for number in range(1, len(subject.rules.rules) + 1):
@@ -94,60 +97,53 @@ def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
 def _winning(
     subject: Subject, seen: RandomProbes, won: dict[int, Witness]
 ) -> Iterator[Answer]:
-    """Answer whether each rule wins strictly; those that were not seen to win first.
-
-    Args:
-        subject: The rules.
-        seen: What points show of them.
-        won: Is given where each rule wins.
-    """
+    """Answer whether each rule wins strictly; those that were not seen to win first."""
     given = seen.base
     count = len(subject.rules.rules)
-    turns = TimeSlices(subject.clock, 0.5)
+    slices = TimeSlices(subject.clock, 0.5)
     order = sorted(range(1, count + 1), key=seen.is_ahead)
     for place, number in enumerate(order):
         name = subject.rule_name(number)
         subject.clock.report(f"does {name} win", place / count)
         rivals = _rivals(subject, number)
-        state = turns.ask(count - place, partial(wins, given, number, rivals))
+        state = slices.run(count - place, partial(wins, given, number, rivals))
         if not isinstance(state, Proved | Witness):
             state = seen.wins(number, rivals) or state
         if isinstance(state, Witness):
             won[number] = state
         if state is None:
-            turns.left_out += 1
+            slices.left_out += 1
             continue
-        # A tree's own cuts tell this of its leaves:
-        # `fuzzytree.auditing.findings.leaves`.
+        # For the leaves of a tree see `fuzzytree.auditing.findings.leaves`.
         if subject.tree is None:
             yield _won(subject, given, number, state)
         if not isinstance(state, Proved | Witness):
             sentence = f"how far {name} leads is open, for it is open whether it wins"
             yield Answer("FT102", name, sentence, state, False, rules=(number,))
-    yield from turns.rest("FT101", "rule", "whether they ever win")
-    # Only of a rule that is known to win is it asked how far it leads.
-    yield from turns.rest("FT102", "rule", "how far they lead")
+    yield from slices.rest("FT101", "rule", "whether they ever win")
+    # Only rules that are known to win have a lead.
+    yield from slices.rest("FT102", "rule", "how far they lead")
 
 
 def _leading(
     subject: Subject, seen: RandomProbes, won: dict[int, Witness]
 ) -> Iterator[Answer]:
     """Answer whether each rule that wins leads by enough."""
-    turns = TimeSlices(subject.clock, 0.5)
+    slices = TimeSlices(subject.clock, 0.5)
     for place, (number, state) in enumerate(sorted(won.items())):
         name = subject.rule_name(number)
         subject.clock.report(f"how far does {name} lead", place / len(won))
         rivals = _rivals(subject, number)
         start = seen.wins(number, rivals) or state
-        found = turns.ask(
+        found = slices.run(
             len(won) - place,
             partial(_led, subject, seen.base, number, rivals, (state, start)),
         )
         if found is None:
-            turns.left_out += 1
+            slices.left_out += 1
             continue
         yield found
-    yield from turns.rest("FT102", "rule", "how far they lead")
+    yield from slices.rest("FT102", "rule", "how far they lead")
 
 
 def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Answer:
@@ -232,11 +228,11 @@ def _led(
 
 
 class _Ties:
-    """Which rules of different classes tie as the strongest; each pair asked once."""
+    """Which rules of different classes tie as the strongest; tests each pair once."""
 
     def __init__(self, subject: Subject, given: Arrangement) -> None:
         self.subject, self.given = subject, given
-        self.turns = TimeSlices(subject.clock, 0.9)
+        self.slices = TimeSlices(subject.clock, 0.9)
         self.known: dict[tuple[int, int], State] = {}
         self.may: BoolArray | None = None
 
@@ -252,10 +248,10 @@ class _Ties:
         if pair in self.known:
             return self.known[pair]
         if self.may is None:
-            self.may = self.turns.ask(1, lambda _: may_tie(self.given))
+            self.may = self.slices.run(1, lambda _: may_tie(self.given))
         if self.may is not None and not self.may[one - 1, other - 1]:
             return _APART
-        state = self.turns.ask(left, partial(tie, self.given, *pair))
+        state = self.slices.run(left, partial(tie, self.given, *pair))
         if state is not None:
             self.known[pair] = state
         return state
@@ -263,9 +259,9 @@ class _Ties:
     def answers(self) -> Iterator[Answer]:
         """Answer for pairs that tie one by one, for all others together."""
         rules = self.subject.rules.rules
-        told = 0
+        tie_count = 0
         left_open: list[State] = []
-        unasked = 0
+        untested = 0
         pairs = [
             (one, other)
             for one, other in itertools.combinations(range(1, len(rules) + 1), 2)
@@ -274,29 +270,29 @@ class _Ties:
         for place, (one, other) in enumerate(pairs, 1):
             self.subject.clock.report("which rules tie", place / len(pairs))
             state = self.of(one, other, len(pairs) - place + 1)
-            unasked += state is None
+            untested += state is None
             if isinstance(state, Declined | Bracket):
                 left_open.append(state)
             if isinstance(state, Witness):
-                told += 1
-                if told <= MOST_SHOWN:
+                tie_count += 1
+                if tie_count <= MOST_SHOWN:
                     yield self._tied(one, other, state)
         if not pairs:
             return
-        how = f"{len(pairs)} pairs of rules of different classes asked"
+        how = f"{len(pairs)} pairs of rules of different classes tested"
         measures = (
             Measure("pairs", len(pairs)),
-            Measure("pairs that tie", told),
-            Measure("pairs told one by one", min(told, MOST_SHOWN)),
-            Measure("pairs left open", len(left_open) + unasked),
+            Measure("pairs that tie", tie_count),
+            Measure("pairs listed", min(tie_count, MOST_SHOWN)),
+            Measure("pairs left open", len(left_open) + untested),
         )
         sentence = (
-            f"of {len(pairs)} pairs of rules of different classes, {told} tie as the "
-            "strongest on more than a surface"
+            f"of {len(pairs)} pairs of rules of different classes, {tie_count} tie as "
+            "the strongest on more than a surface"
         )
         state = left_open[0] if left_open else Proved(how)
-        if unasked:
-            sentence += f"; {counted(unasked, 'pair')} could not be asked"
+        if untested:
+            sentence += f"; {counted(untested, 'pair')} were not tested"
             state = Declined("FTD03", "the budget was spent")
         yield Answer(
             "FT202", "pairs of rules", sentence, state, False, measures=measures
@@ -319,16 +315,16 @@ def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answe
     count = len(subject.rules.rules)
     if count == 1:
         return
-    turns = TimeSlices(subject.clock, 0.5)
+    slices = TimeSlices(subject.clock, 0.5)
     for number in range(1, count + 1):
         name = subject.rule_name(number)
         subject.clock.report(f"is {name} needed", number / count)
         others = tuple(n for n in range(1, count + 1) if n != number)
-        state = seen.wins_alone(number, others) or turns.ask(
+        state = seen.wins_alone(number, others) or slices.run(
             count - number + 1, partial(wins, seen.base, number, others)
         )
         if state is None:
-            turns.left_out += 1
+            slices.left_out += 1
             continue
         if isinstance(state, Witness):
             sentence = f"{name} is somewhere stronger than every other rule"
@@ -341,7 +337,7 @@ def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answe
         later = [n for n in _rivals(subject, number) if n > number]
         known = [ties.of(number, n, len(later)) for n in later]
         if None in known:
-            turns.left_out += 1
+            slices.left_out += 1
             continue
         tied = [one for one in known if one and not isinstance(one, Proved)]
         if tied:
@@ -357,4 +353,4 @@ def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answe
             + (", but where strengths only touch" if later else "")
         )
         yield Answer("FT103", name, sentence, state, True, "info", rules=(number,))
-    yield from turns.rest("FT103", "rule", "whether they are needed")
+    yield from slices.rest("FT103", "rule", "whether they are needed")

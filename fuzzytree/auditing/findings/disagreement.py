@@ -44,8 +44,8 @@ from fuzzytree.auditing.findings.rows import (
     DomainRows,
     distance_measure,
     narrowed_state,
-    not_asked,
     points_of,
+    rows_left_out,
 )
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import RuleBase
@@ -63,14 +63,7 @@ _CROSSED = 8  # rows whose nearest cut is looked at
 
 
 class TreeAndRules:
-    """A tree and its raw rules, asked together.
-
-    Args:
-        tree: The tree.
-        raw: Its raw rules.
-        domain: Where they are asked.
-        found: The tree's regions.
-    """
+    """A tree and its raw rules, compared with each other."""
 
     def __init__(
         self,
@@ -98,7 +91,7 @@ class TreeAndRules:
         one, other = self.claims(point)
         return one.label != other.label and is_within(self.given, point)
 
-    def ask(self, box: Domain, clock: Clock) -> State:
+    def disagree(self, box: Domain, clock: Clock) -> State:
         """Return whether both decide differently somewhere in a box."""
         left_open: State | None = None
         for region in self.found:
@@ -108,7 +101,7 @@ class TreeAndRules:
                 return state
             if not isinstance(state, Proved):
                 left_open = left_open or state
-        return left_open or Proved("all leaves asked")
+        return left_open or Proved("all leaves compared")
 
     def clear_of_cuts(self, point: Mapping[str, Fraction], label: str | None) -> float:
         """Return a radius within which the tree decides alike, by doubles."""
@@ -118,14 +111,7 @@ class TreeAndRules:
 def other_in_boxes(
     given: Arrangement, inside: Sequence[Domain], label: str, clock: Clock
 ) -> State:
-    """Return whether raw rules decide somewhere in some boxes otherwise than a class.
-
-    Args:
-        given: The raw rules.
-        inside: The boxes.
-        label: The class.
-        clock: How much time there is.
-    """
+    """Return whether raw rules decide for another class somewhere in some boxes."""
     left_open: State | None = None
     for box in inside:
         state = other_decision(restricted(given, box), label, clock, of="raw rules")
@@ -134,7 +120,7 @@ def other_in_boxes(
             return Witness(state.point, (tree_too, *state.claims), state.region)
         if not isinstance(state, Proved):
             left_open = left_open or state
-    return left_open or Proved(f"{len(inside)} boxes asked")
+    return left_open or Proved(f"{len(inside)} boxes compared")
 
 
 class _Row(NamedTuple):
@@ -157,13 +143,6 @@ def nearest_difference(
     """Yield how near to a row a tree and its raw rules differ.
 
     Rows at which they differ already are counted, and then left aside.
-
-    Args:
-        both: The two.
-        points: The rows.
-        clock: How much time there is.
-        known: Points at which they differ.
-        is_alike: Whether they are known to differ nowhere.
     """
     inputs = both.tree.inputs
     values = columns([point for _, point in points.at], inputs)
@@ -186,7 +165,7 @@ def nearest_difference(
         search.run([*differ, *known])
     yield _nearest_answer(points, search, len(differ), len(alike))
     if 0 < len(search.settled) < len(search.rows):
-        yield not_asked("FT203", len(search.rows) - len(search.settled))
+        yield rows_left_out("FT203", len(search.rows) - len(search.settled))
 
 
 def answer_of(rules: RuleBase, number: int) -> str | None:
@@ -199,7 +178,7 @@ class _Search:
 
     As long as a ball around a row touches no leaf of another class, both can only
     differ where the raw rules change their mind; and just beyond the nearest cut they
-    do differ, unless the raw rules change theirs there too. So distances to cuts tell
+    do differ, unless the raw rules change theirs there too. So distances to cuts show
     how far to look, and bounds on all balls at once which rows are left.
     """
 
@@ -249,13 +228,13 @@ class _Search:
             found = nearest(
                 self.both.domain,
                 row.point,
-                lambda box: self.both.ask(box, self.end),
+                lambda box: self.both.disagree(box, self.end),
                 self.both.differ,
                 self.end,
                 within=None if self.best is None else self.best.high,
                 near=[hints[place][1]] if place in hints else (),
             )
-            if found.is_none:  # and so for all of them: it was asked on the domain
+            if found.is_none:  # and so for all of them: the search covered the domain
                 self.settled, self.low = set(range(len(self.rows))), None
                 return
             before = self.best
@@ -275,7 +254,7 @@ class _Search:
                 self._keep(place, found)
 
     def _keep(self, place: int, found: Nearest) -> None:
-        assert found.point is not None  # asked by the caller
+        assert found.point is not None  # checked by the caller
         self.claims = self.both.claims(found.point)
         self.best, self.place = found, place
 
@@ -343,17 +322,17 @@ def _nearest_answer(
     points: DomainRows, search: _Search, differ: int, alike: int
 ) -> Answer:
     measures = [Measure("rows that differ already", differ)]
-    measures.append(Measure("rows asked", len(search.settled)))
+    measures.append(Measure("rows evaluated", len(search.settled)))
     before = f"of {points.text} {differ} differ already"
-    asked = len(search.settled)
-    if not asked:
+    count = len(search.settled)
+    if not count:
         why = "no row of the domain is decided alike by both"
         if alike:
             why = "the budget was spent before the first row"
         declined = Declined("FTD03" if alike else "FTD06", why)
         text = f"{before}; the nearest disagreement to others is not sought"
         return Answer("FT203", "rows", text, declined, False, measures=tuple(measures))
-    some = f"{asked} of {alike}" if asked < alike else str(alike)
+    some = f"{count} of {alike}" if count < alike else str(alike)
     best, low = search.best, search.low or Fraction(0)
     if best is None or best.point is None or best.high is None:
         state = _no_nearest(search, low)
@@ -380,13 +359,13 @@ def _no_nearest(search: _Search, low: Fraction) -> State:
     if search.why:
         name = "the distance of the nearest disagreement"
         return Bracket(name, float(low), 1.0, search.why)
-    return Proved("both asked on the whole domain")
+    return Proved("both were compared on the whole domain")
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
     """Yield where a tree and its raw rules differ, leaf by leaf, and near which rows.
 
-    Nothing is asked of a model that is no tree, or has no fitted sets.
+    Only trees with fitted sets have raw rules.
     """
     tree, raw = subject.tree, subject.raw
     if tree is None or raw is None:
@@ -396,36 +375,29 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if declined is not None:
         yield Answer("FT203", "leaves", NOT_LOOKED_AT, declined, False)
         return
-    told: list[Answer] = []
+    known: list[Answer] = []
     for answer in leaf_differences(subject, raw, tree, found):
-        told.append(answer)
+        known.append(answer)
         yield answer
     if subject.rows is not None:
         both = TreeAndRules(tree, raw, subject.domain, found)
         points = points_of(subject, subject.rows)
-        known = [
-            point_of(one.state.point) for one in told if isinstance(one.state, Witness)
+        points_known = [
+            point_of(one.state.point) for one in known if isinstance(one.state, Witness)
         ]
         # Only the answer about all leaves is left where they are alike everywhere.
-        is_alike = len(told) == 1
+        is_alike = len(known) == 1
         yield from nearest_difference(
-            both, points, subject.clock, known=known, is_alike=is_alike
+            both, points, subject.clock, known=points_known, is_alike=is_alike
         )
 
 
 def leaf_differences(
     subject: Subject, raw: RuleBase, tree: FuzzyTree, found: Sequence[Region]
 ) -> Iterator[Answer]:
-    """Yield the leaves in whose regions the raw rules decide otherwise.
-
-    Args:
-        subject: The tree as it is audited.
-        raw: Its raw rules.
-        tree: The tree itself.
-        found: Its regions.
-    """
+    """Yield the leaves in whose regions the raw rules decide differently."""
     given = arrange(raw, subject.domain)
-    alike = asked = 0
+    alike = count = 0
     for region in found:
         subject.clock.report(
             f"leaf {region.leaf} against the raw rules", region.leaf / len(found)
@@ -434,20 +406,20 @@ def leaf_differences(
         subject.clock.check()
         part = subject.clock.share(_LEAF_PART)
         state = other_in_boxes(given, inside, region.label, part)
-        asked += len(inside)
+        count += len(inside)
         if isinstance(state, Proved):
             alike += 1
         else:
             yield _difference(given, region, state)
     text = f"in {alike} of {len(found)} leaves the raw rules decide as the tree does"
-    how = f"all other decisions asked in {asked} boxes of the leaves"
+    how = f"all other decisions were sought in {count} boxes of the leaves"
     yield Answer("FT203", "leaves", text, Proved(how), False)
 
 
 def _difference(given: Arrangement, region: Region, state: State) -> Answer:
     name, rules = f"leaf {region.leaf}", (region.leaf,)
     if not isinstance(state, Witness):
-        text = f"whether the raw rules decide otherwise in {name} is left open"
+        text = f"whether the raw rules decide differently in {name} is left open"
         return Answer("FT203", name, text, state, False, rules=rules)
     strengths = strengths_at(given, point_of(state.point))
     best = max(strengths)

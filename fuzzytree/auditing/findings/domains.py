@@ -72,21 +72,7 @@ def domain_of(
     limited: Iterable[str] = (),
     row: Mapping[str, float] | None = None,
 ) -> Domain:
-    """Return where a model is asked, a side for each input.
-
-    Args:
-        model: The model.
-        within: `model`: the ranges that it declares; where there is none, the span
-            of the input's curves, and as much again on both sides where one of them
-            goes on without end; where there is no curve either, the rows. `data`: the
-            smallest and largest value of the rows.
-        spreads: If given, so many spreads around the means of the fitted sets of
-            each input instead, and around the mean of the rows for an input without.
-            An input of which none of this is known, and on which nothing depends,
-            is asked from 0 to 1 (or to the row's value), and any number would do.
-        rows: The rows, in the order of the model's inputs.
-        limited: Inputs whose limits come from elsewhere; they are left out.
-        row: A row that is asked about besides.
+    """Return the domain of a model, a side for each input.
 
     Raises:
         ValueError: If an input has no such values; the sentence says what to give.

@@ -15,17 +15,20 @@ from fuzzytree.auditing.engine.clock import OutOfTimeError
 from fuzzytree.auditing.engine.cover import uncovered
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, span
 from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
+from fuzzytree.auditing.findings.bounded_arrangement import (
+    BoundedArrangement,
+    bounded_arrangement,
+)
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.rows import rank_by_distance
-from fuzzytree.auditing.findings.strength_bounds import StrengthBounds, strength_bounds
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics.exact import outwards
 
 MOST_GAPS: Final = 8
-"""The most gaps that are told one by one."""
+"""The most gaps that are listed one by one."""
 
 _MOST_BOXES = 64  # parts of the domain in which a gap is looked for
-_MOST_SIDES = 3  # of a gap that a sentence tells
+_MOST_SIDES = 3  # of a gap in a sentence
 _PART = 0.3  # of the time that is left, for one question
 
 
@@ -36,7 +39,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         sentence = "whether an input is covered by no rule is not decided"
         yield Answer("FT301", "cover", sentence, Declined("FTD07", reason), False)
         return
-    sides = strength_bounds(subject)
+    sides = bounded_arrangement(subject)
     if sides.lower.is_empty:
         return
     bare = sides.uncovered(subject.clock.share(_PART))
@@ -50,7 +53,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield _weak(subject, sides)
 
 
-def _weak(subject: Subject, sides: StrengthBounds) -> Answer:
+def _weak(subject: Subject, sides: BoundedArrangement) -> Answer:
     """Answer whether some rule reaches epsilon everywhere, and how little is least."""
     epsilon = subject.settings.epsilon
     state = sides.below(Fraction(epsilon), subject.clock.share(_PART))
@@ -79,18 +82,18 @@ def _weak(subject: Subject, sides: StrengthBounds) -> Answer:
 def _gaps(subject: Subject, given: Arrangement, first: Witness) -> Iterator[Answer]:
     """Answer with the gaps that were found, the nearest to a row first."""
     found, is_all = _separate(subject, given, first)
-    told = [_gap(subject, state) for state in found]
+    gaps = [_gap(subject, state) for state in found]
     if subject.rows is not None:
         rules = subject.rules
         found_near = rank_by_distance(
-            told, subject.rows, subject.domain, rules.inputs, rules.variables
+            gaps, subject.rows, subject.domain, rules.inputs, rules.variables
         )
-        told = [*found_near]
+        gaps = [*found_near]
     yield from (
-        replace(one, subject=f"gap {place}") for place, one in enumerate(told, 1)
+        replace(one, subject=f"gap {place}") for place, one in enumerate(gaps, 1)
     )
     if not is_all:
-        sentence = f"there may be more gaps than the {len(found)} that are told"
+        sentence = f"there may be more gaps than the {len(found)} that are listed"
         reason = f"{MOST_GAPS} gaps at most are looked for, within the budget"
         state = Declined("FTD05", reason)
         yield Answer("FT301", "more gaps", sentence, state, False)
@@ -108,17 +111,17 @@ def _gap(subject: Subject, state: Witness) -> Answer:
 
 def _place(region: tuple[Span, ...]) -> str:
     """Return where a gap is, for a sentence."""
-    told = [f"{one.variable!r} is {_stretch(one)}" for one in region[:_MOST_SIDES]]
+    texts = [f"{one.variable!r} is {_stretch(one)}" for one in region[:_MOST_SIDES]]
     if len(region) > _MOST_SIDES:
-        told.append("so on")
-    return f"where {' and '.join(told)}" if told else "here"
+        texts.append("so on")
+    return f"where {' and '.join(texts)}" if texts else "here"
 
 
 def _stretch(side: Span) -> str:
     low, high = (None if end is None else f"{end:.6g}" for end in (side.low, side.high))
     if low is None or high is None:
         return f"at most {high}" if low is None else f"at least {low}"
-    if low == high:  # six digits do not tell them apart
+    if low == high:  # equal in six digits
         return f"about {low}" if side.low != side.high else low
     return f"{low} to {high}"
 
@@ -142,14 +145,14 @@ def _separate(
         except OutOfTimeError:
             return found, False
         if isinstance(state, Witness):
-            found.append(replace(state, region=_held(state, box, subject.domain)))
+            found.append(replace(state, region=_region_in(state, box, subject.domain)))
             todo += _around(given, box, state.region)
         elif not isinstance(state, Proved):
             return found, False
     return found, True
 
 
-def _held(state: Witness, box: Domain, domain: Domain) -> tuple[Span, ...]:
+def _region_in(state: Witness, box: Domain, domain: Domain) -> tuple[Span, ...]:
     """Return the region of a gap in a part of the domain, with the part's own ends."""
     known = {one.variable for one in state.region}
     parts = (
@@ -168,7 +171,7 @@ def _around(
     variables = {axis.variable.name: axis.variable for axis in given.axes}
     for inner in region:
         if inner.low is None or inner.high is None:
-            return  # of no region that is told
+            return  # no finite region
         side = sides.get(inner.variable)
         if side is None:
             ends = span(variables[inner.variable], box)

@@ -33,8 +33,8 @@ from fuzzytree.model.tree import FuzzyTree
 MOST_BOXES = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""
 
-MOST_TOLD = 1000
-"""Boxes beyond which it is told that leaves are reached, and not where they decide."""
+MOST_LISTED = 1000
+"""Boxes beyond which the regions of leaves are not listed."""
 
 NOT_LOOKED_AT = "the regions of the leaves are not looked at"
 
@@ -42,7 +42,7 @@ NOT_LOOKED_AT = "the regions of the leaves are not looked at"
 def answers(subject: Subject) -> Iterator[Answer]:
     """Yield the region of each leaf, and the leaves that are never reached.
 
-    Nothing is asked of a model that is no tree.
+    Models other than trees have no leaves.
     """
     tree = subject.tree
     if tree is None:
@@ -68,17 +68,11 @@ def too_many_boxes(found: Sequence[Region]) -> Declined | None:
 def leaf_regions(
     subject: Subject, tree: FuzzyTree, found: Sequence[Region]
 ) -> Iterator[Answer]:
-    """Yield where each leaf decides, or that it never does.
-
-    Args:
-        subject: The tree as it is audited.
-        tree: The tree itself.
-        found: Its regions.
-    """
+    """Yield where each leaf decides, or that it never does."""
     live, count = 0, sum(map(box_count, found))
-    if count > MOST_TOLD:
-        why = f"the leaves are made of {count} boxes, more than {MOST_TOLD}"
-        text = "the regions of the leaves are not told one by one"
+    if count > MOST_LISTED:
+        why = f"the leaves are made of {count} boxes, more than {MOST_LISTED}"
+        text = "the regions of the leaves are not listed"
         yield Answer("FT205", "leaves", text, Declined("FTD05", why), False)
     for region in found:
         subject.clock.check()
@@ -89,7 +83,7 @@ def leaf_regions(
             yield _unreached(subject, tree, region, len(inside))
             continue
         live += 1
-        for number, (box, point) in enumerate(parts if count <= MOST_TOLD else (), 1):
+        for number, (box, point) in enumerate(parts if count <= MOST_LISTED else (), 1):
             name = f"leaf {region.leaf}"
             if len(parts) > 1:
                 name += f", part {number} of {len(parts)}"
@@ -109,9 +103,9 @@ def _region(
 ) -> Answer:
     assert leaf_at(tree, point) == region.leaf  # a point of its box
     unions = dict(region.sides)
-    held = [side for side in box.sides if side.variable in unions]
-    spans = tuple(Span(side.variable, side.low, side.high) for side in held)
-    ends = [(side.variable, _ends(side, unions[side.variable])) for side in held]
+    cut_sides = [side for side in box.sides if side.variable in unions]
+    spans = tuple(Span(side.variable, side.low, side.high) for side in cut_sides)
+    ends = [(side.variable, _ends(side, unions[side.variable])) for side in cut_sides]
     texts = [
         f"{variable!r} is {values_text((interval,))}"
         for variable, interval in ends
@@ -166,7 +160,7 @@ def _unreached(subject: Subject, tree: FuzzyTree, region: Region, count: int) ->
     name = f"leaf {region.leaf}"
     how = "the intervals on its path have nothing in common with the domain"
     if count:
-        how = f"{count} boxes of combinations asked: no point of the inputs is in them"
+        how = f"{count} boxes of combinations tested: no point of the inputs is in them"
     return Answer(
         code="FT101",
         subject=name,
@@ -183,16 +177,16 @@ def _reason(tree: FuzzyTree, region: Region, domain: Domain) -> str:
     """Return why no input reaches a leaf."""
     for variable, union in region.sides:
         if not union:
-            return f"the questions about {variable!r} on its path exclude each other"
+            return f"the nodes for {variable!r} on its path exclude each other"
         side = domain.side(variable)
         if side is not None and not any(cut_side(side, one) for one in union):
             return (
-                f"its path asks for {variable!r} {values_text(union)}, and the domain "
+                f"its path needs {variable!r} {values_text(union)}, and the domain "
                 f"is {number_text(side.low)} to {number_text(side.high)}"
             )
     combined = {variable.name for variable in tree.variables if variable.parts}
-    asked = [repr(name) for name, _ in region.sides if name in combined]
-    return f"no input of the domain meets what its path asks of {' and '.join(asked)}"
+    names = [repr(name) for name, _ in region.sides if name in combined]
+    return f"no input of the domain meets what its path needs of {' and '.join(names)}"
 
 
 def values_text(union: Union) -> str:

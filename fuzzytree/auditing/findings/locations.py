@@ -27,7 +27,7 @@ class ModelFile(msgspec.Struct, frozen=True, eq=False):
     Attributes:
         name: Its path as the user wrote it.
         content: Its bytes.
-        locate: Tells where the parts of its model stand.
+        locate: Returns where a part of its model stands.
     """
 
     name: str
@@ -46,7 +46,7 @@ def writable(text: str) -> str:
 
 
 def model_file(name: str, content: bytes) -> ModelFile:
-    """Return a file with its places; it is read for them when they are asked for."""
+    """Return a file with its places; it is read at the first look-up."""
 
     @functools.cache
     def known() -> Locate:
@@ -112,14 +112,7 @@ def _label_path(system: FuzzySystem, label: TermName) -> Path:
 def locations_of(
     answer: Answer, model: Document, file: ModelFile | None, numbers: Iterable[int]
 ) -> tuple[FileLocation, ...]:
-    """Return where the rules and terms of an answer stand, in that order.
-
-    Args:
-        answer: The answer.
-        model: The model in the file.
-        file: The file; without one there are no places.
-        numbers: The numbers in the file of the answer's rules.
-    """
+    """Return where the rules and terms of an answer stand, in that order."""
     if file is None:
         return ()
     paths = [rule_path(model, number) for number in numbers]
@@ -140,13 +133,13 @@ def with_ids(
 
     The hash is taken over the sentences and curves of the rules and the terms
     concerned, whatever their place in the file; where there are neither, over the
-    subject and the region. Equal ids are told apart by `-2`, `-3` in order.
+    subject and the region. Equal ids are numbered `-2`, `-3` in order.
 
     Args:
         answers: The answers.
         representations: The rules that their numbers mean, if there are any; then
             others whose terms may be concerned as well.
-        curves: What terms are in truth whose shape is another.
+        curves: The true curves of terms with another shape.
     """
     shapes: dict[tuple[str, str], object] = {}
     for representation in reversed(representations):

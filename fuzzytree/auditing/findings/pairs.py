@@ -1,4 +1,4 @@
-"""Questions about two rules: is one superfluous, hidden, a copy, or in conflict?"""
+"""Questions about two rules: is one subsumed, masked, a duplicate, or in conflict?"""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ from fuzzytree.auditing.engine.states import (
     short,
 )
 from fuzzytree.auditing.engine.witnesses import coupled
+from fuzzytree.auditing.findings.bounded_arrangement import (
+    BoundedArrangement,
+    bounded_arrangement,
+)
 from fuzzytree.auditing.findings.clauses import clause_answers
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
-from fuzzytree.auditing.findings.strength_bounds import StrengthBounds, strength_bounds
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
 
@@ -31,14 +34,14 @@ NEARLY: Final = Fraction(1, 10**6)
 """Two antecedents are nearly the same if no degree differs by more than this."""
 
 MOST_SHOWN: Final = 20
-"""The most conflicts that are told one by one."""
+"""The most conflicts that are listed one by one."""
 
 Pair = tuple[int, int]
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
     """Answer what is to be said of pairs of rules, and of single clauses."""
-    compared = strength_bounds(subject)
+    compared = bounded_arrangement(subject)
     if compared.lower.is_empty:
         return
     yield from _subsumed(subject, compared)
@@ -78,13 +81,13 @@ def _noun(subject: Subject) -> str:
 # --- FT104 and FT105: is one rule at least as strong everywhere?
 
 
-def _subsumed(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
-    asked = undecided = 0
+def _subsumed(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
+    tested = undecided = 0
     found: dict[int, list[int]] = {}
     for pair in _pairs(subject, is_alike=True):
         if not all(compared.fires[number - 1] for number in pair):
             continue
-        asked += 1
+        tested += 1
         forth, back = (
             compared.never_weaker(*each) for each in (pair, (pair[1], pair[0]))
         )
@@ -107,17 +110,17 @@ def _subsumed(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
             rules=(weak, *strong),
             measures=(Measure("rules that subsume it", len(strong)),),
         )
-    counts = asked, len(found), undecided
+    counts = tested, len(found), undecided
     yield from _rest_of_strengths("FT104", subject, compared, *counts)
 
 
-def _masked(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
-    asked = undecided = 0
+def _masked(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
+    tested = undecided = 0
     found: dict[int, list[tuple[int, bool]]] = {}
     for first, second in _pairs(subject, is_alike=False):
         if not all(compared.fires[number - 1] for number in (first, second)):
             continue
-        asked += 1
+        tested += 1
         verdict = compared.never_weaker(first, second)
         if verdict == "always":
             found.setdefault(second, []).append((first, True))
@@ -143,11 +146,11 @@ def _masked(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
             rules=(weak, *(number for number, _ in strong)),
             measures=(Measure("rules that mask it", len(strong)),),
         )
-    counts = asked, len(found), undecided
+    counts = tested, len(found), undecided
     yield from _rest_of_strengths("FT105", subject, compared, *counts)
 
 
-def _how(compared: StrengthBounds) -> str:
+def _how(compared: BoundedArrangement) -> str:
     cells = sum(len(grid.cells.rank) for grid in compared.lower.grids)
     means = "ratios of degrees" if compared.is_product else "orders of degrees"
     axes = len(compared.lower.axes)
@@ -157,18 +160,18 @@ def _how(compared: StrengthBounds) -> str:
 def _rest_of_strengths(
     code: str,
     subject: Subject,
-    compared: StrengthBounds,
-    asked: int,
+    compared: BoundedArrangement,
+    tested: int,
     found: int,
     undecided: int,
 ) -> Iterator[Answer]:
     """Yield what is known of all pairs of which nothing is found."""
-    if not asked:
+    if not tested:
         return
     silent = len(compared.fires) - int(compared.fires.sum())
     word = "subsumed" if code == "FT104" else "masked"
     kind = f"one {_noun(subject)}" if code == "FT104" else "two classes"
-    among = f"{counted(asked, 'pair')} of {kind}"
+    among = f"{counted(tested, 'pair')} of {kind}"
     rest = "no rule" if not found else "no other rule"
     state: State = Proved(_how(compared))
     sentence = f"{rest} is {word}, among {among}"
@@ -178,7 +181,7 @@ def _rest_of_strengths(
         sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
         state = Declined("FTD04", reason)
     elif undecided:
-        reason = f"{counted(undecided, 'pair')} of strengths are too near to tell"
+        reason = f"{counted(undecided, 'pair')} of strengths are too near to compare"
         sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
         state = Declined("FTD02", reason)
     yield Answer(
@@ -188,17 +191,17 @@ def _rest_of_strengths(
         state,
         is_finding=False,
         measures=(
-            Measure("pairs", asked),
-            Measure("pairs too near to tell", undecided),
+            Measure("pairs", tested),
+            Measure("pairs too near to compare", undecided),
             Measure("rules that never fire", silent),
         ),
     )
 
 
-# --- FT106: do two rules ask the same?
+# --- FT106: do two rules have the same antecedent?
 
 
-def _copied(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
+def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
     count = len(subject.rules.rules)
     copies: list[tuple[Pair, RuleDistance]] = []
     pairs = near = 0
@@ -256,7 +259,7 @@ def _copied(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
         f"somewhere their degrees differ by more than {short(NEARLY)}"
     )
     if near:
-        reason = f"{counted(near, 'pair')} of degrees are too near to tell"
+        reason = f"{counted(near, 'pair')} of degrees are too near to compare"
         sentence = f"{rest} are shown to have nearly the same antecedent, among "
         sentence += f"{among}: {reason}"
         state = Declined("FTD02", reason)
@@ -273,7 +276,7 @@ def _copied(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
 # --- FT201: do rules of different classes reach a level together?
 
 
-def _conflicts(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
+def _conflicts(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
     level = subject.settings.level
     near: list[tuple[float, Pair]] = []
     clean = touching = 0
@@ -289,10 +292,10 @@ def _conflicts(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
         else:
             near.append((-most, (one, other)))
     near.sort()
-    told = hidden = 0
+    listed = hidden = 0
     own = subject.clock.share(0.5)
     for place, (_, pair) in enumerate(near):
-        if own.is_over or (told == MOST_SHOWN and not compared.is_product):
+        if own.is_over or (listed == MOST_SHOWN and not compared.is_product):
             hidden += len(near) - place
             break
         subject.clock.check()
@@ -301,10 +304,10 @@ def _conflicts(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
         if found.level.high < level or isinstance(found.state, Proved):
             clean += 1
             touching += found.is_touch
-        elif is_shown and told == MOST_SHOWN:
+        elif is_shown and listed == MOST_SHOWN:
             hidden += 1
         else:
-            told += is_shown
+            listed += is_shown
             yield _conflict(subject, pair, found)
     if clean or hidden:
         yield _rest_of_conflicts(subject, compared, (clean, touching), hidden)
@@ -314,7 +317,7 @@ def _may_conflict(subject: Subject, one: int, other: int) -> bool:
     """Return whether two rules say different things of one output."""
     if subject.policy.decision == "strongest" or subject.system is None:
         return True
-    told = [
+    parts = [
         {
             (output.name, part)
             for output in subject.system.outputs
@@ -323,8 +326,8 @@ def _may_conflict(subject: Subject, one: int, other: int) -> bool:
         }
         for number in (one, other)
     ]
-    shared = {name for name, _ in told[0]} & {name for name, _ in told[1]}
-    return any(name in shared for name, _ in told[0] ^ told[1])
+    shared = {name for name, _ in parts[0]} & {name for name, _ in parts[1]}
+    return any(name in shared for name, _ in parts[0] ^ parts[1])
 
 
 def _conflict(subject: Subject, pair: Pair, found: JointMaximum) -> Answer:
@@ -378,9 +381,9 @@ def level_reached(found: JointMaximum) -> str:
 
 
 def _rest_of_conflicts(
-    subject: Subject, compared: StrengthBounds, told: tuple[int, int], hidden: int
+    subject: Subject, compared: BoundedArrangement, counts: tuple[int, int], hidden: int
 ) -> Answer:
-    clean, touching = told
+    clean, touching = counts
     level, noun = short(subject.settings.level), _noun(subject)
     kind = "classes" if noun == "class" else "conclusions"
     pairs, reach = counted(clean, "pair"), "reaches" if clean == 1 else "reach"
@@ -390,7 +393,7 @@ def _rest_of_conflicts(
         parts.append(f"{touching} of them at most touch it, at irrational values")
     if hidden:
         more = counted(hidden, "more pair")
-        parts.append(f"{more} of rules may reach {level}, not told one by one")
+        parts.append(f"{more} of rules may reach {level}, not listed")
     means = "products" if compared.is_product else "minima"
     return Answer(
         "FT201",
@@ -400,6 +403,6 @@ def _rest_of_conflicts(
         is_finding=bool(hidden),
         measures=(
             Measure("pairs that never do", clean),
-            Measure("pairs not told one by one", hidden),
+            Measure("pairs not listed", hidden),
         ),
     )

@@ -58,11 +58,11 @@ class Answer(Value, frozen=True):
     Attributes:
         code: The kind of question, such as `FT101`; see
             `fuzzytree.auditing.findings.codes`.
-        subject: What was asked about, short, such as `rule 3`.
+        subject: The subject of the question, such as `rule 3`.
         sentence: The answer as one sentence without its code.
         state: How it is known.
         is_finding: Whether it is something that a reader should see; the others show
-            that it was asked.
+            that it was checked.
         severity: Of the finding.
         rules: The numbers of the rules concerned, from 1, the most concerned first.
         terms: The terms concerned.
@@ -104,14 +104,14 @@ class AuditSelection(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class AuditSettings(Value, frozen=True):
-    """What an audit takes for small, and how long it may take.
+    """The thresholds of an audit, and its budget.
 
     Attributes:
         epsilon: An input is covered if some rule is at least as strong as this.
         margin: Two classes are close if their strengths differ by at most this.
         lead: A rule that never leads by this much is marginal.
         level: Two rules of different classes conflict where both reach this.
-        overlap: Two terms of a variable are hard to tell apart from this share on.
+        overlap: Two terms of a variable are hard to distinguish from this share on.
         rows: How many rows a sampled share looks at.
         seed: Of what is drawn.
         budget_s: After so many seconds nothing new is begun; above 0.
@@ -180,11 +180,11 @@ class Audit(Value, frozen=True):
         data: The table that was given, if one was.
         rows: How many rows it has.
         policy: How the rules decide.
-        domain: Where everything was asked.
-        settings: What was taken for small.
-        answers: Everything that was asked, findings and not, in order of their codes.
-        unasked: What was not asked and why, in sentences: left out by the user, or
-            by the budget, or by an interruption.
+        domain: The domain of all answers.
+        settings: The thresholds.
+        answers: All answers, findings and others, in order of their codes.
+        unasked: Questions without an answer and why, in sentences: left out by the
+            user, the budget or an interruption.
         limits: What this audit does not establish: fixed sentences.
         is_complete: Whether nothing was cut short.
         accepted: The ids of findings that the user's baseline accepts.
@@ -251,15 +251,15 @@ LIMITS: Final = (
     "true of the world",
     "anything outside the domain: every answer holds on the stated ranges and nowhere "
     "else",
-    "that all of the domain can happen: inputs are asked in every combination, also in "
+    "that all of the domain can happen: inputs are combined in every way, also in "
     "those that no row will ever have",
     "more about a sampled share than its interval says, and that only with the stated "
     "confidence",
     "what a bracket leaves open: the number lies between the two ends, and nothing "
     "more is known",
-    "anything about what was declined or not asked; both are listed",
-    "that strengths which only touch are told: ties and gaps without an interior are "
-    "left out",
+    "anything about what was declined or not run; both are listed",
+    "that strengths which only touch are reported: ties and gaps without an interior "
+    "are left out",
     "what rounding changes: answers are about real numbers at the doubles of the "
     "model, and a runtime may differ where strengths nearly tie",
     "that other files, runtimes or devices answer alike: only what was compared is "

@@ -34,6 +34,19 @@ if TYPE_CHECKING:
     from fuzzytree.runtimes.onnxruntime import OnnxModel
 
 
+RUNTIMES: Final = (
+    "native",
+    "native mixed",
+    "native float32",
+    "onnxruntime float64",
+    "onnxruntime mixed",
+    "onnxruntime float32",
+)
+"""What is run: our own arrays and ONNX, in each number type; the native ones are
+compared with exact arithmetic."""
+
+OF_SYSTEMS: Final = ("reference", "native", "onnxruntime float64")
+
 PROBES: Final = 2_000
 """The most probes of a comparison."""
 
@@ -44,7 +57,7 @@ _MOST_ROWS = 2_000  # rows or points that stand behind the probes
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
-    """Ask whether what is made of a model answers as it does.
+    """Compare all representations of a model with it.
 
     Raises:
         OutOfTimeError: If the budget is spent.
@@ -85,13 +98,7 @@ def _points(subject: Subject) -> tuple[FloatArray, str]:
 def agreement(
     subject: Subject, values: FloatArray, *others: Model | OnnxModel
 ) -> Agreement:
-    """Return what a check finds of the model and all that is made of it.
-
-    Args:
-        subject: The model.
-        values: Rows beside the probes, shape (inputs, rows).
-        others: Representations that were shipped with it.
-    """
+    """Return what a check finds of the model and its representations."""
     every = all_runtimes()
     if subject.system is not None:
         names = [one.name for one in every if one.in_audits or one.is_definition]
@@ -103,13 +110,7 @@ def agreement(
 def agreement_answers(
     subject: Subject, found: Agreement, values: FloatArray
 ) -> Iterator[Answer]:
-    """Yield the answers that a check gives: each disagreement, and the rest in short.
-
-    Args:
-        subject: The model.
-        found: What was found of it.
-        values: The rows beside the probes that it was found on.
-    """
+    """Yield an answer for each disagreement of a check, and a summary of the rest."""
     clean: dict[Basis, list[Comparison]] = {}
     for one in found.comparisons:
         if one.verdict in ("DISAGREES", "rows only"):

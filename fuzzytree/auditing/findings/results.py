@@ -1,4 +1,4 @@
-"""What other verbs found of the same model: results that an audit is read beside."""
+"""Results of `check` and `stability` for the same model, named in an audit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LoadedResult(NamedTuple):
     """A result that a user gave.
 
     Attributes:
-        result: What an audit tells of it.
+        result: Its summary in an audit.
         found: All of it.
     """
 
@@ -41,8 +41,8 @@ class LoadedResult(NamedTuple):
 def with_results(audit: Audit, given: Iterable[LoadedResult]) -> Audit:
     """Return an audit that names the results that it is read beside."""
     results = tuple(one.result for one in given)
-    told = msgspec.structs.replace(audit, results=results)
-    return msgspec.structs.replace(told, digest=digest_of(told))
+    audit = msgspec.structs.replace(audit, results=results)
+    return msgspec.structs.replace(audit, digest=digest_of(audit))
 
 
 def read_results(
@@ -94,7 +94,7 @@ def _read(path: PathLike, model: Document) -> LoadedResult:
 
 
 def _result(found: Agreement | Stability, file: SourceFile) -> VerbResult:
-    """Return what an audit tells of a result."""
+    """Return the summary of a result."""
     if isinstance(found, Stability):
         verdicts = [one.verdict for one in found.criteria]
         return VerbResult("stability", file, len(verdicts), verdicts.count("FAILS"))

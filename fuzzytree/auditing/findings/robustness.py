@@ -49,8 +49,8 @@ from fuzzytree.auditing.findings.rows import (
     DomainRows,
     distance_measure,
     narrowed_state,
-    not_asked,
     points_of,
+    rows_left_out,
 )
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.tree import FuzzyTree
@@ -58,11 +58,11 @@ from fuzzytree.numerics.exact import outwards
 
 Point = dict[str, Fraction]
 
-_HALVINGS = 16  # of a radius, to find one within which bounds tell the decision
+_HALVINGS = 16  # of a radius, to find one within which bounds decide the class
 
 
 class Decider(Protocol):
-    """A model that decides, asked exactly."""
+    """A model whose decisions are evaluated exactly."""
 
     of: Representation
 
@@ -75,7 +75,7 @@ class Decider(Protocol):
         ...
 
     def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
-        """Look at points together, before each is asked about."""
+        """Prepare the search for several points at once."""
         ...
 
     def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
@@ -84,19 +84,14 @@ class Decider(Protocol):
 
 
 def decider_of(subject: Subject) -> Decider:
-    """Return a model as it is asked: trees by regions, rules by strengths."""
+    """Return what decides: the regions of a tree, or the strengths of rules."""
     if subject.tree is not None:
         return CrispDecider(subject.tree, subject.domain)
     return RuleDecider(subject)
 
 
 class CrispDecider:
-    """A tree, by the regions of its leaves.
-
-    Args:
-        tree: The tree.
-        domain: Where it is asked.
-    """
+    """A tree, by the regions of its leaves."""
 
     of: Representation = "tree"
 
@@ -146,11 +141,7 @@ class CrispDecider:
 
 
 class RuleDecider:
-    """Rules of which the strongest decides.
-
-    Args:
-        subject: The rules as they are audited.
-    """
+    """Rules of which the strongest decides."""
 
     of: Representation = "rules"
 
@@ -173,8 +164,8 @@ class RuleDecider:
     def leaves_out(self, label: str | None) -> bool:
         """Return whether a rule of another class stands before one of a class's.
 
-        It wins where both are equally strong, and that is asked on sets with an
-        interior only.
+        It wins where both are equally strong, and only sets with an interior are
+        searched.
         """
         order = [rule.then == label for rule in self.subject.rules.rules]
         return any(order) and not all(order[: len(order) - order[::-1].index(True)])
@@ -215,7 +206,7 @@ class RuleDecider:
     def _clear(
         self, point: Mapping[str, Fraction], label: str | None, away: float
     ) -> Fraction | None:
-        """Return a radius within which bounds of doubles tell the decision."""
+        """Return a radius within which bounds in doubles decide the class."""
         centre = columns([point], self.subject.rules.inputs)
         top = min(away, 1.0) * (1.0 - float(NARROW))
         radii = [top * 0.5**number for number in range(_HALVINGS)]
@@ -237,7 +228,7 @@ SHOWN_ROWS = 5
 ASIDE = ", places where strengths only touch aside"
 """What a sentence adds where rules of other classes go first in a tie."""
 
-_PART = 0.9  # of the time, to seek; what is found must still be told
+_PART = 0.9  # of the time, to seek; the rest is for the answers
 _MOST_NAMED = 4  # inputs in a sentence
 
 
@@ -246,10 +237,6 @@ _MOST_NAMED = 4  # inputs in a sentence
 
 def radius(subject: Subject, row: Mapping[str, float]) -> Answer:
     """Return how far the nearest point is that is decided otherwise than a row.
-
-    Args:
-        subject: The model, of which one class decides.
-        row: A value for each input.
 
     Raises:
         ValueError: If the row lies outside the domain.
@@ -262,10 +249,6 @@ def radius(subject: Subject, row: Mapping[str, float]) -> Answer:
 
 def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[Answer]:
     """Yield how a row is decided, and how far the nearest other decision is.
-
-    Args:
-        subject: The model; nothing is asked where more than one rule answers.
-        row: A value for each input.
 
     Raises:
         ValueError: If the row lies outside the domain.
@@ -291,7 +274,7 @@ NOT_SOUGHT = "the nearest other decision is not sought"
 
 
 def _declined(subject: Subject) -> Declined | None:
-    """Return why no row of a model is asked about, None if rows are."""
+    """Return why rows of a model are declined, None if they are not."""
     if subject.policy.decision != "strongest":
         why = "every rule takes part in the answer, so that no class decides"
         return Declined("FTD07", why)
@@ -323,7 +306,7 @@ def _answer(
     if found.point is None or found.high is None:
         if found.is_none:
             text = f"all of the domain is decided as {name}, {answer_text(own)}{aside}"
-            state: State = Proved("other decisions asked on the whole domain")
+            state: State = Proved("other decisions were sought on the whole domain")
         else:
             text = f"no decision other than {answer_text(own)} is known around {name}"
             state = Bracket(what, outwards(found.low)[0], 1.0, found.why)
@@ -331,8 +314,8 @@ def _answer(
     other, _ = decider.decided(found.point)
     claim = Claim("decides", of=decider.of, label=other)
     moved = [axis for axis, value in found.point.items() if value != point[axis]]
-    told = _told(decider, point, found.point, moved)
-    changed = " and ".join(f"{axis!r} is {told[axis]}" for axis in moved)
+    values = _short_values(decider, point, found.point, moved)
+    changed = " and ".join(f"{axis!r} is {values[axis]}" for axis in moved)
     if len(moved) > _MOST_NAMED:
         changed = f"{len(moved)} inputs move by no more than {percent(found.high)}"
     text = (
@@ -352,7 +335,7 @@ def _answer(
     )
 
 
-def _told(
+def _short_values(
     decider: Decider,
     row: Mapping[str, Fraction],
     point: Mapping[str, Fraction],
@@ -361,10 +344,10 @@ def _told(
     """Return the values of a point in the fewest digits that are decided like it."""
     other, _ = decider.decided(point)
     for digits in range(6, 18) if len(moved) <= _MOST_NAMED else ():
-        told = {axis: f"{float(point[axis]):.{digits}g}" for axis in moved}
-        near = {axis: Fraction(text) for axis, text in told.items()}
+        values = {axis: f"{float(point[axis]):.{digits}g}" for axis in moved}
+        near = {axis: Fraction(text) for axis, text in values.items()}
         if decider.decided({**point, **near})[0] == other:
-            return told
+            return values
     return {axis: _moved(point[axis], row[axis]) for axis in moved}
 
 
@@ -384,7 +367,7 @@ def _moved(value: Fraction, own: Fraction) -> str:
 def answers(subject: Subject) -> Iterator[Answer]:
     """Yield how far rows are from another decision: the nearest of them, and in all.
 
-    Nothing is asked where more than one rule answers.
+    Systems in which more than one rule answers have no such rows.
     """
     if subject.policy.decision != "strongest":
         return
@@ -398,56 +381,56 @@ def answers(subject: Subject) -> Iterator[Answer]:
     points = points_of(subject, subject.rows)
     decider = decider_of(subject)
     clock = subject.clock.share(_PART)
-    asked: list[_Asked] = []
+    radii: list[_RowRadius] = []
     most = MOST_ROWS if subject.tree is None else MOST_ROWS_OF_TREE
     chosen = points.at[:most]
     decider.look([point for _, point in chosen])
     for number, point in chosen:
         if clock.is_over:
             break
-        subject.clock.report(f"radius of row {number}", len(asked) / len(chosen))
+        subject.clock.report(f"radius of row {number}", len(radii) / len(chosen))
         found = decider.nearest_other(point, clock)
-        is_worth_telling = found.is_narrow or (not asked and found.high is not None)
-        if clock.is_over and not is_worth_telling:
+        is_worth_keeping = found.is_narrow or (not radii and found.high is not None)
+        if clock.is_over and not is_worth_keeping:
             break
         answer = _answer(decider, f"row {number}", point, found)
         is_aside = decider.leaves_out(decider.decided(point)[0])
-        asked.append(_Asked(number, found.low, answer, is_aside))
-    asked.sort(key=lambda one: (one.low, one.number))
-    yield _in_all(points, asked)
-    yield from (one.answer for one in asked[:SHOWN_ROWS])
-    if 0 < len(asked) < len(chosen):
-        yield not_asked("FT204", len(chosen) - len(asked))
+        radii.append(_RowRadius(number, found.low, answer, is_aside))
+    radii.sort(key=lambda one: (one.low, one.number))
+    yield _in_all(points, radii)
+    yield from (one.answer for one in radii[:SHOWN_ROWS])
+    if 0 < len(radii) < len(chosen):
+        yield rows_left_out("FT204", len(chosen) - len(radii))
 
 
-class _Asked(NamedTuple):
+class _RowRadius(NamedTuple):
     number: int
     low: Fraction
     answer: Answer
     is_aside: bool
 
 
-def _in_all(points: DomainRows, asked: Sequence[_Asked]) -> Answer:
-    """Return an answer about all rows together; `asked` is in order of their radius."""
-    count = Measure("rows asked", len(asked))
-    if not asked:
+def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> Answer:
+    """Return an answer about all rows together; `radii` is in order of their radius."""
+    count = Measure("rows evaluated", len(radii))
+    if not radii:
         state = (
             Declined("FTD03", "the budget was spent before the first row")
             if points.at
             else Declined("FTD06", "no row lies in the domain")
         )
         return Answer("FT204", "rows", NOT_SOUGHT, state, False, measures=(count,))
-    first = asked[0]
+    first = radii[0]
     least = first.low
-    aside = ASIDE if any(one.is_aside for one in asked) else ""
-    of_all = "" if len(asked) == len(points.at) else "with the smallest margins "
-    median = statistics.median_low([one.low for one in asked])
+    aside = ASIDE if any(one.is_aside for one in radii) else ""
+    of_all = "" if len(radii) == len(points.at) else "with the smallest margins "
+    median = statistics.median_low([one.low for one in radii])
     return Answer(
         code="FT204",
         subject="rows",
-        sentence=f"of {points.text} {len(asked)} different ones {of_all}were asked: "
-        f"each keeps its decision within at least {percent(least)} {OF_RANGES}, half "
-        f"of them within {percent(median)}{aside}",
+        sentence=f"of {points.text} {len(radii)} different ones {of_all}were "
+        f"evaluated: each keeps its decision within at least {percent(least)} "
+        f"{OF_RANGES}, half of them within {percent(median)}{aside}",
         state=first.answer.state,
         is_finding=False,
         measures=(

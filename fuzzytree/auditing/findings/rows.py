@@ -63,10 +63,6 @@ def points_of(subject: Subject, rows: AuditRows) -> DomainRows:
 
     A call is close where the margin of the rules is small: there another decision tends
     to be near.
-
-    Args:
-        subject: The model.
-        rows: The rows.
     """
     names = subject.rules.inputs
     total = rows.values.shape[1]
@@ -162,8 +158,8 @@ def _part(
 ) -> Polytope | None:
     """Return the region of a gap whose combinations are known; None of any other."""
     combined = {one.name: one for one in variables if one.parts}
-    asked = {span.variable for span in gap.region}
-    if not asked & set(combined) or not asked <= {*combined, *inputs}:
+    names = {span.variable for span in gap.region}
+    if not names & set(combined) or not names <= {*combined, *inputs}:
         return None
     sides = {side.variable: side for side in domain.sides}
     for one in gap.region:
@@ -182,17 +178,17 @@ def _nearest_to_part(
     part: Polytope, rows: AuditRows, domain: Domain, inputs: Sequence[str]
 ) -> tuple[Fraction, int] | None:
     """Return how near a row is to a part of the inputs, at least, and which is it."""
-    asked = Polytopes(domain, inputs, [part])
+    regions = Polytopes(domain, inputs, [part])
     near: list[tuple[float, int, dict[str, Fraction]]] = []
     for row, values in enumerate(rows.values.T.tolist()):
         if all(map(math.isfinite, values)):
             point = dict(zip(inputs, map(Fraction, values), strict=True))
-            near.append((asked.bounds(point)[0], row, point))
+            near.append((regions.bounds(point)[0], row, point))
     best: tuple[Fraction, int] | None = None
     for bound, row, point in sorted(near, key=lambda one: one[:2]):
         if best is not None and bound > best[0]:
             break
-        found = asked.nearest(point, [0])
+        found = regions.nearest(point, [0])
         if not found.is_none and (best is None or found.low < best[0]):
             best = found.low, row + 1
     return best
@@ -250,26 +246,18 @@ def box_distance(
     return away
 
 
-def not_asked(code: str, count: int) -> Answer:
+def rows_left_out(code: str, count: int) -> Answer:
     """Return an answer that says how many rows the budget left out."""
     declined = Declined("FTD03", "the budget was spent")
-    text = f"{count} more rows are not asked"
+    text = f"{count} more rows are not evaluated"
     return Answer(code, "more rows", text, declined, False)
 
 
 def narrowed_state(
     name: str, low: Fraction, found: Nearest, claims: Sequence[Claim], why: str
 ) -> State:
-    """Return how a distance is known: by a witness, or between two bounds.
-
-    Args:
-        name: What the distance is.
-        low: Its lower bound.
-        found: The search for it, which found a point.
-        claims: What holds at that point.
-        why: Why the bounds are wide, if they are.
-    """
-    assert found.point is not None  # asked by the caller
+    """Return how a distance is known: by a witness, or between two bounds."""
+    assert found.point is not None  # checked by the caller
     assert found.high is not None
     point = coordinates(found.point)
     if msgspec.structs.replace(found, low=low).is_narrow:

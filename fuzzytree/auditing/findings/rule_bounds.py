@@ -49,7 +49,7 @@ class BoundedRules(msgspec.Struct, frozen=True, eq=False, dict=True):
     Attributes:
         lower: No rule is weaker in truth.
         upper: No rule is stronger in truth.
-        terms: The terms of both that are no plain shapes of the model.
+        terms: The terms of both that have no exact shape in the model.
         rules: The numbers of the rules that differ in both.
         gap: How far the lines of a curve are apart at most.
     """
@@ -66,15 +66,15 @@ class BoundedRules(msgspec.Struct, frozen=True, eq=False, dict=True):
         return f"curves are known to within {self.gap:.2g}"
 
     def key(self, number: int) -> tuple[object, ...]:
-        """Return what a rule asks: equal for rules that ask the same."""
-        asked = (
+        """Return a key that is equal for rules with the same antecedent."""
+        keys = (
             (one.variable, one.negated, frozenset(self._keys(one)))
             for one in self.lower.rules[number - 1].when
         )
-        return tuple(sorted(asked, key=repr))
+        return tuple(sorted(keys, key=repr))
 
-    def asked(self, clause: Clause) -> tuple[tuple[object, ...], float, float]:
-        """Return what a clause asks, and times which weights: the least, the most."""
+    def weighted_key(self, clause: Clause) -> tuple[tuple[object, ...], float, float]:
+        """Return the key of a clause without weights, and its least and most weight."""
         weights, keys = set[float](), set[tuple[object, ...]]()
         for key in self._keys(clause):
             is_weighted = isinstance(key[0], float)
@@ -97,7 +97,7 @@ class BoundedRules(msgspec.Struct, frozen=True, eq=False, dict=True):
     def certified(self, state: State) -> State:
         """Return what a state of the lower rules says of the true ones.
 
-        Strengths of rules that are held are not told: they are larger in truth.
+        Strengths of inexact rules are left out: they are larger in truth.
         """
         if not isinstance(state, Witness | Bracket):
             return state
@@ -117,12 +117,6 @@ def bounded_rules(
 ) -> BoundedRules | None:
     """Return rules from below and from above; None if they are plain.
 
-    Args:
-        rules: The rules as people read them, without weights.
-        weights: The weight of each.
-        terms: The terms that are held between lines.
-        ranges: The values of each variable, as far as they are known.
-
     Raises:
         ValueError: If a weight has no place: a rule without clauses, and no input.
     """
@@ -134,17 +128,17 @@ def bounded_rules(
         for rule, weight in zip(rules.rules, weights, strict=True)
     )
     inexact = {name for name, one in made.terms.items() if not one.is_exact}
-    asked = [
+    used = [
         {(clause.variable, term) for clause in rule.when for term in clause.terms}
         for rule in own
     ]
-    known = {name for of in asked for name in of} & inexact
+    known = {name for of in used for name in of} & inexact
     apart = (gap(made.terms[one], of) for one in known if (of := ranges[one[0]]))
     return BoundedRules(
         msgspec.structs.replace(rules, rules=own, variables=made.variables("lower")),
         msgspec.structs.replace(rules, rules=own, variables=made.variables("upper")),
         made.terms,
-        frozenset(n for n, of in enumerate(asked, 1) if of & inexact),
+        frozenset(n for n, of in enumerate(used, 1) if of & inexact),
         outwards(max(apart, default=Fraction(0)))[1],
     )
 
@@ -214,8 +208,8 @@ class _Made:
 
     def _constant(self, rule: Rule, weight: float) -> Clause:
         """Return a clause that has the same degree everywhere."""
-        asked = [clause.variable for clause in rule.when]
-        names = asked or [one.name for one in self.rules.variables]
+        used = [clause.variable for clause in rule.when]
+        names = used or [one.name for one in self.rules.variables]
         if not names:
             raise ValueError("there is no input that a weight could be laid upon")
         line = Points((0.0,), (weight,))

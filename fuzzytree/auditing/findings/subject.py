@@ -68,8 +68,8 @@ class Subject(msgspec.Struct, frozen=True, eq=False):
         rules: The rules: of a tree its relative rules, which decide as it does; of a
             system a view of it, whose classes are the texts of conclusions.
         policy: How the rules decide.
-        domain: Where everything is asked.
-        settings: What is taken for small.
+        domain: The domain of all questions.
+        settings: The thresholds.
         clock: How much time is left.
         tree: The tree that the rules come from.
         raw: The tree's raw rules, if it has fitted sets.
@@ -80,7 +80,7 @@ class Subject(msgspec.Struct, frozen=True, eq=False):
         declined: What the view could not take over, as answers.
         is_whole: Whether no rule is left out of the view that may fire. Otherwise what
             no rule of it covers may be covered all the same, and a term that no rule of
-            it asks may be asked.
+            it uses may be used.
         bounds: Lower and upper rules; None if the rules are exact as they stand here.
     """
 
@@ -110,26 +110,22 @@ _Found = TypeVar("_Found")
 
 
 class TimeSlices:
-    """Questions that are asked one after another.
-
-    Args:
-        clock: How much time there is for all that is asked with it.
-        part: How much of it these questions may take together.
+    """Many questions of one kind that share the remaining time.
 
     Attributes:
-        left_out: How many were not answered; whoever asks counts them.
+        left_out: How many were not answered; the caller counts them.
     """
 
     def __init__(self, clock: Clock, part: float) -> None:
         self.clock = clock.share(part)
         self.left_out = 0
 
-    def ask(self, left: int, question: Callable[[Clock], _Found]) -> _Found | None:
+    def run(self, left: int, question: Callable[[Clock], _Found]) -> _Found | None:
         """Return the answer to a question, None if the time does not suffice.
 
         Args:
             left: How many questions are left, this one too; at least 1.
-            question: Is given its own clock, which its steps are made to ask.
+            question: Called with a clock of its own, which its steps check.
         """
         if self.clock.is_over:
             return None
@@ -141,17 +137,11 @@ class TimeSlices:
             return None
 
     def rest(self, code: str, noun: str, what: str) -> Iterator[Answer]:
-        """Yield that some questions are open, if there are any.
-
-        Args:
-            code: Of the questions.
-            noun: What each is about, such as `rule`.
-            what: What is not known of them, such as `whether they ever win`.
-        """
+        """Yield that some questions are open, if there are any."""
         if self.left_out:
             reason = "the budget was spent"
             of = counted(self.left_out, noun)
-            sentence = f"{what} is not known of {of}: {reason}"
+            sentence = f"{what} is not known for {of}: {reason}"
             yield Answer(
                 code, f"{of} left open", sentence, Declined("FTD03", reason), False
             )

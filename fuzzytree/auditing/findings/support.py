@@ -240,7 +240,7 @@ def _settled(
         one is, and on the same side of the settings' margin.
     """
     rules, settings = subject.rules, subject.settings
-    assert found.strengths is not None  # it was asked for
+    assert found.strengths is not None  # the default
     best = found.strengths.max(axis=0)
     fires, may_fire = _firing(rules, values)
     is_weak = best < settings.epsilon
@@ -286,7 +286,7 @@ def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
-    """Ask what the rows say about each rule, and which shares of the domain are weak.
+    """Count what the rows show about each rule, and estimate shares of the domain.
 
     Raises:
         OutOfTimeError: If the budget is spent.

@@ -55,15 +55,10 @@ from fuzzytree.semantics.conversion.points import shape_of
 class SystemTerms:
     """The terms of each input.
 
-    Args:
-        plain: Those with an exact shape, by variable and name.
-        bounds: Those between two lines.
-        ranges: The values of each input, as far as they are known.
-
     Attributes:
         plain: As given.
         bounds: As given.
-        made: Hedged terms that conditions ask, by variable and a name of their own.
+        made: Hedged terms of conditions, by variable and a name of their own.
     """
 
     def __init__(
@@ -78,7 +73,7 @@ class SystemTerms:
         self.made: dict[Name, CurveBounds] = {}
 
     def knows(self, variable: str, term: str) -> bool:
-        """Return whether rules can ask a term."""
+        """Return whether rules can use a term."""
         return term in self.plain[variable] or (variable, term) in self.bounds
 
     def pointed(self, variable: str, term: str) -> CurveBounds | None:
@@ -89,7 +84,7 @@ class SystemTerms:
         return as_points(self.plain[variable][term], self.ranges.get(variable))
 
     def hedged(self, variable: str, term: str, hedges: Sequence[Hedge]) -> str | None:
-        """Return the name of a hedged term, which rules can then ask.
+        """Return the name of a hedged term, which rules can then use.
 
         Returns:
             None if there are no lines between which it is.
@@ -109,7 +104,7 @@ class SystemTerms:
         return name
 
     def variable(self, one: SystemInput) -> Variable:
-        """Return an input as a variable; what is held is there as its lower line."""
+        """Return an input as a variable; an inexact term has its lower line."""
         shapes = {**self.plain[one.name]}
         for (variable, term), found in {**self.bounds, **self.made}.items():
             if variable == one.name:
@@ -133,19 +128,14 @@ def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Interval | None]
 def terms_of(
     system: FuzzySystem, ranges: Mapping[str, Interval | None]
 ) -> tuple[SystemTerms, tuple[Answer, ...]]:
-    """Return the terms of a system's inputs, and what is to be said of some.
-
-    Args:
-        system: The system.
-        ranges: The values of each input.
-    """
+    """Return the terms of a system's inputs, and what is to be said of some."""
     plain: dict[str, dict[str, Shape]] = {}
     bounds: dict[Name, CurveBounds] = {}
     answers: list[Answer] = []
-    asking = Counter(
+    uses = Counter(
         key
         for rule in system.rules
-        for key in {(asked.variable, asked.label) for asked in questions(rule.when)}
+        for key in {(one.variable, one.label) for one in questions(rule.when)}
     )
     for one in system.inputs:
         plain[one.name] = {}
@@ -158,11 +148,11 @@ def terms_of(
             found = None if is_moved else _between(label, ranges[one.name])
             if found is not None:
                 bounds[one.name, label.name] = found
-            count = asking[one.name, label.name]
-            few = {0: "no rule asks", 1: "1 rule asks"}
-            asks = few.get(count, f"{count} rules ask")
-            told = _told(one, label, found, ranges[one.name])
-            answers.append(_answer(one, label, told, f"{asks} for it"))
+            count = uses[one.name, label.name]
+            few = {0: "no rule uses it", 1: "1 rule uses it"}
+            users = few.get(count, f"{count} rules use it")
+            outcome = _outcome(one, label, found, ranges[one.name])
+            answers.append(_answer(one, label, outcome, users))
     return SystemTerms(plain, bounds, ranges), tuple(answers)
 
 
@@ -185,7 +175,7 @@ def _between(label: SystemLabel, of: Interval | None) -> CurveBounds | None:
     return found and (found if label.height == 1.0 else scale(found, label.height))
 
 
-def _told(
+def _outcome(
     one: SystemInput, label: SystemLabel, found: CurveBounds | None, of: Interval | None
 ) -> tuple[str, str]:
     """Return what becomes of a term, and why."""
@@ -194,25 +184,25 @@ def _told(
     if one.parts and one.clips:
         reason = "a combination that is moved into a range has no exact method"
     if found is None:
-        return "is not taken over", reason
+        return "is left out", reason
     if of is None and isinstance(found.lower, Points):
         of = Fraction(found.lower.values[0]), Fraction(found.lower.values[-1])
     apart = f" {float(gap(found, of)):.2g} apart" if of else ""
     return (
-        f"is asked between two lines{apart} at most",
-        f"{reason}; its shape and its overlaps are not asked",
+        f"is bounded by two lines{apart} at most",
+        f"{reason}; its shape and its overlaps are not checked",
     )
 
 
 def _answer(
-    one: SystemInput, label: SystemLabel, told: tuple[str, str], asks: str
+    one: SystemInput, label: SystemLabel, outcome: tuple[str, str], users: str
 ) -> Answer:
-    name, (what, reason) = f"term {label.name!r} of {one.name!r}", told
+    name, (what, reason) = f"term {label.name!r} of {one.name!r}", outcome
     return Answer(
         "FTD02",
         name,
-        f"{name} {what}: {reason}; {asks}",
-        Declined("FTD02", f"{reason}; {asks}"),
+        f"{name} {what}: {reason}; {users}",
+        Declined("FTD02", f"{reason}; {users}"),
         is_finding=False,
         terms=(TermName(one.name, label.name),),
     )
@@ -222,7 +212,7 @@ MOST_WAYS: Final = 64
 """The most rules that one rule of a system becomes."""
 
 MOST_QUESTIONS: Final = 1_000
-"""The most that a rule may ask."""
+"""The most propositions in the condition of a rule."""
 
 NORMS: Mapping[str | None, Conjunction] = {"minimum": "min", "product": "product"}
 """The norms with an exact method, and what rules of ours call them."""
@@ -256,11 +246,6 @@ def decline(code: str, reason: str) -> NoReturn:
 class Conditions:
     """Makes ways of a block's conditions: each holds as far as the best of them.
 
-    Args:
-        conjunction: The AND of the rules that ways become part of.
-        terms: The terms of each input.
-        block: The block, whose norms join the conditions.
-
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> line = Points((0.0, 1.0), (0.0, 1.0))
@@ -282,7 +267,7 @@ class Conditions:
 
         Args:
             condition: The condition; None holds always.
-            negated: Whether the ways in which it does not hold are asked for.
+            negated: Whether the ways in which it does not hold are returned.
 
         Raises:
             DecliningError: If it has none that are exact.
@@ -291,7 +276,7 @@ class Conditions:
             case None:
                 return [*_ALWAYS]
             case Is():
-                return self._asked(condition, negated=negated)
+                return self._proposition(condition, negated=negated)
             case Not(part=part):
                 return self.ways(part, negated=not negated)
             case And(parts=(part,)) | Or(parts=(part,)):
@@ -306,35 +291,37 @@ class Conditions:
                 self._check_joint("or", negated=negated)
                 return self._joined(parts, is_union=not negated, negated=negated)
 
-    def _asked(self, asked: Is, *, negated: bool) -> list[Way]:
-        """Return the only way of a question: a clause, or always, or never."""
-        hedges = asked.hedges
+    def _proposition(self, one: Is, *, negated: bool) -> list[Way]:
+        """Return the only way of a proposition: a clause, or always, or never."""
+        hedges = one.hedges
         while hedges and hedges[0] == "not":
             negated, hedges = not negated, hedges[1:]
         if hedges and hedges[0] == "any":
             return [*(_NEVER if negated else _ALWAYS)]
         if "any" in hedges:
             decline("FTD07", f"the hedge {hedges[0]!r} of 'any' has no exact method")
-        if asked.variable not in self.terms.plain:
-            decline("FTD07", f"it asks the output {asked.variable!r}")
-        if asked.label is None or not self.terms.knows(asked.variable, asked.label):
-            name = f"{asked.label!r} of {asked.variable!r}"
+        if one.variable not in self.terms.plain:
+            decline("FTD07", f"it uses the output {one.variable!r}")
+        if one.label is None or not self.terms.knows(one.variable, one.label):
+            name = f"{one.label!r} of {one.variable!r}"
             decline("FTD02", f"the curve of {name} has no exact method")
         if hedges:
-            made = self.terms.hedged(asked.variable, asked.label, hedges)
+            made = self.terms.hedged(one.variable, one.label, hedges)
             if made is None:
                 decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
-            return [(Clause(asked.variable, (made,), negated),)]
-        return [(Clause(asked.variable, (asked.label,), negated),)]
+            return [(Clause(one.variable, (made,), negated),)]
+        return [(Clause(one.variable, (one.label,), negated),)]
 
     def _one_clause(
         self, parts: Sequence[Condition], *, negated: bool
     ) -> Clause | None:
         """Return `x is a or b` as one clause, if it is that and a maximum."""
-        asked = [*_plain_questions(parts)]
-        if self.block.disjunction != "maximum" or None in asked:
+        plain = [*_plain_questions(parts)]
+        if self.block.disjunction != "maximum" or None in plain:
             return None
-        ways = [way for one in asked if one for way in self._asked(one, negated=False)]
+        ways = [
+            way for one in plain if one for way in self._proposition(one, negated=False)
+        ]
         clauses = [way[0] for way in ways]
         if len({clause.variable for clause in clauses}) > 1:
             return None
@@ -374,7 +361,7 @@ class Conditions:
         return found
 
     def _both(self, one: Way, other: Way) -> Way:
-        """Return clauses of both; a minimum does not change by asking twice."""
+        """Return clauses of both; a minimum does not change by repetition."""
         both = (*one, *other)
         return tuple(dict.fromkeys(both)) if self.conjunction == "min" else both
 

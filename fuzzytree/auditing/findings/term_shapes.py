@@ -42,7 +42,7 @@ from fuzzytree.auditing.findings.terms import (
 from fuzzytree.model.rulebase import Points, Shape, Term
 
 SHALLOW: Final = Fraction(1, 100)
-"""Excesses and dips of degrees below this are counted and not told one by one."""
+"""Excesses and dips of degrees below this are counted and not listed."""
 
 
 def shape_answers(subject: Subject) -> Iterator[Answer]:
@@ -52,10 +52,10 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
         for term in of.variable.terms:
             subject.clock.check()
             found = [*_defects(of, term)]
-            told = [one for one in found if one is not None]
-            shallow += len(found) - len(told)
-            sound += not told
-            yield from told
+            defects = [one for one in found if one is not None]
+            shallow += len(found) - len(defects)
+            sound += not defects
+            yield from defects
     if not sound and not shallow:
         return
     shapes = "1 term has" if sound == 1 else f"{sound} terms have"
@@ -70,7 +70,7 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
 
 
 def _defects(of: VariableRange, term: Term) -> Iterator[Answer | None]:
-    """Yield the defects of a term's shape, None for each that is too small to tell."""
+    """Yield the defects of a term's shape, None for each too small one."""
     for excess in excesses(term.shape, of.low, of.high):
         yield _excess(of, term, excess) if excess.depth >= SHALLOW else None
     yield from _dips(of, term)
@@ -122,23 +122,23 @@ def _excess(of: VariableRange, term: Term, found: Excess) -> Answer:
 def _dips(of: VariableRange, term: Term) -> Iterator[Answer | None]:
     made = of.line(term)
     walked = [*walk(made, 0)]
-    told = [*dips(walked, SHALLOW)]
+    deep = [*dips(walked, SHALLOW)]
     smaller = [*dips(walked, Fraction(1, 10**12))]
-    yield from [None] * (len(smaller) - len(told))
-    if not told:
+    yield from [None] * (len(smaller) - len(deep))
+    if not deep:
         return
-    depths = [min(a.low, c.low) - b.high for (a, _), (b, _), (c, _) in told]
+    depths = [min(a.low, c.low) - b.high for (a, _), (b, _), (c, _) in deep]
     depth = max(depths)
-    (_, left), (bottom, valley), (_, right) = told[depths.index(depth)]
+    (_, left), (bottom, valley), (_, right) = deep[depths.index(depth)]
     yield _defect(
         of,
         term,
-        f"has {len(told) + 1} peaks: between {short(left)} and {short(right)} "
+        f"has {len(deep) + 1} peaks: between {short(left)} and {short(right)} "
         f"its degree falls to {short(bottom.nearest)}, at {short(valley)}",
         f"its curve was visited in {len(made.cells.rank)} stretches, in each of which "
         "it is monotone",
         (
-            Measure("peaks", len(told) + 1),
+            Measure("peaks", len(deep) + 1),
             Measure("depth of the deepest dip", float(depth)),
             Measure("place of the deepest dip", float(valley), unit=of.variable.unit),
         ),
@@ -202,13 +202,13 @@ def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
 
 
 MOST_SHOWN: Final = 20
-"""The most pairs of terms that are told one by one."""
+"""The most pairs of terms that are listed one by one."""
 
-_MOST_PIECES = 4_000  # of two curves whose overlap is asked for
+_MOST_PIECES = 4_000  # of two curves whose overlap is computed
 
 
 def overlap_answers(subject: Subject) -> Iterator[Answer]:
-    """Answer which terms share so much of their area that they are hard to tell."""
+    """Answer which terms share so much area that they are hard to distinguish."""
     limit = Fraction(subject.settings.overlap)
     found: list[tuple[Fraction, Answer]] = []
     apart = points = 0
@@ -279,7 +279,7 @@ def _overlapping(
     return Answer(
         "FT403",
         name,
-        f"{name} are hard to tell apart: they share "
+        f"{name} are hard to distinguish: they share "
         f"{_share(jaccard)} of their area{relation}",
         state,
         is_finding=True,
@@ -311,7 +311,7 @@ def _other_pairs(found: int, apart: int, points: int, limit: float) -> Answer:
     fewer, more = (counted(n, "pair") for n in (apart, found - MOST_SHOWN))
     parts = [f"{fewer} of terms share less than {short(limit)} of their area"]
     if found > MOST_SHOWN:
-        parts.append(f"{more} besides those told share more")
+        parts.append(f"{more} besides those listed share more")
     if points:
         parts.append(f"{counted(points, 'pair')} have no area on the domain")
     return Answer(
@@ -322,7 +322,7 @@ def _other_pairs(found: int, apart: int, points: int, limit: float) -> Answer:
         is_finding=found > MOST_SHOWN,
         measures=(
             Measure("pairs apart", apart),
-            Measure("pairs not told one by one", max(found - MOST_SHOWN, 0)),
+            Measure("pairs not listed", max(found - MOST_SHOWN, 0)),
             Measure("pairs without area", points),
         ),
     )

@@ -43,20 +43,20 @@ class VariableRange(NamedTuple):
 def ranges(subject: Subject) -> tuple[VariableRange, ...]:
     """Return the range of each variable that has terms; none if the domain is empty.
 
-    Terms that are held between two lines are left out.
+    Terms whose curves are known between bounds are left out.
     """
-    held = subject.bounds.terms if subject.bounds else {}
+    bounds = subject.bounds.terms if subject.bounds else {}
     found: list[VariableRange] = []
     for of in whole_ranges(subject):
         name, terms = of.variable.name, of.variable.terms
-        plain = tuple(term for term in terms if (name, term.name) not in held)
+        plain = tuple(term for term in terms if (name, term.name) not in bounds)
         if plain:
             found.append(of._replace(variable=replace(of.variable, terms=plain)))
     return tuple(found)
 
 
 def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
-    """Return the same with all terms; of those that are held the lower line.
+    """Return the same with all terms; of inexact ones the lower line.
 
     Terms that only the view has, such as `very high`, are left out.
     """
@@ -76,7 +76,7 @@ def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
 
 def _own_terms(subject: Subject, variable: Variable) -> Iterator[Term]:
     """Yield the terms of a variable that the system has."""
-    assert subject.system is not None  # nothing else is held
+    assert subject.system is not None  # nothing else has bounds
     for one in subject.system.inputs:
         if one.name == variable.name:
             names = {label.name for label in one.labels}
@@ -109,12 +109,12 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
 def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answer]:
     level = Fraction(subject.settings.level)
-    held = subject.bounds.terms if subject.bounds else {}
+    bounds = subject.bounds.terms if subject.bounds else {}
     clean, lowest = 0, Fraction(1)
     for of in whole:
         for term in of.variable.terms:
             subject.clock.check()
-            lines = held.get((of.variable.name, term.name))
+            lines = bounds.get((of.variable.name, term.name))
             if lines is None and _is_full(of, term):
                 clean += 1
                 continue
@@ -181,13 +181,13 @@ def _low_term(
 def _low_curve(
     of: VariableRange, term: Term, height: Bounds, *, is_low: bool
 ) -> Answer:
-    """Return that a curve that is held between lines is hardly reached, or may be."""
+    """Return that a curve between bounds is hardly reached, or may be."""
     name = term_name(of.variable, term)
     low, high = outwards(height.low)[0], outwards(height.high)[1]
     where = f"from {short(of.low)} to {short(of.high)}"
     begins = "is hardly reached" if is_low else "may hardly be reached"
     largest = f"its largest degree {where}"
-    why = "its curve was held between two lines of points"
+    why = "its curve is known between two lines of points"
     return Answer(
         "FT401",
         name,
@@ -205,29 +205,29 @@ def _low_curve(
 
 def _unused(subject: Subject) -> Iterator[Answer]:
     terms, variables, clauses = _inventory(subject)
-    asked = set(clauses)
-    needed = {variable for variable, _ in asked}
+    used = set(clauses)
+    needed = {variable for variable, _ in used}
     for variable in subject.rules.variables:
         if variable.name in needed:
             needed.update(part.input for part in variable.parts)
-    proof = Proved(f"{counted(len(clauses), 'question')} of all rules read")
+    proof = Proved(f"{counted(len(clauses), 'proposition')} of all rules read")
     for name in variables:
         if name not in needed:
             yield Answer(
                 "FT404",
                 f"variable {name!r}",
-                f"no rule asks variable {name!r}",
+                f"no rule uses variable {name!r}",
                 proof,
                 is_finding=True,
                 severity="info",
                 terms=tuple(TermName(name, term) for of, term in terms if of == name),
             )
-    idle = [one for one in terms if one[0] in needed and one not in asked]
+    idle = [one for one in terms if one[0] in needed and one not in used]
     for name, term in idle:
         yield Answer(
             "FT404",
             f"term {term!r} of {name!r}",
-            f"no rule asks term {term!r} of {name!r}",
+            f"no rule uses term {term!r} of {name!r}",
             proof,
             is_finding=True,
             severity="info",
@@ -235,12 +235,12 @@ def _unused(subject: Subject) -> Iterator[Answer]:
         )
     counts = (
         sum(name in needed for name in variables),
-        sum(one in asked for one in terms),
+        sum(one in used for one in terms),
     )
     yield Answer(
         "FT404",
         "terms and variables",
-        f"rules ask {counted(counts[0], 'variable')} and {counted(counts[1], 'term')}",
+        f"rules use {counted(counts[0], 'variable')} and {counted(counts[1], 'term')}",
         proof,
         is_finding=False,
         measures=(
@@ -253,7 +253,7 @@ def _unused(subject: Subject) -> Iterator[Answer]:
 def _inventory(
     subject: Subject,
 ) -> tuple[list[tuple[str, str]], list[str], list[tuple[str, str]]]:
-    """Return all terms, all variables, and what rules ask, question by question.
+    """Return all terms, all variables, and the terms that rules use, one by one.
 
     Of a system whose rules all take part the system itself is read: its view may lack
     rules and terms.

@@ -1,15 +1,15 @@
-"""What an audit asks about: a model's rules, as a rule base with all its meaning.
+"""The rules of a model as an audit sees them: a rule base with all its meaning.
 
-Rule bases and trees are asked as they are. A fuzzy system that only stands for a rule
-base of ours is asked as that one. Of any other system a *view* is made: its conditions
-as rules whose classes are the texts of what they conclude. A rule that asks `a and (b
+Rule bases and trees are audited as they are. A fuzzy system that only stands for a rule
+base is audited as that one. Of any other system a *view* is made: its conditions as
+rules whose classes are the texts of what they conclude. A rule of `a and (b
 or c)` becomes two rules, one for each way in which it can hold: under minimum or
 product, and maximum, its strength is that of the stronger one, exactly. A curve
-without an exact counterpart is held between two lines of points, and a weight is part
+without an exact counterpart is bounded by two lines of points, and a weight is part
 of a rule (see `rule_bounds`). What has no place here is left out, and an answer says
 so for each term and each rule.
 
-A view tells how strongly conditions hold, at every double. What outputs make of it,
+A view shows how strongly conditions hold, at every double. What outputs make of it,
 their curves and numbers, is not part of it.
 """
 
@@ -55,11 +55,11 @@ class AuditView(msgspec.Struct, frozen=True, eq=False):
     """A model's rules as they are audited.
 
     Attributes:
-        rules: The rules as people read them, without weights, each curve that is held
-            between lines as the lower one; None if not one rule of a system could be
+        rules: The rules as people read them, without weights, each inexact curve
+            as its lower bound; None if not one rule of a system could be
             taken over.
         policy: How they decide.
-        domain: Where they are asked: where inputs are moved into their range, not
+        domain: The domain: where inputs are moved into their range, not
             beyond it.
         tree: The tree they come from.
         raw: Its raw rules, if it has fitted sets.
@@ -94,7 +94,7 @@ def view(model: Document, domain: Domain) -> AuditView:
     Args:
         model: A tree: its relative rules, which decide as it does. A rule base: itself.
             A system: the rule base it stands for, or a view of it.
-        domain: Where everything is to be asked.
+        domain: The domain of the audit.
 
     Example:
         >>> from fuzzytree.testing import random_system
@@ -191,7 +191,7 @@ def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[Answer]]:
                 _declined(
                     "FTD07",
                     f"input {side.variable!r}",
-                    f"values outside its range are moved to its ends, so it is asked "
+                    f"values outside its range are moved to its ends, so its domain is "
                     f"from {low!r} to {high!r}",
                 )
             )
@@ -206,7 +206,7 @@ def _moved(one: SystemInput, value: float) -> float:
 
 
 def _declined(code: str, subject: str, reason: str) -> Answer:
-    sentence = f"{subject} is not taken over: {reason}"
+    sentence = f"{subject} is left out: {reason}"
     return Answer(code, subject, sentence, Declined(code, reason), is_finding=False)
 
 
@@ -229,7 +229,7 @@ class _Taken:
     def note_activation(self, position: int, block: RuleBlock) -> None:
         """Note that a block activates only some of the rules that fire."""
         subject = f"the activation of block {position}"
-        reason = f"it is {block.activation.method!r}; only conditions are asked"
+        reason = f"it is {block.activation.method!r}; only conditions are audited"
         self.answers.append(_declined("FTD07", subject, reason))
 
     def take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
@@ -245,7 +245,7 @@ class _Taken:
             return
         try:
             if sum(1 for _ in questions(rule.when)) > MOST_QUESTIONS:
-                decline("FTD05", f"it asks more than {MOST_QUESTIONS} questions")
+                decline("FTD05", f"it has more than {MOST_QUESTIONS} propositions")
             if rule.weight != 1.0 and not self.terms.plain:
                 decline("FTD07", "there is no input that its weight could stand for")
             ways = Conditions(self.conjunction, self.terms, block).ways(rule.when)

@@ -136,7 +136,7 @@ def _check_not_hidden(case: Case, answer: Answer) -> None:
     is_alike = answer.code == "FT104"
     pairs = [pair for pair in case.pairs(alike=is_alike) if case.fire(*pair)]
     silent = sum(not case.fire(number) for number in case.numbers)
-    counts = {"pairs": len(pairs), "pairs too near to tell": 0}
+    counts = {"pairs": len(pairs), "pairs too near to compare": 0}
     counts["rules that never fire"] = silent
     counted(answer, counts, 3)
     entries = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
@@ -183,7 +183,7 @@ def apart(case: Case, answer: Answer) -> None:
     rest = [pair for pair in case.pairs(alike=False) if pair not in entries]
     if case.view is not None:
         rest = [pair for pair in rest if case.view.may_conflict(*pair)]
-    omitted = next((m.value for m in answer.measures if "not told" in m.name), 0)
+    omitted = next((m.value for m in answer.measures if "not listed" in m.name), 0)
     require(answer.is_finding == (omitted > 0), "a finding that is none")
     counted(answer, {"pairs that never do": len(rest) - omitted}, 1)
     if omitted:
@@ -331,7 +331,7 @@ def overlaps(case: Case, answer: Answer) -> None:
             answer.is_finding == (len(near) > len(entries)), "a finding that is none"
         )
         counts = {
-            "pairs not told one by one": len(near) - len(entries),
+            "pairs not listed": len(near) - len(entries),
             "pairs apart": len(known) - len(near),
             "pairs without area": len(case.shares) - len(known),
         }
@@ -445,7 +445,7 @@ def tied(case: Case, answer: Answer) -> None:
     """Count the pairs of rules of two classes, and those with a finding."""
     pairs = len(case.pairs(alike=False))
     entries = sum(bool(one.rules) for one in case.coded("FT202"))
-    counted(answer, {"pairs": pairs, "pairs told one by one": entries}, 2)
+    counted(answer, {"pairs": pairs, "pairs listed": entries}, 2)
     require(not answer.is_finding, "that others do not tie is no finding")
     known = {one.rules for one in case.coded("FT202") if one.rules}
     total = next(

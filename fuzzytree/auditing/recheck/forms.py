@@ -41,7 +41,7 @@ FT101 P -info | leaves
 FT101 P +error | leaf {n1}
   leaf {n1} (rule {n1}) is never reached: {...}
 FT101 D -info | {...}
-  whether they ever {...} is not known of {_} <rule|rules>: {reason}
+  whether they ever {...} is not known for {_} <rule|rules>: {reason}
 FT102 W -info | {1} | largest lead, at least
   {1} leads by {largest lead, at least:.4g} at least somewhere
 FT102 B +warning | {1} | largest lead, at least; largest lead, at most
@@ -52,7 +52,7 @@ FT102 B -warning | {1} | largest lead, at least; largest lead, at most
 FT102 BD -info | {1}
   how far {1} leads is open, for it is open whether it wins
 FT102 D -info | {...}
-  how far they lead is not known of {_} <rule|rules>: {reason}
+  how far they lead is not known for {_} <rule|rules>: {reason}
 FT103 W -info | {1}
   {1} is somewhere stronger than every other rule
 FT103 WBD -info | {1}
@@ -69,13 +69,13 @@ FT104 P +warning | {1} | rules that subsume it
 FT105 P +error | {1} | rules that mask it
   {1} is never answered: wherever it fires, {2} of class {then2} is <at least as strong
   and stands before it|stronger>
-FT104 P -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+FT104 P -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
   no [other ]rule is subsumed, among {pairs:n pair} of one {noun}
-FT104 D -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+FT104 D -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
   no [other ]rule is shown to be subsumed, among {pairs:n pair} of one {noun}: {reason}
-FT105 P -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+FT105 P -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
   no [other ]rule is masked, among {pairs:n pair} of two classes
-FT105 D -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+FT105 D -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
   no [other ]rule is shown to be masked, among {pairs:n pair} of two classes: {reason}
 FT106 P +warning | {1} and {2} | largest distance; place of it
   {1} and {2} have [nearly ]the same antecedent and the same {noun} {then1}[; degrees
@@ -98,7 +98,7 @@ FT107 P +info | {1}, {clause}
 FT107 BD -info | {1}, {clause}
   whether {1} needs {clause} is open
 FT107 P -info | {1}
-  {1} never fires, so that its clauses are not asked one by one
+  {1} never fires, so its clauses are not tested one by one
 FT107 P -info | clauses | clauses
   {clauses:d} more <clause matters: it decides|clauses matter: each decides> some input
 FT201 W +info | {1} and {2} | highest common level; * at least; * at most
@@ -107,41 +107,41 @@ FT201 W +info | {1} and {2} | highest common level; * at least; * at most
 FT201 B -info | {1} and {2} | highest common level at most
   {1} and {2} may conflict, on {then1} and {then2}: no more than
   {highest common level at most:s} is reached by both
-FT201 P -info | pairs of rules | pairs that never do; pairs not told one by one
+FT201 P -info | pairs of rules | pairs that never do; pairs not listed
   {pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
   {level:s} together[; {...}]
-FT201 P +info | pairs of rules | pairs that never do; pairs not told one by one
+FT201 P +info | pairs of rules | pairs that never do; pairs not listed
   [{pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
-  {level:s} together; [{...}; ]]{pairs not told one by one:n more pair} of rules may
-  reach {level:s}, not told one by one
+  {level:s} together; [{...}; ]]{pairs not listed:n more pair} of rules may
+  reach {level:s}, not listed
 FT202 W +warning | {1} and {2}
   {1} and {2} are equally strong, and the strongest, on more than a surface: the order
   of the rules alone decides there
-FT202 PBD -info | pairs of rules | pairs; * that tie; * told one by one; * left open
+FT202 PBD -info | pairs of rules | pairs; * that tie; * listed; * left open
   of {pairs:d} pairs of rules of different classes, {pairs that tie:d} tie as the
   strongest on more than a surface
 FT203 W +warning | leaf {n1}
   in leaf {n1} the tree answers {then1}, and somewhere there the raw rules answer {...}
 FT203 BD -info | leaf {n1}
-  whether the raw rules decide otherwise in leaf {n1} is left open
+  whether the raw rules decide differently in leaf {n1} is left open
 FT203 P -info | leaves
   in {_} of {rules} leaves the raw rules decide as the tree does
-FT203 WB -info | rows | rows that differ already; rows asked; * in ranges; row
+FT203 WB -info | rows | rows that differ already; rows evaluated; * in ranges; row
   of {rows of the audit:d} rows[ ({_} incomplete or outside the domain)]
-  {rows that differ already:d} differ already; around {rows asked:d}[ of {_}] others the
-  nearest disagreement is {distance of the witness, in ranges:p} of each input's range
-  from row {row:d}
-FT204 WB -info | rows | rows asked; * certified radius, in ranges; row
-  of {rows of the audit:d} rows[ ({_} incomplete or outside the domain)] {rows asked:d}
-  different ones [with the smallest margins ]were asked: each keeps its decision within
-  at least {smallest certified radius, in ranges:p} of each input's range, half of them
-  within {median certified radius, in ranges:p}[, {...}]
+  {rows that differ already:d} differ already; around {rows evaluated:d}[ of {_}] others
+  the nearest disagreement is {distance of the witness, in ranges:p} of each input's
+  range from row {row:d}
+FT204 WB -info | rows | rows evaluated; * certified radius, in ranges; row
+  of {rows of the audit:d} rows[ ({_} incomplete or outside the domain)]
+  {rows evaluated:d} different ones [with the smallest margins ]were evaluated: each
+  keeps its decision within at least {smallest certified radius, in ranges:p} of each
+  input's range, half of them within {median certified radius, in ranges:p}[, {...}]
 FT204 WB -info | row[ {_}] | * in ranges
   [the ]{subject} stays {...} within {certified radius, in ranges:p} of each input's
   range[, {...}]; where {...} it is {...}
 FT204 D -info | row
   the nearest other decision is not sought
-FT204 D -info | rows | rows asked
+FT204 D -info | rows | rows evaluated
   the nearest other decision is not sought
 FT205 W -info | {subject} | share of the domain
   {subject} decides {then1} {...}
@@ -161,7 +161,7 @@ FT301 BD -info | cover of {epsilon:g} | strength where it is least, *
 FT301 W +{gap} | gap {_} | *
   no rule fires {...}: the answer is {default}
 FT301 D -info | more gaps
-  there may be more gaps than the {_} that are told
+  there may be more gaps than the {_} that are listed
 FT401 P -info | terms | lowest height
   {_} <term reaches|terms reach> a degree of {level:s} or more
 FT401 P +warning | {term1} | height
@@ -183,20 +183,20 @@ FT402 P +warning | {term1} | share of its area on the domain
   {term1} lies outside of the domain for the most part:
   {share of its area on the domain:s} of its area is from {_} to {_}
 FT403 PB +info | {terms} | shared area by joined area; possibility; crossing*
-  {terms} are hard to tell apart: they share {...} of their area[; {...}]
+  {terms} are hard to distinguish: they share {...} of their area[; {...}]
 FT403 D -info | {terms}
   {terms} were not compared: {reason}
-FT403 P -info | pairs of terms | pairs apart; * not told one by one; * without area
+FT403 P -info | pairs of terms | pairs apart; * not listed; * without area
   {pairs apart:n pair} of terms share less than {overlap:s} of their
   area[; {pairs without area:n pair} have no area on the domain]
-FT403 P +info | pairs of terms | pairs apart; * not told one by one; * without area
+FT403 P +info | pairs of terms | pairs apart; * not listed; * without area
   {pairs apart:n pair} of terms share less than {overlap:s} of their
-  area; {pairs not told one by one:n pair} besides those told share
+  area; {pairs not listed:n pair} besides those listed share
   more[; {pairs without area:n pair} have no area on the domain]
 FT404 P +info | {subject}
-  no rule asks {subject}
+  no rule uses {subject}
 FT404 P -info | terms and variables | variables in use; terms in use
-  rules ask {variables in use:n variable} and {terms in use:n term}
+  rules use {variables in use:n variable} and {terms in use:n term}
 FT501 P -info | the rule base | *
   [audited as ]{rules:n rule} with {clauses:n clause}[, index of Nauck
   {index of Nauck:s}]
@@ -216,7 +216,7 @@ FT701 D -info | domain
 FT701 D -info | covered <rows|points>
   how many {...} are covered is not known: {reason}
 FTD D -info | {subject}
-  {subject} is <not taken over|asked {...}>: {reason}
+  {subject} is <left out|bounded {...}>: {reason}
 """
 """A form: its code, the states it is told in by their first letters, the severity of a
 finding (+) or of none (-); the subject; the measures. Then the sentence.

@@ -35,15 +35,15 @@ LIMITS = (
     "true of the world",
     "anything outside the domain: every answer holds on the stated ranges and nowhere "
     "else",
-    "that all of the domain can happen: inputs are asked in every combination, also in "
+    "that all of the domain can happen: inputs are combined in every way, also in "
     "those that no row will ever have",
     "more about a sampled share than its interval says, and that only with the stated "
     "confidence",
     "what a bracket leaves open: the number lies between the two ends, and nothing "
     "more is known",
-    "anything about what was declined or not asked; both are listed",
-    "that strengths which only touch are told: ties and gaps without an interior are "
-    "left out",
+    "anything about what was declined or not run; both are listed",
+    "that strengths which only touch are reported: ties and gaps without an interior "
+    "are left out",
     "what rounding changes: answers are about real numbers at the doubles of the "
     "model, and a runtime may differ where strengths nearly tie",
     "that other files, runtimes or devices answer alike: only what was compared is "
@@ -247,8 +247,8 @@ def _questions(case: Case, report: Report) -> None:
         is_stated = code.startswith("FTD") or code in codes or code in entries
         expect(is_stated, f"{code} is neither answered nor listed as left out")
     for code, text in zip(entries, audit.unasked, strict=True):
-        is_left = text.endswith(("left out by the user", "to ask it of"))
-        is_both = code in codes and (is_left or ": not asked: " in text)
+        is_left = text.endswith(("left out by the user", "that it applies to"))
+        is_both = code in codes and (is_left or ": not run: " in text)
         expect(not is_both, f"{code} is answered, and listed as left out")
 
 

@@ -67,7 +67,7 @@ def grip(cut: float = 2.0) -> RuleBase:
     )
 
 
-def told(old: Document, new: Document) -> Difference:
+def results(old: Document, new: Document) -> Difference:
     return ft.diff(old, new, settings=FEW)
 
 
@@ -76,7 +76,7 @@ def sentences(found: Difference) -> list[tuple[str, str]]:
 
 
 def test_a_model_and_itself_are_equal_on_any_input() -> None:
-    found = told(grip(), grip())
+    found = results(grip(), grip())
     assert (found.verdict, found.ok, found.changes) == ("equal", True, ())
     assert found.answers[0].state == Proved(
         "both take the same curves of the same inputs in the same rules, on any input"
@@ -85,13 +85,13 @@ def test_a_model_and_itself_are_equal_on_any_input() -> None:
 
 def test_a_tree_and_its_rules_are_equal() -> None:
     tree = random_tree(1)
-    assert told(tree, rules_from_tree(tree)).verdict == "equal"
+    assert results(tree, rules_from_tree(tree)).verdict == "equal"
 
 
 def test_a_rule_of_another_class_breaks_decisions_and_its_repair_does_not() -> None:
     old = grip()
     new = replace(old, rules=(old.rules[0], replace(old.rules[1], then="drop")))
-    found = told(old, new)
+    found = results(old, new)
     assert (found.verdict, found.ok) == ("changed", False)
     assert sentences(found) == [
         ("breaking", "rule 2 has changed: its class is 'drop', and was 'hold'")
@@ -99,7 +99,7 @@ def test_a_rule_of_another_class_breaks_decisions_and_its_repair_does_not() -> N
     (state,) = found.witnesses
     assert [claim.label for claim in state.claims] == ["hold", "drop"]
     assert [claim.of for claim in state.claims] == ["old", "new"]
-    assert told(old, replace(new, rules=old.rules)).ok
+    assert results(old, replace(new, rules=old.rules)).ok
 
 
 def test_names_units_and_notes_are_cosmetic() -> None:
@@ -118,7 +118,7 @@ def test_names_units_and_notes_are_cosmetic() -> None:
             old.rules[1],
         ),
     )
-    found = told(old, new)
+    found = results(old, new)
     assert found.verdict == "equal"
     assert sentences(found) == [
         ("cosmetic", "the unit of 'force' is 'kN', and was 'N'"),
@@ -131,7 +131,7 @@ def test_names_units_and_notes_are_cosmetic() -> None:
 
 def test_rules_in_another_order_break_nothing_where_no_tie_changes() -> None:
     rules = rules_from_tree(random_tree(1, combinations=0))
-    found = told(rules, replace(rules, rules=rules.rules[::-1]))
+    found = results(rules, replace(rules, rules=rules.rules[::-1]))
     assert (found.verdict, found.ok) == ("equal", True)
     ((grade, text),) = sentences(found)
     assert grade == "non-breaking"
@@ -147,7 +147,7 @@ def test_rules_in_another_order_break_where_a_tie_is_answered_otherwise() -> Non
     variable = Variable("x", (rising, falling), "", 0.0, 1.0)
     rules = (Rule((Clause("x", ("up",)),), "a"), Rule((Clause("x", ("down",)),), "b"))
     old = RuleBase("tie", ("a", "b"), (variable,), rules)
-    found = told(old, replace(old, rules=rules[::-1]))
+    found = results(old, replace(old, rules=rules[::-1]))
     assert [change.grade for change in found.changes] == ["breaking"]
     (state,) = found.witnesses
     assert point_of(state.point) == {"x": Fraction(1, 2)}
@@ -159,7 +159,7 @@ def test_rules_in_another_order_differ_only_where_classes_tie() -> None:
     variable = Variable("x", (rises, falls), "", 0.0, 1.0)
     up, down = Rule((Clause("x", ("up",)),), "a"), Rule((Clause("x", ("down",)),), "b")
     old = RuleBase("tie", ("a", "b"), (variable,), (up, down))
-    found = told(old, replace(old, rules=(down, up, up)))
+    found = results(old, replace(old, rules=(down, up, up)))
     assert found.verdict == "open"
     state = found.answers[0].state
     assert isinstance(state, Bracket)
@@ -177,7 +177,7 @@ def test_rules_in_another_order_differ_only_where_classes_tie() -> None:
         RuleBase("tie", ("a", "b"), (variable,), (one, down), product)
         for one in (up, squared)
     )
-    assert told(old, new).verdict == "changed"  # twice is no longer once
+    assert results(old, new).verdict == "changed"  # twice is no longer once
 
 
 def test_a_cut_that_moved_by_one_double_has_its_witness_exactly_there() -> None:
@@ -187,7 +187,7 @@ def test_a_cut_that_moved_by_one_double_has_its_witness_exactly_there() -> None:
         return replace(whole, rules=rules, variables=whole.variables[:1])
 
     moved = math.nextafter(2.0, 3.0)
-    found = told(crisp(2.0), crisp(moved))
+    found = results(crisp(2.0), crisp(moved))
     assert found.verdict == "changed"
     assert {point_of(one.point)["force"] for one in found.witnesses} == {
         Fraction(moved)
@@ -201,7 +201,7 @@ def test_a_class_that_is_called_otherwise_is_one_breaking_change() -> None:
         classes=("hold", "let go"),
         rules=(replace(old.rules[0], then="let go"), old.rules[1]),
     )
-    found = told(old, new)
+    found = results(old, new)
     assert sentences(found) == [
         ("breaking", "the class 'drop' is called 'let go'"),
     ]
@@ -214,10 +214,10 @@ def test_rules_are_matched_by_what_they_say() -> None:
     clause = Clause("slip", ("wet",), negated=True)
     changed = replace(old.rules[0], when=(old.rules[0].when[0], clause))
     new = replace(old, rules=(extra, old.rules[1], changed))
-    found = told(old, new)
+    found = results(old, new)
     assert [(c.sentence, c.old_rules, c.new_rules) for c in found.changes] == [
         (
-            "rule 1 (now 3) has changed: it asks 'slip is not wet' in place of "
+            "rule 1 (now 3) has changed: it has 'slip is not wet' in place of "
             "'slip is wet'",
             (1,),
             (3,),
@@ -243,7 +243,7 @@ def test_an_input_that_is_gone_breaks_and_a_range_does_not() -> None:
             old.rules[1],
         ),
     )
-    texts = {text: grade for grade, text in sentences(told(old, new))}
+    texts = {text: grade for grade, text in sentences(results(old, new))}
     assert texts["the input 'slip' was removed"] == "breaking"
     assert texts["the input 'slide' is new, so that rows need it"] == "breaking"
     assert texts["the range of 'force' is 0.0 to 6.0, and was 0.0 to 5.0"] == (
@@ -254,7 +254,7 @@ def test_an_input_that_is_gone_breaks_and_a_range_does_not() -> None:
 def test_another_answer_to_missing_values_breaks_though_all_others_are_equal() -> None:
     old = grip()
     semantics = replace(old.semantics, missing="drop")
-    found = told(old, replace(old, semantics=semantics))
+    found = results(old, replace(old, semantics=semantics))
     assert (found.verdict, found.ok) == ("equal", False)
     assert sentences(found) == [
         ("breaking", "the answer where a value is missing is 'drop', and was no class")
@@ -308,13 +308,13 @@ def test_what_cannot_be_decided_is_left_open_and_said_so() -> None:
         Rule((Clause("x", ("rises",)),), "b"),
     )
     old = RuleBase("tie", ("a", "b"), (Variable("x", (falls, rises), "", 0, 1),), rules)
-    found = told(old, replace(old, rules=rules[::-1]))
+    found = results(old, replace(old, rules=rules[::-1]))
     assert (found.verdict, found.ok) == ("open", True)
     assert isinstance(found.answers[0].state, Bracket)
     assert [change.is_proved for change in found.changes] == [False]
 
 
-def test_points_that_a_spent_budget_leaves_out_are_told() -> None:
+def test_points_that_a_spent_budget_leaves_out_are_reported() -> None:
     old, new = grip(), replace(grip(), rules=grip().rules[::-1])
     ticks = itertools.count()
     clock = Clock(4.0, now=lambda: float(next(ticks)))  # over after a few looks
@@ -337,15 +337,15 @@ def test_points_that_a_spent_budget_leaves_out_are_told() -> None:
 
 def test_nothing_is_left_out_where_there_is_time() -> None:
     new = replace(grip(), rules=grip().rules[::-1])
-    assert all(one.subject != "points" for one in told(grip(), new).answers)
+    assert all(one.subject != "points" for one in results(grip(), new).answers)
 
 
-def test_a_curve_that_changed_is_told_with_how_far() -> None:
+def test_a_curve_that_changed_is_reported_with_how_far() -> None:
     old = grip()
     slip = replace(
         old.variables[1], terms=(Term("wet", Points((0.0, 2.0), (0.0, 1.0))),)
     )
-    found = told(old, replace(old, variables=(old.variables[0], slip)))
+    found = results(old, replace(old, variables=(old.variables[0], slip)))
     (change,) = found.changes
     assert change.sentence == (
         "the curve of 'wet' of 'slip' has changed, by 0.5 at most, near 1"
@@ -353,7 +353,7 @@ def test_a_curve_that_changed_is_told_with_how_far() -> None:
     assert change.measures[0].exact == "1/2"
 
 
-def test_places_are_told_of_both_files(tmp_path: Path) -> None:
+def test_places_are_reported_of_both_files(tmp_path: Path) -> None:
     old, new = tmp_path / "old.yaml", tmp_path / "new.yaml"
     first = grip()
     ft.save(first, old)
@@ -390,14 +390,14 @@ def test_points_in_place_of_curves_are_proved_to_decide_alike(tmp_path: Path) ->
 
 def test_systems_are_compared_by_their_numbers() -> None:
     one = as_system(grip(), scores="class")
-    assert told(one, replace(one, note="new")).verdict == "equal"
+    assert results(one, replace(one, note="new")).verdict == "equal"
     block = one.blocks[0]
     fewer = replace(one, blocks=(replace(block, rules=block.rules[1:]),))
-    found = told(one, fewer)
+    found = results(one, fewer)
     assert (found.verdict, found.ok) == ("changed", False)
     assert ("breaking", "rule 1 was removed") in sentences(found)
     moved = replace(one.inputs[0], unit="kN", high=9.0)
-    found = told(one, replace(one, inputs=(moved, *one.inputs[1:])))
+    found = results(one, replace(one, inputs=(moved, *one.inputs[1:])))
     assert (found.verdict, found.ok) == ("equal", True)
     assert sentences(found) == [
         ("non-breaking", "the high of 'force' is 9.0, and was 5.0"),
@@ -406,7 +406,7 @@ def test_systems_are_compared_by_their_numbers() -> None:
 
 
 def test_the_same_input_gives_the_same_bytes() -> None:
-    found = [told(grip(2.0), grip(2.5)).to_json() for _ in range(2)]
+    found = [results(grip(2.0), grip(2.5)).to_json() for _ in range(2)]
     assert found[0] == found[1]
     assert json.loads(found[0])["verdict"] == "changed"
 
@@ -416,7 +416,7 @@ def test_models_of_different_inputs_are_not_compared() -> None:
     with pytest.raises(ReadError) as caught:
         ft.diff(grip(), other)
     assert str(caught.value) == (
-        "b: has no input in common with grip: it asks 'p', and that asks 'force', "
+        "b: has no input in common with grip: it uses 'p', and that uses 'force', "
         "'slip'"
     )
 
@@ -463,7 +463,7 @@ def test_a_distance_of_curves_holds_every_point() -> None:
 
 @pytest.mark.heavy
 def test_a_witness_is_kept_for_each_pair_of_classes() -> None:
-    found = told(random_tree(1, combinations=0), random_tree(2, combinations=0))
+    found = results(random_tree(1, combinations=0), random_tree(2, combinations=0))
     pairs = {tuple(claim.label for claim in state.claims) for state in found.witnesses}
     assert len(pairs) == len(found.witnesses) > 1
     assert all(isinstance(state, Witness) for state in found.witnesses)

@@ -85,7 +85,9 @@ def tipper(
     )
 
 
-def told(old: FuzzySystem, new: FuzzySystem, clock: Clock | None = None) -> Difference:
+def results(
+    old: FuzzySystem, new: FuzzySystem, clock: Clock | None = None
+) -> Difference:
     domain = joined_domain(old, new, {})
     return difference(old, new, domain=domain, settings=FEW, clock=clock)
 
@@ -109,7 +111,7 @@ def test_what_no_number_depends_on_leaves_the_operations_the_same() -> None:
     wide = replace(other.inputs[0], unit="points", high=11.0)
     service = replace(other.inputs[1], labels=other.inputs[1].labels[::-1])
     other = replace(other, name="b", note="new", inputs=(service, wide))
-    found = told(system, other)
+    found = results(system, other)
     assert (found.verdict, found.ok) == ("equal", True)
     (answer,) = found.answers
     assert answer.sentence == "both systems compute alike"
@@ -121,7 +123,7 @@ def test_what_no_number_depends_on_leaves_the_operations_the_same() -> None:
 
 
 def test_rules_in_another_order_are_alike_but_for_rounding() -> None:
-    found = told(tipper(), with_rules(tipper(), THREE, ONE, TWO))
+    found = results(tipper(), with_rules(tipper(), THREE, ONE, TWO))
     assert (found.verdict, found.ok) == ("equal", True)
     first = found.answers[0]
     assert first.sentence == (
@@ -139,29 +141,29 @@ def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
     service = tipper().inputs[1]
     old, new = (tipper(inputs=(each, service)) for each in (one, other))
     assert operation_keys(old) != operation_keys(new)
-    assert told(old, new).answers[0].state == Proved(
+    assert results(old, new).answers[0].state == Proved(
         "both are one function of real numbers: equal curves in equal rules"
     )
 
 
 def test_a_range_that_holds_the_domain_moves_no_value() -> None:
     food, service = tipper().inputs
-    held = tipper(inputs=(replace(food, clips=True), service))
-    found = told(tipper(), held)
+    bounds = tipper(inputs=(replace(food, clips=True), service))
+    found = results(tipper(), bounds)
     assert (found.verdict, found.ok) == ("equal", True)
     assert found.answers[0].sentence == (
         "both systems compute alike everywhere on the domain"
     )
     assert [change.sentence for change in found.changes] == [
-        "values of 'food' are now held in its range"
+        "values of 'food' are now clamped to its range"
     ]
     short = tipper(inputs=(replace(food, high=5.0, clips=True), service))
-    assert told(tipper(), short).verdict == "changed"
+    assert results(tipper(), short).verdict == "changed"
 
 
-def test_columns_that_one_alone_has_are_told_of() -> None:
+def test_columns_of_one_model_alone_are_reported() -> None:
     more = (*tipper().inputs, SystemInput("music", (), 0.0, 1.0))
-    found = told(tipper(), tipper(inputs=more))
+    found = results(tipper(), tipper(inputs=more))
     assert found.answers[0].sentence == (
         "both systems compute alike, where no value is missing"
     )
@@ -173,14 +175,14 @@ def test_where_order_decides_it_is_no_rounding() -> None:
     highest = replace(tipper(), blocks=(first,))
     turned = with_rules(highest, THREE, ONE, TWO)
     assert function_keys(highest, Curves()) == {}
-    assert told(highest, turned).verdict == "changed"
+    assert results(highest, turned).verdict == "changed"
 
 
 def test_systems_without_a_common_output_are_not_called_alike() -> None:
     renamed = replace(tipper().outputs[0], name="money")
     rules = [replace(one, then=(Conclusion("money", "low"),)) for one in (ONE, TWO)]
     new = replace(tipper(), outputs=(renamed,), blocks=(RuleBlock(tuple(rules)),))
-    found = told(tipper(), new)
+    found = results(tipper(), new)
     assert (found.verdict, found.ok, found.answers) == ("open", False, ())
 
 
@@ -189,7 +191,7 @@ def test_systems_without_a_common_output_are_not_called_alike() -> None:
 
 def test_a_constant_that_changed_has_a_witness_and_a_bound() -> None:
     old, new = tipper(), tipper(numbers={"high": 25.5})
-    found = told(old, new)
+    found = results(old, new)
     assert (found.verdict, found.ok) == ("changed", False)
     witness = found.answers[0]
     assert isinstance(witness.state, Witness)
@@ -208,14 +210,14 @@ def test_a_constant_that_changed_has_a_witness_and_a_bound() -> None:
 
 def test_a_constant_that_is_changed_back_is_no_difference() -> None:
     changed = tipper(numbers={"high": 25.5})
-    assert told(tipper(), changed).verdict == "changed"
-    assert told(tipper(), tipper(numbers={"high": 25.0})).verdict == "equal"
+    assert results(tipper(), changed).verdict == "changed"
+    assert results(tipper(), tipper(numbers={"high": 25.0})).verdict == "equal"
 
 
 def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
     wide = SystemTerm("bad", Trapezoid(0.0, 0.0, 3.0, 7.0))
     food = replace(tipper().inputs[0], labels=(wide, tipper().inputs[0].labels[1]))
-    found = told(tipper(), tipper(inputs=(food, tipper().inputs[1])))
+    found = results(tipper(), tipper(inputs=(food, tipper().inputs[1])))
     (bound,) = (a.state for a in found.answers if isinstance(a.state, Bracket))
     assert bound.high == 25.0  # from 0, the default, to 25
     assert 0.0 < bound.low < 25.0
@@ -229,7 +231,7 @@ def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
     food = replace(tipper().inputs[0], labels=(*tipper().inputs[0].labels, sliver))
     old = tipper(inputs=(food, tipper().inputs[1]), outputs=(output,))
     new = with_rules(old, ONE, TWO, THREE, rule(Is("food", "sliver"), "top"))
-    found = told(old, new)
+    found = results(old, new)
     assert found.verdict in ("open", "changed")
     assert any(
         isinstance(a.state, Bracket) and a.state.high == 30.0 for a in found.answers
@@ -242,7 +244,7 @@ def test_numbers_without_fractions_are_shown_as_they_are_computed() -> None:
         tipper().inputs[0].labels[1]))  # fmt: skip
     old = tipper(inputs=(bell, tipper().inputs[1]))
     new = tipper(inputs=old.inputs, numbers={"low": 6.0})
-    witness = told(old, new).answers[0]
+    witness = results(old, new).answers[0]
     assert isinstance(witness.state, Witness)
     assert witness.sentence.endswith("as the reference computes it")
     with pytest.raises(NotExactError):
@@ -257,7 +259,7 @@ def test_an_output_that_stays_is_proved_beside_one_that_differs() -> None:
     moved = replace(
         output, labels=(*output.labels[:2], SystemTerm("high", Singleton(9.0)))
     )
-    found = told(old, replace(old, outputs=(both[0], moved)))
+    found = results(old, replace(old, outputs=(both[0], moved)))
     assert found.verdict == "changed"
     states = {answer.subject: answer.state for answer in found.answers}
     assert isinstance(states["tip"], Proved)
@@ -275,18 +277,18 @@ def test_the_budget_ends_the_comparison_of_numbers() -> None:
         if text == "comparing numbers" and done > 0.0:  # behind the probes
             hour[0] = 999.0
 
-    found = told(tipper(), new, Clock(99.0, now=now, report=tell))
+    found = results(tipper(), new, Clock(99.0, now=now, report=tell))
     (left,) = (a for a in found.answers if a.subject == "points")
     assert left.sentence == "36 points were not looked at: the budget was spent"
     assert left.state == Declined("FTD03", "the budget was spent")
     assert found.verdict == "changed"
-    whole = told(tipper(), new, Clock(99.0, now=now))
+    whole = results(tipper(), new, Clock(99.0, now=now))
     assert all(a.subject != "points" for a in whole.answers)
 
 
-def test_a_budget_that_is_spent_before_anything_was_compared_is_told() -> None:
+def test_a_budget_that_is_spent_before_anything_was_compared_is_reported() -> None:
     now = iter(range(10**9))
-    found = told(
+    found = results(
         tipper(), tipper(numbers={"low": 6.0}), Clock(3.0, now=lambda: next(now))
     )
     (answer,) = found.answers
@@ -326,14 +328,14 @@ def made(chance: random.Random) -> FuzzySystem:
         clips=chance.random() < 0.2,
     )
 
-    def asked() -> Is:
+    def queries() -> Is:
         hedges: tuple[Hedge, ...] = chance.choice([(), (), ("not",), ("very",)])
         return Is(chance.choice("ab"), f"t{chance.randrange(3)}", hedges)
 
     def condition() -> Condition:
         kind = chance.randrange(4)
-        both = (asked(), asked())
-        return (asked(), And(both), Or(both), Not(And(both)))[kind]
+        both = (queries(), queries())
+        return (queries(), And(both), Or(both), Not(And(both)))[kind]
 
     rules = [
         rule(condition(), f"o{chance.randrange(3)}", weight=chance.choice([1.0, 0.5]))
@@ -359,9 +361,9 @@ def altered(system: FuzzySystem, chance: random.Random) -> FuzzySystem:
         moved = replace(output, labels=(first, *output.labels[1:]))
         return replace(system, outputs=(moved, *system.outputs[1:]))
     elif kind == 3:
-        asked, *others = system.inputs
-        labels = tuple(replace(label, height=0.5) for label in asked.labels)
-        return replace(system, inputs=(replace(asked, labels=labels), *others))
+        queries, *others = system.inputs
+        labels = tuple(replace(label, height=0.5) for label in queries.labels)
+        return replace(system, inputs=(replace(queries, labels=labels), *others))
     changed = replace(block, rules=tuple(rules))
     return replace(system, blocks=(changed, *system.blocks[1:]))
 

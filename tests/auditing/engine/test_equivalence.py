@@ -80,7 +80,7 @@ def pair(seed: int) -> tuple[RuleBase, RuleBase]:
 
 
 def differing(old: RuleBase, new: RuleBase) -> list[float]:
-    """Return the smaller margin at each point of a grid that is answered otherwise."""
+    """Return the smaller margin at each point of a grid with different classes."""
     steps = np.arange(-3.0, 3.01, 0.1).round(1)
     grid = np.array(np.meshgrid(steps, steps)).reshape(2, -1)
     one, other = (decide(m, grid, with_strengths=False) for m in (old, new))

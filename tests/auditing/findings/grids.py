@@ -1,4 +1,4 @@
-"""Audits of systems, held against what the systems themselves compute on a grid."""
+"""Compare audits of systems with what the systems themselves compute on a grid."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.inference import infer
 
 
-def told_rightly(system: FuzzySystem, found: Audit, seen: AuditView, steps: int) -> int:
-    """Hold an audit of a system against its degrees on a grid.
+def check_on_grid(
+    system: FuzzySystem, found: Audit, seen: AuditView, steps: int
+) -> int:
+    """Compare an audit of a system with its degrees on a grid.
 
     Args:
         system: The system; every rule that fires is activated.
@@ -23,7 +25,7 @@ def told_rightly(system: FuzzySystem, found: Audit, seen: AuditView, steps: int)
         steps: How many values of each input the grid has.
 
     Returns:
-        How many answers were held against it.
+        How many answers were compared.
     """
     assert seen.rules is not None
     grid = [*_grid(found, steps)]

@@ -32,7 +32,7 @@ def bands(name: str, cut: float) -> tuple[Term, Term]:
 def one_cut(
     meeting: float = 0.5, conjunction: Conjunction = "min", *, is_steep: bool = False
 ) -> FuzzyTree:
-    """Return a tree that asks x once, at 0.5, and whose fitted sets meet elsewhere.
+    """Return a tree with one cut of x, at 0.5, and whose fitted sets meet elsewhere.
 
     Args:
         meeting: Where the two sets cross; at 0.5 the raw rules decide as the tree does.
@@ -62,7 +62,7 @@ def one_cut(
 
 
 def two_cuts(second: float, *, combined: bool = False) -> FuzzyTree:
-    """Return a tree that asks x at 0.5, and above it again, or the sum x + y.
+    """Return a tree with a cut of x at 0.5, and above it another, or one of x + y.
 
     Args:
         second: The second cut; the leaf between the two is never reached if it is at
@@ -71,7 +71,7 @@ def two_cuts(second: float, *, combined: bool = False) -> FuzzyTree:
     """
     first = bands("first", 0.5)
     again = bands("again", second)
-    asked = "sum" if combined else "x"
+    queries = "sum" if combined else "x"
     parts = (Part("x", 1.0), Part("y", 1.0)) if combined else ()
     variables = (
         Variable("x", first if combined else (*first, *again)),
@@ -90,7 +90,7 @@ def two_cuts(second: float, *, combined: bool = False) -> FuzzyTree:
                 (Branch((first[0].name,), leaf=1), Branch((first[1].name,), node=2)),
             ),
             Node(
-                asked,
+                queries,
                 (second,),
                 (0, 1),
                 (Branch((again[0].name,), leaf=2), Branch((again[1].name,), leaf=3)),

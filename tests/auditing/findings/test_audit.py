@@ -1,4 +1,4 @@
-"""An audit as a whole: what was asked, what was not, ids, places, digest, bytes."""
+"""An audit as a whole: codes run and not run, ids, locations, digest, bytes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def steep(*order: int) -> RuleBase:
-    """Return three rules, in an order of one's own, of which one asks for nothing."""
+    """Return three rules, in an order of one's own, of which one has no effect."""
     terms = (Term("low", Band(high=1.0)), Term("high", Band(low=1.0)))
     rules = (
         Rule((Clause("x", ("low",)),), "a"),
@@ -53,11 +53,11 @@ def steep(*order: int) -> RuleBase:
     )
 
 
-def test_each_question_is_answered_or_stands_among_what_was_not_asked() -> None:
+def test_each_code_is_answered_or_listed_as_not_run() -> None:
     found = audit(grip(), domain=FAR)
-    told = {one.code for one in found.answers}
-    told |= {text.split()[0] for text in found.unasked}
-    assert told >= AUDITED
+    results = {one.code for one in found.answers}
+    results |= {text.split()[0] for text in found.unasked}
+    assert results >= AUDITED
     assert found.is_complete
 
 
@@ -133,7 +133,7 @@ def test_an_id_says_what_a_rule_says_and_not_where_it_stands() -> None:
     assert one.findings[0].id == other.findings[0].id
 
 
-def test_codes_that_are_left_out_are_told() -> None:
+def test_codes_that_are_left_out_are_reported() -> None:
     found = audit(grip(), domain=FAR, select=["FT10"], ignore=["FT102"])
     codes = {one.code for one in found.answers}
     assert "FT101" in codes
@@ -142,13 +142,13 @@ def test_codes_that_are_left_out_are_told() -> None:
     assert "FT301 coverage gap: left out by the user" in found.unasked
 
 
-def test_a_spent_budget_leaves_the_rest_unasked_and_says_so() -> None:
+def test_a_spent_budget_leaves_the_rest_unanswered_and_says_so() -> None:
     times = itertools.chain([0.0], itertools.repeat(10.0))
     clock = Clock(1.0, now=lambda: next(times))
     found = audit(grip(), domain=FAR, clock=clock, settings=AuditSettings(budget_s=1.0))
     assert not found.is_complete
     assert not found.was_interrupted
-    why = "not asked: the budget of 1 s is spent"
+    why = "not run: the budget of 1 s is spent"
     assert f"FT101 dead rule: {why}" in found.unasked
 
 
@@ -160,7 +160,7 @@ def test_a_budget_that_ends_midway_keeps_what_was_answered() -> None:
         times = itertools.chain(itertools.repeat(0.0, ticks), itertools.repeat(10.0))
         clock = Clock(1.0, now=functools.partial(next, times))
         part = audit(grip(), domain=FAR, clock=clock)
-        # Of what is left open, a sum of pairs may be told that the whole audit has not.
+        # A single family may count open pairs that the whole audit does not.
         known = {one.id for one in part.answers if one.rules or one.terms}
         assert known <= {one.id for one in whole.answers}
         counts.add(len(part.answers))
@@ -256,7 +256,7 @@ def test_every_random_tree_is_audited_to_its_end(seed: int) -> None:
     assert msgspec.json.decode(msgspec.json.encode(found), type=Audit) == found
 
 
-def test_where_all_is_declined_it_is_said_that_nothing_was_left_to_ask() -> None:
+def test_where_all_is_declined_the_audit_says_so() -> None:
     root = Path(__file__).resolve().parents[3]
     tipper = ft.load(root / "examples" / "tipper.fll")
     assert isinstance(tipper, ft.FuzzySystem)
@@ -266,6 +266,4 @@ def test_where_all_is_declined_it_is_said_that_nothing_was_left_to_ask() -> None
     found = audit(replace(tipper, blocks=(summed,)), select=["FT101"])
     assert found.answers
     assert all(isinstance(one.state, Declined) for one in found.answers)
-    assert found.unasked[0] == (
-        "FT101 dead rule: nothing is left to ask it of, beside what was declined"
-    )
+    assert found.unasked[0] == ("FT101 dead rule: all that it applies to was declined")

@@ -90,5 +90,5 @@ def test_the_depth_of_a_tree_is_its_longest_path() -> None:
     tree = random_tree(4, leaves=9)
     (answer,) = audit(tree, select=["FT501"]).answers
     longest = max(len(rule.when) for rule in rules_from_tree(tree).rules)
-    told = {one.name: one.value for one in answer.measures}
-    assert told["depth of the tree"] == depth(tree) == longest
+    results = {one.name: one.value for one in answer.measures}
+    assert results["depth of the tree"] == depth(tree) == longest

@@ -91,13 +91,13 @@ def test_an_empty_mapping_changes_nothing() -> None:
     ],
     ids=["keys", "number", "settings", "limits", "list", "empty", "aliases"],
 )
-def test_mistakes_are_told_with_their_places(content: bytes, message: str) -> None:
+def test_mistakes_are_reported_with_their_places(content: bytes, message: str) -> None:
     with pytest.raises(ReadError) as caught:
         configuration(content, "x.yaml")
     assert str(caught.value) == message
 
 
-def test_an_unknown_code_is_told_with_its_place() -> None:
+def test_an_unknown_code_is_reported_with_its_place() -> None:
     with pytest.raises(ReadError, match=r"^x.yaml:1:15: no code begins with 'FT9'; "):
         configuration(b"select: [FT1, FT9]", "x.yaml")
 
@@ -133,8 +133,8 @@ def test_a_baseline_that_was_written_is_read_and_accepts_all(tmp_path: Path) -> 
     assert not [*resolved_ids(read_baseline(path), found)]
 
 
-def test_what_is_accepted_and_no_longer_found_is_told_where_it_was_asked() -> None:
-    known = {"FT101-00000000": "a", "FT501-00000000": "not asked here"}
+def test_accepted_findings_that_are_gone_are_reported_for_codes_that_were_run() -> None:
+    known = {"FT101-00000000": "a", "FT501-00000000": "not run here"}
     assert [*resolved_ids(known, far())] == ["FT101-00000000"]
 
 

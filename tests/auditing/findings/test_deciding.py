@@ -91,7 +91,7 @@ def test_a_rule_out_of_the_domain_never_fires() -> None:
     assert found[3,].sentence == "rule 3 never fires on the domain"
 
 
-def test_a_rule_that_wins_by_its_place_alone_is_told_as_that() -> None:
+def test_a_rule_that_wins_by_its_place_alone_is_reported_as_that() -> None:
     found = _found(_asked(("low", "a"), ("low", "b"), ("high", "b")), "FT101")
     assert "by its place in the list alone" in found[1,].sentence
     assert isinstance(found[1,].state, Witness)
@@ -138,7 +138,7 @@ def test_rules_that_share_their_weakest_clause_are_ambiguous() -> None:
     assert (1, 2) not in _found(_asked(*apart), "FT202")
 
 
-def test_products_are_asked_too_and_tie_where_they_are_one_function() -> None:
+def test_products_are_tested_too_and_tie_where_they_are_one_function() -> None:
     given = _asked(*CLEAN, ("small", "c"), conjunction="product")
     assert list(_found(given, "FT101")) == [(3,)]
     (ties,) = [one for one in given if one.code == "FT202"]
@@ -147,7 +147,7 @@ def test_products_are_asked_too_and_tie_where_they_are_one_function() -> None:
     assert list(_found(copied, "FT202")) == [(1, 3)]
 
 
-def test_where_all_rules_take_part_only_firing_is_asked() -> None:
+def test_where_all_rules_take_part_only_firing_is_tested() -> None:
     given = _asked(*CLEAN, ("small", "c"), ("never", "c"), decision="all")
     assert {one.code for one in given} == {"FT101"}
     (dead,) = [one for one in given if one.is_finding]
@@ -175,7 +175,7 @@ def test_where_a_place_in_the_list_may_decide_a_rule_is_no_error() -> None:
     )
 
 
-def test_without_time_the_rules_that_points_show_to_win_are_told() -> None:
+def test_without_time_the_rules_that_points_show_to_win_are_reported() -> None:
     base = with_hidden_rule(random_base(0, 7, 4))
     ticks = itertools.count()
     clock = Clock(1.0, now=lambda: next(ticks) / 100.0)
@@ -183,16 +183,16 @@ def test_without_time_the_rules_that_points_show_to_win_are_told() -> None:
     won = [one for one in found if one.code == "FT101"]
     assert [one.sentence for one in won if isinstance(one.state, Witness)]
     (rest,) = [one for one in won if isinstance(one.state, Declined)]
-    assert rest.sentence.startswith("whether they ever win is not known of ")
+    assert rest.sentence.startswith("whether they ever win is not known for ")
     of = rest.subject
-    leads = f"how far they lead is not known of {of.removesuffix(' left open')}"
+    leads = f"how far they lead is not known for {of.removesuffix(' left open')}"
     open_leads = [one for one in found if (one.code, one.subject) == ("FT102", of)]
     assert open_leads[0].sentence == f"{leads}: the budget was spent"
     assert isinstance(open_leads[0].state, Declined)
     assert not any(one.is_finding for one in found)
 
 
-def test_rules_that_points_do_not_show_to_win_are_asked_first() -> None:
+def test_rules_that_points_do_not_show_to_win_are_tested_first() -> None:
     base = with_hidden_rule(random_base(0, 7, 4))
     first = next(
         one for one in answers(_subject(base, Clock(300.0))) if one.code == "FT101"

@@ -61,10 +61,12 @@ def test_sets_that_meet_off_the_cut_are_found_and_those_at_the_cut_are_not(
     assert _findings(subject_of(one_cut(0.5, conjunction))) == []
 
 
-def test_all_leaves_that_agree_are_told_of_in_one_answer() -> None:
-    [told] = answers(subject_of(one_cut(0.5)))
-    assert told.sentence == "in 2 of 2 leaves the raw rules decide as the tree does"
-    assert told.state == Proved("all other decisions asked in 2 boxes of the leaves")
+def test_all_leaves_that_agree_share_one_answer() -> None:
+    [results] = answers(subject_of(one_cut(0.5)))
+    assert results.sentence == "in 2 of 2 leaves the raw rules decide as the tree does"
+    assert results.state == Proved(
+        "all other decisions were sought in 2 boxes of the leaves"
+    )
 
 
 def test_a_part_of_a_leaf_that_no_raw_rule_covers_is_found() -> None:
@@ -79,20 +81,20 @@ def test_a_part_of_a_leaf_that_no_raw_rule_covers_is_found() -> None:
 def test_the_nearest_disagreement_to_a_row_is_bounded_on_both_sides() -> None:
     # Both differ on (0.25, 0.5]: rows 1 and 2 are 0.15 and 0.1 away, row 3 is inside.
     rows = [[0.1], [0.6], [0.3], [7.0]]
-    told = [*answers(subject_of(one_cut(0.25), rows=rows))][-1]
-    assert told.subject == "rows"
-    assert told.sentence == (
+    results = [*answers(subject_of(one_cut(0.25), rows=rows))][-1]
+    assert results.subject == "rows"
+    assert results.sentence == (
         "of 4 rows (1 incomplete or outside the domain) 1 differ already; around 2 "
         "others the nearest disagreement is 10 % of each input's range from row 2"
     )
-    assert _number(told, "row") == 2
-    assert 0.0998 < _number(told, "certified distance, in ranges") <= 0.1
-    assert 0.0999 < _number(told, "distance of the witness, in ranges") < 0.1002
-    assert isinstance(told.state, Witness)
+    assert _number(results, "row") == 2
+    assert 0.0998 < _number(results, "certified distance, in ranges") <= 0.1
+    assert 0.0999 < _number(results, "distance of the witness, in ranges") < 0.1002
+    assert isinstance(results.state, Witness)
 
 
 @pytest.mark.parametrize("calls", [3, 8, 12, 20, 40])
-def test_a_budget_that_ends_certifies_no_more_than_was_asked(calls: int) -> None:
+def test_a_budget_that_ends_certifies_no_more_than_was_tested(calls: int) -> None:
     subject = subject_of(one_cut(0.25), rows=[[0.1], [0.6], [0.8]])
     assert subject.tree is not None
     assert subject.raw is not None
@@ -102,43 +104,43 @@ def test_a_budget_that_ends_certifies_no_more_than_was_asked(calls: int) -> None
     )
     times = iter([0.0] * calls + [9.0] * 10_000)
     clock = Clock(1.0, now=lambda: next(times))
-    told, *more = nearest_difference(both, points_of(subject, subject.rows), clock)
-    asked = _number(told, "rows asked")
+    results, *more = nearest_difference(both, points_of(subject, subject.rows), clock)
+    queries = _number(results, "rows evaluated")
     assert [one.state for one in more] == (
-        [Declined("FTD03", "the budget was spent")] if 0 < asked < 3 else []
+        [Declined("FTD03", "the budget was spent")] if 0 < queries < 3 else []
     )
-    if not asked:
-        assert told.state == Declined(
+    if not queries:
+        assert results.state == Declined(
             "FTD03", "the budget was spent before the first row"
         )
         return
-    assert _number(told, "certified distance, in ranges") <= 0.1
-    assert isinstance(told.state, Witness if asked == 3 else (Bracket, Witness))
+    assert _number(results, "certified distance, in ranges") <= 0.1
+    assert isinstance(results.state, Witness if queries == 3 else (Bracket, Witness))
 
 
-def test_rows_around_which_nothing_differs_are_told_so() -> None:
-    told = [*answers(subject_of(one_cut(0.5), rows=[[0.1], [0.9]]))][-1]
-    assert told.sentence == (
+def test_rows_around_which_nothing_differs_are_reported_as_such() -> None:
+    results = [*answers(subject_of(one_cut(0.5), rows=[[0.1], [0.9]]))][-1]
+    assert results.sentence == (
         "of 2 rows 0 differ already; no disagreement is known around 2 others"
     )
-    assert isinstance(told.state, Proved)
+    assert isinstance(results.state, Proved)
 
 
 def test_rows_that_all_differ_leave_nothing_to_seek() -> None:
-    told = [*answers(subject_of(one_cut(0.25), rows=[[0.3]]))][-1]
-    assert told.sentence == (
+    results = [*answers(subject_of(one_cut(0.25), rows=[[0.3]]))][-1]
+    assert results.sentence == (
         "of 1 rows 1 differ already; the nearest disagreement to others is not sought"
     )
-    assert told.state == Declined(
+    assert results.state == Declined(
         "FTD06", "no row of the domain is decided alike by both"
     )
 
 
-def test_of_a_tree_without_sets_nothing_is_asked() -> None:
+def test_a_tree_without_sets_has_no_disagreement() -> None:
     assert [*answers(subject_of(two_cuts(0.75)))] == []
 
 
-def test_a_share_is_told_in_three_digits() -> None:
+def test_a_share_is_shown_in_three_digits() -> None:
     assert percent(Fraction(123456, 1000000)) == "12.3 %"
 
 
@@ -153,11 +155,11 @@ def _sampled(seed: int, points: int) -> None:
     limits = {name: (-r, r) for name, r in reach.items()}
     rows = [[draw.uniform(-r, r) for r in reach.values()] for _ in range(3)]
     subject = subject_of(tree, limits=limits, rows=rows, clock=Clock(20.0))
-    told = [*answers(subject)]
-    differing = {one.rules[0] for one in told if one.is_finding}
+    results = [*answers(subject)]
+    differing = {one.rules[0] for one in results if one.is_finding}
     assert subject.raw is not None
     both = TreeAndRules(tree, subject.raw, subject.domain, regions(tree))
-    near = next(one for one in told if one.subject == "rows")
+    near = next(one for one in results if one.subject == "rows")
     starts = [
         {name: Fraction(x) for name, x in zip(reach, row, strict=True)} for row in rows
     ]

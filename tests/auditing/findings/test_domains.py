@@ -1,4 +1,4 @@
-"""Where a model is asked: ranges, curves, spreads, rows, and what is none of these."""
+"""The domain of a model: ranges, curves, spreads, rows, and what is none of these."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_spreads_are_counted_from_the_rows_where_there_are_no_sets() -> None:
     )
 
 
-def test_a_system_is_asked_on_its_ranges_and_curves() -> None:
+def test_a_system_is_audited_on_its_ranges_and_curves() -> None:
     inputs = (
         SystemInput("dirt", (SystemTerm("much", Gaussian(5.0, 1.0)),)),
         SystemInput("load", (), 0.0, 3.0),

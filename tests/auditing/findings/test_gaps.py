@@ -52,7 +52,7 @@ def test_full_cover_is_proved_and_its_least_strength_known() -> None:
     assert [one.value for one in weak.measures] == [0.5, 0.5]
 
 
-def test_every_gap_is_told_with_its_ends() -> None:
+def test_every_gap_is_reported_with_its_ends() -> None:
     given = _asked(0.0, 2.5, width=1.0)
     ends = sorted((one.region[0].low, one.region[0].high) for one in given)
     assert ends == [(1.0, 1.5), (3.5, 4.0)]
@@ -77,7 +77,7 @@ def test_the_gap_nearest_to_a_row_comes_first() -> None:
     assert first.subject == "gap 1"
 
 
-def test_weak_cover_is_told_with_the_least_strength() -> None:
+def test_weak_cover_is_reported_with_the_least_strength() -> None:
     cover, weak = _asked(0.0, 1.9, 3.8, width=1.0)
     assert isinstance(cover.state, Proved)
     assert isinstance(weak.state, Witness)

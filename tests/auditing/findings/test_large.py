@@ -1,4 +1,4 @@
-"""Large models: within the budget, with bounded memory, and what is known is told."""
+"""Large models: within the budget, with bounded memory, and with all that is known."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LARGE: dict[str, RuleBase] = {
 }
 
 
-def asked(name: str) -> tuple[Audit, float]:
+def queries(name: str) -> tuple[Audit, float]:
     """Return an audit of a large model, and what it took of the processor."""
     clock = Clock(BUDGET_S, now=time.process_time)
     start = time.process_time()
@@ -42,18 +42,18 @@ def asked(name: str) -> tuple[Audit, float]:
 def test_an_audit_of_a_large_model_keeps_its_budget(name: str) -> None:
     # In another thread, where no alarm of the system would end it.
     found: list[tuple[Audit, float]] = []
-    thread = threading.Thread(target=lambda: found.append(asked(name)))
+    thread = threading.Thread(target=lambda: found.append(queries(name)))
     thread.start()
     thread.join()
-    ((told, taken),) = found
+    ((results, taken),) = found
     assert taken < BUDGET_S + SLACK_S
-    assert not told.is_complete
-    assert any(": not asked: " in one or ": cut short" in one for one in told.unasked)
+    assert not results.is_complete
+    assert any(": not run: " in one or ": cut short" in one for one in results.unasked)
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("name", ["500 x 2", "500 x 2, product", "60 classes"])
 def test_most_rules_of_a_large_model_are_seen_to_win(name: str) -> None:
-    found, _ = asked(name)
+    found, _ = queries(name)
     won = [one for one in found.answers if one.code == "FT101"]
     assert sum(isinstance(one.state, Witness) for one in won) > 20

@@ -112,7 +112,7 @@ def test_a_damaged_yaml_file_has_no_places() -> None:
     assert model_file("x.yaml", b"a: [").place(("rules", 0)) is None
 
 
-def test_places_are_told_once_each_rules_first() -> None:
+def test_places_are_reported_once_each_rules_first() -> None:
     rules = ft.rules_from_tree(random_tree(1))
     file = written(rules)
     first = rules.variables[0]
@@ -175,7 +175,7 @@ def test_an_id_changes_with_a_curve_a_rule_or_a_code() -> None:
     assert len(known) == 4
 
 
-def test_equal_ids_are_told_apart_in_order() -> None:
+def test_equal_ids_are_numbered_in_order() -> None:
     about = found("FT201", rules=(1, 2))
     first, second, third = ids(base(), about, about, about)
     assert second == f"{first}-2"

@@ -76,14 +76,14 @@ def with_rule(term: str, then: str, *terms: Term) -> RuleBase:
 
 
 def with_clause(term: Term) -> RuleBase:
-    """Return the clean rules, the first of which asks one more thing."""
+    """Return the clean rules, the first of which has one more clause."""
     first, *others = CLEAN.rules
     wide = replace(first, when=(*first.when, Clause("force", (term.name,))))
     return replace(with_terms(term), rules=(wide, *others))
 
 
 class Planted(NamedTuple):
-    """A defect, and how its finding is to be told."""
+    """A defect, and how its finding should read."""
 
     code: str
     model: Document
@@ -91,7 +91,7 @@ class Planted(NamedTuple):
     state: type[State]
     about: tuple[int | str, ...] = ()  # rules or terms
     clean: Document = CLEAN
-    says: str = ""  # where a code is told in several ways: a part of the sentence
+    says: str = ""  # where a code has several sentences: a part of this one
 
 
 def points(*of: tuple[float, float]) -> Points:
@@ -211,10 +211,10 @@ def system(
     """Return the clean rules as a system, with more rules: term, conclusion, weight."""
     low = SystemTerm("low", Trapezoid(None, 0.0, *falls))
     high = SystemTerm("high", Trapezoid(1.5, 3.0, 4.0, None))
-    asked = (("low", "weak", 1.0), ("high", "strong", 1.0), *others)
+    entries = (("low", "weak", 1.0), ("high", "strong", 1.0), *others)
     rules = tuple(
         SystemRule(Is("force", term), (Conclusion("grip", then),), weight)
-        for term, then, weight in asked
+        for term, then, weight in entries
     )
     ends = SystemTerm("weak", Singleton(0.0)), SystemTerm("strong", Singleton(1.0))
     output = SystemOutput("grip", ends, None, None, Defuzzifier("weighted average"))
@@ -252,7 +252,7 @@ def answers(model: Document) -> tuple[Answer, ...]:
             pass
     found = ft.audit(
         model,
-        data=ft.table(data, columns=columns),
+        data=None if data is None else ft.table(data, columns=columns),
         domain=ft.AuditDomain(limits=limits),
         selection=ft.AuditSelection(ignore=["FT6"]),
     )
@@ -260,7 +260,7 @@ def answers(model: Document) -> tuple[Answer, ...]:
     return found.answers
 
 
-def asked(model: Document, code: str) -> list[Answer]:
+def answers_for(model: Document, code: str) -> list[Answer]:
     """Return what a whole audit answers to one kind of question."""
     return [one for one in answers(model) if one.code == code]
 
@@ -276,19 +276,19 @@ def test_every_code_of_an_audit_is_planted_or_said_why_not() -> None:
     ids=lambda one: f"{one.code}-{type(one.model).__name__}",
 )
 def test_a_planted_defect_is_found_and_gone_without_it(planted: Planted) -> None:
-    found = [one for one in asked(planted.model, planted.code) if one.is_finding]
+    found = [one for one in answers_for(planted.model, planted.code) if one.is_finding]
     first = next(one for one in found if planted.says in one.sentence)
     assert first.severity == planted.severity
     assert isinstance(first.state, planted.state)
     assert (*first.rules, *(one.term for one in first.terms)) == planted.about
-    clean = asked(planted.clean, planted.code)
+    clean = answers_for(planted.clean, planted.code)
     assert clean
     assert not [one for one in clean if one.is_finding]
 
 
 def test_an_audit_counts_what_the_model_has() -> None:
     for model, count in ((CLEAN, 2.0), (with_rule("low", "soft"), 3.0)):
-        (facts,) = asked(model, "FT501")
+        (facts,) = answers_for(model, "FT501")
         assert not facts.is_finding
         assert {one.name: one.value for one in facts.measures}["rules"] == count
 
@@ -327,5 +327,5 @@ def test_a_planted_row_is_found_and_gone_without_it(
             data=ft.table(np.array(data), columns=["force"]),
             selection=ft.AuditSelection(select=["FT7"]),
         )
-        told = [one.sentence for one in found.findings]
-        assert told.count(text) == count
+        results = [one.sentence for one in found.findings]
+        assert results.count(text) == count

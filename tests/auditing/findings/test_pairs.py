@@ -74,15 +74,15 @@ def base(
     )
 
 
-def asked(
+def answers_for(
     rules: RuleBase, code: str, settings: AuditSettings | None = None
 ) -> list[Answer]:
     settings = settings or AuditSettings(budget_s=5.0)
     return [*audit(rules, select=[code], settings=settings).answers]
 
 
-def told(rules: RuleBase, code: str) -> list[str]:
-    return [one.sentence for one in asked(rules, code) if one.is_finding]
+def results(rules: RuleBase, code: str) -> list[str]:
+    return [one.sentence for one in answers_for(rules, code) if one.is_finding]
 
 
 CLEAN = (("force is low", "soft"), ("force is high, slip is high", "hard"))
@@ -95,7 +95,7 @@ def test_a_clean_model_has_no_finding_about_pairs(
 ) -> None:
     rules = base(*CLEAN, conjunction=conjunction)
     settings = AuditSettings(level=0.6)
-    assert not any(one.is_finding for one in asked(rules, code, settings))
+    assert not any(one.is_finding for one in answers_for(rules, code, settings))
 
 
 # --- FT104
@@ -107,12 +107,12 @@ def test_a_narrower_rule_of_the_same_class_is_subsumed(
 ) -> None:
     narrow = ("force is high, slip is high, force is low", "hard")
     rules = base(*CLEAN, narrow, conjunction=conjunction)
-    assert told(rules, "FT104") == [
+    assert results(rules, "FT104") == [
         "rule 3 is subsumed by rule 2: wherever it fires, rule 2 of the same class "
         "is at least as strong"
     ]
     other = ("force is high, slip is none, slip is wide", "hard")
-    assert not told(base(*CLEAN, other, conjunction=conjunction), "FT104")
+    assert not results(base(*CLEAN, other, conjunction=conjunction), "FT104")
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
@@ -120,7 +120,7 @@ def test_a_rule_with_another_curve_below_is_subsumed(conjunction: Conjunction) -
     rules = base(
         ("force is high", "hard"), ("force is wide", "hard"), conjunction=conjunction
     )
-    (answer,) = [one for one in asked(rules, "FT104") if one.is_finding]
+    (answer,) = [one for one in answers_for(rules, "FT104") if one.is_finding]
     assert answer.rules == (1, 2)
     assert isinstance(answer.state, Proved)
 
@@ -134,21 +134,21 @@ def test_under_min_another_clause_may_hold_a_rule_below() -> None:
         ("force is low, slip is faint", "hard"),
         more=(faint, quarter),
     )
-    assert told(rules, "FT104")
+    assert results(rules, "FT104")
     product = replace(rules, semantics=Semantics("product"))
-    assert told(product, "FT104")  # there 1/4 low is below quarter as well
+    assert results(product, "FT104")  # there 1/4 low is below quarter as well
     stronger = replace(
         rules,
         rules=(rules.rules[0], Rule((Clause("force", ("low",)),), "hard")),
     )
-    assert not told(stronger, "FT104")
+    assert not results(stronger, "FT104")
 
 
-def test_rules_that_never_fire_are_not_told_as_subsumed() -> None:
+def test_rules_that_never_fire_are_not_reported_as_subsumed() -> None:
     never = ("force is none, force is high", "hard")
     rules = base(*CLEAN, never, ("slip is none", "hard"))
-    assert not told(rules, "FT104")
-    (answer,) = asked(rules, "FT104")
+    assert not results(rules, "FT104")
+    (answer,) = answers_for(rules, "FT104")
     assert answer.measures[-1].name == "rules that never fire"
     assert answer.measures[-1].value == 1
 
@@ -161,7 +161,7 @@ def test_with_inputs_that_depend_on_each_other_nothing_is_ruled_out() -> None:
         variables=(*rules.variables, mix),
         rules=(*rules.rules, Rule((Clause("mix", ("high",)),), "soft")),
     )
-    (answer,) = asked(rules, "FT104")
+    (answer,) = answers_for(rules, "FT104")
     assert isinstance(answer.state, Declined)
     assert answer.state.code == "FTD04"
 
@@ -171,12 +171,12 @@ def test_a_rule_with_the_antecedent_of_another_is_subsumed_or_masked(
     conjunction: Conjunction,
 ) -> None:
     twice = ("slip is high, force is high", "hard")
-    assert told(base(*CLEAN, twice, conjunction=conjunction), "FT104") == [
+    assert results(base(*CLEAN, twice, conjunction=conjunction), "FT104") == [
         "rule 3 is subsumed by rule 2: wherever it fires, rule 2 of the same class "
         "is at least as strong"
     ]
     other = ("slip is high, force is high", "soft")
-    assert told(base(*CLEAN, other, conjunction=conjunction), "FT105") == [
+    assert results(base(*CLEAN, other, conjunction=conjunction), "FT105") == [
         "rule 3 is never answered: wherever it fires, rule 2 of class 'hard' "
         "is at least as strong and stands before it"
     ]
@@ -191,7 +191,7 @@ def test_a_rule_behind_one_of_another_class_that_is_as_strong_is_masked(
 ) -> None:
     special = ("force is high, slip is high, force is low", "soft")
     rules = base(*CLEAN, special, conjunction=conjunction)
-    assert told(rules, "FT105") == [
+    assert results(rules, "FT105") == [
         "rule 3 is never answered: wherever it fires, rule 2 of class 'hard' "
         "is at least as strong and stands before it"
     ]
@@ -202,7 +202,7 @@ def test_the_special_case_that_stands_first_is_not_masked(
     conjunction: Conjunction,
 ) -> None:
     special = ("force is high, slip is high, force is low", "soft")
-    assert not told(base(special, *CLEAN, conjunction=conjunction), "FT105")
+    assert not results(base(special, *CLEAN, conjunction=conjunction), "FT105")
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
@@ -214,7 +214,7 @@ def test_a_rule_before_a_stronger_one_is_masked(conjunction: Conjunction) -> Non
         conjunction=conjunction,
         more=(half,),
     )
-    assert told(rules, "FT105") == [
+    assert results(rules, "FT105") == [
         "rule 1 is never answered: wherever it fires, "
         "rule 2 of class 'hard' is stronger"
     ]
@@ -228,18 +228,18 @@ def test_a_rule_that_only_comes_near_a_stronger_one_is_not_called_unmasked() -> 
         conjunction="product",
         more=(UP, DOWN),
     )
-    (answer,) = asked(rules, "FT105")
+    (answer,) = answers_for(rules, "FT105")
     assert isinstance(answer.state, Declined)
     assert answer.sentence == (
         "no rule is shown to be masked, among 1 pair of two classes: 1 pair of "
-        "strengths are too near to tell"
+        "strengths are too near to compare"
     )
 
 
 def test_a_rule_that_ties_somewhere_before_the_other_is_answered_there() -> None:
     # Both are 1 from 2 on: the first one is answered there.
     rules = base(("force is wide, force is high", "soft"), ("force is wide", "hard"))
-    assert not told(rules, "FT105")
+    assert not results(rules, "FT105")
     assert exact_answer(rules, {"force": 4.0, "slip": 0.0}).label == "soft"
 
 
@@ -248,7 +248,7 @@ def test_a_rule_that_ties_somewhere_before_the_other_is_answered_there() -> None
 )
 def test_a_masked_rule_is_never_answered_on_a_grid(seed: int) -> None:
     rules = random_base(seed, 6, 2, kind="points", shared=0.7)
-    masked = {a.rules[0] for a in asked(rules, "FT105") if a.is_finding}
+    masked = {a.rules[0] for a in answers_for(rules, "FT105") if a.is_finding}
     grid = [n / 16 for n in range(17)]
     answered = {
         exact_answer(rules, {"x1": a, "x2": b}).rule for a in grid for b in grid
@@ -261,7 +261,9 @@ def test_a_masked_rule_is_never_answered_on_a_grid(seed: int) -> None:
 
 def test_two_rules_that_ask_the_same_contradict_each_other() -> None:
     copy = ("slip is high, force is high", "soft")
-    (answer,) = [one for one in asked(base(*CLEAN, copy), "FT106") if one.is_finding]
+    (answer,) = [
+        one for one in answers_for(base(*CLEAN, copy), "FT106") if one.is_finding
+    ]
     assert answer.sentence == (
         "rule 2 and rule 3 have the same antecedent and contradict each other: "
         "'hard' and 'soft'"
@@ -271,20 +273,22 @@ def test_two_rules_that_ask_the_same_contradict_each_other() -> None:
 
 def test_two_rules_that_ask_the_same_of_one_class_are_copies() -> None:
     copy = ("slip is high, force is high, force is high", "hard")
-    (answer,) = [one for one in asked(base(*CLEAN, copy), "FT106") if one.is_finding]
+    (answer,) = [
+        one for one in answers_for(base(*CLEAN, copy), "FT106") if one.is_finding
+    ]
     assert answer.sentence == (
         "rule 2 and rule 3 have the same antecedent and the same class 'hard'"
     )
     assert answer.severity == "warning"
     product = base(*CLEAN, copy, conjunction="product")
-    assert not told(product, "FT106")  # the degree counts twice there
-    assert told(product, "FT104")
+    assert not results(product, "FT106")  # the degree counts twice there
+    assert results(product, "FT104")
 
 
-def test_curves_that_nearly_agree_are_told_with_the_place() -> None:
+def test_curves_that_nearly_agree_are_reported_with_the_place() -> None:
     near = Term("near", Points((2.0, 4.0), (0.0, 1.0 - 2.0**-20)))
     rules = base(*CLEAN, ("force is near, slip is high", "hard"), more=(near,))
-    assert told(rules, "FT106") == [
+    assert results(rules, "FT106") == [
         "rule 2 and rule 3 have nearly the same antecedent and the same class 'hard'; "
         "degrees differ by at most 9.537e-07, at 'force' = 4"
     ]
@@ -293,8 +297,8 @@ def test_curves_that_nearly_agree_are_told_with_the_place() -> None:
 def test_curves_that_agree_on_the_domain_only_are_the_same() -> None:
     beyond = Term("beyond", Points((2.0, 4.0, 5.0), (0.0, 1.0, 0.0)))
     rules = (*CLEAN, ("force is beyond, slip is high", "hard"))
-    assert told(base(*rules, more=(beyond,)), "FT106")
-    assert not told(base(*rules, more=(beyond,), high=5.0), "FT106")
+    assert results(base(*rules, more=(beyond,)), "FT106")
+    assert not results(base(*rules, more=(beyond,), high=5.0), "FT106")
 
 
 def test_two_ways_of_one_rule_are_no_pair() -> None:
@@ -314,20 +318,20 @@ def test_two_small_distances_under_the_product_are_left_open() -> None:
         conjunction="product",
         more=(near,),
     )
-    (answer,) = asked(rules, "FT106")
+    (answer,) = answers_for(rules, "FT106")
     assert isinstance(answer.state, Declined)
     assert answer.sentence == (
         "no two rules are shown to have nearly the same antecedent, among 3 pairs: "
-        "1 pair of degrees are too near to tell"
+        "1 pair of degrees are too near to compare"
     )
 
 
 # --- FT201
 
 
-def test_a_conflict_is_told_with_its_highest_level_and_a_region() -> None:
+def test_a_conflict_is_reported_with_its_highest_level_and_a_region() -> None:
     rules = base(*CLEAN, ("slip is wide", "soft"))
-    (first,) = [one for one in asked(rules, "FT201") if one.rules == (2, 3)]
+    (first,) = [one for one in answers_for(rules, "FT201") if one.rules == (2, 3)]
     assert first.sentence == (
         "rule 2 and rule 3 conflict: both reach 1 at one input, "
         "and say 'hard' and 'soft'"
@@ -356,7 +360,7 @@ def test_no_point_of_a_grid_is_above_the_highest_common_level(kind: str) -> None
     rows = [
         exact_answer(rules, {"x1": a, "x2": b}).strengths for a in grid for b in grid
     ]
-    for answer in asked(rules, "FT201", AuditSettings(level=0.1)):
+    for answer in answers_for(rules, "FT201", AuditSettings(level=0.1)):
         if len(answer.rules) == 2:
             one, other = (number - 1 for number in answer.rules)
             level = Fraction(answer.measures[0].exact or answer.measures[0].value)
@@ -374,7 +378,9 @@ def test_no_point_of_a_grid_is_above_the_highest_common_level(kind: str) -> None
 def test_under_the_product_the_highest_common_level_is_closed_in_on() -> None:
     rules = random_base(0, 4, 2, "product", "points")
     found = [
-        one for one in asked(rules, "FT201", AuditSettings(level=0.2)) if one.rules
+        one
+        for one in answers_for(rules, "FT201", AuditSettings(level=0.2))
+        if one.rules
     ]
     assert found
     for answer in found:
@@ -387,13 +393,11 @@ def test_under_the_product_the_highest_common_level_is_closed_in_on() -> None:
         assert float(reached) == pytest.approx(least.value, abs=1e-12)
 
 
-def test_many_conflicts_are_told_up_to_a_number_and_counted() -> None:
+def test_many_conflicts_are_reported_up_to_a_number_and_counted() -> None:
     rules = base(*(("force is low", ("soft", "hard")[n % 2]) for n in range(12)))
-    *found, rest = asked(rules, "FT201")
+    *found, rest = answers_for(rules, "FT201")
     assert (len(found), rest.is_finding) == (20, True)
-    assert rest.sentence == (
-        "16 more pairs of rules may reach 0.5, not told one by one"
-    )
+    assert rest.sentence == ("16 more pairs of rules may reach 0.5, not listed")
 
 
 def test_pairs_that_cross_at_the_level_itself_conflict() -> None:
@@ -404,13 +408,13 @@ def test_pairs_that_cross_at_the_level_itself_conflict() -> None:
         Term("up", Points((0.0, 2.0 * third), (0.0, 1.0))),
     )
     rules = base(("force is down", "soft"), ("force is up", "hard"), more=ramps)
-    (answer,) = asked(rules, "FT201")
+    (answer,) = answers_for(rules, "FT201")
     assert answer.is_finding
     assert isinstance(answer.state, Witness)
     assert point_of(answer.state.point)["force"] == Fraction(third)
     assert answer.measures[0].value == 0.5
     above = AuditSettings(level=0.5 + 2.0**-53)
-    assert not any(one.is_finding for one in asked(rules, "FT201", above))
+    assert not any(one.is_finding for one in answers_for(rules, "FT201", above))
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
@@ -421,14 +425,14 @@ def test_pairs_that_cross_at_the_level_at_an_irrational_value_are_counted(
     rules = base(("force is square", "soft"), more=(square,), conjunction=conjunction)
     apart = Rule((Clause("force", ("square",), negated=True),), "hard")
     rules = replace(rules, rules=(*rules.rules, apart))
-    (answer,) = asked(rules, "FT201")
+    (answer,) = answers_for(rules, "FT201")
     assert not answer.is_finding
     assert isinstance(answer.state, Proved)
     assert answer.sentence == (
         "1 pair of rules of different classes never reaches 0.5 together; "
         "1 of them at most touch it, at irrational values"
     )
-    below = asked(rules, "FT201", AuditSettings(level=0.499))
+    below = answers_for(rules, "FT201", AuditSettings(level=0.499))
     assert below[0].is_finding
 
 
@@ -440,13 +444,13 @@ def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:
         variables=(*rules.variables, mix),
         rules=(*rules.rules, Rule((Clause("mix", ("low",)),), "hard")),
     )
-    (answer,) = [one for one in asked(rules, "FT201") if one.rules]
+    (answer,) = [one for one in answers_for(rules, "FT201") if one.rules]
     assert isinstance(answer.state, Witness)
     point = {k: float(v) for k, v in point_of(answer.state.point).items()}
     strengths = exact_answer(rules, point).strengths
     assert min(strengths) > Fraction(9, 10)
     apart = replace(rules.rules[1], when=(Clause("mix", ("none",)),))
-    assert not told(replace(rules, rules=(rules.rules[0], apart)), "FT201")
+    assert not results(replace(rules, rules=(rules.rules[0], apart)), "FT201")
 
 
 @pytest.mark.parametrize(
@@ -484,7 +488,7 @@ def test_only_conclusions_about_one_output_conflict(
 def test_a_clause_that_is_always_true_is_irrelevant() -> None:
     always = Term("any", Points((0.0, 4.0), (1.0, 1.0)))
     rules = base(CLEAN[0], ("force is high, slip is any", "hard"), more=(always,))
-    assert told(rules, "FT107") == ["rule 2 decides the same without 'slip is any'"]
+    assert results(rules, "FT107") == ["rule 2 decides the same without 'slip is any'"]
 
 
 @pytest.mark.heavy
@@ -495,19 +499,19 @@ def test_a_clause_that_only_others_make_irrelevant_is_proved_by_boxes() -> None:
         ("slip is wide, force is wide", "soft"),
         ("slip is wide, force is none", "hard"),
     )
-    found = asked(rules, "FT107")
+    found = answers_for(rules, "FT107")
     (answer,) = [one for one in found if one.subject == "rule 3, 'force is none'"]
     assert isinstance(answer.state, Proved)
     assert "every box" in answer.state.how
-    found = asked(replace(rules, rules=rules.rules[::-1]), "FT107")
+    found = answers_for(replace(rules, rules=rules.rules[::-1]), "FT107")
     (answer,) = [one for one in found if one.subject == "rule 1, 'force is none'"]
     assert isinstance(answer.state, Witness)
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
-def test_an_input_is_told_where_a_clause_matters(conjunction: Conjunction) -> None:
+def test_an_input_where_a_clause_matters_is_reported(conjunction: Conjunction) -> None:
     rules = base(*CLEAN, conjunction=conjunction)
-    found = {one.subject: one for one in asked(rules, "FT107")}
+    found = {one.subject: one for one in answers_for(rules, "FT107")}
     one = found["rule 2, 'slip is high'"]
     assert one.sentence == (
         "rule 2 needs 'slip is high': without it 'soft' becomes 'hard' at some input"
@@ -520,25 +524,25 @@ def test_an_input_is_told_where_a_clause_matters(conjunction: Conjunction) -> No
     assert prediction_at(without, point).label == "hard"
 
 
-def test_clauses_of_a_rule_that_never_fires_are_not_asked() -> None:
+def test_clauses_of_a_rule_that_never_fires_are_not_tested() -> None:
     rules = base(*CLEAN, ("force is none, force is high", "hard"))
-    assert [one.sentence for one in asked(rules, "FT107") if one.rules == (3,)] == [
-        "rule 3 never fires, so that its clauses are not asked one by one"
-    ]
+    assert [
+        one.sentence for one in answers_for(rules, "FT107") if one.rules == (3,)
+    ] == ["rule 3 never fires, so its clauses are not tested one by one"]
 
 
 def test_a_clause_that_a_rule_of_the_class_makes_irrelevant_is_proved() -> None:
     rules = base(("force is wide", "hard"), ("force is high, slip is low", "hard"))
-    (answer,) = [one for one in asked(rules, "FT107") if "slip" in one.subject]
+    (answer,) = [one for one in answers_for(rules, "FT107") if "slip" in one.subject]
     assert isinstance(answer.state, Proved)
     assert answer.state.how == "rule 1 of the same class is as strong everywhere"
 
 
-def test_many_clauses_that_matter_are_told_up_to_a_number_and_counted(
+def test_many_clauses_that_matter_are_reported_up_to_a_number_and_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("fuzzytree.auditing.findings.clauses.MOST_SHOWN", 2)
-    answers = asked(base(*CLEAN), "FT107")
+    answers = answers_for(base(*CLEAN), "FT107")
     assert [isinstance(one.state, Witness) for one in answers] == [True, True, False]
     assert answers[2].sentence == "1 more clause matters: it decides some input"
 

@@ -161,7 +161,7 @@ def test_a_system_is_compared_in_all_runtimes() -> None:
 def test_a_runtime_of_systems_in_which_nan_is_a_number_is_found() -> None:
     system = system_of(block_of(A_LOW))
     subject = subject_of(system)
-    question = asked(subject, "missing values")
+    question = queries(subject, "missing values")
     load = find_runtime("native").load_system
     assert load is not None
     right = load(system)(question.values)
@@ -186,7 +186,7 @@ def tied_rules() -> RuleBase:
     return replace(RULES, rules=(*RULES.rules, again))
 
 
-def asked(subject: Subject, name: str) -> Convention:
+def queries(subject: Subject, name: str) -> Convention:
     return next(one for one in questions(subject) if one.name == name)
 
 
@@ -238,7 +238,7 @@ def test_a_graph_that_breaks_a_convention_is_found_and_a_right_one_is_not(
 ) -> None:
     rules = tied_rules()
     subject = subject_of(rules)
-    question = asked(subject, name)
+    question = queries(subject, name)
     assert question.values.shape[1] > 0
     (clean,) = answered(subject, question, graph(rules))
     assert not clean.is_finding
@@ -253,7 +253,7 @@ def test_a_graph_that_breaks_a_convention_is_found_and_a_right_one_is_not(
 
 def test_a_runtime_in_which_nan_is_a_number_is_found() -> None:
     subject = subject_of(RULES)
-    question = asked(subject, "missing values")
+    question = queries(subject, "missing values")
     native = find_runtime("native").load(RULES)
     blind = native(np.nan_to_num(question.values, nan=0.5))
     found = [

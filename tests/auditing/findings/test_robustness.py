@@ -45,7 +45,7 @@ def test_the_radius_of_a_row_of_a_tree_is_the_distance_to_its_cut() -> None:
     assert found.state.claims[0].label == "b"
 
 
-def test_the_point_that_is_told_is_decided_as_the_sentence_says() -> None:
+def test_the_point_that_is_reported_is_decided_as_the_sentence_says() -> None:
     grip = Path(__file__).parents[3] / "examples" / "grip.yaml"
     rules = ft.read(grip).model
     assert isinstance(rules, RuleBase)
@@ -103,7 +103,7 @@ def test_places_where_strengths_only_touch_are_named_where_another_goes_first() 
     assert "touch" not in first.sentence + whole.sentence
 
 
-def test_a_row_is_told_its_decision_and_then_its_radius() -> None:
+def test_a_row_has_its_decision_first_and_then_its_radius() -> None:
     first, second = row_answers(subject_of(one_cut()), {"x": 0.75})
     assert first.sentence == "the row is decided as 'b' by leaf 2"
     assert second.sentence.startswith("the row stays 'b' within 25 %")
@@ -118,43 +118,43 @@ def test_a_row_outside_the_domain_is_refused() -> None:
     )
 
 
-def test_all_rows_are_told_of_together_and_the_nearest_by_name() -> None:
+def test_all_rows_are_summarised_and_the_nearest_are_named() -> None:
     rows = [[0.1], [0.4], [0.9], [0.4], [2.0]]
-    told = [*answers(subject_of(one_cut(), rows=rows))]
-    assert told[0].sentence == (
-        "of 5 rows (1 incomplete or outside the domain) 3 different ones were asked: "
-        "each keeps its decision within at least 10 % of each input's range, half of "
-        "them within 40 %"
+    results = [*answers(subject_of(one_cut(), rows=rows))]
+    assert results[0].sentence == (
+        "of 5 rows (1 incomplete or outside the domain) 3 different ones were "
+        "evaluated: each keeps its decision within at least 10 % of each input's "
+        "range, half of them within 40 %"
     )
-    assert [one.subject for one in told] == ["rows", "row 2", "row 1", "row 3"]
-    assert _number(told[0], "row") == 2
+    assert [one.subject for one in results] == ["rows", "row 2", "row 1", "row 3"]
+    assert _number(results[0], "row") == 2
 
 
-def test_all_rows_of_a_tree_are_asked_and_only_close_calls_of_rules() -> None:
+def test_all_rows_of_a_tree_are_tested_and_only_close_calls_of_rules() -> None:
     rows = [[number / 100] for number in range(80)]
     whole = next(answers(subject_of(one_cut(), rows=rows)))
-    assert _number(whole, "rows asked") == 80
+    assert _number(whole, "rows evaluated") == 80
     assert "with the smallest margins" not in whole.sentence
     raw = subject_of(one_cut()).raw
     assert raw is not None
     some = next(answers(subject_of(raw, rows=rows)))
-    assert _number(some, "rows asked") == 50
-    assert "50 different ones with the smallest margins were asked" in some.sentence
+    assert _number(some, "rows evaluated") == 50
+    assert "50 different ones with the smallest margins were evaluated" in some.sentence
 
 
 def test_without_rows_it_is_declined() -> None:
-    [told] = answers(subject_of(one_cut()))
-    assert told.state == Declined("FTD06", "rows are needed (--data TABLE)")
+    [results] = answers(subject_of(one_cut()))
+    assert results.state == Declined("FTD06", "rows are needed (--data TABLE)")
 
 
-def test_a_budget_that_ends_keeps_the_rows_that_were_asked() -> None:
+def test_a_budget_that_ends_keeps_the_rows_that_were_tested() -> None:
     times = iter([0.0] + [0.5] * 6 + [9.0] * 1000)
     clock = Clock(1.0, now=lambda: next(times))
     rows = [[number / 10] for number in range(1, 9)]
-    told = [*answers(subject_of(one_cut(), rows=rows, clock=clock))]
-    assert _number(told[0], "rows asked") == 2
-    assert told[-1].sentence == "6 more rows are not asked"
-    assert told[-1].state == Declined("FTD03", "the budget was spent")
+    results = [*answers(subject_of(one_cut(), rows=rows, clock=clock))]
+    assert _number(results[0], "rows evaluated") == 2
+    assert results[-1].sentence == "6 more rows are not evaluated"
+    assert results[-1].state == Declined("FTD03", "the budget was spent")
 
 
 def _check(subject: Subject, row: Mapping[str, float], points: int, seed: int) -> None:

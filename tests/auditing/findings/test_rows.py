@@ -41,19 +41,19 @@ def test_gaps_are_ranked_by_their_distance_to_the_nearest_row() -> None:
 
 
 def test_a_gap_that_holds_a_row_is_at_distance_zero() -> None:
-    [told] = rank_by_distance(
+    [results] = rank_by_distance(
         [_gap("here", Span("x", None, 2.0))], ROWS, BOX, ["x", "y"]
     )
-    assert told.measures[0].value == 0.0
+    assert results.measures[0].value == 0.0
 
 
 def test_a_gap_of_a_combination_is_as_far_as_its_inputs_must_move() -> None:
     # From row 2, (1, 0.5), both move by r of their ranges: 1 + 4 r + 0.5 + r = 3.
     of = Variable("sum", parts=(Part("x", 1.0), Part("y", 1.0)))
     gap = _gap("sum", Span("sum", 3.0, None))
-    [told] = rank_by_distance([gap], ROWS, BOX, ["x", "y"], [of])
-    assert told.measures[0].exact == "3/10"
-    assert told.measures[1].value == 2
+    [results] = rank_by_distance([gap], ROWS, BOX, ["x", "y"], [of])
+    assert results.measures[0].exact == "3/10"
+    assert results.measures[1].value == 2
     low, high = _gap("low", Span("sum", None, 1.0)), _gap("high", Span("sum", 2.0, 3.0))
     first, second = rank_by_distance([high, low], ROWS, BOX, ["x", "y"], [of])
     assert (first.subject, second.subject) == ("low", "high")
@@ -64,8 +64,8 @@ def test_a_gap_of_an_unknown_combination_is_measured_at_its_point() -> None:
     point = coordinates({"x": Fraction(3), "y": Fraction(1, 2)})
     state = Witness(point, (Claim("below", rules=(1,), level="0"),))
     gap = Answer("FT301", "sum", "", state, True, region=(Span("sum", 3.0, 4.0),))
-    [told] = rank_by_distance([gap], ROWS, BOX, ["x", "y"])
-    assert told.measures[0].exact == "1/2"
+    [results] = rank_by_distance([gap], ROWS, BOX, ["x", "y"])
+    assert results.measures[0].exact == "1/2"
 
 
 def test_a_place_that_is_not_named_stands_last_as_it_is() -> None:
@@ -112,6 +112,6 @@ def test_a_long_exact_number_is_left_out_and_its_double_is_no_larger() -> None:
     third = Fraction(1, 3)
     assert distance_measure("d", third).exact == "1/3"
     long = Fraction(10**50 + 1, 3 * 10**50)
-    told = distance_measure("d", long)
-    assert told.exact is None
-    assert Fraction(told.value) < long
+    results = distance_measure("d", long)
+    assert results.exact is None
+    assert Fraction(results.value) < long

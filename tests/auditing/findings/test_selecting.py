@@ -13,17 +13,17 @@ from fuzzytree.auditing.findings.configuration import (
 from fuzzytree.auditing.findings.records import AuditSettings
 
 
-def test_all_codes_are_asked_unless_some_are_chosen() -> None:
+def test_all_codes_are_tested_unless_some_are_chosen() -> None:
     assert chosen_codes() == set(CODES)
 
 
 def test_ignoring_goes_before_selecting() -> None:
     chosen = chosen_codes(["FT4", "FT301"], ["FT402"])
-    asked = {code for code in chosen if not code.startswith("FTD")}
-    assert asked == {"FT401", "FT403", "FT404", "FT301"}
+    queries = {code for code in chosen if not code.startswith("FTD")}
+    assert queries == {"FT401", "FT403", "FT404", "FT301"}
 
 
-def test_reasons_for_declining_are_told_whatever_is_selected() -> None:
+def test_reasons_for_declining_are_reported_whatever_is_selected() -> None:
     declined = {code for code in CODES if code.startswith("FTD")}
     assert chosen_codes(["FT501"]) == {"FT501", *declined}
     assert chosen_codes(["FT5"], ["FT4"]) == {"FT501", *declined}
@@ -33,8 +33,8 @@ def test_reasons_for_declining_are_told_whatever_is_selected() -> None:
 def test_reasons_for_declining_cannot_be_left_out(text: str) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
         chosen_codes([], [text])
-    told = f"the code {text!r} cannot be left out: it tells what was not asked"
-    assert str(caught.value) == told
+    results = f"the code {text!r} cannot be left out: it reports what was declined"
+    assert str(caught.value) == results
 
 
 @pytest.mark.parametrize("text", ["", "FT9", "x", "FT1011"])
@@ -80,6 +80,6 @@ def test_a_budget_of_nothing_or_without_end_is_refused(budget: float) -> None:
 
 
 def test_a_choice_that_leaves_nothing_to_ask_is_refused() -> None:
-    message = "^select and ignore leave no code of which anything is asked$"
+    message = "^select and ignore leave no code to answer$"
     with pytest.raises(ValueError, match=message):
         chosen_codes(["FT2"], ["FT2"])

@@ -77,7 +77,7 @@ def subject_of(
     )
 
 
-def asked(subject: Subject) -> dict[str, Answer]:
+def queries(subject: Subject) -> dict[str, Answer]:
     found = {one.subject: one for one in answers(subject)}
     assert {one.code for one in found.values()} == {"FT701"}
     return found
@@ -129,8 +129,8 @@ def test_what_is_no_share_is_refused(
     assert str(caught.value) == text
 
 
-def test_rows_are_told_rule_by_rule_and_together() -> None:
-    found = asked(subject_of(RULES, AuditRows("grips.csv", FORCES, CODES)))
+def test_rows_are_reported_rule_by_rule_and_together() -> None:
+    found = queries(subject_of(RULES, AuditRows("grips.csv", FORCES, CODES)))
     assert sentences(
         found,
         *("rows with a missing value", "rows outside the domain", "uncovered rows"),
@@ -169,18 +169,18 @@ def test_a_rule_without_rows_is_found_and_gone_when_it_is_removed() -> None:
         rules=(*RULES.rules, Rule((Clause("force", ("far",)),), "soft")),
     )
     values = np.array([[0.5, 2.0, 3.0]])
-    found = asked(subject_of(planted, AuditRows("grips.csv", values)))
+    found = queries(subject_of(planted, AuditRows("grips.csv", values)))
     assert found["rule 3"].is_finding
     assert found["rule 3"].sentence == "rule 3 fires on none of 3 rows"
     assert found["rule 3"].rules == (3,)
-    clean = asked(subject_of(RULES, AuditRows("grips.csv", values)))
+    clean = queries(subject_of(RULES, AuditRows("grips.csv", values)))
     assert not any(one.is_finding for one in clean.values())
 
 
 def test_a_rule_that_fires_and_never_wins_is_found() -> None:
     planted = replace(RULES, rules=(*RULES.rules, RULES.rules[0]))
     values = np.array([[0.5, 2.0]])
-    found = asked(subject_of(planted, AuditRows("grips.csv", values)))["rule 3"]
+    found = queries(subject_of(planted, AuditRows("grips.csv", values)))["rule 3"]
     assert found.is_finding
     assert found.sentence == "rule 3 fires on 1 of 2 rows and wins none"
     assert [(one.name, one.value) for one in found.measures] == [
@@ -257,8 +257,8 @@ def test_points_are_drawn_within_the_domain_and_alike_for_a_seed() -> None:
         sample_points(rules, Domain(box.sides[:1]), 5, 0)
 
 
-def test_shares_of_the_domain_are_told_without_rows() -> None:
-    found = asked(subject_of(RULES, settings=AuditSettings(rows=4000, seed=3)))
+def test_shares_of_the_domain_are_reported_without_rows() -> None:
+    found = queries(subject_of(RULES, settings=AuditSettings(rows=4000, seed=3)))
     assert isinstance(found["rows"].state, Declined)
     assert found["rows"].sentence == (
         "what rows say about the rules is not known: rows are needed (--data TABLE)"
@@ -275,7 +275,7 @@ def test_a_domain_that_no_point_meets_is_declined() -> None:
     rules = replace(RULES, variables=(*RULES.variables, mix))
     subject = subject_of(rules)
     box = Domain((*subject.domain.sides, DomainSide("mix", 50.0, 60.0)))
-    found = asked(replace(subject, domain=box))["domain"]
+    found = queries(replace(subject, domain=box))["domain"]
     assert found.state == Declined(
         "FTD04", "no drawn point lies within the sides of the combinations"
     )
@@ -283,12 +283,12 @@ def test_a_domain_that_no_point_meets_is_declined() -> None:
 
 def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> None:
     values = np.array([[0.0, 3.5], [0.0, 0.0]])
-    whole = asked(subject_of(system_of(block_of(A_LOW)), AuditRows("pump", values)))
+    whole = queries(subject_of(system_of(block_of(A_LOW)), AuditRows("pump", values)))
     assert whole["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
     assert whole["uncovered rows"].is_finding
     assert "tied rows" not in whole
     part = system_of(block_of(A_LOW, Is("power", "big")))
-    found = asked(subject_of(part, AuditRows("pump", values)))
+    found = queries(subject_of(part, AuditRows("pump", values)))
     assert "uncovered rows" not in found
     assert found["covered rows"].sentence == (
         "how many rows are covered is not known: rules are left out, and they may "
@@ -296,16 +296,16 @@ def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> No
     )
 
 
-def test_of_a_curve_between_lines_counts_are_told_where_both_lines_agree() -> None:
+def test_counts_for_a_bounded_curve_are_reported_where_both_bounds_agree() -> None:
     system = system_of(block_of(A_LOW), low=SCurve(0.0, 4.0))
     clear, near = (
         np.array([[0.0, 3.0], [0.0, 0.0]]),
         np.array([[0.01, 3.0], [0.0, 0.0]]),
     )
-    found = asked(subject_of(system, AuditRows("pump", clear)))
+    found = queries(subject_of(system, AuditRows("pump", clear)))
     assert found["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
     assert found["uncovered rows"].sentence == "on 1 of 2 rows no rule fires"
-    found = asked(subject_of(system, AuditRows("pump", near)))
+    found = queries(subject_of(system, AuditRows("pump", near)))
     assert found["rule 1"].sentence == (
         "on how many rows rule 1 fires is not decided: it fires on 1 of 2 at least, "
         "and on 2 at most"
@@ -330,6 +330,6 @@ def test_of_a_model_of_many_clauses_fewer_points_are_drawn(
 ) -> None:
     monkeypatch.setattr(support, "_MOST_DEGREES", 1)
     subject = subject_of(RULES, settings=AuditSettings(rows=5000))
-    found = asked(subject)["uncovered points"]
+    found = queries(subject)["uncovered points"]
     assert isinstance(found.state, Sampled)
     assert found.state.rows == 1000

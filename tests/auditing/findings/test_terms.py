@@ -71,7 +71,7 @@ def test_a_term_beyond_the_domain_is_empty() -> None:
     assert not found(base(LOW, HIGH, far, high=6.0), "FT401")
 
 
-def test_a_term_that_is_hardly_reached_is_told_with_its_height() -> None:
+def test_a_term_that_is_hardly_reached_is_reported_with_its_height() -> None:
     faint = Term("faint", Points((3.0, 7.0), (0.0, 1.0)))
     (answer,) = found(base(LOW, HIGH, faint), "FT401")
     assert answer.sentence == (
@@ -92,7 +92,7 @@ def test_a_step_at_an_open_lower_end_counts_from_above_only() -> None:
     assert "'spike' of 'force' is empty" in answer.sentence
 
 
-def test_a_term_of_a_combination_is_asked_on_all_its_inputs_allow() -> None:
+def test_a_term_of_a_combination_is_tested_on_all_its_inputs_allow() -> None:
     mix = Variable(
         "mix",
         (Term("far", Points((3.0, 4.0), (0.0, 1.0))),),
@@ -133,9 +133,9 @@ def test_a_term_of_a_combination_is_asked_on_all_its_inputs_allow() -> None:
     ],
     ids=["excess", "shortfall", "peaks", "subnormal", "outlying"],
 )
-def test_a_defect_of_shape_is_told(shape: Shape, text: str) -> None:
-    told = found(base(LOW, HIGH, Term("odd", shape)), "FT402")
-    assert [answer.sentence for answer in told] == [f"term 'odd' of 'force' {text}"]
+def test_a_defect_of_shape_is_reported(shape: Shape, text: str) -> None:
+    results = found(base(LOW, HIGH, Term("odd", shape)), "FT402")
+    assert [answer.sentence for answer in results] == [f"term 'odd' of 'force' {text}"]
 
 
 def test_what_is_too_small_to_tell_is_counted() -> None:
@@ -146,7 +146,7 @@ def test_what_is_too_small_to_tell_is_counted() -> None:
     assert answer.measures[0].value == 1
 
 
-def test_a_dip_has_the_degrees_that_it_is_told_with() -> None:
+def test_a_dip_has_the_reported_degrees() -> None:
     shape = Band(0.0, 1.0, right=Flank(1.0, 8.0, (3.0, -7.2, 5.2)))
     (answer,) = found(base(LOW, Term("odd", shape), high=9.0), "FT402")
     measures = {one.name: one.value for one in answer.measures}
@@ -158,11 +158,11 @@ def test_a_dip_has_the_degrees_that_it_is_told_with() -> None:
     assert float(peak - exact_degree(shape, valley)) == pytest.approx(depth, abs=1e-9)
 
 
-def test_two_terms_for_one_thing_are_told_with_their_shared_area() -> None:
+def test_two_terms_for_one_thing_are_reported_with_their_shared_area() -> None:
     same = Term("mild", Points((0.0, 1.0, 2.5), (1.0, 1.0, 0.0)))
     (answer,) = found(base(LOW, HIGH, same), "FT403")
     assert answer.sentence == (
-        "terms 'low' and 'mild' of 'force' are hard to tell apart: "
+        "terms 'low' and 'mild' of 'force' are hard to distinguish: "
         "they share 0.8571 of their area; 'low' is nowhere above 'mild'"
     )
     assert answer.measures[0].exact == "6/7"
@@ -174,13 +174,13 @@ def test_equal_terms_share_all_of_their_area() -> None:
     assert answer.sentence.endswith("they share 1 of their area; they are equal")
 
 
-def test_terms_that_cross_are_told_with_the_crossing() -> None:
+def test_terms_that_cross_are_reported_with_the_crossing() -> None:
     near = Term("near", Points((0.0, 0.5, 3.5), (1.0, 1.0, 0.0)))
     (answer,) = found(base(LOW, near), "FT403", AuditSettings(overlap=0.5))
     assert "they cross at 1.25 with degree 0.75" in answer.sentence
 
 
-def test_shares_that_cannot_be_told_from_the_setting_are_a_bracket() -> None:
+def test_shares_too_near_to_the_setting_are_a_bracket() -> None:
     one = Term("one", Band(0.0, 1.0, right=Flank(1.0, 3.0, (0.0, 0.0, 1.0))))
     other = Term("other", Band(0.0, 1.0, right=Flank(1.0, 3.5, (0.0, 1.5, -0.5))))
     (answer,) = found(base(one, other), "FT403", AuditSettings(overlap=0.1))
@@ -197,14 +197,14 @@ def test_shares_that_cannot_be_told_from_the_setting_are_a_bracket() -> None:
     assert states == [Bracket, Proved]
 
 
-def test_many_pairs_are_told_up_to_a_number_and_counted() -> None:
+def test_many_pairs_are_reported_up_to_a_number_and_counted() -> None:
     terms = tuple(Term(f"t{n}", Points((n / 100, 4.0), (1.0, 0.0))) for n in range(8))
     made = audit(base(*terms), select=["FT403"])
-    *told, rest = made.answers
-    assert (len(told), rest.is_finding) == (20, True)
+    *results, rest = made.answers
+    assert (len(results), rest.is_finding) == (20, True)
     assert rest.sentence == (
         "0 pairs of terms share less than 0.75 of their area; "
-        "8 pairs besides those told share more"
+        "8 pairs besides those listed share more"
     )
 
 
@@ -228,17 +228,17 @@ def test_a_domain_of_one_point_has_no_areas() -> None:
     )
 
 
-def test_what_no_rule_asks_is_told() -> None:
+def test_what_no_rule_uses_is_reported() -> None:
     idle = Variable("slip", (LOW,), low=0.0, high=4.0)
     forgotten = replace(CLEAN.variables[0], terms=(LOW, HIGH, Term("mid", LOW.shape)))
     rules = replace(CLEAN, variables=(forgotten, idle))
     assert [answer.sentence for answer in found(rules, "FT404")] == [
-        "no rule asks variable 'slip'",
-        "no rule asks term 'mid' of 'force'",
+        "no rule uses variable 'slip'",
+        "no rule uses term 'mid' of 'force'",
     ]
 
 
-def test_an_input_of_a_combination_that_is_asked_is_used() -> None:
+def test_an_input_of_a_used_combination_is_used() -> None:
     mix = Variable("mix", (LOW,), parts=(Part("a", 1.0), Part("b", 1.0)))
     inputs = tuple(Variable(name, low=0.0, high=1.0) for name in "ab")
     rules = RuleBase(
@@ -250,8 +250,8 @@ def test_an_input_of_a_combination_that_is_asked_is_used() -> None:
 def test_a_system_is_read_itself_and_not_its_view() -> None:
     system = system_of(block_of(A_LOW))
     made = audit(system, select=["FT404"])
-    told = [answer.sentence for answer in made.findings]
-    assert all(text.startswith("no rule asks") for text in told)
+    results = [answer.sentence for answer in made.findings]
+    assert all(text.startswith("no rule uses") for text in results)
 
 
 def test_short_numbers_have_four_digits() -> None:

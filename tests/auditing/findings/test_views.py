@@ -1,4 +1,4 @@
-"""Rules of systems as rules that can be asked, and what is left out."""
+"""Rules of systems as a rule base, and what is left out."""
 
 from __future__ import annotations
 
@@ -147,24 +147,21 @@ def test_an_or_of_one_input_stays_one_clause() -> None:
 
 
 DECLINING = {
-    "rule 1 is not taken over: its 'and' is the einstein product, which has no exact "
+    "rule 1 is left out: its 'and' is the einstein product, which has no exact "
     "method": block_of(And((A_LOW, B_LOW)), conjunction="einstein product"),
-    "rule 1 is not taken over: its 'or' is the algebraic sum, which has no exact "
+    "rule 1 is left out: its 'or' is the algebraic sum, which has no exact "
     "method": block_of(Or((A_LOW, B_LOW)), disjunction="algebraic sum"),
-    "rule 1 is not taken over: the hedge 'very' of 'any' has no exact method": block_of(
+    "rule 1 is left out: the hedge 'very' of 'any' has no exact method": block_of(
         Is("a", None, ("not", "very", "any"))
     ),
-    "rule 1 is not taken over: it asks the output 'power'": block_of(
-        Is("power", "big")
-    ),
-    "rule 1 is not taken over: it negates a product, which has no exact "
-    "method": block_of(
+    "rule 1 is left out: it uses the output 'power'": block_of(Is("power", "big")),
+    "rule 1 is left out: it negates a product, which has no exact method": block_of(
         Not(And((A_LOW, B_LOW))), And((A_LOW, B_LOW)), conjunction="product"
     ),
-    "rule 1 is not taken over: it negates an 'or' within rules that multiply": block_of(
+    "rule 1 is left out: it negates an 'or' within rules that multiply": block_of(
         Not(Or((A_LOW, B_LOW))), And((A_LOW, B_LOW)), conjunction="product"
     ),
-    f"rule 1 is not taken over: it can hold in more than {MOST_WAYS} ways": block_of(
+    f"rule 1 is left out: it can hold in more than {MOST_WAYS} ways": block_of(
         And(tuple(Or((A_LOW, B_LOW, Not(A_LOW), Not(B_LOW))) for _ in range(4))),
         conjunction="product",
     ),
@@ -191,7 +188,7 @@ def test_deep_and_long_conditions_end_soon() -> None:
     assert rules_of(found) == ["IF a is low or high THEN power is big"]
     long = And((A_LOW,) * (MOST_QUESTIONS + 1))
     assert reasons(view(system_of(block_of(long)), BOX)) == [
-        f"rule 1 is not taken over: it asks more than {MOST_QUESTIONS} questions"
+        f"rule 1 is left out: it has more than {MOST_QUESTIONS} propositions"
     ]
 
 
@@ -201,22 +198,22 @@ def test_rules_of_another_norm_than_most_are_left_out() -> None:
     found = view(system, BOX)
     assert found.policy.conjunction == "min"
     assert reasons(found) == [
-        "rule 1 of block 2 is not taken over: its 'and' is the product, and that of "
+        "rule 1 of block 2 is left out: its 'and' is the product, and that of "
         "most rules is another"
     ]
 
 
-def test_a_curve_without_an_exact_method_is_told_with_its_rules() -> None:
+def test_a_curve_without_an_exact_method_is_reported_with_its_rules() -> None:
     system = system_of(block_of(A_LOW, A_HIGH), low=Gaussian(0.0, 1.0))
     found = view(system, BOX)
     assert len(rules_of(found)) == 2
     assert reasons(found) == [
-        "term 'low' of 'a' is asked between two lines 0.00098 apart at most: its curve "
-        "(gaussian) has no exact method; its shape and its overlaps are not asked; "
-        "1 rule asks for it",
-        "term 'low' of 'b' is asked between two lines 0.00098 apart at most: its curve "
-        "(gaussian) has no exact method; its shape and its overlaps are not asked; "
-        "no rule asks for it",
+        "term 'low' of 'a' is bounded by two lines 0.00098 apart at most: its curve "
+        "(gaussian) has no exact method; its shape and its overlaps are not checked; "
+        "1 rule uses it",
+        "term 'low' of 'b' is bounded by two lines 0.00098 apart at most: its curve "
+        "(gaussian) has no exact method; its shape and its overlaps are not checked; "
+        "no rule uses it",
     ]
 
 
@@ -225,9 +222,9 @@ def test_a_formula_is_not_taken_over_and_leaves_its_rules_out() -> None:
     found = view(system, BOX)
     assert rules_of(found) == ["IF a is high THEN power is big"]
     assert reasons(found)[::2] == [
-        "term 'low' of 'a' is not taken over: its curve (formula) has no exact "
-        "method; 1 rule asks for it",
-        "rule 1 is not taken over: the curve of 'low' of 'a' has no exact method",
+        "term 'low' of 'a' is left out: its curve (formula) has no exact "
+        "method; 1 rule uses it",
+        "rule 1 is left out: the curve of 'low' of 'a' has no exact method",
     ]
 
 
@@ -262,26 +259,26 @@ def test_a_rule_that_cannot_fire_is_a_finding_and_leaves_nothing_open() -> None:
         assert found.numbers == (2,)
 
 
-def test_beyond_the_range_of_a_clipped_input_nothing_is_asked() -> None:
+def test_the_domain_ends_at_the_range_of_a_clipped_input() -> None:
     wide = Domain((DomainSide("a", -9.0, 4.0), DomainSide("b", 0.0, 9.0)))
     found = view(system_of(block_of(A_LOW), clips=True), wide)
     assert [(side.low, side.high) for side in found.domain.sides] == [(0.0, 4.0)] * 2
     assert reasons(found)[0] == (
-        "input 'a' is not taken over: values outside its range are moved to its ends, "
-        "so it is asked from 0.0 to 4.0"
+        "input 'a' is left out: values outside its range are moved to its ends, "
+        "so its domain is from 0.0 to 4.0"
     )
     assert view(system_of(block_of(A_LOW)), wide).domain == wide
 
 
-def test_an_activation_of_only_some_rules_is_told() -> None:
+def test_an_activation_of_only_some_rules_is_reported() -> None:
     found = view(system_of(block_of(A_LOW, activation=Activation("lowest"))), BOX)
     assert reasons(found) == [
-        "the activation of block 1 is not taken over: it is 'lowest'; only conditions "
-        "are asked"
+        "the activation of block 1 is left out: it is 'lowest'; only conditions "
+        "are audited"
     ]
 
 
-def test_without_one_rule_that_can_be_asked_there_are_no_rules() -> None:
+def test_without_one_exact_rule_there_are_no_rules() -> None:
     found = view(system_of(block_of(Is("power", "big"))), BOX)
     assert found.rules is None
     assert found.numbers == ()

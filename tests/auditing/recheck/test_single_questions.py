@@ -40,7 +40,6 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
@@ -48,6 +47,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
 )
 from fuzzytree.numerics.exact import exact_degree
 
@@ -98,13 +98,16 @@ def random_numeric_system(seed: int) -> FuzzySystem:
     """Return a system with rules that are equal, weigh nothing or hold in two ways."""
     chance = random.Random(seed)
     curves = tuple(
-        Label(name, random_points(chance)) for name in ("low", "mid", "high", "spare")
+        SystemTerm(name, random_points(chance))
+        for name in ("low", "mid", "high", "spare")
     )
     inputs = tuple(
         SystemInput(name, curves, 0.0, float(TOP))
         for name in ("x", "y")[: chance.randint(1, 2)]
     )
-    labels = tuple(Label(name, Singleton(x)) for name, x in (("s", 1.0), ("l", 2.0)))
+    labels = tuple(
+        SystemTerm(name, Singleton(x)) for name, x in (("s", 1.0), ("l", 2.0))
+    )
     how = Defuzzifier("weighted average")
     outputs = tuple(
         SystemOutput(name, labels, None, None, how)

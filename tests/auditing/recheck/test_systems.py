@@ -31,7 +31,6 @@ from fuzzytree.model.system import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
@@ -39,6 +38,7 @@ from fuzzytree.model.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    SystemTerm,
     Trapezoid,
 )
 from fuzzytree.semantics.inference import infer, norms
@@ -121,13 +121,13 @@ def test_sentences_are_read_as_conditions() -> None:
 LEFT, RIGHT = Trapezoid(None, 0.0, 1.0, 3.0), Trapezoid(1.0, 3.0, 4.0, None)
 TIP = SystemOutput(
     "tip",
-    (Label("small", Singleton(1.0)), Label("large", Singleton(2.0))),
+    (SystemTerm("small", Singleton(1.0)), SystemTerm("large", Singleton(2.0))),
     None,
     None,
     Defuzzifier("weighted average"),
 )
 INPUTS = tuple(
-    SystemInput(name, (Label("left", LEFT), Label("right", RIGHT)), 0.0, 4.0)
+    SystemInput(name, (SystemTerm("left", LEFT), SystemTerm("right", RIGHT)), 0.0, 4.0)
     for name in ("x", "y")
 )
 

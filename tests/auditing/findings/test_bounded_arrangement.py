@@ -1,4 +1,4 @@
-"""Weights and curves between lines: what is told holds of the system itself."""
+"""Weights and curves between lines: answers are true of the system itself."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.bounded_arrangement import BoundedArrangement
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.auditing.findings.rule_bounds import bounded_rules
-from fuzzytree.auditing.findings.strength_bounds import StrengthBounds
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.rulebase import (
     LR,
@@ -56,7 +56,7 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.semantics.inference import infer
-from tests.auditing.findings.grids import told_rightly
+from tests.auditing.findings.grids import check_on_grid
 
 A, B = Is("a", "low"), Is("b", "low")
 A_HIGH, B_HIGH = Is("a", "high"), Is("b", "high")
@@ -93,14 +93,14 @@ def system_of(
     return FuzzySystem("pump", inputs, (output,), (block,))
 
 
-def told(system: FuzzySystem, code: str, **settings: float) -> list[Answer]:
+def results(system: FuzzySystem, code: str, **settings: float) -> list[Answer]:
     made = replace(AuditSettings(), **settings)
     answers = audit(system, settings=made, select=[code]).answers
     return [one for one in answers if one.code == code]
 
 
 def findings(system: FuzzySystem, code: str, **settings: float) -> list[str]:
-    return [one.sentence for one in told(system, code, **settings) if one.is_finding]
+    return [one.sentence for one in results(system, code, **settings) if one.is_finding]
 
 
 # --- weights
@@ -158,7 +158,7 @@ def rules_of(term: Term) -> RuleBase:
     )
 
 
-def test_a_weight_on_a_curve_of_polynomials_is_held_between_lines() -> None:
+def test_a_weighted_curve_of_polynomials_is_bounded_by_lines() -> None:
     side = Flank(1.0, (0.5,), 2.0)
     term = Term("low", LR(1.0, side, side))
     weighted = bounded_rules(
@@ -182,8 +182,7 @@ def test_a_weight_on_a_curve_without_points_is_declined() -> None:
     found = view(system, domain_of(system))
     assert found.numbers == (2,)
     assert [one.sentence for one in found.declined if one.code == "FTD07"] == [
-        "rule 1 is not taken over: the curve of 'low' of 'a' has no points to be "
-        "weighted"
+        "rule 1 is left out: the curve of 'low' of 'a' has no points to be weighted"
     ]
 
 
@@ -225,9 +224,9 @@ HEDGES: tuple[Hedge, ...] = (
     ],
 )
 def test_hedged_clauses_are_as_strong_as_those_of_the_system(curve: Curve) -> None:
-    asked = [Is("a", "low", (hedge,)) for hedge in HEDGES]
-    asked += [Is("a", "low", ("not", "very")), Is("a", "low", ("very", "not"))]
-    rules = tuple((one, "big", 0.5) for one in asked)
+    queries = [Is("a", "low", (hedge,)) for hedge in HEDGES]
+    queries += [Is("a", "low", ("not", "very")), Is("a", "low", ("very", "not"))]
+    rules = tuple((one, "big", 0.5) for one in queries)
     system = system_of(rules, low=curve)
     found = view(system, domain_of(system))
     assert found.bounds is not None
@@ -244,7 +243,7 @@ def test_hedged_clauses_are_as_strong_as_those_of_the_system(curve: Curve) -> No
             assert above - below < 0.1  # roots are steep at 0
 
 
-def test_hedged_terms_are_named_and_asked_but_are_no_terms_of_the_system() -> None:
+def test_hedged_terms_are_named_and_used_but_are_no_terms_of_the_system() -> None:
     rules: Rules = ((Is("a", "low", ("very",)), "soft", 1.0), (A, "soft", 1.0))
     others: dict[str, Curve] = {"very low": FLAT}
     system = system_of(rules, norm="minimum", low=LOW, high=HIGH, **others)
@@ -252,7 +251,7 @@ def test_hedged_terms_are_named_and_asked_but_are_no_terms_of_the_system() -> No
     assert seen.rules is not None
     assert sentence(seen.rules.rules[0]) == "IF a is very low' THEN power is soft"
     assert findings(system, "FT104") == []  # what is below is not seen within lines
-    assert not any("very low'" in one.sentence for one in told(system, "FT401"))
+    assert not any("very low'" in one.sentence for one in results(system, "FT401"))
 
 
 # --- each finding is planted in a system of curves between lines, and removed
@@ -306,16 +305,16 @@ def test_a_gap_between_curves_that_end_is_found_and_closed() -> None:
     assert findings(system_of(rules, low=SCurve(3.0, 0.0)), "FT301") == []
 
 
-def test_weak_cover_is_told_between_its_two_ends() -> None:
+def test_weak_cover_is_reported_between_its_two_ends() -> None:
     rules: Rules = ((A, "soft", 1.0), (A_HIGH, "hard", 1.0))
     system = system_of(rules)
-    (weak,) = (one for one in told(system, "FT301", epsilon=0.2) if one.is_finding)
+    (weak,) = (one for one in results(system, "FT301", epsilon=0.2) if one.is_finding)
     assert isinstance(weak.state, Witness)
     least, most = (one.value for one in weak.measures)
     assert least < 0.1353352832 < most < least + 0.002  # exp(-2), halfway
     (close,) = (
         one
-        for one in told(system, "FT301", epsilon=0.1353)
+        for one in results(system, "FT301", epsilon=0.1353)
         if one.subject == "cover of 0.1353"
     )
     assert isinstance(close.state, Bracket)
@@ -325,12 +324,12 @@ def test_weak_cover_is_told_between_its_two_ends() -> None:
 @pytest.mark.parametrize(
     ("behind", "is_finding"), [(1.19, True), (1.1774, False), (1.16, None)]
 )
-def test_a_term_that_nearly_reaches_the_level_is_told_between_its_ends(
+def test_a_term_that_nearly_reaches_the_level_is_reported_between_its_ends(
     behind: float, is_finding: bool | None
 ) -> None:
     # exp(-x^2 / 2) is 1/2 at x = 1.17741
     system = system_of(CLEAN, edge=Gaussian(-behind, 1.0))
-    found = [one for one in told(system, "FT401") if "edge" in one.sentence]
+    found = [one for one in results(system, "FT401") if "edge" in one.sentence]
     assert [one.is_finding for one in found] == [is_finding] * len(found)
     assert all(isinstance(one.state, Bracket) for one in found)
     assert bool(found) is (is_finding is not None)
@@ -345,14 +344,14 @@ def test_a_clause_that_two_rules_share_is_one_degree_in_both() -> None:
     ]
     near = (And((Is("a", "near"), B)), "soft", 1.0)  # a little below, at most 1e-4
     system = system_of((*CLEAN[:2], near), near=Gaussian(0.0, 0.9999))
-    (rest,) = told(system, "FT104")
+    (rest,) = results(system, "FT104")
     assert rest.sentence == (
         "no rule is shown to be subsumed, among 1 pair of one conclusion: 1 pair of "
-        "strengths are too near to tell"
+        "strengths are too near to compare"
     )
 
 
-# --- what is told, against the system itself
+# --- answers, compared with the system itself
 
 
 DRAWN: tuple[Condition, ...] = (
@@ -380,20 +379,20 @@ def drawn_system(seed: int, norm: TNorm) -> FuzzySystem:
 
 
 @pytest.mark.parametrize("norm", NORMS)
-def test_what_is_told_of_drawn_systems_holds_on_a_grid(norm: TNorm) -> None:
+def test_answers_about_random_systems_are_true_on_a_grid(norm: TNorm) -> None:
     system = drawn_system(0, norm)
     found = audit(system, select=["FT1", "FT2", "FT3"])
-    assert told_rightly(system, found, view(system, found.domain), 9) > 4
+    assert check_on_grid(system, found, view(system, found.domain), 9) > 4
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("norm", ["minimum", "product"])
-def test_what_is_told_of_many_drawn_systems_holds_on_a_grid(norm: TNorm) -> None:
+def test_answers_about_many_random_systems_are_true_on_a_grid(norm: TNorm) -> None:
     checked = 0
     for seed in range(3, 15):
         system = drawn_system(seed, norm)
         found = audit(system, select=["FT1", "FT2", "FT3"])
-        checked += told_rightly(system, found, view(system, found.domain), 25)
+        checked += check_on_grid(system, found, view(system, found.domain), 25)
     assert checked > 100
 
 
@@ -407,7 +406,7 @@ def test_where_rules_do_not_meet_nothing_is_claimed_of_the_upper_ones(
     lower, upper = (
         arrange(one, seen.domain) for one in (seen.bounds.lower, seen.bounds.upper)
     )
-    found = StrengthBounds(lower, upper, seen.bounds).meet(
+    found = BoundedArrangement(lower, upper, seen.bounds).meet(
         1, 2, Fraction(1, 2), Clock()
     )
     assert found.level.high < Fraction(1, 2)

@@ -65,7 +65,7 @@ _ROUNDING: Final = 1e-9
 """What differences of degrees in doubles may be off by, and far more."""
 
 
-class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
+class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
     """Rules from below and from above, on a box.
 
     Attributes:
@@ -126,13 +126,7 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         return "not" if found == "not" else "open"
 
     def _pair(self, one: int, other: int, *, shares: bool = True) -> RulePairs:
-        """Return two rules, the first from below and the second from above.
-
-        Args:
-            one: The number of a rule.
-            other: The number of another.
-            shares: Whether clauses of both are taken from above in both.
-        """
+        """Return two rules, the first from below and the second from above."""
         below, above = self.lower.rules, self.upper.rules
         mine, theirs = below.rules[one - 1], above.rules[other - 1]
         known = [*theirs.when] if shares else []
@@ -152,21 +146,21 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         return RulePairs(arrange(rules, self.lower.domain))
 
     def _is_shared(self, clause: Clause, rule: Rule, others: Sequence[Clause]) -> bool:
-        """Return whether other clauses ask what one of a rule does, perhaps for less.
+        """Return whether other clauses have the key of one, with no more weight.
 
         Under the product they must do so as often: `v b` is not below `v v a`.
         """
         assert self.bounds is not None
         if self.is_product:
             return rule.when.count(clause) <= others.count(clause)
-        mine, weight, _ = self.bounds.asked(clause)
-        found = map(self.bounds.asked, others)
+        mine, weight, _ = self.bounds.weighted_key(clause)
+        found = map(self.bounds.weighted_key, others)
         return any(theirs == mine and most <= weight for theirs, _, most in found)
 
     def distance(self, one: int, other: int, most: Fraction) -> RuleDistance | None:
         """Return how far two rules are apart, None if more; see `factors.distance`.
 
-        Of rules that are held it is known only if they ask the same.
+        Between inexact rules it is known only if their antecedents are equal.
         """
         if self.is_inexact(one, other) and self._keys[one - 1] != self._keys[other - 1]:
             return None
@@ -175,7 +169,7 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
     def is_near(self, one: int, other: int, most: Fraction) -> bool:
         """Return whether it is open whether degrees of two rules differ by more.
 
-        That is so only of rules that are held.
+        That is so only for inexact rules.
         """
         limit = float(most) + _ROUNDING
         return self.is_inexact(one, other) and not any(
@@ -257,7 +251,7 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
             if isinstance(state, Bracket):  # its point is one of the upper rules
                 state = replace(state, low=0.0, point=(), claims=())
             return JointMaximum(Bounds(Fraction(0), most), state, above.is_touch)
-        # What is reached nearly is told, with its point.
+        # A level that is nearly reached is reported, with its point.
         easier = max(level - 4 * Fraction(self.bounds.gap), Fraction(0))
         near = joint_maximum(self.from_below, one, other, easier, clock)
         low = near.level.low if isinstance(near.state, Witness) else Fraction(0)
@@ -270,13 +264,13 @@ class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
         return JointMaximum(Bounds(low, most), state)
 
 
-def strength_bounds(subject: Subject) -> StrengthBounds:
+def bounded_arrangement(subject: Subject) -> BoundedArrangement:
     """Return a subject's rules from below and from above, on its domain."""
     if subject.bounds is None:
         given = arrange(subject.rules, subject.domain)
-        return StrengthBounds(given, given)
+        return BoundedArrangement(given, given)
     lower, upper = subject.bounds.lower, subject.bounds.upper
-    return StrengthBounds(
+    return BoundedArrangement(
         arrange(lower, subject.domain), arrange(upper, subject.domain), subject.bounds
     )
 
@@ -305,7 +299,7 @@ def _places(variable: Variable, domain: Domain) -> FloatArray:
 
 
 def _degrees(rules: RuleBase, name: str, at: FloatArray) -> tuple[FloatArray, ...]:
-    """Return bounds of what rules ask of a variable at some values of it."""
+    """Return bounds of each rule's degree at some values of a variable."""
     shapes, value = shapes_of(rules.variables), Value(at, None)
     known: dict[Clause, Enclosure] = {}
     low, high = (np.ones((len(rules.rules), len(at))) for _ in range(2))
