@@ -102,7 +102,7 @@ class _Text(msgspec.Struct, frozen=True):
 class _Grown(msgspec.Struct, frozen=True):
     """A part of a formula: the place of the token behind it, and its depth.
 
-    `is_literal` tells a bare number, which takes a sign in front into itself.
+    `is_literal` marks a bare number, which takes a sign in front into itself.
     """
 
     expression: Expression

@@ -57,7 +57,7 @@ def from_sklearn(
             written unless given.
         soft: Over what width beside a cut the degree falls in a line from 1 to 0: a
             number of spreads of each column, or a width for each column that the tree
-            asks, in the column's own unit.
+            tests, in the column's own unit.
         spreads: The spread of each column, such as `X.std(axis=0)`, if `soft` is a
             number.
         name: The tree's name.
@@ -68,7 +68,7 @@ def from_sklearn(
         TypeError: If it is no decision tree for classes, such as a forest or a
             regressor.
         ValueError: If it is not fitted, or names or widths do not fit.
-        LossError: If it has several outputs, asks whether a value is missing, or has
+        LossError: If it has several outputs, tests whether a value is missing, or has
             learnt where missing values go.
 
     Example:
@@ -82,7 +82,7 @@ def from_sklearn(
     grown = _grown(classifier)
     named = _Names.of(grown, columns, classes)
     arrays = _Arrays.of(grown.tree_, named)
-    widths = _widths(arrays.asked(named), named, soft, spreads)
+    widths = _widths(arrays.used(named), named, soft, spreads)
     nodes, leaves = _nodes(arrays, named)
     terms = _with_terms(nodes, widths)
     inputs = [column for column in named.columns if column in terms]
@@ -190,7 +190,7 @@ class _Arrays(NamedTuple):
         for start, column, threshold in zip(left, columns, thresholds, strict=True):
             if start >= 0 and not math.isfinite(threshold):
                 raise LossError(
-                    "cannot read a tree that asks whether "
+                    "cannot read a tree that tests whether "
                     f"{named.columns[column]!r} is missing"
                 )
             cuts.append(exact_cut(threshold) if start >= 0 else 0.0)
@@ -199,8 +199,8 @@ class _Arrays(NamedTuple):
         counts = tree.n_node_samples.tolist()
         return _Arrays(left, right, columns, cuts, winners, counts)
 
-    def asked(self, named: _Names) -> dict[str, int]:
-        """Return the columns that nodes ask, and their places."""
+    def used(self, named: _Names) -> dict[str, int]:
+        """Return the columns that nodes test, and their indices."""
         places = sorted(
             {c for c, start in zip(self.column, self.left, strict=True) if start >= 0}
         )
@@ -211,7 +211,7 @@ def _refuse_directions(tree: Any, columns: list[int], named: _Names) -> None:
     """Refuse a tree that learnt where missing values go.
 
     A node that saw none sends them to the child with more rows. Another direction was
-    learnt; one that happens to be the same cannot be told apart.
+    learnt; one that happens to be the same cannot be distinguished.
     """
     for place, goes_left in enumerate(tree.missing_go_to_left.tolist()):
         left, right = int(tree.children_left[place]), int(tree.children_right[place])
@@ -226,23 +226,23 @@ def _refuse_directions(tree: Any, columns: list[int], named: _Names) -> None:
 
 
 def _widths(
-    asked: Mapping[str, int],
+    used: Mapping[str, int],
     named: _Names,
     soft: float | Mapping[str, float] | None,
     spreads: Iterable[float] | None,
 ) -> dict[str, float | None]:
     """Return how wide the flanks on each column are."""
     if soft is None:
-        return dict.fromkeys(asked)
+        return dict.fromkeys(used)
     if isinstance(soft, Mapping):
         for column in soft:
             if column not in named.columns:
                 choice = name_choice(column, named.columns)
                 raise ValueError(f"soft: no column {column!r}; {choice}")
-        for column in asked:
+        for column in used:
             if column not in soft:
-                raise ValueError(f"soft: no width for {column!r}, which the tree asks")
-        widths = {column: float(soft[column]) for column in asked}
+                raise ValueError(f"soft: no width for {column!r}, which the tree tests")
+        widths = {column: float(soft[column]) for column in used}
     elif spreads is None:
         raise ValueError(
             "soft is a number of spreads: give spreads=X.std(axis=0) too, or a width "
@@ -252,7 +252,7 @@ def _widths(
         listed = [float(spread) for spread in spreads]  # a pandas series has an index
         if len(listed) != len(named.columns):
             raise ValueError(f"{len(listed)} spreads for {len(named.columns)} columns")
-        widths = {column: soft * listed[place] for column, place in asked.items()}
+        widths = {column: soft * listed[place] for column, place in used.items()}
     for column, width in widths.items():
         if not (math.isfinite(width) and width > 0.0):
             raise ValueError(

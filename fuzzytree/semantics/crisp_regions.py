@@ -29,19 +29,19 @@ def free_axes(model: _Model) -> _Model:
     """Return a model whose combinations are inputs of their own.
 
     The inputs that only combinations need are left out, so that a row of the new
-    model is a point on the axes that the old one asks.
+    model is a point on the axes that the old one uses.
     """
-    asked = {variable.name for variable in model.variables if variable.terms}
+    used = {variable.name for variable in model.variables if variable.terms}
     variables = tuple(
         Variable(v.name, v.terms, v.unit, v.low, v.high)
         for v in model.variables
-        if v.name in asked
+        if v.name in used
     )
     return replace(model, variables=variables, columns=())
 
 
 def cuts_by_variable(tree: FuzzyTree) -> dict[str, tuple[float, ...]]:
-    """Return all cuts on each variable that a node asks, in ascending order."""
+    """Return all cuts on each variable that a node tests, in ascending order."""
     cuts: dict[str, set[float]] = {}
     for node in tree.nodes:
         cuts.setdefault(node.variable, set()).update(node.cuts)
@@ -49,7 +49,7 @@ def cuts_by_variable(tree: FuzzyTree) -> dict[str, tuple[float, ...]]:
 
 
 def axis_points(tree: FuzzyTree) -> dict[str, tuple[float, ...]]:
-    """Return, for each variable that a node asks, the points that tell all about it.
+    """Return, for each variable that a node tests, points that represent its axis.
 
     They are each cut and the two floats beside it, a point inside each interval, and
     one far beyond either end.
@@ -113,7 +113,7 @@ def node_faults(tree: FuzzyTree) -> Iterator[str]:
 
 
 def node_points(node: Node) -> tuple[float, ...]:
-    """Return the points that tell all about one node's axis."""
+    """Return points that represent the axis of one node."""
     return tuple(_points(list(node.cuts)))
 
 

@@ -80,7 +80,7 @@ def rules_from_tree(
         conjunction: The AND of the rules; the tree's own unless given.
 
     Returns:
-        A rule base whose rule k is leaf k, with the variables that the nodes ask.
+        A rule base whose rule k is leaf k, with the variables that the nodes test.
 
     Raises:
         InvalidModelError: If `kind` is `raw` and the tree carries no sets.

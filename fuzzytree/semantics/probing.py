@@ -74,7 +74,7 @@ SPECIAL = (
 """Values that number types and runtimes treat differently."""
 
 _RANDOM_ROWS = 100
-_ROUNDS = 12  # of moving a row towards what a path asks of its combinations
+_ROUNDS = 12  # of moving a row towards what a path requires of its combinations
 _TRIES = 48  # of meeting one value of a combination to the last bit
 
 Row = dict[str, float]
@@ -243,8 +243,8 @@ class Aim:
         for variable, wish in _wishes(rule.when, is_true=True):
             if variable in self._inputs:
                 wishes.setdefault(variable, set()).add(wish)
-        for variable, asked in wishes.items():
-            value = self._value(variable, frozenset(asked), row)
+        for variable, wish_set in wishes.items():
+            value = self._value(variable, frozenset(wish_set), row)
             one = self._inputs[variable]
             if not one.parts:
                 row[variable] = value
@@ -254,23 +254,25 @@ class Aim:
             row[last.input] = last.centre + (value - rest) / last.weight
         return row
 
-    def _value(self, variable: str, asked: frozenset[_Wish], row: Row) -> float:
-        key = variable, asked
+    def _value(self, variable: str, wish_set: frozenset[_Wish], row: Row) -> float:
+        key = variable, wish_set
         if key not in self._known:
-            self._known[key] = self._best(variable, asked, row)
+            self._known[key] = self._best(variable, wish_set, row)
         best, degree = self._known[key]
         low, high = self._ends(variable)
         near = best + 0.05 * (high - low) * self._chance.uniform(-1.0, 1.0)
-        is_near = self._degree(variable, asked, near, row) >= 0.5 * degree
+        is_near = self._degree(variable, wish_set, near, row) >= 0.5 * degree
         return near if is_near and low <= near <= high else best
 
     def _best(
-        self, variable: str, asked: frozenset[_Wish], row: Row
+        self, variable: str, wish_set: frozenset[_Wish], row: Row
     ) -> tuple[float, float]:
         """Return the landmark at which some propositions are truest, and how true."""
         points = sorted(dict.fromkeys(self._landmarks(variable)))
         middles = [a + 0.5 * (b - a) for a, b in itertools.pairwise(points)]
-        found = [(self._degree(variable, asked, x, row), x) for x in points + middles]
+        found = [
+            (self._degree(variable, wish_set, x, row), x) for x in points + middles
+        ]
         degree, best = max(found, key=lambda pair: pair[0])
         return best, degree
 
@@ -288,11 +290,11 @@ class Aim:
         return _hull(self._landmarks(variable))
 
     def _degree(
-        self, variable: str, asked: frozenset[_Wish], value: float, row: Row
+        self, variable: str, wish_set: frozenset[_Wish], value: float, row: Row
     ) -> float:
         names = {**row, variable: value}
         degrees = []
-        for label, hedges, is_true in asked:
+        for label, hedges, is_true in wish_set:
             curve = self._curves[variable, label]
             degree = hedges_applied(hedges, curve_degree(curve, value, names))
             degrees.append(degree if is_true else 1.0 - degree)

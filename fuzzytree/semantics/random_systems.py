@@ -85,7 +85,7 @@ def random_system(
     """Return a valid fuzzy system made from a seed.
 
     A hundred seeds show every kind of curve, norm, hedge, activation, defuzzifier, grid
-    and aggregation, several blocks, outputs that are asked, combinations of inputs,
+    and aggregation, several blocks, outputs in antecedents, combinations of inputs,
     ranges that clip, weights, defaults and rules without a condition.
 
     Args:
@@ -140,10 +140,10 @@ class _Maker:
         chance = self.chance
         columns = self._names("x", inputs)
         self.scales = {name: 10.0 ** chance.randint(-2, 3) for name in columns}
-        asked = [self._input(name, columns) for name in columns]
+        variables = [self._input(name, columns) for name in columns]
         if inputs > 1 and chance.random() < 0.4:
-            asked.append(self._combination(columns))
-        nameable = [one.name for one in asked]
+            variables.append(self._combination(columns))
+        nameable = [one.name for one in variables]
         concluded: list[SystemOutput] = []
         for name in self._names("y", outputs):
             concluded.append(self._output(name, nameable, columns, kind))
@@ -152,10 +152,12 @@ class _Maker:
         if rules > 1 and chance.random() < 0.5:
             first = chance.randint(1, rules - 1)
             sizes = [first, rules - first]
-        blocks = [self._block(size, asked, concluded) for size in sizes]
+        blocks = [self._block(size, variables, concluded) for size in sizes]
         name = self._name(f"random {rules}")
         note = chance.choice(("", "Made by chance.", "two\nlines: # and 'quotes'"))
-        return FuzzySystem(name, tuple(asked), tuple(concluded), tuple(blocks), note)
+        return FuzzySystem(
+            name, tuple(variables), tuple(concluded), tuple(blocks), note
+        )
 
     def _name(self, plain: str) -> str:
         if not self.has_odd_names or self.chance.random() < 0.3:
@@ -272,8 +274,8 @@ class _Maker:
         self, inputs: Sequence[SystemInput], outputs: Sequence[SystemOutput]
     ) -> SystemRule:
         chance = self.chance
-        asked: list[SystemInput | SystemOutput] = [*inputs, *inputs, *outputs]
-        when = None if chance.random() < 0.05 else self._condition(asked, 3)
+        variables: list[SystemInput | SystemOutput] = [*inputs, *inputs, *outputs]
+        when = None if chance.random() < 0.05 else self._condition(variables, 3)
         then: list[Conclusion] = []
         for _ in range(chance.choice((1, 1, 2, 3))):
             output = chance.choice(outputs)
@@ -283,13 +285,13 @@ class _Maker:
         return SystemRule(when, tuple(then), weight, chance.choice(("", "", "rule")))
 
     def _condition(
-        self, asked: Sequence[SystemInput | SystemOutput], levels: int
+        self, variables: Sequence[SystemInput | SystemOutput], levels: int
     ) -> Condition:
         chance = self.chance
         if levels and chance.random() < 0.5:
-            parts = [self._condition(asked, levels - 1) for _ in range(2)]
+            parts = [self._condition(variables, levels - 1) for _ in range(2)]
             if chance.random() < 0.3:
-                parts.append(self._condition(asked, levels - 1))
+                parts.append(self._condition(variables, levels - 1))
             match chance.randint(0, 4):
                 case 0 | 1:
                     return And(tuple(parts))
@@ -297,7 +299,7 @@ class _Maker:
                     return Or(tuple(parts))
                 case _:
                     return Not(parts[0])
-        one = chance.choice(asked)
+        one = chance.choice(variables)
         if chance.random() < 0.05:
             return Is(one.name, None, (*self._hedges(0.5), "any"))
         return Is(one.name, chance.choice(one.labels).name, self._hedges(0.3))

@@ -114,10 +114,10 @@ def descend(tree: FuzzyTree, row: Mapping[str, float]) -> Answer:
         return Answer(0, tree.semantics.missing, Status.MISSING)
     node, leaf = (1, None) if tree.nodes else (None, 1)
     while node is not None:
-        asked = tree.nodes[node - 1]
-        value = axes[asked.variable]
-        interval = sum(1 for cut in asked.cuts if value > cut)
-        branch = asked.branches[asked.owners[interval]]
+        current = tree.nodes[node - 1]
+        value = axes[current.variable]
+        interval = sum(1 for cut in current.cuts if value > cut)
+        branch = current.branches[current.owners[interval]]
         node, leaf = branch.node, branch.leaf
     number = leaf or 0
     return Answer(number, tree.leaves[number - 1].label, Status.DECIDED)
@@ -205,9 +205,9 @@ def points_degree(points: Points, value: float) -> float:
     """Return the degree on the line between the points on either side of a value.
 
     The quotient lies in [0, 1] and is monotone, in rounded numbers too; so are the
-    product and the sum, which is held between the two degrees. Measured from its right
-    end, a line is exact there, and from a left end of degree 0 it is exact at both and
-    near 0 to the last digit.
+    product and the sum, which is clamped between the two degrees. Measured from its
+    right end, a line is exact there, and from a left end of degree 0 it is exact at
+    both and near 0 to the last digit.
     """
     values, degrees = points.values, points.degrees
     after = bisect_left(values, value)  # so many points lie below the value

@@ -1,6 +1,6 @@
 """Small models, each with one thing that not every format can carry.
 
-`fuzzytree formats` writes each of them in each format and tells what comes of it; the
+`fuzzytree formats` writes each of them in each format and reports the result; the
 conformance suite reads and writes them as well.
 """
 
@@ -104,7 +104,7 @@ def _lr(name: str, mean: float) -> Term:
 
 
 def _mixed_tree() -> FuzzyTree:
-    """Return a tree that asks a sum of two inputs."""
+    """Return a tree that tests a sum of two inputs."""
     mix = Variable(
         "mix",
         (
@@ -325,6 +325,6 @@ SAMPLES: Mapping[str, Callable[[], Document]] = {
         _sugeno(), blocks=(RuleBlock(_two(), activation=Activation("highest", 1)),)
     ),
     "a default answer": _default,
-    "inputs held in their range": _clipped,
+    "inputs clamped to their range": _clipped,
 }
 """What makes each sample, by what is special about it."""

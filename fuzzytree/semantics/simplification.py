@@ -9,11 +9,11 @@ Why an answer keeps its bits:
 - *Two terms of one curve* have equal degrees, and max of equal numbers is that number.
 - *A clause that always holds* has degree 1: `min(1, d)` and `1 * d` are d.
 - *A clause that stands twice* under min: `min(d, d)` is d. Under product it counts.
-- *A combination that no clause asks* is looked at to see whether a value is missing. It
+- *A combination that no clause uses* still shows whether a value is missing. It
   may go where it cannot overflow: then it is finite wherever its inputs are.
 - *A rule whose clauses never hold together* has strength 0 for every input, and a rule
   of strength 0 neither wins nor ties; but the rules behind it change their numbers.
-- *An input that nothing asks* decides alone whether a row with a missing value is
+- *An input that nothing uses* decides alone whether a row with a missing value is
   answered: leaving it out answers more rows.
 """
 
@@ -93,7 +93,7 @@ def pruned(
         model: A tree or a rule base.
         uses: What a tree is to serve. Its fitted sets stay for `raw`, its flanks for
             `relative`; its path needs the cuts alone. Without effect on a rule base.
-        inputs: Whether inputs that nothing asks go as well, and combinations that
+        inputs: Whether inputs that nothing uses go as well, and combinations that
             might overflow: rows in which only these are missing are then answered.
         rules: Whether rules that can never fire go as well: the rules behind them then
             have other numbers.
@@ -199,7 +199,7 @@ def _same_curves(terms: Iterable[Term]) -> dict[str, str]:
 
 
 def curve_bytes(shape: Shape) -> bytes:
-    """Return what tells curves apart: all numbers of a shape, the sign of 0 included.
+    """Return what distinguishes curves: all numbers of a shape, the sign of 0 included.
 
     Example:
         >>> curve_bytes(Band(high=0.0)) == curve_bytes(Band(high=-0.0))
@@ -233,7 +233,7 @@ def _pruned_variables(
     *,
     drops_inputs: bool,
 ) -> tuple[Variable, ...]:
-    """Leave out terms that are not named, then variables that are not asked."""
+    """Leave out terms that are not named, then variables that are not used."""
     kept: list[Variable] = []
     for variable in variables:
         terms = tuple(t for t in variable.terms if (variable.name, t.name) in named)
@@ -252,23 +252,23 @@ def _pruned_variables(
 
 
 def _idle_variables(variables: Iterable[Variable]) -> Iterator[tuple[Removed, str]]:
-    """Yield each variable that nothing asks, with what leaving it out changes.
+    """Yield each variable that nothing uses, with what leaving it out changes.
 
-    An input that only idle combinations ask is idle as well.
+    An input that only idle combinations use is idle as well.
     """
     known = list(variables)
-    asked = {part.input for v in known if v.terms for part in v.parts}
+    used = {part.input for v in known if v.terms for part in v.parts}
     for variable in known:
-        if variable.terms or variable.name in asked:
+        if variable.terms or variable.name in used:
             continue
         name = repr(variable.name)
         if not variable.parts:
             change = "a row is answered though it is missing"
-            yield Removed(f"input {name}", "nothing asks it", change), variable.name
+            yield Removed(f"input {name}", "nothing uses it", change), variable.name
             continue
         change = "a row is answered though it overflows"
         change = "" if cannot_overflow(variable.parts) else change
-        yield Removed(f"combination {name}", "nothing asks it", change), variable.name
+        yield Removed(f"combination {name}", "nothing uses it", change), variable.name
 
 
 def cannot_overflow(parts: Iterable[Part]) -> bool:
@@ -353,14 +353,14 @@ def _pruned_sets(
 ) -> tuple[tuple[Sets, ...], dict[str, dict[str, str]]]:
     """Return the fitted sets that raw rules need, and which stand in for which."""
     named = {(n.variable, s) for n in tree.nodes for b in n.branches for s in b.sets}
-    asked = {variable for variable, _ in named}
+    used = {variable for variable, _ in named}
     same: dict[str, dict[str, str]] = {}
     kept: list[Sets] = []
     for group in tree.sets:
         where = f"the fitted sets of {group.variable!r}"
-        if "raw" not in uses or group.variable not in asked:
-            is_idle = group.variable not in asked
-            why = "no node asks it" if is_idle else "only raw rules need them"
+        if "raw" not in uses or group.variable not in used:
+            is_idle = group.variable not in used
+            why = "no node uses it" if is_idle else "only raw rules need them"
             removed.append(Removed(where, why))
             continue
         same[group.variable] = of = _same_curves(group.terms)

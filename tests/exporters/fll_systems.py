@@ -28,7 +28,7 @@ def plain_system(seed: int, *, outputs: int = 2, rules: int = 8) -> FuzzySystem:
     """Return `random_system(seed)` without what FLL lacks.
 
     Combinations become columns, unknown hedges and NOTs of several conditions go,
-    curves are looked at in the middle of pieces, and bands and LR sets are trapezoids.
+    curves are sampled at the middle of pieces, and bands and LR sets are trapezoids.
     Conclusions lose `any` and `not`, by which the engines mean different things.
     """
     system = random_system(

@@ -178,7 +178,7 @@ def test_any_tests_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
     assert [(loss.where, loss.what) for loss in found.losses] == [
         (
             "rule 1",
-            "it asks 'any' (.99) of a term, and fuzzylite does not load it; left out",
+            "it uses 'any' (.99) with a term, which fuzzylite does not load; left out",
         )
     ]
 

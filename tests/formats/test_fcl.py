@@ -271,7 +271,7 @@ def test_a_file_of_fuzzylite_is_read_line_by_line() -> None:
     assert (second.weight, second.name) == (0.5, "x")
 
 
-def test_the_dialect_is_told_with_the_reasons() -> None:
+def test_the_dialect_is_reported_with_the_reasons() -> None:
     remark = _read(FUZZYLITE).remarks[0]
     assert remark.startswith("the dialect is fuzzylite: ")
     assert "the term class Triangle (line 13)" in remark
@@ -328,7 +328,7 @@ def test_a_file_of_jfuzzylogic_is_read_with_its_shapes_and_defaults() -> None:
     assert [loss.where for loss in reading.losses] == ["the other function blocks"]
 
 
-def test_an_or_before_an_and_is_told_of_in_a_file_of_jfuzzylogic() -> None:
+def test_an_or_before_an_and_is_reported_in_a_file_of_jfuzzylogic() -> None:
     reading = _read(JFUZZYLOGIC)
     assert any(
         "line 20: AND binds closer than OR" in remark for remark in reading.remarks
@@ -412,7 +412,7 @@ def test_other_encodings_are_read(encoding: str) -> None:
     assert has_remark == (encoding in ("latin-1", "utf-16"))
 
 
-def test_every_mistake_of_a_file_is_told_with_its_place() -> None:
+def test_every_mistake_of_a_file_is_reported_with_its_place() -> None:
     text = """\
 FUNCTION_BLOCK f
 VAR_INPUT a : REAL; b : REAL; END_VAR
@@ -468,7 +468,7 @@ END_RULEBLOCK
         ("END_VAR\n  VAR_OUT", "\n  VAR_OUT", "found 'VAR_OUTPUT'; expected END_VAR"),
         ("FUZZIFY load", "FUZZIFY lod", "no variable 'lod' in VAR_INPUT"),
         ("METHOD : COGS", "METHOD : COG", "a number has no area"),
-        ("TERM long := 60", "TERM long := (1, 0)", "a curve where METHOD asks for"),
+        ("TERM long := 60", "TERM long := (1, 0)", "a curve where METHOD needs"),
         ("(2, 0) (6, 1)", "(low, 0) (6, 1)", "'low' where a number must stand"),
         ("(2, 0) (6, 1)", "SINGLETONS (2, 1)", "no shape 'SINGLETONS'"),
         ("(2, 0) (6, 1)", "TRIAN 1 2", "TRIAN takes 3 numbers, not 2"),
@@ -483,7 +483,7 @@ END_RULEBLOCK
         ("AND: MIN;", "AND: MIN; §;", "has no meaning here"),
     ],
 )
-def test_a_mistake_is_told(old: str, new: str, expected: str) -> None:
+def test_a_mistake_is_reported(old: str, new: str, expected: str) -> None:
     text = STANDARD.replace(old, new, 1)
     if not expected:
         assert _system(text) == _system(STANDARD)
@@ -496,7 +496,7 @@ def test_an_unknown_type_is_a_loss() -> None:
     assert loss.what == "the type INT is read as REAL, without rounding"
 
 
-def test_an_output_that_is_asked_for_is_a_loss_outside_of_fuzzylite() -> None:
+def test_an_output_in_an_antecedent_is_a_loss_outside_of_fuzzylite() -> None:
     text = STANDARD.replace("IF dirt IS little", "IF minutes IS long")
     assert [loss.where for loss in _read(text).losses] == ["output 'minutes'"]
 

@@ -191,7 +191,7 @@ def test_hundredths_are_hedges_and_mean_other_things_in_octave_and_fuzzylite() -
         (("2 -1, 2", "2.2 -1, 2"), "read as octave's: line 37 has hedges, which"),
     ],
 )
-def test_the_dialect_is_found_out_and_told(
+def test_the_dialect_is_detected_and_reported(
     change: tuple[str, str], remark: str
 ) -> None:
     text = SUGENO.replace(*change, 1) if change[0] else SUGENO
@@ -299,7 +299,7 @@ def test_where_fuzzylite_inverts_curves_otherwise_is_a_loss_of_its_files() -> No
     )
 
 
-def test_a_rule_that_asks_nothing_is_always_true_or_told_to_be_left_out() -> None:
+def test_a_rule_without_an_antecedent_is_always_true_or_reported_as_left_out() -> None:
     text = SUGENO.replace("1 1, 1 (1) : 1", "0 0, 1 (1) : 1")
     assert read(text).rules[0].when is None
     found = reading(text.encode(), "tip.fis", dialect="fuzzylite")
@@ -307,11 +307,11 @@ def test_a_rule_that_asks_nothing_is_always_true_or_told_to_be_left_out() -> Non
     text = SUGENO.replace("2 -1, 2 (0.5) : 2", "0 0, 2 (1) : 2")
     found = reading(text.encode(), "tip.fis")
     assert found.losses[0].what == (
-        "it asks nothing and never fires (an or of none); left out"
+        "its antecedent is empty and it never fires (an or of none); left out"
     )
 
 
-def test_names_that_stand_twice_are_told_apart_and_told() -> None:
+def test_names_that_stand_twice_are_renamed_and_reported() -> None:
     text = SUGENO.replace("'service'", "'food'").replace("'fair'", "'small'")
     found = reading(text.encode(), "tip.fis")
     assert found.model.columns == ("food", "food 2")
@@ -363,7 +363,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("change", "message"), MISTAKES)
-def test_a_mistake_is_told_with_its_place(
+def test_a_mistake_is_reported_with_its_place(
     change: tuple[str, str], message: str
 ) -> None:
     assert change[0] in SUGENO
@@ -374,7 +374,7 @@ def test_a_mistake_is_told_with_its_place(
     ), caught.value
 
 
-def test_all_mistakes_are_told_at_once() -> None:
+def test_all_mistakes_are_reported_at_once() -> None:
     text = SUGENO.replace("'zmf'", "'zm'").replace("(0.5)", "(5)")
     with pytest.raises(ReadError) as caught:
         read(text.replace("'prod'\nOr", "'and'\nOr"))

@@ -276,7 +276,7 @@ def test_a_curve_that_ends_before_it_starts_has_degrees_somewhere_all_the_same(
     assert isinstance(output_of(term, "WeightedAverage TakagiSugeno").curve, Points)
 
 
-def test_only_monotone_terms_are_asked_where_they_have_a_degree() -> None:
+def test_only_monotone_terms_are_inverted() -> None:
     ramp = Points((1.0, 3.0), (0.0, 1.0))
     assert output_of("Ramp 1 3", "WeightedAverage Tsukamoto").curve == ramp
     assert output_of("Ramp 1 3", "WeightedAverage").curve == ramp
@@ -321,7 +321,9 @@ nonsense
 """
 
 
-def test_all_mistakes_are_told_at_once_with_their_places_and_nearest_names() -> None:
+def test_all_mistakes_are_reported_at_once_with_their_places_and_nearest_names() -> (
+    None
+):
     with pytest.raises(ReadError) as error:
         read(MISTAKES.encode(), "m.fll")
     assert str(error.value).splitlines() == [
@@ -370,7 +372,7 @@ def test_all_mistakes_are_told_at_once_with_their_places_and_nearest_names() -> 
     ]
 
 
-def test_at_most_a_hundred_mistakes_are_told() -> None:
+def test_at_most_a_hundred_mistakes_are_reported() -> None:
     with pytest.raises(ReadError) as error:
         read(
             b"InputVariable: a\n" + b" term: t Triangle a b c d e\n" * 200_000, "m.fll"
@@ -425,7 +427,7 @@ RuleBlock: second
 """
 
 
-def test_what_is_disabled_says_nothing_and_this_is_told() -> None:
+def test_what_is_disabled_says_nothing_and_is_reported() -> None:
     reading = read(DISABLED.encode(), "off.fll")
     system = reading.model
     assert isinstance(system, FuzzySystem)
@@ -463,7 +465,7 @@ def test_a_file_of_latin_1_is_read_with_a_remark() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         (b"", "x.fll:1:1: there is no OutputVariable that is enabled"),
         (
@@ -475,12 +477,12 @@ def test_a_file_of_latin_1_is_read_with_a_remark() -> None:
         (b"a" * (33 * 2**20), "x.fll: 34,603,008 bytes are more than the 33,554,432"),
     ],
 )
-def test_what_is_no_text_file_is_told_in_one_sentence(
-    content: bytes, told: str
+def test_what_is_no_text_file_is_reported_in_one_sentence(
+    content: bytes, message: str
 ) -> None:
     with pytest.raises(ReadError) as error:
         read(content, "x.fll")
-    assert told in str(error.value)
+    assert message in str(error.value)
     assert len(str(error.value).splitlines()) == 1
 
 
@@ -530,8 +532,8 @@ def test_a_damaged_file_is_refused_or_read_and_never_crashes() -> None:
         try:
             read("".join(text).encode(), "d.fll")
         except ReadError as error:
-            told = str(error)
-            assert all(line.startswith("d.fll:") for line in told.splitlines())
+            message = str(error)
+            assert all(line.startswith("d.fll:") for line in message.splitlines())
 
 
 def test_a_constant_under_a_centroid_is_a_degree_and_a_remark_says_so() -> None:

@@ -100,8 +100,8 @@ def test_a_sugeno_system_is_read_whole() -> None:
         (Is("food", "bad", ("very",)), Is("service", "slow"))
     )
     assert first.rules[0].weight == 0.5
-    asked: Condition = Or((Is("food", "bad"), Is("food", "good", ("not", "not"))))
-    assert second.rules[0].when == Or((asked, Is("food", "good", ("not", "not"))))
+    either: Condition = Or((Is("food", "bad"), Is("food", "good", ("not", "not"))))
+    assert second.rules[0].when == Or((either, Is("food", "good", ("not", "not"))))
     (tip,) = infer(system, {"food": 0.0, "service": 0.0}).outputs
     assert tip == pytest.approx((0.5 * 5.0 + 1.0 * 2.0) / 1.5)
 
@@ -268,7 +268,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("change", "message"), MISTAKES)
-def test_a_mistake_is_told_with_its_place(
+def test_a_mistake_is_reported_with_its_place(
     change: tuple[str, str], message: str
 ) -> None:
     assert change[0] in TIPPER
@@ -328,7 +328,7 @@ def test_encodings_change_nothing(encoding: str) -> None:
     assert reading(text.encode(encoding), "tip.xml").model == read(TIPPER)
 
 
-def test_a_file_without_the_namespace_is_read_and_told() -> None:
+def test_a_file_without_the_namespace_is_read_with_a_remark() -> None:
     text = TIPPER.replace(' xmlns="http://www.ieee1855.org"', "")
     found = reading(text.encode(), "tip.xml")
     assert found.model == read(TIPPER)

@@ -156,12 +156,12 @@ def _outcome(sample: str, *, bound: float | None, read: bool = True) -> str:
     return found.outcome
 
 
-def test_a_loss_with_a_bound_is_told_from_one_without() -> None:
+def test_a_loss_with_a_bound_differs_from_one_without() -> None:
     assert _outcome("tree", bound=1e-3) == "points"
     assert _outcome("tree", bound=None) == "lossy"
 
 
-def test_a_refusal_is_told_with_its_reason() -> None:
+def test_a_refusal_is_reported_with_its_reason() -> None:
     def write(model: Document, /, *, allow_loss: bool = False) -> Written:
         raise LossError("turtles only")
 

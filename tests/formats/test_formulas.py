@@ -114,7 +114,7 @@ def test_fuzzylite_gets_no_exponents_and_no_minus_before_a_name() -> None:
         ),
     ],
 )
-def test_what_is_no_formula_is_told_with_its_column(
+def test_what_is_no_formula_is_reported_with_its_column(
     text: str, column: int, sentence: str
 ) -> None:
     with pytest.raises(FormulaError) as error:
@@ -122,7 +122,7 @@ def test_what_is_no_formula_is_told_with_its_column(
     assert (error.value.column, error.value.sentence) == (column, sentence)
 
 
-def test_a_function_that_does_not_exist_is_told_with_the_nearest() -> None:
+def test_a_function_that_does_not_exist_is_reported_with_the_nearest() -> None:
     with pytest.raises(FormulaError, match=r"no function 'squrt'.*mean 'sqrt'"):
         parse("squrt(a)")
 

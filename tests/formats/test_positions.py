@@ -172,8 +172,8 @@ def astray(content: bytes, name: str) -> Iterator[str]:
 
 def said(kind: str, rule: SystemRule, text: str, model: Document) -> bool:
     """Return whether a rule stands at the beginning of a text."""
-    asked = [(one.variable, one.label or "any") for one in questions(rule.when)]
-    asked += [(one.output, one.label) for one in rule.then]
+    references = [(one.variable, one.label or "any") for one in questions(rule.when)]
+    references += [(one.output, one.label) for one in rule.then]
     if kind == "fis":
         numbers = re.findall(r"-?[0-9.]+", text.partition("(")[0])
         assert isinstance(model, FuzzySystem)
@@ -184,7 +184,7 @@ def said(kind: str, rule: SystemRule, text: str, model: Document) -> bool:
             for k, n in enumerate(numbers)
             if float(n)
         }
-        return {*asked} <= found  # Octave's hedges make several rules of a line
+        return {*references} <= found  # Octave's hedges make several rules of a line
     begin, end = {
         "fll": ("if ", "\n"),
         "fcl": ("rule ", "(?i:;|\n *RULE|\n *END_RULE)"),
@@ -198,7 +198,7 @@ def said(kind: str, rule: SystemRule, text: str, model: Document) -> bool:
             {one.variable for one in questions(rule.when)}
         )
     at = 0
-    for word in itertools.chain.from_iterable(asked):
+    for word in itertools.chain.from_iterable(references):
         at = whole.find(word, at) + len(word)
         if at < len(word):
             return False

@@ -178,7 +178,7 @@ def test_a_tree_without_a_question_has_one_leaf() -> None:
     assert descend(ours, {}).label == "1"
 
 
-def test_a_missing_value_has_the_answer_that_was_asked_for() -> None:
+def test_a_missing_value_has_the_prediction_of_the_caller() -> None:
     tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], ["a", "b"])
     for missing in (None, "b"):
         answer = descend(from_sklearn(tree, missing=missing), {"x1": math.nan})
@@ -190,7 +190,9 @@ def test_a_tree_that_asks_for_missing_values_is_refused() -> None:
     tree.fit([[math.nan], [math.nan], [1.0], [1.0]], ["a", "a", "b", "b"])
     with pytest.raises(LossError) as caught:
         from_sklearn(tree)
-    assert str(caught.value) == ("cannot read a tree that asks whether 'x1' is missing")
+    assert str(caught.value) == (
+        "cannot read a tree that tests whether 'x1' is missing"
+    )
 
 
 def test_a_tree_that_learnt_where_missing_values_go_is_refused() -> None:
@@ -250,7 +252,7 @@ def test_a_tree_that_is_not_fitted_is_refused() -> None:
             {"soft": 0.0, "spreads": [1.0, 1.0]},
             "the width beside a cut of 'x1' must be above 0, not 0.0",
         ),
-        ({"soft": {}}, "soft: no width for 'x1', which the tree asks"),
+        ({"soft": {}}, "soft: no width for 'x1', which the tree tests"),
         (
             {"soft": {"x": 1.0}},
             "soft: no column 'x'; there is x1, x2 (did you mean 'x2'?)",

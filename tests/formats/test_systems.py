@@ -125,7 +125,7 @@ def _or_none(text: str) -> FuzzySystem | None:
         return None
 
 
-def test_mistakes_of_every_part_are_told_at_once() -> None:
+def test_mistakes_of_every_part_are_reported_at_once() -> None:
     text = (
         TIPPER.replace("service is good", "service is god")
         .replace("deviation: 1.5}}\n  - {name: good", "deviation: 0}}\n  - {name: good")
@@ -287,8 +287,8 @@ def test_a_damaged_system_gives_a_read_error_or_a_system(seed: int) -> None:
 def test_a_hedge_of_two_words_is_written_with_a_hyphen() -> None:
     hedges: tuple[Hedge, ...] = ("very very", "cube root")
     system = random_system(0, rules=1)
-    asked: SystemInput | SystemOutput = system.inputs[0]
-    when = Is(asked.name, asked.labels[0].name, hedges)
+    variable: SystemInput | SystemOutput = system.inputs[0]
+    when = Is(variable.name, variable.labels[0].name, hedges)
     block = replace(system.blocks[0], rules=(replace(system.rules[0], when=when),))
     text = write(replace(system, blocks=(block,))).content.decode()
     assert "is very-very cube-root " in text

@@ -178,7 +178,7 @@ def test_a_system_and_its_facts_make_the_rule_base_again(
     rules: RuleBase, scores: Scores, always: Always
 ) -> None:
     if always != "nothing" and not rules.variables:
-        with pytest.raises(LossError, match="must ask an input"):
+        with pytest.raises(LossError, match="must reference an input"):
             as_system(rules, scores, always=always)
         return
     system = as_system(rules, scores, always=always)

@@ -522,8 +522,8 @@ def test_where_nothing_is_concluded_the_default_answers(
 
 def test_a_curve_without_area_answers_the_default_too() -> None:
     labels = (SystemTerm("one", Trapezoid(5.0, 6.0, 6.0, 7.0)),)
-    asked = system([rule(None)], labels, "centroid", aggregation="sum", default=9.0)
-    found = infer(asked, {"a": 0.0, "b": 0.0})
+    subject = system([rule(None)], labels, "centroid", aggregation="sum", default=9.0)
+    found = infer(subject, {"a": 0.0, "b": 0.0})
     assert (found.outputs, found.status) == ((9.0,), Status.UNCOVERED)
     assert found.activations == (1.0,)
 
@@ -664,16 +664,16 @@ def test_a_formula_sees_inputs_and_earlier_outputs() -> None:
 def test_inputs_are_moved_into_their_range_before_anything_else() -> None:
     line = SystemTerm("line", Linear((1.0,)))
     output = SystemOutput("y", (line,), None, None, Defuzzifier("weighted sum"))
-    held = SystemInput("a", (UP,), 0.25, 0.5, clips=True)
+    clamped = SystemInput("a", (UP,), 0.25, 0.5, clips=True)
     mix = SystemInput("mix", parts=(Part("a", 2.0),))
-    asked = FuzzySystem(
-        "held", (held, mix), (output,),
+    subject = FuzzySystem(
+        "clamped", (clamped, mix), (output,),
         (RuleBlock((SystemRule(None, (Conclusion("y", "line"),)),)),),
     )  # fmt: skip
-    assert [infer(asked, {"a": a}).outputs[0] for a in (0.0, 0.3, 9.0)] == [
+    assert [infer(subject, {"a": a}).outputs[0] for a in (0.0, 0.3, 9.0)] == [
         *(0.25, 0.3, 0.5)
     ]
-    open_above = replace(asked, inputs=(replace(held, high=None), mix))
+    open_above = replace(subject, inputs=(replace(clamped, high=None), mix))
     assert infer(open_above, {"a": 9.0}).outputs == (9.0,)
 
 
@@ -688,21 +688,21 @@ def test_an_answer_is_moved_into_its_range_and_so_is_the_default() -> None:
 
 @pytest.mark.parametrize("value", [NAN, INF, -INF])
 def test_a_row_without_a_value_makes_everything_nan(value: float) -> None:
-    asked = system([rule(A_UP)], default=3.0)
-    held = replace(asked.inputs[1], low=0.0, high=1.0, clips=True)
-    asked = replace(asked, inputs=(asked.inputs[0], held))
-    found = infer(asked, {"a": 0.5, "b": value})
+    subject = system([rule(A_UP)], default=3.0)
+    clamped = replace(subject.inputs[1], low=0.0, high=1.0, clips=True)
+    subject = replace(subject, inputs=(subject.inputs[0], clamped))
+    found = infer(subject, {"a": 0.5, "b": value})
     assert math.isnan(found.outputs[0])
     assert math.isnan(found.activations[0])
     assert found.status == Status.MISSING
 
 
 def test_a_combination_that_overflows_is_missing() -> None:
-    asked = system([rule(A_UP)])
+    subject = system([rule(A_UP)])
     mix = SystemInput("mix", (UP,), parts=(Part("a", 1e300),))
-    asked = replace(asked, inputs=(*asked.inputs, mix), outputs=asked.outputs)
-    assert infer(asked, {"a": 1.0, "b": 0.0}).status == Status.DECIDED
-    assert infer(asked, {"a": 1e300, "b": 0.0}).status == Status.MISSING
+    subject = replace(subject, inputs=(*subject.inputs, mix), outputs=subject.outputs)
+    assert infer(subject, {"a": 1.0, "b": 0.0}).status == Status.DECIDED
+    assert infer(subject, {"a": 1e300, "b": 0.0}).status == Status.MISSING
 
 
 def test_a_column_without_a_value_is_a_key_error() -> None:
@@ -712,42 +712,44 @@ def test_a_column_without_a_value_is_a_key_error() -> None:
 
 def test_a_degree_that_is_nan_activates_nothing() -> None:
     root = SystemInput("a", (SystemTerm("up", Formula(parse("sqrt(x)"))),))
-    asked = replace(system([rule(A_UP), rule(B_UP)]), inputs=(
+    subject = replace(system([rule(A_UP), rule(B_UP)]), inputs=(
         root, SystemInput("b", (UP,)),
     ))  # fmt: skip
-    found = infer(asked, {"a": -1.0, "b": 0.5})
+    found = infer(subject, {"a": -1.0, "b": 0.5})
     assert found.activations == (0.0, 0.5)
     assert found.outputs == (0.5,)
 
 
 @pytest.mark.parametrize("seed", range(30))
 def test_nothing_fails_on_any_system_and_any_row(seed: int) -> None:
-    asked = random_system(seed, formulas="wild")
-    rows = random_rows(asked, seed, 6)
+    subject = random_system(seed, formulas="wild")
+    rows = random_rows(subject, seed, 6)
     chance = random.Random(seed)
     extreme = (1e308, -1e308, 5e-324, -0.0, 0.0, 1e16)
-    rows += [{name: chance.choice(extreme) for name in asked.columns} for _ in range(9)]
+    rows += [
+        {name: chance.choice(extreme) for name in subject.columns} for _ in range(9)
+    ]
     for row in rows:
-        found = infer(asked, row)
-        assert len(found.outputs) == len(asked.outputs)
-        assert len(found.activations) == len(asked.rules)
-        assert repr(infer(asked, row)) == repr(found)
+        found = infer(subject, row)
+        assert len(found.outputs) == len(subject.outputs)
+        assert len(found.activations) == len(subject.rules)
+        assert repr(infer(subject, row)) == repr(found)
 
 
 def test_random_systems_show_everything_that_a_system_can_have() -> None:
     seen: set[str] = set()
     for seed in range(100):
-        asked = random_system(seed)
-        for variable in asked.variables:
+        subject = random_system(seed)
+        for variable in subject.variables:
             seen |= {type(label.curve).__name__ for label in variable.labels}
-        for output in asked.outputs:
+        for output in subject.outputs:
             how = output.defuzzifier
             seen |= {how.method, how.grid, f"joined by {output.aggregation}"}
-        for block in asked.blocks:
+        for block in subject.blocks:
             seen |= {f"and {block.conjunction}", f"or {block.disjunction}"}
             seen |= {f"cut by {block.implication}", block.activation.method}
             seen |= {block.activation.relation}
-        seen |= set(repr(asked.rules).split("'"))
+        seen |= set(repr(subject.rules).split("'"))
     kinds = {kind.__name__ for kind in get_args(Curve)}
     norms = {f"and {name}" for name in get_args(TNorm)}
     norms |= {f"cut by {name}" for name in get_args(TNorm)}
@@ -782,8 +784,8 @@ def test_the_last_sample_is_the_end_of_the_range() -> None:
 def test_degrees_above_1_are_bounded_by_the_aggregation_that_joins_them() -> None:
     block = RuleBlock((), disjunction="sum")
     rules = [rule(Or((A_DOWN, B_UP))), rule(ECHO, "three")]
-    asked = system(rules, LABELS, aggregation="bounded sum", block=block)
-    found = infer(asked, {"a": 0.25, "b": 0.75})
+    subject = system(rules, LABELS, aggregation="bounded sum", block=block)
+    found = infer(subject, {"a": 0.25, "b": 0.75})
     assert found.activations == (1.5, 1.0)
     assert found.outputs == (1.0 * 1.0 + 1.0 * 3.0,)
 
@@ -801,13 +803,13 @@ def test_numbers_are_added_in_the_order_of_the_rules(method: Any) -> None:
 
 
 def test_a_combination_is_of_values_within_their_ranges() -> None:
-    held = SystemInput("a", (UP,), 0.0, 0.5, clips=True)
+    clamped = SystemInput("a", (UP,), 0.0, 0.5, clips=True)
     mix = SystemInput("mix", (UP,), parts=(Part("a", 2.0, 0.25), Part("b", 1.0)))
-    asked = system([rule(B_UP)])
-    asked = replace(asked, inputs=(held, SystemInput("b", (UP,)), mix))
+    subject = system([rule(B_UP)])
+    subject = replace(subject, inputs=(clamped, SystemInput("b", (UP,)), mix))
     block = RuleBlock((rule(Is("mix", "up")),))
-    asked = replace(asked, blocks=(block,))
-    found = infer(asked, {"a": 9.0, "b": 0.125})
+    subject = replace(subject, blocks=(block,))
+    found = infer(subject, {"a": 9.0, "b": 0.125})
     assert found.activations == (2.0 * (0.5 - 0.25) + 0.125,)
 
 

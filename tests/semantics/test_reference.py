@@ -67,7 +67,7 @@ def test_a_side_without_a_flank_is_a_step() -> None:
     assert [degree(step, x) for x in (0.0, 0.5, 1.0, 1.5)] == [0.0, 1.0, 1.0, 0.0]
 
 
-def test_a_curve_above_one_is_held_below_one_and_below_zero_at_zero() -> None:
+def test_a_curve_above_one_is_clamped_below_one_and_below_zero_at_zero() -> None:
     high = Band(high=1.0, right=Flank(1.0, 2.0, (4.0,)))
     low = Band(high=1.0, right=Flank(1.0, 2.0, (-4.0,)))
     assert (degree(high, 1.5), degree(low, 1.5)) == (BELOW_ONE, 0.0)
@@ -135,7 +135,7 @@ def test_or_is_the_maximum_and_not_is_one_minus() -> None:
     assert answer.strengths == (0.8, 1.0 - 0.8)
 
 
-def test_the_first_of_equally_strong_rules_wins_and_the_tie_is_told() -> None:
+def test_the_first_of_equally_strong_rules_wins_and_the_tie_is_reported() -> None:
     answer = evaluate(rules((LOW_X,), (LOW_Y,)), {"x": 2.0, "y": 2.0})
     assert (answer.rule, answer.label, answer.status) == (1, "a", Status.TIE)
 

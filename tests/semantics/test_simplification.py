@@ -162,7 +162,7 @@ def test_an_input_that_nothing_asks_goes_on_request_and_the_change_is_said() -> 
     assert pruned(rules).removed == ()
     found = pruned(rules, inputs=True)
     change = "a row is answered though it is missing"
-    assert found.removed == (Removed("input 'slip'", "nothing asks it", change),)
+    assert found.removed == (Removed("input 'slip'", "nothing uses it", change),)
     assert found.model.inputs == ("force",)
 
 

@@ -244,9 +244,9 @@ _HEDGES = frozenset({"ANY", "VERY", "SOMEWHAT", "EXTREMELY", "SELDOM"})
 
 def _of_rule(rule: RuleStatement) -> Iterator[DialectEvidence]:
     line = rule.keyword.line or 1
-    asked = list(clauses(rule.condition))
-    words = [word for one in asked for word in one.words[:-1]]
-    is_any = any(one.words[-1].upper() == "ANY" for one in asked)
+    propositions = list(clauses(rule.condition))
+    words = [word for one in propositions for word in one.words[:-1]]
+    is_any = any(one.words[-1].upper() == "ANY" for one in propositions)
     if is_any or any(word.upper() in _HEDGES for word in words):
         yield DialectEvidence("fuzzylite", "hedges", line)
     if is_lower(rule):
@@ -267,7 +267,7 @@ def is_lower(rule: RuleStatement) -> bool:
 
 
 def clauses(condition: FclCondition) -> Iterator[FclProposition]:
-    """Yield what a condition asks, from left to right."""
+    """Yield the propositions of a condition, from left to right."""
     match condition:
         case FclProposition():
             yield condition

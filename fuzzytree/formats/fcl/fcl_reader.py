@@ -344,12 +344,12 @@ def _terms(
 def read_input(name: str, known: FclVariables) -> SystemInput:
     """Return an input; mistakes are noted."""
     named = known.inputs[name]
-    _tell_disabled(f"input {name!r}", named, known)
+    _note_disabled(f"input {name!r}", named, known)
     labels = tuple(term.label for term in _terms(name, named.block, known))
     return SystemInput(name, labels, named.low, named.high)
 
 
-def _tell_disabled(where: str, named: FclVariable, known: FclVariables) -> None:
+def _note_disabled(where: str, named: FclVariable, known: FclVariables) -> None:
     if named.block is not None and named.block.is_disabled:
         known.notes.loss(where, "it is disabled in the file, and read as enabled")
 
@@ -361,7 +361,7 @@ def read_output(name: str, known: FclVariables) -> SystemOutput:
     if block is None:
         known.mistake(named.token, f"output {name!r} has no DEFUZZIFY")
         return SystemOutput(name, (), 0.0, 1.0, Defuzzifier("weighted average"))
-    _tell_disabled(f"output {name!r}", named, known)
+    _note_disabled(f"output {name!r}", named, known)
     how = _defuzzifier(name, block, known)
     terms = _terms(name, block, known, is_weighted=how.is_weighted)
     labels = tuple(
@@ -398,14 +398,14 @@ def _check_kinds(
     *,
     is_weighted: bool,
 ) -> None:
-    """Note numbers where an area is asked for, and curves where numbers are."""
+    """Note numbers where an area is needed, and curves where numbers are."""
     kinds = {term.label.name: term for term in terms}
     for text in texts:
         term = kinds[str(text.name)]
         is_number = text.kind == "number" or term.is_number
         if is_weighted and not is_number:
             sentence = (
-                "a curve where METHOD asks for numbers; write a number, or METHOD : COG"
+                "a curve where METHOD needs numbers; write a number, or METHOD : COG"
             )
             known.mistake(text.tokens[0], sentence)
         elif text.kind == "number" and not is_weighted:
@@ -418,7 +418,7 @@ def _estimated(
 ) -> tuple[float, float]:
     """Return the range that an output's terms span, where the file says none."""
     name = str(named.token)
-    if known.notes.mistakes:  # a term that was not read is no reason to ask for a range
+    if known.notes.mistakes:  # a term that was not read is no reason to demand a range
         return 0.0, 1.0
     ends = [fcl_terms.extent(label.curve) for label in labels]
     spans = [one for one in ends if one is not None]

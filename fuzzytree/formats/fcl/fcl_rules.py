@@ -92,7 +92,7 @@ def _weight(token: Token, scope: Scope) -> float:
 def _condition(condition: FclCondition, scope: Scope) -> Condition:
     match condition:
         case FclProposition():
-            return _asked(condition, scope)
+            return _proposition(condition, scope)
         case FclNegation(part=part):
             return Not(_condition(part, scope))
         case FclJunction(connective=connective, parts=parts):
@@ -100,27 +100,31 @@ def _condition(condition: FclCondition, scope: Scope) -> Condition:
             return And(made) if connective == "and" else Or(made)
 
 
-def _asked(asked: FclProposition, scope: Scope) -> Is:
-    variable = str(asked.variable)
+def _proposition(proposition: FclProposition, scope: Scope) -> Is:
+    variable = str(proposition.variable)
     if variable in scope.outputs and scope.dialect not in ("fuzzylite", "portable"):
         what = (
-            "asked in a condition: how far rules before have concluded it counts, as "
+            "used in an antecedent: how far earlier rules conclude it counts, as "
             "in fuzzylite, and not its value"
         )
         loss = Loss(f"output {variable!r}", what)
         if loss not in scope.notes.losses:
             scope.notes.losses.append(loss)
-    if asked.words[-1].lower() == "any" and "any" not in scope.terms.get(variable, ()):
-        _known_variable(asked.variable, scope.terms, scope.notes)
-        return Is(variable, None, _hedges(asked.words, scope))
-    label = _known(asked, scope.terms, scope.notes)
-    return Is(variable, label, _hedges(asked.words[:-1], scope))
+    if proposition.words[-1].lower() == "any" and "any" not in scope.terms.get(
+        variable, ()
+    ):
+        _known_variable(proposition.variable, scope.terms, scope.notes)
+        return Is(variable, None, _hedges(proposition.words, scope))
+    label = _known(proposition, scope.terms, scope.notes)
+    return Is(variable, label, _hedges(proposition.words[:-1], scope))
 
 
-def _conclusion(asked: FclProposition, scope: Scope) -> Conclusion:
+def _conclusion(proposition: FclProposition, scope: Scope) -> Conclusion:
     known = {name: scope.terms[name] for name in scope.outputs}
-    label = _known(asked, known, scope.notes)
-    return Conclusion(str(asked.variable), label, _hedges(asked.words[:-1], scope))
+    label = _known(proposition, known, scope.notes)
+    return Conclusion(
+        str(proposition.variable), label, _hedges(proposition.words[:-1], scope)
+    )
 
 
 def _hedges(words: Sequence[Token], scope: Scope) -> tuple[Hedge, ...]:
@@ -146,14 +150,16 @@ def _known_variable(
 
 
 def _known(
-    asked: FclProposition, terms: Mapping[str, Collection[str]], notes: ReaderNotes
+    proposition: FclProposition,
+    terms: Mapping[str, Collection[str]],
+    notes: ReaderNotes,
 ) -> str:
-    label = asked.words[-1]
-    if _known_variable(asked.variable, terms, notes):
-        known = terms.get(str(asked.variable), ())
+    label = proposition.words[-1]
+    if _known_variable(proposition.variable, terms, notes):
+        known = terms.get(str(proposition.variable), ())
         if str(label) not in known and not notes.is_full:
             choice = name_choice(label[:99], known)
-            whose = repr(str(asked.variable))
+            whose = repr(str(proposition.variable))
             sentence = f"{whose} has no term {str(label)!r}; {choice}"
             notes.mistake(place(label), sentence)
     return str(label)
@@ -284,35 +290,35 @@ def _uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
 
 
 ALWAYS: Final = Points((0.0,), (1.0,))
-"""The curve of a term that rules without a condition ask, where they must ask."""
+"""The curve of the term that rules without a condition use in formats that need one."""
 
 
 def without_questions(system: FuzzySystem) -> FuzzySystem:
     """Return a system that was written here, with rules that have no condition again.
 
-    The writer lets them ask whether the first input is `any`, or its last term, which
+    The writer makes them test whether the first input is `any`, or its last term, which
     it adds.
     """
     if not system.inputs:
         return system
     first = system.inputs[0]
-    asked: Condition = Is(first.name, None, ("any",))
+    proposition: Condition = Is(first.name, None, ("any",))
     if first.labels and first.labels[-1].curve == ALWAYS:
-        asked = Is(first.name, first.labels[-1].name)
+        proposition = Is(first.name, first.labels[-1].name)
         first = replace(first, labels=first.labels[:-1])
     others = [
         one
         for rule in system.rules
-        if rule.when is not None and rule.when != asked
+        if rule.when is not None and rule.when != proposition
         for one in questions(rule.when)
     ]
-    if asked in others or all(rule.when != asked for rule in system.rules):
+    if proposition in others or all(rule.when != proposition for rule in system.rules):
         return system
     blocks = tuple(
         replace(
             block,
             rules=tuple(
-                replace(rule, when=None) if rule.when == asked else rule
+                replace(rule, when=None) if rule.when == proposition else rule
                 for rule in block.rules
             ),
         )

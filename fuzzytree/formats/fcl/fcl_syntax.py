@@ -101,7 +101,7 @@ class TermStatement(msgspec.Struct, frozen=True):
 
 
 class RuleStatement(msgspec.Struct, frozen=True):
-    """A rule; `has_comma` tells whether `,` joins its conclusions."""
+    """A rule; `has_comma`: whether `,` joins its conclusions."""
 
     keyword: Token
     label: tuple[Token, ...]

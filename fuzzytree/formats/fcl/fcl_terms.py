@@ -86,7 +86,7 @@ def _number(token: Token) -> float:
     if value is None or not math.isfinite(value):
         sentence = (
             f"{str(token)!r} where a number must stand; curves that depend on "
-            "variables are not held"
+            "variables are not supported"
         )
         raise PartError((*place(token), sentence))
     return value

@@ -168,7 +168,7 @@ Variables = tuple[Sequence[SystemInput], Sequence[SystemOutput]]
 class _Line(msgspec.Struct, frozen=True):
     """`1 0 -2, 1 (1) : 1` in parts: numbers before and behind the comma, and so on."""
 
-    asked: list[float]
+    antecedent: list[float]
     concluded: list[float]
     weight: float
     connection: float
@@ -254,9 +254,9 @@ def _rules(
     number, _ = where
     found = len(notes.mistakes)
     questions = [
-        asked
-        for variable, code in zip(variables[0], line.asked, strict=True)
-        if (asked := _question(variable, code, where, dialect, notes)) is not None
+        proposition
+        for variable, code in zip(variables[0], line.antecedent, strict=True)
+        if (proposition := _question(variable, code, where, dialect, notes)) is not None
     ]
     conclusions = [
         one
@@ -269,7 +269,9 @@ def _rules(
         notes.loss(f"rule {number}", "it concludes nothing; left out")
         return
     if any(one.label and one.hedges[-1:] == ("any",) for one in questions):
-        what = "it asks 'any' (.99) of a term, and fuzzylite does not load it; left out"
+        what = (
+            "it uses 'any' (.99) with a term, which fuzzylite does not load; left out"
+        )
         notes.loss(f"rule {number}", what)
         return
     is_or = line.connection == 2.0
@@ -277,11 +279,11 @@ def _rules(
         why = (
             "fuzzylite does not load it" if dialect == "fuzzylite" else "an or of none"
         )
-        what = f"it asks nothing and never fires ({why}); left out"
+        what = f"its antecedent is empty and it never fires ({why}); left out"
         notes.loss(f"rule {number}", what)
         return
     if not questions and dialect == "octave":
-        what = f"rule {number} asks nothing and always fires; Octave cannot run it"
+        what = f"rule {number} has no antecedent and always fires; Octave cannot run it"
         notes.remark(what)
     when: Condition | None = questions[0] if questions else None
     if len(questions) > 1:
@@ -320,7 +322,7 @@ def _question(
     dialect: Dialect,
     notes: ReaderNotes,
 ) -> Is | None:
-    """Return what is asked of an input; None if nothing."""
+    """Return the proposition on an input; None if there is none."""
     if code == 0.0:
         return None
     found = _code(code, variable, where, notes)

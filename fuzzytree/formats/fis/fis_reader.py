@@ -262,8 +262,8 @@ def _methods(
         how = Defuzzifier(how.method)
     else:
         notes.remark(
-            f"FIS has no resolution: curves are looked at in {how.samples} places, "
-            f"as {dialect} does unless told otherwise"
+            f"FIS has no resolution: curves are sampled at {how.samples} values, "
+            f"the default of {dialect}"
         )
     if is_sugeno != how.is_weighted and dialect != "fuzzylite" and "Type" in entries:
         entry = entries["Type"]

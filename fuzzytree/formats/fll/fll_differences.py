@@ -113,9 +113,9 @@ def _depends_on_degree(label: SystemTerm) -> bool:
 def _is_infinite_at_zero(label: SystemTerm) -> bool:
     """Return whether a label's number at degree 0 is, or may be, no finite number."""
     if isinstance(label.curve, Formula):
-        asked = "x" in names_in(label.curve.expression)
+        uses_degree = "x" in names_in(label.curve.expression)
         functions = {call.function for call in _calls([label.curve])}
-        return asked and bool(functions & {"/", "^", "log", "log10", "%", "fmod"})
+        return uses_degree and bool(functions & {"/", "^", "log", "log10", "%", "fmod"})
     found = value_at(label.curve, 0.0)
     return found is not None and not math.isfinite(found)
 

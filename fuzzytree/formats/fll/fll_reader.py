@@ -115,7 +115,7 @@ def _system(
     if notes.mistakes:
         return None
     variables, blocks = _without_disabled(variables, blocks, notes)
-    _tell_descriptions(sections, notes)
+    _note_descriptions(sections, notes)
     outputs = [one for one in variables if one.is_output]
     inputs = [one for one in variables if not one.is_output]
     engine = next((one for one in sections if one.kind == "Engine"), None)
@@ -139,14 +139,16 @@ def _system(
     return system, positions
 
 
-def _tell_descriptions(sections: Sequence[FllSection], notes: ReaderNotes) -> None:
-    told = [
+def _note_descriptions(sections: Sequence[FllSection], notes: ReaderNotes) -> None:
+    sources = [
         one.head.value or one.kind
         for one in sections
         if one.kind != "Engine" and one.one_of("description")
     ]
-    if told:
-        names = ", ".join(map(repr, told[:5])) + (", ..." if len(told) > 5 else "")
+    if sources:
+        names = ", ".join(map(repr, sources[:5])) + (
+            ", ..." if len(sources) > 5 else ""
+        )
         notes.remark(f"descriptions have no place here: of {names}")
 
 
@@ -293,7 +295,7 @@ def _variable(
             _default(section.one_of("default"), notes),
             clips,
         )
-        _tell_locked(section.one_of("lock-previous"), name, notes)
+        _note_locked(section.one_of("lock-previous"), name, notes)
     kind = "" if how is None else how[1]
     return ReadVariable(
         section,
@@ -317,7 +319,7 @@ def _terms(
         if term is not None:
             name = term.label.name
             if name in found:
-                _tell_second(name, found.pop(name)[1], entry, notes)
+                _note_second(name, found.pop(name)[1], entry, notes)
             words = (name, entry.words()[0].text, *_other_names(name))
             found[name] = (term, entry, words)
         if notes.is_full:
@@ -330,7 +332,7 @@ def _terms(
     )
 
 
-def _tell_second(
+def _note_second(
     name: str, first: FllEntry, second: FllEntry, notes: ReaderNotes
 ) -> None:
     what = (
@@ -370,13 +372,13 @@ def _term(entry: FllEntry, place: TermScope, notes: ReaderNotes) -> FllTerm | No
         term = read_term(name, kind, rest, place, formula)
     except PartError as error:
         notes.mistakes.extend(error.mistakes)
-        # Rules may ask for it all the same.
+        # Rules may use it all the same.
         return FllTerm(SystemTerm(name, Singleton(0.0)), "")
-    _tell_odd(term, rest, place, notes)
+    _note_differences(term, rest, place, notes)
     return term
 
 
-def _tell_odd(
+def _note_differences(
     term: FllTerm, rest: Sequence[Word], place: TermScope, notes: ReaderNotes
 ) -> None:
     """Note a term by which the two engines mean other things."""
@@ -432,7 +434,7 @@ def _default(entry: FllEntry | None, notes: ReaderNotes) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _tell_locked(entry: FllEntry | None, name: str, notes: ReaderNotes) -> None:
+def _note_locked(entry: FllEntry | None, name: str, notes: ReaderNotes) -> None:
     if fll.truth(entry, False, notes):
         notes.loss(
             f"output {name!r}",
@@ -476,9 +478,9 @@ def _without_disabled(
     blocks: Sequence[FllRuleBlock],
     notes: ReaderNotes,
 ) -> tuple[list[ReadVariable], list[FllRuleBlock]]:
-    """Return variables and blocks without what is disabled; remarks tell it.
+    """Return variables and blocks without what is disabled, with remarks.
 
-    What is asked of a disabled variable has degree 0, whatever the hedges. A disabled
+    A proposition on a disabled variable has degree 0, whatever the hedges. A disabled
     input stays a column, for formulas may name it.
     """
     for block in blocks:
@@ -506,7 +508,7 @@ def _without(
     lines: list[FllEntry] = []
     for rule, line in zip(read.block.rules, read.lines, strict=True):
         then = tuple(one for one in rule.then if one.output not in off)
-        when = None if rule.when is None else _asked(rule.when, off, never)
+        when = None if rule.when is None else _condition_without(rule.when, off, never)
         if then:
             rules.append(replace(rule, when=when, then=then))
             lines.append(line)
@@ -517,27 +519,29 @@ def _without(
     return replace(read, block=block, lines=tuple(lines))
 
 
-def _asked(condition: Condition, off: Collection[str], never: Condition) -> Condition:
+def _condition_without(
+    condition: Condition, off: Collection[str], never: Condition
+) -> Condition:
     match condition:
         case Is(variable=variable):
             return never if variable in off else condition
         case And(parts=parts):
-            return And(tuple(_asked(part, off, never) for part in parts))
+            return And(tuple(_condition_without(part, off, never) for part in parts))
         case Or(parts=parts):
-            return Or(tuple(_asked(part, off, never) for part in parts))
+            return Or(tuple(_condition_without(part, off, never) for part in parts))
         case Not(part=part):
-            return Not(_asked(part, off, never))
+            return Not(_condition_without(part, off, never))
 
 
 def _as_meant(output: ReadVariable, notes: ReaderNotes) -> SystemOutput:
     """Return an output whose weighted terms are numbers where the file says so.
 
     Fuzzylite calls it the type: `TakagiSugeno` takes the degree of every term at the
-    activation, `Tsukamoto` asks a monotone term where it has that degree, `Automatic`
-    goes by the terms.
+    activation, `Tsukamoto` the value at which a monotone term has that degree, and
+    `Automatic` goes by the terms.
     """
     variable = output.variable
-    assert isinstance(variable, SystemOutput)  # who calls it sees to that
+    assert isinstance(variable, SystemOutput)  # the caller selects outputs
     if not variable.defuzzifier.is_weighted:
         return variable
     has_numbers = any(term.is_number for term in output.terms)

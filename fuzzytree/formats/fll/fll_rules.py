@@ -62,7 +62,7 @@ class _Read(msgspec.Struct, frozen=True):
 class _Rule(msgspec.Struct, frozen=True):
     """A rule's words, an empty one behind them, and what they may say.
 
-    `found` collects names that do not exist, so that all of them are told.
+    `found` collects names that do not exist, so that all of them are reported.
     """
 
     words: tuple[Word, ...]
@@ -89,7 +89,7 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
     A condition that is nothing but `v is any` holds always.
 
     Raises:
-        PartError: If they say none, with all mistakes that can be told apart.
+        PartError: If they say none, with all its mistakes.
     """
     rule = _Rule((*words, end), vocabulary, [])
     if rule.words[0].text != "if":
@@ -100,8 +100,12 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
     place = read.end
     then: list[Conclusion] = []
     while not then or rule.words[place].text == "and":
-        asked, place = _statement(rule, place + 1, concludes=True)
-        then.append(Conclusion(asked.variable, asked.label or "", asked.hedges))
+        proposition, place = _statement(rule, place + 1, concludes=True)
+        then.append(
+            Conclusion(
+                proposition.variable, proposition.label or "", proposition.hedges
+            )
+        )
     weight = 1.0
     if rule.words[place].text == "with":
         weight, place = _weight(rule, place + 1), place + 2

@@ -51,7 +51,7 @@ class TermScope(msgspec.Struct, frozen=True):
         inputs: The names of all inputs, in order.
         names: The names of all variables.
         is_weighted: Whether its variable is an output of weighted numbers.
-        is_inverse: Whether a weighted output asks where monotone terms have a degree.
+        is_inverse: Whether a weighted output takes where monotone terms have a degree.
     """
 
     variable: str
@@ -74,7 +74,7 @@ class FllTerm(msgspec.Struct, frozen=True):
 
     @property
     def is_monotone(self) -> bool:
-        """Whether a weighted output asks where it has a degree."""
+        """Whether a weighted output takes the value at which it has a degree."""
         return self.kind in _MONOTONE
 
 
@@ -289,9 +289,9 @@ CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *_CLASSES)
 def as_degree(label: SystemTerm) -> SystemTerm:
     """Return a monotone term as one whose own degree is a weighted output's number.
 
-    A weighted output asks a monotone term *where* it has a degree (after Tsukamoto),
-    and any other term *which* degree it has at the activation. The curve that comes
-    back has the same degrees and does not count as monotone.
+    Of a monotone term a weighted output takes the value at which it has a degree
+    (after Tsukamoto), and of any other term the degree at the activation. The curve
+    that comes back has the same degrees and does not count as monotone.
     """
     match label.curve:
         case Points(values=(a, b) as values, degrees=degrees) if a < b:

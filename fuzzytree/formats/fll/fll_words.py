@@ -83,7 +83,7 @@ METHODS: Mapping[str, Method] = {
     "WeightedSum": "weighted sum",
 }
 TYPES: Final = ("Automatic", "TakagiSugeno", "Tsukamoto")
-"""What a weighted defuzzifier may be told to do with terms."""
+"""How a weighted defuzzifier may treat terms."""
 
 SAMPLES: Final = 1000
 """At how many values a curve is looked at where a file does not say it."""

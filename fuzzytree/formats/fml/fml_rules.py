@@ -37,18 +37,18 @@ _RULES: Final = {
 
 
 _MOST_LEVELS: Final = 20
-_MOST_ASKED: Final = 50_000
+_MOST_DEFINITIONS: Final = 50_000
 
 
 class FmlVariables(msgspec.Struct, frozen=True):
-    """What rules can ask and conclude.
+    """What rules can reference and conclude.
 
     Attributes:
         labels: For each variable the names of its terms: in rules, and in the system.
         circular: Terms that are an and or an or of others.
         outputs: The outputs by name.
         negated: Terms that are the complement of their shape.
-        spent: One entry for each term that was asked, so that terms which are made of
+        spent: One entry for each definition that was followed: terms which are made of
             others many times over come to an end.
     """
 
@@ -74,7 +74,7 @@ class _Inner(NamedTuple):
 
 
 _About = tuple[FmlVariables, list[_Inner]]
-"""What rules can ask, and the joints of the terms that one rule asks."""
+"""What rules can reference, and the operators within the terms of one rule."""
 
 
 def blocks_of(
@@ -152,17 +152,17 @@ def _rule(
     _, consequent, then, otherwise, clause = _RULES[base.name]
     before = len(notes.mistakes)
     name = element.attributes.get("name", "")
-    asked = _only(element, "antecedent", notes)
+    antecedent = _only(element, "antecedent", notes)
     concluded = _only(element, consequent, notes)
-    if asked is None or concluded is None:
+    if antecedent is None or concluded is None:
         return None
     parts = [
         part
-        for one in asked.all("clause")
+        for one in antecedent.all("clause")
         if (part := _question(one, about, notes)) is not None
     ]
     if not parts and len(notes.mistakes) == before:
-        notes.mistake(asked.position, f"rule {name!r} asks nothing")
+        notes.mistake(antecedent.position, f"rule {name!r} has an empty antecedent")
     for one in concluded.all(otherwise):
         what = "its else is left out"
         notes.loss(f"rule {name!r}, line {one.line}", what)
@@ -269,28 +269,28 @@ def _question(
     if named is None:
         return None
     hedges = _modifier(clause, notes)
-    asked = _asked(named, about, notes, 0)
+    antecedent = _condition_of(named, about, notes, 0)
     if hedges == ("any",):
         return Is(named[0], None, ("any",))
-    match asked:
+    match antecedent:
         case Is(variable=variable, label=label, hedges=before):
             return Is(variable, label, (*hedges, *before))
         case None:
             return None
         case _ if hedges == ("not",):
-            return Not(asked)
+            return Not(antecedent)
         case _ if not hedges:
-            return asked
+            return antecedent
         case _:
             what = f"{hedges[0]!r} of a term that is made of others has no place here"
             notes.mistake(clause.position, what)
             return None
 
 
-def _asked(
+def _condition_of(
     named: tuple[str, str], about: _About, notes: ReaderNotes, level: int
 ) -> Condition | None:
-    """Return what a term asks: itself, or what it is made of."""
+    """Return the condition that a term stands for: itself, or what it is made of."""
     variables, _ = about
     definition = variables.circular.get(named)
     if definition is None:
@@ -298,7 +298,7 @@ def _asked(
         hedges: tuple[Hedge, ...] = ("not",) if named in variables.negated else ()
         return Is(named[0], label, hedges)
     variables.spent.append(None)
-    if level > _MOST_LEVELS or len(variables.spent) > _MOST_ASKED:
+    if level > _MOST_LEVELS or len(variables.spent) > _MOST_DEFINITIONS:
         what = f"the term {named[1]!r} is made of too many others, or of itself"
         notes.mistake(definition.position, what)
         return None
@@ -343,7 +343,7 @@ def _joined(
             what = f"{variable!r} has no term {element.text[:40]!r}; {choice}"
             notes.mistake(element.position, what)
             return None
-        found = _asked((variable, element.text), about, notes, level + 1)
+        found = _condition_of((variable, element.text), about, notes, level + 1)
         is_not = element.attributes.get("complement", "false").lower() == "true"
         if is_not and isinstance(found, Is):
             return Is(variable, found.label, ("not", *found.hedges))

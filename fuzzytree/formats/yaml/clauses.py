@@ -172,11 +172,11 @@ def _branches(nodes: Sequence[Node]) -> Iterator[tuple[Path, str, Node, Branch]]
 
 
 def unknown_terms(
-    asked: Iterable[LocatedClause], vocabulary: Vocabulary
+    located: Iterable[LocatedClause], vocabulary: Vocabulary
 ) -> Iterator[Mistake]:
     """Yield the clauses that name an unknown variable or term."""
     known: dict[int, Clause] = {}  # rules share clauses
-    for path, where, clause in asked:
+    for path, where, clause in located:
         declared = vocabulary.get(clause.variable)
         if id(clause) in known:
             continue

@@ -306,7 +306,7 @@ FormulaText = Annotated[
     Meta(
         min_length=1,
         max_length=MOST_CHARACTERS,
-        description="`x` is the value whose degree is asked for.",
+        description="`x` is the value whose degree is computed.",
         examples=["2 * dirt + 1", "max(0, 1 - abs(x) / 3)"],
     ),
 ]

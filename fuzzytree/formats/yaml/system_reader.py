@@ -332,9 +332,9 @@ def _unknown(
     concludable = {one.name for one in outputs}
     for position, block in enumerate(blocks):
         for index, rule in enumerate(block.rules):
-            asked = [(one.variable, one.label) for one in questions(rule.when)]
+            references = [(one.variable, one.label) for one in questions(rule.when)]
             wrong = [
-                *(pair for pair in asked if not _is_known(*pair, known)),
+                *(pair for pair in references if not _is_known(*pair, known)),
                 *(
                     (one.output, one.label)
                     for one in rule.then

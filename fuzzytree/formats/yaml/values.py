@@ -1,4 +1,4 @@
-"""Records of a file to values of the hub; what they mean together is not asked."""
+"""Records of a file to parts of the model; the model checks what they mean together."""
 
 from __future__ import annotations
 

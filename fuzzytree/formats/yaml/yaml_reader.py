@@ -185,13 +185,17 @@ def _tree(root: MappingNode, found: list[FileMistake]) -> FuzzyTree | None:
         return None
     variables, broken = known
     nodes, leaves, fitted = _whole(questions), _whole(ends), _whole(groups)
-    asked = tuple(map(values.node, nodes or ()))
+    tree_nodes = tuple(map(values.node, nodes or ()))
     sets = tuple(map(values.sets, fitted or ()))
     vocabulary = vocabulary_of(variables)
     patterns = {group.variable: words(t.name for t in group.terms) for group in sets}
     astray = [
-        *unknown_terms(clauses_of_nodes(asked), vocabulary),
-        *(unknown_terms(sets_of_nodes(asked), patterns) if fitted is not None else ()),
+        *unknown_terms(clauses_of_nodes(tree_nodes), vocabulary),
+        *(
+            unknown_terms(sets_of_nodes(tree_nodes), patterns)
+            if fitted is not None
+            else ()
+        ),
     ]
     unknown = [*unknown_inputs(variables, head.columns), *astray]
     if is_flood(unknown, _names_declared(head, vocabulary, patterns)):
@@ -210,7 +214,7 @@ def _tree(root: MappingNode, found: list[FileMistake]) -> FuzzyTree | None:
             name=head.name,
             classes=head.classes,
             variables=variables,
-            nodes=asked,
+            nodes=tree_nodes,
             leaves=tuple(map(values.leaf, leaves)),
             sets=sets,
             semantics=meant,

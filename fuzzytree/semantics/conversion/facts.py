@@ -252,17 +252,17 @@ def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
     Facts name a clause by its place, so that few bytes could stand for very much.
     """
     sizes = [len(terms) for _, terms, _ in facts.clauses]
-    asked = 0
+    needed = 0
     for clauses, place, _ in facts.rules:
         if not 0 <= place < len(facts.classes):
             return False
         if not all(0 <= k < len(sizes) for k in clauses):
             return False
-        asked += sum(sizes[k] for k in clauses) if clauses else 1
+        needed += sum(sizes[k] for k in clauses) if clauses else 1
     if len(_places(facts)) != len(system.inputs):
         return False
     found = sum(1 for rule in system.rules for _ in questions(rule.when))
-    return asked <= found + 2 * len(facts.rules) + 1
+    return needed <= found + 2 * len(facts.rules) + 1
 
 
 def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | None:
@@ -370,7 +370,7 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
 def _clauses(condition: Condition | None) -> Iterator[Clause]:
     """Yield the clauses of a condition, from left to right.
 
-    What is no AND of clauses gives others than were asked for, or raises LookupError.
+    What is no AND of clauses gives other clauses, or raises LookupError.
     """
     match condition:
         case None:

@@ -107,7 +107,7 @@ def pointed(
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Refuse a tolerance that no degree can be held to, or that allows every degree.
+    """Refuse a tolerance that no degree can meet, or that allows every degree.
 
     Raises:
         ValueError: If it is not above 0 and below 1.
@@ -209,7 +209,7 @@ def straight_points(band: Band) -> tuple[Points, float] | None:
     """Return the points of a band whose flanks are straight, and how far they are off.
 
     A flank `q c0` that starts at the plateau's end or outside of it is a line up to
-    its start and constant from there on. Only where c0 is 1 is it held below 1, by
+    its start and constant from there on. Only where c0 is 1 is it clamped below 1, by
     2^-53.
 
     Example:

@@ -35,7 +35,7 @@ def joined_outputs(system: FuzzySystem) -> frozenset[str]:
     """Return the weighted outputs with an aggregation that can change an answer.
 
     It joins the degrees of each term: where every term is concluded once at most, and
-    no rule asks the output, there is nothing to join.
+    no rule references the output, there is nothing to join.
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
@@ -46,7 +46,9 @@ def joined_outputs(system: FuzzySystem) -> frozenset[str]:
     """
     counts = Counter((one.output, one.label) for r in system.rules for one in r.then)
     several = {output for (output, _), count in counts.items() if count > 1}
-    several |= {asked.variable for r in system.rules for asked in questions(r.when)}
+    several |= {
+        proposition.variable for r in system.rules for proposition in questions(r.when)
+    }
     return frozenset(
         one.name
         for one in system.outputs

@@ -67,7 +67,7 @@ Scores = Literal["rule", "class", "winner"]
 """What the outputs of a system say about a rule base."""
 
 Always = Literal["nothing", "any", "term"]
-"""What a rule without clauses asks: nothing; `input is any`; or whether the input is a
+"""What a rule without clauses tests: nothing; `input is any`; or whether the input is a
 term of degree 1 everywhere. The input is the first that is not for sums alone."""
 
 _AVERAGE = Defuzzifier("weighted average")
@@ -81,11 +81,11 @@ def as_system(
 
     `fuzzytree.semantics.conversion.scores` says what the outputs mean. A clause with
     several terms becomes an OR of one variable, joined by maximum. A negated one
-    becomes `is not`, which under min is asked of each of its terms; under product it is
+    becomes `is not`, which under min applies to each of its terms; under product it is
     a NOT of the OR.
 
     Raises:
-        LossError: If a rule without clauses must ask an input and there is none.
+        LossError: If a rule without clauses must reference an input and there is none.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -95,12 +95,12 @@ def as_system(
         ['score 1 class 1', 'score 2 class 1']
     """
     inputs = tuple(map(_input, rules.variables))
-    held: Condition | None = None
+    tautology: Condition | None = None
     needs_one = scores != "winner" or any(not rule.when for rule in rules.rules)
     if always != "nothing" and needs_one:
-        inputs, held = _held(inputs, always)
+        inputs, tautology = _with_tautology(inputs, always)
     taken = [one.name for one in inputs]
-    conditions = _conditions(rules, held)
+    conditions = _conditions(rules, tautology)
     if scores == "winner":
         outputs: tuple[SystemOutput, ...] = (_class_output(rules, taken),)
         made = tuple(
@@ -109,7 +109,7 @@ def as_system(
         )
         block = _block(rules, made, Activation("highest"))
     else:
-        found = _scored(rules, scores, conditions, held)
+        found = _scored(rules, scores, conditions, tautology)
         outputs = _score_outputs([one.name for one in found], taken)
         absent = tuple(Conclusion(one.name, "absent") for one in outputs)
         present = tuple(
@@ -117,7 +117,7 @@ def as_system(
             for one, output in zip(found, outputs, strict=True)
             if one.has_rules
         )
-        block = _block(rules, (SystemRule(held, absent), *present), Activation())
+        block = _block(rules, (SystemRule(tautology, absent), *present), Activation())
     return FuzzySystem(rules.name, inputs, outputs, (block,), _note(rules, scores))
 
 
@@ -302,27 +302,27 @@ def _input(variable: Variable) -> SystemInput:
     )
 
 
-def _held(
+def _with_tautology(
     inputs: tuple[SystemInput, ...], always: Always
 ) -> tuple[tuple[SystemInput, ...], Condition]:
-    """Return inputs that can be asked something that always holds, and the question."""
+    """Return inputs, and a proposition on one of them that is always true."""
     if not inputs:
         raise LossError(
-            "a rule without clauses must ask an input, and the rule base has none"
+            "a rule without clauses must reference an input, but there is none"
         )
     summed = {part.input for one in inputs for part in one.parts}
-    asked = next(one for one in inputs if one.labels or one.name not in summed)
+    first = next(one for one in inputs if one.labels or one.name not in summed)
     if always == "any":
-        return inputs, Is(asked.name, None, ("any",))
-    name = unlike("always", {label.name for label in asked.labels})
+        return inputs, Is(first.name, None, ("any",))
+    name = unlike("always", {label.name for label in first.labels})
     label = SystemTerm(name, _EVERYWHERE)
-    changed = replace(asked, labels=(*asked.labels, label))
-    return tuple(changed if one is asked else one for one in inputs), Is(
-        asked.name, name
+    changed = replace(first, labels=(*first.labels, label))
+    return tuple(changed if one is first else one for one in inputs), Is(
+        first.name, name
     )
 
 
-def _conditions(rules: RuleBase, held: Condition | None) -> list[Condition | None]:
+def _conditions(rules: RuleBase, tautology: Condition | None) -> list[Condition | None]:
     """Return the condition of each rule; rules share what their clauses become."""
     is_product = rules.semantics.conjunction == "product"
     known: dict[int, tuple[Condition, ...]] = {}
@@ -334,7 +334,7 @@ def _conditions(rules: RuleBase, held: Condition | None) -> list[Condition | Non
                 known[id(clause)] = _clause(clause, is_product=is_product)
             parts += known[id(clause)]
         found.append(
-            And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else held
+            And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else tautology
         )
     return found
 
@@ -343,8 +343,8 @@ def _clause(clause: Clause, *, is_product: bool) -> tuple[Condition, ...]:
     """Return what a clause becomes: conditions that are joined by AND."""
     variable, terms = clause.variable, clause.terms
     if not clause.negated:
-        asked = tuple(Is(variable, term) for term in terms)
-        return asked if len(asked) == 1 else (Or(asked),)
+        propositions = tuple(Is(variable, term) for term in terms)
+        return propositions if len(propositions) == 1 else (Or(propositions),)
     if len(terms) == 1 or not is_product:  # 1 - max = min of 1 - each, exactly
         return tuple(Is(variable, term, ("not",)) for term in terms)
     return (Not(Or(tuple(Is(variable, term) for term in terms))),)
@@ -388,7 +388,7 @@ def _scored(
     rules: RuleBase,
     scores: Scores,
     conditions: list[Condition | None],
-    held: Condition | None,
+    tautology: Condition | None,
 ) -> list[_Score]:
     """Return what each score is called and the condition of its rules."""
     if scores == "rule":
@@ -402,19 +402,21 @@ def _scored(
     for rule, condition in zip(rules.rules, conditions, strict=True):
         own[rule.then].append(condition)
     return [
-        _Score(f"score {name}", _any_of(some, held), bool(some))
+        _Score(f"score {name}", _any_of(some, tautology), bool(some))
         for name, some in own.items()
     ]
 
 
 def _any_of(
-    conditions: list[Condition | None], held: Condition | None
+    conditions: list[Condition | None], tautology: Condition | None
 ) -> Condition | None:
     """Return an OR of conditions; a rule that always holds is as strong as can be."""
-    asked = [one for one in conditions if one is not None and one is not held]
-    if len(asked) < len(conditions) or not asked:
-        return held
-    return Or(tuple(asked)) if len(asked) > 1 else asked[0]
+    propositions = [
+        one for one in conditions if one is not None and one is not tautology
+    ]
+    if len(propositions) < len(conditions) or not propositions:
+        return tautology
+    return Or(tuple(propositions)) if len(propositions) > 1 else propositions[0]
 
 
 def _block(

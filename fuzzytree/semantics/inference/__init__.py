@@ -129,7 +129,7 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
 def input_values(
     inputs: Iterable[SystemInput], row: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the value of each input, held in its range where it clips.
+    """Return the value of each input, clamped to its range where it clips.
 
     A combination is `w1 (x1 - c1) + w2 (x2 - c2) + ...` of the values so found, summed
     from left to right. If a value of the row is not finite it is left as it is.
@@ -143,8 +143,8 @@ def input_values(
             value = _left_to_right(terms)
         else:
             value = float(row[one.name])
-        is_held = one.clips and math.isfinite(value)
-        values[one.name] = _held(value, one.low, one.high) if is_held else value
+        is_clamped = one.clips and math.isfinite(value)
+        values[one.name] = _clamped(value, one.low, one.high) if is_clamped else value
     return values
 
 
@@ -152,10 +152,10 @@ def answer(output: SystemOutput, number: float) -> float:
     """Return what an output answers: its number, its default for NaN, both clipped."""
     if math.isnan(number) and output.default is not None:
         number = output.default
-    return _held(number, output.low, output.high) if output.clips else number
+    return _clamped(number, output.low, output.high) if output.clips else number
 
 
-def _held(value: float, low: float | None, high: float | None) -> float:
+def _clamped(value: float, low: float | None, high: float | None) -> float:
     """Return a value moved into a range; NaN stays NaN."""
     if low is not None and value < low:
         return low
@@ -225,7 +225,7 @@ class _Run:
     def _degree(self, condition: Condition, block: RuleBlock) -> float:
         match condition:
             case Is():
-                return self._asked(condition)
+                return self._proposition(condition)
             case And(parts=parts):
                 degrees = [self._degree(part, block) for part in parts]
                 return _folded(T_NORMS[block.conjunction or "minimum"], degrees)
@@ -235,18 +235,18 @@ class _Run:
             case Not(part=part):
                 return 1.0 - self._degree(part, block)
 
-    def _asked(self, asked: Is) -> float:
-        if asked.label is None:
+    def _proposition(self, proposition: Is) -> float:
+        if proposition.label is None:
             degree = math.nan  # the hedge `any` makes 1 of it
-        elif asked.variable in self.outputs:
-            degree = self._so_far(self.outputs[asked.variable], asked.label)
+        elif proposition.variable in self.outputs:
+            degree = self._so_far(self.outputs[proposition.variable], proposition.label)
         else:
-            key = asked.variable, asked.label  # an input keeps its value
+            key = proposition.variable, proposition.label  # an input keeps its value
             if key not in self.degrees:
-                value = self.values[asked.variable]
+                value = self.values[proposition.variable]
                 self.degrees[key] = self._label_degree(*key, value)
             degree = self.degrees[key]
-        return hedges_applied(asked.hedges, degree)
+        return hedges_applied(proposition.hedges, degree)
 
     def _label_degree(self, variable: str, label: str, value: float) -> float:
         found = self.labels[variable, label]

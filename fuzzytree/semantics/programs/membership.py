@@ -174,7 +174,7 @@ def _one_by_one_plus(make: Maker, a: int) -> int:
 
 
 def _trapezoid(make: Maker, curve: Trapezoid, x: int) -> int:
-    """Return the smaller slope, held in [0, 1]; an upright side is cut off last."""
+    """Return the smaller slope, clamped to [0, 1]; an upright side is cut off last."""
     a, b, c, d = curve.a, curve.b, curve.c, curve.d
     slopes: list[int] = []
     if a is not None and a < b:
@@ -341,7 +341,7 @@ def _side(make: Maker, side: Side, distance: int) -> int:
 
 
 def smaller_slope(make: Maker, slopes: Sequence[int], *, is_peak: bool) -> int:
-    """Return the smaller of some slopes, held in [0, 1].
+    """Return the smaller of some slopes, clamped to [0, 1].
 
     Rounding keeps order, so a slope is at least 1 wherever the other one counts.
     """
@@ -442,5 +442,5 @@ def _line(make: Maker, ends: Sequence[int], x: int) -> int:
     share = make("divide", make("subtract", x, anchor), make("subtract", other, anchor))
     rise = make("multiply", share, make("subtract", far, near))
     line = make("add", near, rise)
-    held = make("maximum", line, make("minimum", near, far))
-    return make("minimum", held, make("maximum", near, far))
+    clamped = make("maximum", line, make("minimum", near, far))
+    return make("minimum", clamped, make("maximum", near, far))

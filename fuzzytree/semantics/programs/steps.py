@@ -111,7 +111,7 @@ class Program(Value, frozen=True):
 
     Attributes:
         name: Of the model.
-        inputs: The names of its inputs, in order; each may be asked for or not.
+        inputs: The names of its inputs, in order, whether used or not.
         steps: The steps; every argument stands before the step that uses it.
         results: What is wanted, of steps with one number for a row.
         titles: What each step computes, in words, or "" for it; () for no words.
@@ -257,7 +257,9 @@ class Maker:
         key = (
             step.operation,
             step.arguments,
-            struct.pack("<d", step.number),  # tells -0.0 from 0.0, and knows NaN
+            struct.pack(
+                "<d", step.number
+            ),  # distinguishes -0.0 from 0.0, and knows NaN
             step.name,
             struct.pack(f"<{len(step.table)}d", *step.table),
             step.samples,

@@ -123,7 +123,7 @@ def _values(make: Maker, system: FuzzySystem) -> tuple[int, dict[str, int]]:
             value = _combined(make, one, values) if one.parts else make.input(one.name)
             make.titled(value, one.name)
             found.append(value)
-            values[one.name] = _held(make, one, value) if one.clips else value
+            values[one.name] = _clamped(make, one, value) if one.clips else value
             make.titled(values[one.name], f"{one.name} clamped")
     with make.topic("inputs"):
         return known_row(make, found), values
@@ -137,23 +137,23 @@ def _combined(make: Maker, one: SystemInput, values: dict[str, int]) -> int:
     return make.chain("add", terms)
 
 
-def _held(make: Maker, one: SystemInput | SystemOutput, value: int) -> int:
+def _clamped(make: Maker, one: SystemInput | SystemOutput, value: int) -> int:
     """Return a value moved into a range; NaN stays NaN."""
-    held = value
+    clamped = value
     if one.high is not None:
         high = make.constant(one.high)
-        held = make("where", make("less", high, value), high, held)
+        clamped = make("where", make("less", high, value), high, clamped)
     if one.low is not None:
         low = make.constant(one.low)
-        held = make("where", make("less", value, low), low, held)
-    return held
+        clamped = make("where", make("less", value, low), low, clamped)
+    return clamped
 
 
 def _answer(make: Maker, output: SystemOutput, number: int) -> int:
     if output.default is not None:
         default = make.constant(output.default)
         number = make("where", is_nan(make, number), default, number)
-    return _held(make, output, number) if output.clips else number
+    return _clamped(make, output, number) if output.clips else number
 
 
 def _status(make: Maker, known: int, numbers: Sequence[int]) -> int:
@@ -270,7 +270,7 @@ class _Run:
     def _degree(self, condition: Condition, block: RuleBlock) -> int:
         match condition:
             case Is():
-                return self._asked(condition)
+                return self._proposition(condition)
             case And(parts=parts):
                 both = block.conjunction or "minimum"
                 degrees = [self._degree(part, block) for part in parts]
@@ -293,23 +293,28 @@ class _Run:
             total = joined
         return total
 
-    def _asked(self, asked: Is) -> int:
-        if asked in self.propositions:
-            return self.propositions[asked]
-        if asked.label is None:
+    def _proposition(self, proposition: Is) -> int:
+        if proposition in self.propositions:
+            return self.propositions[proposition]
+        if proposition.label is None:
             degree = self.make.constant(math.nan)  # the hedge `any` makes 1 of it
-        elif asked.variable in self.outputs:
-            degree = self._so_far(self.outputs[asked.variable], asked.label)
+        elif proposition.variable in self.outputs:
+            degree = self._so_far(self.outputs[proposition.variable], proposition.label)
         else:
-            label = self.labels[asked.variable, asked.label]
-            value = self.values[asked.variable]
-            degree = self._label_degree(asked.variable, label, value)
-        words = (asked.variable, "is", *asked.hedges, asked.label or "")
+            label = self.labels[proposition.variable, proposition.label]
+            value = self.values[proposition.variable]
+            degree = self._label_degree(proposition.variable, label, value)
+        words = (
+            proposition.variable,
+            "is",
+            *proposition.hedges,
+            proposition.label or "",
+        )
         with self.make.topic(" ".join(words)):
-            found = hedged(self.make, asked.hedges, degree)
+            found = hedged(self.make, proposition.hedges, degree)
             self.make.titled(found, " ".join(words))
-        if asked.variable not in self.outputs:  # of those, each rule changes it
-            self.propositions[asked] = found
+        if proposition.variable not in self.outputs:  # of those, each rule changes it
+            self.propositions[proposition] = found
         return self._unit(found, if_all=[degree])
 
     def _label_degree(self, variable: str, label: SystemTerm, x: int) -> int:
