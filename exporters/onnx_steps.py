@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.exporters.onnx_graph import OnnxGraph, identifier
-from fuzzytree.semantics.programs.evaluate import Found, still_results
+from fuzzytree.semantics.programs.evaluate import StepValue, still_results
 from fuzzytree.semantics.programs.steps import Program, Step
 
 NODES: Mapping[str, str] = {
@@ -136,7 +136,7 @@ def add_steps(graph: OnnxGraph, program: Program, columns: Sequence[str]) -> lis
 
 
 def chain_links(
-    program: Program, still: Sequence[Found | None], operations: Container[str]
+    program: Program, still: Sequence[StepValue | None], operations: Container[str]
 ) -> set[int]:
     """Return the steps that are taken only as the beginning of a chain like them.
 
@@ -160,7 +160,7 @@ def chain_links(
     }
 
 
-def number_constant(graph: OnnxGraph, known_value: Found) -> str:
+def number_constant(graph: OnnxGraph, known_value: StepValue) -> str:
     """Return the name of what no input enters: a number, a truth, or samples."""
     kind: npt.DTypeLike = np.float64
     first = known_value[0] if isinstance(known_value, list) else known_value

@@ -246,10 +246,10 @@ def _call(text: _Text, place: int, level: int) -> _Grown:
         )
         raise FormulaError(token.column, sentence)
     name = _OTHER_NAMES.get(token.text, token.text)
-    given, needed = len(arguments), FUNCTIONS[name]
-    if given != needed:
+    value, needed = len(arguments), FUNCTIONS[name]
+    if value != needed:
         count = f"{needed} argument" + "s" * (needed != 1)
-        sentence = f"the function {token.text!r} takes {count}, not {given}"
+        sentence = f"the function {token.text!r} takes {count}, not {value}"
         raise FormulaError(token.column, sentence)
     return _joined(token, name, arguments, end)
 
@@ -276,18 +276,18 @@ def _joined(token: _Token, function: str, parts: Sequence[_Grown], end: int) -> 
 def _tokens(text: str) -> Iterator[_Token]:
     place = 0
     while place < len(text):
-        found = _TOKEN.match(text, place)
-        if found is None:
+        token_match = _TOKEN.match(text, place)
+        if token_match is None:
             what = f"{text[place]!r} does not belong into a formula"
             if text[place] == "'":
                 what = "the quote that opens here is not closed"
             raise FormulaError(place + 1, what)
-        if found.end() - place > _LONGEST and found.lastgroup != "blank":
-            sentence = f"a word of {found.end() - place:,} characters"
+        if token_match.end() - place > _LONGEST and token_match.lastgroup != "blank":
+            sentence = f"a word of {token_match.end() - place:,} characters"
             raise FormulaError(place + 1, sentence)
-        if found.lastgroup != "blank":
-            yield _Token(found.lastgroup or "", found.group(), place + 1)
-        place = found.end()
+        if token_match.lastgroup != "blank":
+            yield _Token(token_match.lastgroup or "", token_match.group(), place + 1)
+        place = token_match.end()
 
 
 def _number(token: _Token) -> float:
@@ -298,8 +298,8 @@ def _number(token: _Token) -> float:
 
 
 def _unexpected(token: _Token, wanted: str) -> FormulaError:
-    found = "the end" if token.kind == "end" else repr(token.text)
-    return FormulaError(token.column, f"{found} where {wanted} must stand")
+    result = "the end" if token.kind == "end" else repr(token.text)
+    return FormulaError(token.column, f"{result} where {wanted} must stand")
 
 
 def _too_deep(token: _Token) -> FormulaError:

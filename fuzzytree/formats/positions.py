@@ -52,10 +52,10 @@ class Positions(msgspec.Struct, frozen=True, gc=False):
                 every = [position for block in self.blocks for position in block.parts]
                 return every[self.rules[place] if self.rules else place]
             case ("variables", int(place), *rest):
-                found = self.variables[place] if self.variables else place
-                if found is None:
+                result = self.variables[place] if self.variables else place
+                if result is None:
                     return None
-                return self.find(in_system(("variables", found, *rest)))
+                return self.find(in_system(("variables", result, *rest)))
             case (("inputs" | "outputs" | "blocks") as field, int(place), *rest):
                 group: PositionGroup = getattr(self, field)[place]
             case _:

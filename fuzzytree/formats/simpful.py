@@ -95,7 +95,7 @@ def from_simpful(system: object, *, name: str = "simpful system") -> FuzzySystem
         rule = SystemRule(condition, (then,), 1.0 if is_sugeno else end.weight)
         conjunction = _AND[operators.get("AND", "AND")]
         rules.append((rule, conjunction, _OR[operators.get("OR", "OR")]))
-    made = [
+    part = [
         _sugeno(one, ends, functions, [*columns])
         if is_sugeno
         else _mamdani(one, source)
@@ -103,7 +103,7 @@ def from_simpful(system: object, *, name: str = "simpful system") -> FuzzySystem
     ]
     inputs = tuple(_input(column, source) for column in columns)
     blocks = blocks_of(rules, None if is_sugeno else "minimum")
-    return FuzzySystem(name, inputs, tuple(made), blocks)
+    return FuzzySystem(name, inputs, tuple(part), blocks)
 
 
 class _End(NamedTuple):
@@ -126,25 +126,25 @@ class _End(NamedTuple):
 
 
 def _condition(
-    found: Any, source: Any, operators: dict[str, str], where: str
+    part: Any, source: Any, operators: dict[str, str], where: str
 ) -> Condition:
     """Return the condition of a rule, and note which AND and which OR it uses."""
-    if _is_of_simpful(found, "Clause"):
-        if found._variable not in source._lvs:
-            raise _refusal(f"{where} uses {found._variable!r}, which is no variable")
-        return Is(found._variable, found._term)
-    if not _is_of_simpful(found, "Functional"):
+    if _is_of_simpful(part, "Clause"):
+        if part._variable not in source._lvs:
+            raise _refusal(f"{where} uses {part._variable!r}, which is no variable")
+        return Is(part._variable, part._term)
+    if not _is_of_simpful(part, "Functional"):
         raise _refusal(f"{where} has an empty condition")
-    sign = found._fun
+    sign = part._fun
     kind = sign.partition("_")[0]
-    if sign not in (*_AND, *_OR, "NOT") or (sign == "NOT") != (found._A == ""):
+    if sign not in (*_AND, *_OR, "NOT") or (sign == "NOT") != (part._A == ""):
         raise _refusal(f"{where} uses the operator {sign!r}")
     if operators.setdefault(kind, sign) != sign:
         raise _refusal(f"{where} uses both {operators[kind]} and {sign}")
-    right = _condition(found._B, source, operators, where)
+    right = _condition(part._B, source, operators, where)
     if kind == "NOT":
         return Not(right)
-    left = _condition(found._A, source, operators, where)
+    left = _condition(part._A, source, operators, where)
     return joined(And if kind == "AND" else Or, left, right)
 
 
@@ -160,13 +160,13 @@ def _mamdani(output: str, source: Any) -> SystemOutput:
     variable = source._lvs.get(output)
     if variable is None:
         raise _refusal(f"a rule concludes {output!r}, which is no variable")
-    found = _range(variable)
-    if found is None:
+    part = _range(variable)
+    if part is None:
         raise _refusal(f"the output {output!r} has no universe of discourse")
     return SystemOutput(
         output,
         _labels(output, variable),
-        *found,
+        *part,
         Defuzzifier("centroid", _SAMPLES, "ends"),
         aggregation="maximum",
         default=0.0,
@@ -183,9 +183,9 @@ def _sugeno(
     for end in ends:
         if end.output == output:
             weights, offset = functions[end.term]
-            found = [weights.get(column, 0.0) * end.weight for column in columns]
+            results = [weights.get(column, 0.0) * end.weight for column in columns]
             number = offset * end.weight
-            curve = Linear(tuple(found), number) if weights else Singleton(number)
+            curve = Linear(tuple(results), number) if weights else Singleton(number)
             labels[end.label] = SystemTerm(end.label, curve)
     how = Defuzzifier("weighted average")
     return SystemOutput(output, (*labels.values(),), None, None, how, default=0.0)
@@ -258,20 +258,20 @@ def _labels(name: str, variable: Any) -> tuple[SystemTerm, ...]:
     )
 
 
-def _curve(found: Any, where: str) -> Curve:
+def _curve(part: Any, where: str) -> Curve:
     """Return the curve of a fuzzy set."""
-    if found._type == "pointbased":
-        return _points(found)
-    function = found._funpointer
+    if part._type == "pointbased":
+        return _points(part)
+    function = part._funpointer
     build = _CURVES.get(type(function).__name__)
     if build is None or not _is_of_simpful(function, type(function).__name__):
         raise _refusal(f"{where} is a {type(function).__name__}")
     return build(function)
 
 
-def _points(found: Any) -> Points:
+def _points(part: Any) -> Points:
     """Return points, and beyond the first and the last one what simpful answers."""
-    (xs, degrees), ends = found._points.T.tolist(), found.boundary_values
+    (xs, degrees), ends = part._points.T.tolist(), part.boundary_values
     if ends[0] != degrees[0]:
         xs, degrees = [math.nextafter(xs[0], -math.inf), *xs], [ends[0], *degrees]
     if ends[1] != degrees[-1]:
@@ -304,8 +304,8 @@ _CURVES: Final[Mapping[str, Callable[[Any], Curve]]] = {
 """What each membership function of simpful becomes."""
 
 
-def _is_of_simpful(found: object, name: str) -> bool:
-    kind = type(found)
+def _is_of_simpful(part: object, name: str) -> bool:
+    kind = type(part)
     return kind.__module__.startswith("simpful.") and kind.__name__ == name
 
 

@@ -85,8 +85,8 @@ def from_skfuzzy(system: object, *, name: str = "scikit-fuzzy system") -> FuzzyS
         label = rule.label if isinstance(rule.label, str) else ""
         for end in rule.consequent:
             then = Conclusion(end.term.parent.label, end.term.label)
-            made = SystemRule(when, (then,), float(end.weight), label)
-            rules.append((made, with_and, with_or))
+            part = SystemRule(when, (then,), float(end.weight), label)
+            rules.append((part, with_and, with_or))
     return FuzzySystem(
         name,
         tuple(_input(one) for one in source.antecedents),
@@ -95,16 +95,16 @@ def from_skfuzzy(system: object, *, name: str = "scikit-fuzzy system") -> FuzzyS
     )
 
 
-def _condition(found: Any, kinds: set[str]) -> Condition:
+def _condition(part: Any, kinds: set[str]) -> Condition:
     """Return a condition, and note which kinds of joints it has."""
-    if _is_of_skfuzzy(found, "Term"):
-        return Is(found.parent.label, found.label)
-    kinds.add(found.kind)
-    left = _condition(found.term1, kinds)
-    if found.kind == "not":
+    if _is_of_skfuzzy(part, "Term"):
+        return Is(part.parent.label, part.label)
+    kinds.add(part.kind)
+    left = _condition(part.term1, kinds)
+    if part.kind == "not":
         return Not(left)
-    join = And if found.kind == "and" else Or
-    return joined(join, left, _condition(found.term2, kinds))
+    join = And if part.kind == "and" else Or
+    return joined(join, left, _condition(part.term2, kinds))
 
 
 _Norm = TypeVar("_Norm")
@@ -162,8 +162,8 @@ def _universe(variable: Any) -> list[float]:
     values = np.asarray(variable.universe, np.float64)
     if len(values) < 2 or not bool(np.all(np.diff(values) > 0.0)):
         raise _refusal(f"the universe of {variable.label!r} does not rise")
-    found: list[float] = values.tolist()
-    return found
+    results: list[float] = values.tolist()
+    return results
 
 
 def _labels(variable: Any) -> tuple[SystemTerm, ...]:
@@ -194,8 +194,8 @@ def _corners(values: list[float], degrees: list[float]) -> list[int]:
     return sorted(kept)
 
 
-def _is_of_skfuzzy(found: object, name: str) -> bool:
-    kind = type(found)
+def _is_of_skfuzzy(part: object, name: str) -> bool:
+    kind = type(part)
     return kind.__module__.startswith("skfuzzy.") and kind.__name__ == name
 
 

@@ -160,16 +160,16 @@ class _Names(NamedTuple):
         if columns is None:
             columns = [f"x{number}" for number in range(1, count + 1)]
         labels = grown.classes_.tolist()
-        found = [str(one) for one in labels]
-        for what, given, needed in (
+        results = [str(one) for one in labels]
+        for what, value, needed in (
             ("columns", columns, count),
-            ("classes", classes or found, len(found)),
+            ("classes", classes or results, len(results)),
         ):
-            if len(given) != needed:
-                raise ValueError(f"{len(given)} names for {needed} {what}")
+            if len(value) != needed:
+                raise ValueError(f"{len(value)} names for {needed} {what}")
         if classes is not None:
             return _Names(tuple(columns), tuple(classes), msgspec.UNSET)
-        return _Names(tuple(columns), tuple(found), label_type_of(labels))
+        return _Names(tuple(columns), tuple(results), label_type_of(labels))
 
 
 class _Arrays(NamedTuple):

@@ -81,9 +81,9 @@ def report(name: str, mistakes: Sequence[FileMistake]) -> ReadError:
         >>> len(str(report("x.yaml", [(1, 1, "no term " + "n" * 1_000_000)])))
         1517
     """
-    found = sorted(set(mistakes))
+    result = sorted(set(mistakes))
     lines = [
-        f"{name}:{line}:{column}: {_shortened(text)}" for line, column, text in found
+        f"{name}:{line}:{column}: {_shortened(text)}" for line, column, text in result
     ]
     if len(lines) > MOST_SHOWN:
         rest = len(lines) - MOST_SHOWN

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.semantics.programs.evaluate import Found, still_results
+from fuzzytree.semantics.programs.evaluate import StepValue, still_results
 from fuzzytree.semantics.programs.steps import Program, Step
 
 if TYPE_CHECKING:
@@ -264,7 +264,7 @@ def _still_values(program: Program) -> tuple[Values | None, ...]:
     )
 
 
-def _still_value(found: Found) -> Values:
+def _still_value(found: StepValue) -> Values:
     value = np.array(found)
     return value.reshape(-1, 1) if isinstance(found, list) else value
 

@@ -103,11 +103,11 @@ def node_faults(tree: FuzzyTree) -> Iterator[str]:
         for point in node_points(node):
             owner = node.owners[sum(1 for cut in node.cuts if point > cut)]
             for index, clause in enumerate(clauses):
-                found = clause_degree(clause, shapes, point)
-                if (found == 1.0) != (index == owner):
+                result = clause_degree(clause, shapes, point)
+                if (result == 1.0) != (index == owner):
                     yield (
                         f"node {number}: at {node.variable} = {point!r} branch "
-                        f"{index + 1} has degree {found!r}, and branch {owner + 1} "
+                        f"{index + 1} has degree {result!r}, and branch {owner + 1} "
                         "owns the point"
                     )
 
@@ -118,12 +118,12 @@ def node_points(node: Node) -> tuple[float, ...]:
 
 
 def _points(cuts: list[float]) -> Iterator[float]:
-    seen: set[float] = set()
+    earlier: set[float] = set()
     inner = [a + (b - a) / 2 for a, b in itertools.pairwise(cuts)]
     reach = max(abs(cuts[0]), abs(cuts[-1]), cuts[-1] - cuts[0], 1e-300)
     ends = [cuts[0] - reach, cuts[-1] + reach]
     near = [math.nextafter(cut, end) for cut in cuts for end in (-math.inf, math.inf)]
     for point in sorted([*cuts, *inner, *ends, *near]):
-        if point not in seen and math.isfinite(point):
-            seen.add(point)
+        if point not in earlier and math.isfinite(point):
+            earlier.add(point)
             yield point

@@ -55,14 +55,14 @@ def forms(
     if isinstance(model, RuleBase):
         return {"rules": model}
     wanted = set(TITLES if uses is None else uses)
-    made: dict[Form, FuzzyTree | RuleBase] = {}
+    result: dict[Form, FuzzyTree | RuleBase] = {}
     if "tree" in wanted:
-        made[TITLES["tree"]] = model
+        result[TITLES["tree"]] = model
     kinds: tuple[Kind, ...] = ("relative", "raw") if model.sets else ("relative",)
     for kind in kinds:
         if kind in wanted:
-            made[TITLES[kind]] = rules_from_tree(model, kind)
-    return made
+            result[TITLES[kind]] = rules_from_tree(model, kind)
+    return result
 
 
 def rules_from_tree(

@@ -123,13 +123,13 @@ def few_probes(model: FuzzyTree | RuleBase, limit: int) -> list[Row]:
         64
     """
     special = len(SPECIAL) * len(model.inputs)
-    made = probes(model, limit=_RANDOM_ROWS + special + 10 * limit)
-    last = len(made) - special
+    rows = probes(model, limit=_RANDOM_ROWS + special + 10 * limit)
+    last = len(rows) - special
     first = max(last - _RANDOM_ROWS, 0)
     return [
-        *_spread(made[:first], limit // 2),
-        *_spread(made[first:last], limit // 8),
-        *_spread(made[last:], limit - limit // 2 - limit // 8),
+        *_spread(rows[:first], limit // 2),
+        *_spread(rows[first:last], limit // 8),
+        *_spread(rows[last:], limit - limit // 2 - limit // 8),
     ]
 
 
@@ -145,9 +145,9 @@ def probe_values(
     """Return the rows of `probes` as an array of shape (inputs, rows)."""
     import numpy as np
 
-    made = probes(model, limit=limit, seed=seed)
-    table = np.array([[row[n] for row in made] for n in model.inputs], np.float64)
-    return table.reshape(len(model.inputs), len(made))
+    rows = probes(model, limit=limit, seed=seed)
+    table = np.array([[row[n] for row in rows] for n in model.inputs], np.float64)
+    return table.reshape(len(model.inputs), len(rows))
 
 
 def system_probes(
@@ -270,10 +270,10 @@ class Aim:
         """Return the landmark at which some propositions are truest, and how true."""
         points = sorted(dict.fromkeys(self._landmarks(variable)))
         middles = [a + 0.5 * (b - a) for a, b in itertools.pairwise(points)]
-        found = [
+        results = [
             (self._degree(variable, wish_set, x, row), x) for x in points + middles
         ]
-        degree, best = max(found, key=lambda pair: pair[0])
+        degree, best = max(results, key=lambda pair: pair[0])
         return best, degree
 
     def _landmarks(self, variable: str) -> list[float]:
@@ -355,19 +355,19 @@ def numbers_of(curve: Curve) -> list[float]:
         ):
             return [*numbers_of(first), *numbers_of(second)]
         case Bell(center=middle, width=width) | Gaussian(mean=middle, deviation=width):
-            found = [middle, middle - width, middle + width]
+            results = [middle, middle - width, middle + width]
         case Cosine(center=middle, width=width) | Spike(center=middle, width=width):
-            found = [middle, middle - width / 2.0, middle + width / 2.0]
+            results = [middle, middle - width / 2.0, middle + width / 2.0]
         case Sigmoid(inflection=middle):
-            found = [middle]
+            results = [middle]
         case TwoGaussians(left=left, right=right):
-            found = [left, right]
+            results = [left, right]
         case Binary(start=start):
-            found = [start]
+            results = [start]
         case _:
             fields = [getattr(curve, name) for name in curve.__struct_fields__]
-            found = [value for value in fields if value is not None]
-    return [value for value in found if math.isfinite(value)]
+            results = [value for value in fields if value is not None]
+    return [value for value in results if math.isfinite(value)]
 
 
 def landmarks(shape: Shape) -> tuple[float, ...]:
@@ -404,12 +404,12 @@ def _targets(
     rules: RuleBase, shapes: Mapping[tuple[str, str], Shape]
 ) -> Iterator[tuple[Rule, Clause, float]]:
     """Yield a rule, a clause of it and a value, once for each distinct clause."""
-    seen: set[Clause] = set()
+    earlier: set[Clause] = set()
     for rule in rules.rules:
         for clause in rule.when:
-            if clause in seen:
+            if clause in earlier:
                 continue
-            seen.add(clause)
+            earlier.add(clause)
             values = itertools.chain.from_iterable(
                 landmarks(shapes[clause.variable, term]) for term in clause.terms
             )

@@ -61,7 +61,7 @@ def never_firing(rules: RuleBase) -> dict[int, str]:
         {1: 'x is low AND x is high never hold together'}
     """
     holding = functools.cache(partial(_holding, shapes=shapes_of(rules.variables)))
-    found: dict[int, str] = {}
+    results: dict[int, str] = {}
     for number, rule in enumerate(rules.rules, 1):
         by_variable: dict[str, list[Clause]] = {}
         for clause in rule.when:
@@ -73,9 +73,9 @@ def never_firing(rules: RuleBase) -> dict[int, str]:
             if not left:
                 texts = " AND ".join(map(clause_text, clauses))
                 verb = "never holds" if len(clauses) == 1 else "never hold together"
-                found[number] = f"{texts} {verb}"
+                results[number] = f"{texts} {verb}"
                 break
-    return found
+    return results
 
 
 def _holding(clause: Clause, shapes: Mapping[tuple[str, str], Shape]) -> Spans:

@@ -422,7 +422,7 @@ def unguarded(before: Model, after: Model) -> tuple[str, ...]:
     Where a combination stands, none of its inputs can be missing unseen: the weights
     are not 0, so the sum is not finite either.
     """
-    seen = {variable.parts for variable in after.variables if variable.parts}
+    earlier = {variable.parts for variable in after.variables if variable.parts}
     inputs = {v.name for v in after.variables if not v.parts}
     return tuple(
         variable.name
@@ -430,7 +430,7 @@ def unguarded(before: Model, after: Model) -> tuple[str, ...]:
         if not (
             variable.name in inputs
             if not variable.parts
-            else variable.parts in seen
+            else variable.parts in earlier
             or (
                 cannot_overflow(variable.parts)
                 and {part.input for part in variable.parts} <= inputs
@@ -474,7 +474,7 @@ def _rule_forms(rules: RuleBase) -> list[object]:
 
     forms: list[object] = []
     for rule in rules.rules:
-        when = [found for clause in rule.when if (found := form(clause))]
+        when = [result for clause in rule.when if (result := form(clause))]
         forms.append((rule.then, frozenset(when) if is_min else tuple(when)))
     return forms
 
@@ -501,9 +501,9 @@ def _node_forms(tree: FuzzyTree, uses: Collection[Use]) -> Iterator[object]:
         for branch in node.branches:
             curves = [(terms, name) for name in branch.terms if "relative" in uses]
             fitted = [(sets, name) for name in branch.sets if "raw" in uses]
-            found = [
+            results = [
                 frozenset(curve_bytes(known[node.variable, name]) for known, name in of)
                 for of in (curves, fitted)
             ]
-            ways.append((branch.node, branch.leaf, *found))
+            ways.append((branch.node, branch.leaf, *results))
         yield axes[node.variable], node.cuts, node.owners, ways

@@ -135,18 +135,18 @@ def detected(text: FclText) -> tuple[Dialect, str]:
     named = _first_line(text.text)
     if named is not None:
         return named, f"the dialect is {SHOWN[named]}: the first line says so"
-    found = list(_evidence(text))
+    result = list(_evidence(text))
     counts: Counter[Dialect] = Counter()
-    for one in {(one.dialect, one.what): one for one in found}.values():
+    for one in {(one.dialect, one.what): one for one in result}.values():
         counts[one.dialect] += one.weight
     best: Dialect = max(_ORDER, key=lambda one: (counts[one], -_ORDER.index(one)))
     if not counts[best]:
         return "iec", "the dialect is IEC 61131-7: nothing speaks for another one"
-    sentence = f"the dialect is {SHOWN[best]}: {_listed(found, best)}"
+    sentence = f"the dialect is {SHOWN[best]}: {_listed(result, best)}"
     for other in _ORDER:
         if other == best or not counts[other]:
             continue
-        sentence += f"; {SHOWN[other]} would have {_listed(found, other)}"
+        sentence += f"; {SHOWN[other]} would have {_listed(result, other)}"
     return best, sentence
 
 
@@ -167,9 +167,9 @@ def _first_line(text: str) -> Dialect | None:
             return None
 
 
-def _listed(found: list[DialectEvidence], dialect: Dialect) -> str:
+def _listed(results: list[DialectEvidence], dialect: Dialect) -> str:
     first: dict[str, int] = {}
-    for one in found:
+    for one in results:
         if one.dialect == dialect:
             first.setdefault(one.what, one.line)
     shown = [f"{what} (line {line})" for what, line in first.items()]
@@ -199,8 +199,8 @@ def _evidence(text: FclText) -> Iterator[DialectEvidence]:
                         line.line if isinstance(line, Token) and line.line else 1,
                     )
     for sign, dialect in _COMMENTS.items():
-        before, found, _ = text.text.partition(sign)
-        if found:
+        before, result, _ = text.text.partition(sign)
+        if result:
             line = before.count("\n") + 1
             yield DialectEvidence(dialect, f"comments {sign}", line, 1)
     if text.text.startswith("//Code automatically generated with fuzzylite"):

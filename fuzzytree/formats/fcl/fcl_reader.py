@@ -173,7 +173,7 @@ def _model(
 
 
 def _rule_blocks(blocks: Sequence[FclBlock], scope: Scope) -> list[FclRuleBlock]:
-    found: list[FclRuleBlock] = []
+    results: list[FclRuleBlock] = []
     for block in blocks:
         if block.kind != "RULEBLOCK":
             continue
@@ -181,8 +181,8 @@ def _rule_blocks(blocks: Sequence[FclBlock], scope: Scope) -> list[FclRuleBlock]
             text = f"line {block.line}: a disabled block is left out"
             scope.notes.remark(text)
         else:
-            found.append(read_block(block, scope))
-    return found
+            results.append(read_block(block, scope))
+    return results
 
 
 def _aggregated(
@@ -250,14 +250,14 @@ def known_variables(
 ) -> FclVariables:
     """Return the variables of a file; mistakes are noted."""
     known = FclVariables({}, {}, dialect, notes)
-    for kind, found in (("VAR_INPUT", known.inputs), ("VAR_OUTPUT", known.outputs)):
+    for kind, variables in (("VAR_INPUT", known.inputs), ("VAR_OUTPUT", known.outputs)):
         for block in blocks:
             if block.kind == kind:
-                _declare(block, found, known)
-    for kind, found in (("FUZZIFY", known.inputs), ("DEFUZZIFY", known.outputs)):
+                _declare(block, variables, known)
+    for kind, variables in (("FUZZIFY", known.inputs), ("DEFUZZIFY", known.outputs)):
         for block in blocks:
             if block.kind == kind:
-                _describe(block, found, known)
+                _describe(block, variables, known)
     for name in known.outputs:
         if name in known.inputs:
             token = known.outputs[name].token
@@ -266,42 +266,42 @@ def known_variables(
 
 
 def _declare(
-    block: FclBlock, found: dict[str, FclVariable], known: FclVariables
+    block: FclBlock, variables: dict[str, FclVariable], known: FclVariables
 ) -> None:
     last = ""
     for one in block.statements:
         if isinstance(one, Declaration):
             for token in one.names:
                 last = str(token)
-                if last in found:
+                if last in variables:
                     known.mistake(token, f"{last!r} is declared twice")
-                found.setdefault(last, FclVariable(token))
+                variables.setdefault(last, FclVariable(token))
             if one.kind.upper() not in _REAL:
                 what = f"the type {one.kind!s} is read as REAL, without rounding"
                 known.notes.loss(f"variable {last!r}", what)
         elif isinstance(one, FclRange) and last:
             low, high = _range(one, known)
-            found[last] = replace(found[last], low=low, high=high)
+            variables[last] = replace(variables[last], low=low, high=high)
 
 
 def _describe(
-    block: FclBlock, found: dict[str, FclVariable], known: FclVariables
+    block: FclBlock, variables: dict[str, FclVariable], known: FclVariables
 ) -> None:
     token = block.head.words[0]
     name = str(token)
-    if name not in found:
+    if name not in variables:
         kind = "VAR_INPUT" if block.kind == "FUZZIFY" else "VAR_OUTPUT"
-        choice = name_choice(name[:99], found)
+        choice = name_choice(name[:99], variables)
         known.mistake(token, f"no variable {name!r} in {kind}; {choice}")
         return
-    if found[name].block is not None:
+    if variables[name].block is not None:
         known.mistake(token, f"a second {block.kind} of {name!r}")
-    named = replace(found[name], block=block)
+    named = replace(variables[name], block=block)
     for one in block.statements:
         if isinstance(one, FclRange):
             low, high = _range(one, known)
             named = replace(named, low=low, high=high)
-    found[name] = named
+    variables[name] = named
 
 
 def _range(one: FclRange, known: FclVariables) -> tuple[float | None, float | None]:
@@ -319,26 +319,26 @@ def _range(one: FclRange, known: FclVariables) -> tuple[float | None, float | No
 def _terms(
     name: str, block: FclBlock | None, known: FclVariables, *, is_weighted: bool = False
 ) -> list[FllTerm]:
-    found: list[FllTerm] = []
-    seen: set[str] = set()
+    results: list[FllTerm] = []
+    earlier: set[str] = set()
     names = (*known.inputs, *known.outputs)
     where = TermScope(name, tuple(known.inputs), names, is_weighted)
     for text in block.terms if block is not None else ():
         label = str(text.name)
-        if label in seen:
+        if label in earlier:
             known.mistake(text.name, f"a second term {label!r}")
             continue
-        seen.add(label)
+        earlier.add(label)
         try:
-            made = fcl_terms.read(text, where, known.dialect)
+            result = fcl_terms.read(text, where, known.dialect)
         except PartError as error:
             known.notes.mistakes.extend(error.mistakes)
-            found.append(FllTerm(SystemTerm(label, Singleton(0.0)), "Constant"))
+            results.append(FllTerm(SystemTerm(label, Singleton(0.0)), "Constant"))
             continue
-        if made.loss:
-            known.notes.loss(f"term {label!r} of {name!r}", made.loss)
-        found.append(made.term)
-    return found
+        if result.loss:
+            known.notes.loss(f"term {label!r} of {name!r}", result.loss)
+        results.append(result.term)
+    return results
 
 
 def read_input(name: str, known: FclVariables) -> SystemInput:
@@ -375,7 +375,7 @@ def read_output(name: str, known: FclVariables) -> SystemOutput:
         _check_kinds(block.terms, terms, known, is_weighted=how.is_weighted)
     if not how.is_weighted and (low is None or high is None):
         low, high = _estimated(named, labels, known)
-    found = SystemOutput(
+    result = SystemOutput(
         name=name,
         labels=labels,
         low=low,
@@ -385,10 +385,10 @@ def read_output(name: str, known: FclVariables) -> SystemOutput:
         clips=_clips(name, block, known),
     )
     if known.dialect == "fuzzylite":
-        known.notes.losses.extend(fuzzylite_losses(found))
-        for text in constant_degrees(found):
+        known.notes.losses.extend(fuzzylite_losses(result))
+        for text in constant_degrees(result):
             known.notes.remark(text)
-    return found
+    return result
 
 
 def _check_kinds(
@@ -450,12 +450,12 @@ def _defuzzifier(name: str, block: FclBlock, known: FclVariables) -> Defuzzifier
         return Defuzzifier("weighted average")
     if method in ("weighted average", "weighted sum"):
         return Defuzzifier(method)
-    made = replace(default, method=method)
-    text = f"output {name!r}: {made.samples} values of its range are looked at"
+    result = replace(default, method=method)
+    text = f"output {name!r}: {result.samples} values of its range are looked at"
     if known.dialect == "jfuzzylogic":
         text += "; jFuzzyLogic takes the low ends of as many pieces, and not the middle"
     known.notes.remark(text)
-    return made
+    return result
 
 
 def _default(name: str, block: FclBlock, known: FclVariables) -> float | None:

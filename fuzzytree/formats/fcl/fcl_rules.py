@@ -96,8 +96,8 @@ def _condition(condition: FclCondition, scope: Scope) -> Condition:
         case FclNegation(part=part):
             return Not(_condition(part, scope))
         case FclJunction(connective=connective, parts=parts):
-            made = tuple(_condition(part, scope) for part in parts)
-            return And(made) if connective == "and" else Or(made)
+            result = tuple(_condition(part, scope) for part in parts)
+            return And(result) if connective == "and" else Or(result)
 
 
 def _proposition(proposition: FclProposition, scope: Scope) -> Is:
@@ -128,15 +128,15 @@ def _conclusion(proposition: FclProposition, scope: Scope) -> Conclusion:
 
 
 def _hedges(words: Sequence[Token], scope: Scope) -> tuple[Hedge, ...]:
-    found: list[Hedge] = []
+    results: list[Hedge] = []
     for word in words:
         hedge = _HEDGES.get(word.lower())
         if hedge is None:
             sentence = f"no hedge {str(word)!r}; {name_choice(word[:99], _HEDGES)}"
             scope.notes.mistake(place(word), sentence)
         else:
-            found.append(hedge)
-    return tuple(found)
+            results.append(hedge)
+    return tuple(results)
 
 
 def _known_variable(
@@ -215,7 +215,7 @@ def read_block(block: FclBlock, scope: Scope) -> FclRuleBlock:
         tokens.append(text.keyword)
         last = label
     conjunction, disjunction = _norms(block, rules, scope)
-    made = RuleBlock(
+    result = RuleBlock(
         rules=tuple(rules),
         conjunction=conjunction,
         disjunction=disjunction,
@@ -223,7 +223,7 @@ def read_block(block: FclBlock, scope: Scope) -> FclRuleBlock:
         name=raw(block.head.words),
     )
     accu = norm_of(block, "ACCU", scope.notes)
-    return FclRuleBlock(made, block.head.keyword, tuple(tokens), accu)
+    return FclRuleBlock(result, block.head.keyword, tuple(tokens), accu)
 
 
 def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:
@@ -270,8 +270,8 @@ def _partner(disjunction: SNorm | None, pairs: Mapping[TNorm, SNorm]) -> TNorm:
     return "minimum"
 
 
-def _check_pair(block: FclBlock, wanted: SNorm, given: SNorm, scope: Scope) -> None:
-    if wanted != given:
+def _check_pair(block: FclBlock, wanted: SNorm, value: SNorm, scope: Scope) -> None:
+    if wanted != value:
         what = (
             "AND and OR are taken as they are written; jFuzzyLogic takes the last of "
             "the two lines and the operator that belongs to it"

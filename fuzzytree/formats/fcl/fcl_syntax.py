@@ -209,17 +209,17 @@ class _Statements(Transformer[Token, Any]):
 
     def conclusions(self, children: list[Any]) -> tuple[list[Any], bool, bool]:
         """Return the conclusions, whether `,` joins some, and if any is in brackets."""
-        found: list[Any] = []
+        results: list[Any] = []
         has_comma = any(_is_token(one) and one.type == "COMMA" for one in children)
         is_grouped = False
         for one in children:
             if isinstance(one, tuple):
                 inner, comma, _ = one
-                found += inner
+                results += inner
                 has_comma, is_grouped = has_comma or comma, True
             elif not _is_token(one):
-                found.append(one)
-        return found, has_comma, is_grouped
+                results.append(one)
+        return results, has_comma, is_grouped
 
     def grouped(self, children: list[Any]) -> Any:
         (inner,) = (one for one in children if not _is_token(one))
@@ -251,11 +251,11 @@ _KINDS = {"(": "LPAR", ")": "RPAR", ",": "COMMA"}
 def _parts(point: Token) -> Iterator[Token]:
     """Yield the words of a point, each with its place."""
     line, column = place(point)
-    for found in _PART.finditer(point):
-        before = point[: found.start()]
+    for match in _PART.finditer(point):
+        before = point[: match.start()]
         breaks = before.count("\n")
         start = len(before) - before.rfind("\n") if breaks else column + len(before)
-        text = found.group()
+        text = match.group()
         yield Token(_KINDS.get(text, "NUMBER"), text, line=line + breaks, column=start)
 
 
@@ -301,15 +301,15 @@ def parsed(content: bytes, name: str) -> FclText:
     text, remarks = decoded(content, name, MOST_BYTES, reads_utf16=True)
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     check_characters(text, name, _FORBIDDEN)
-    tokens, found = _tokens(text, name)
+    tokens, result = _tokens(text, name)
     statements: list[Statement] = []
     for group in _groups(tokens):
-        given = _statement(group)
-        if isinstance(given, tuple):
-            found.append(given)
+        value = _statement(group)
+        if isinstance(value, tuple):
+            result.append(value)
         else:
-            statements.append(given)
-    return FclText(text, tuple(tokens), tuple(statements), tuple(found), remarks)
+            statements.append(value)
+    return FclText(text, tuple(tokens), tuple(statements), tuple(result), remarks)
 
 
 _BLOCKS: Final = {
@@ -333,21 +333,21 @@ _EVERYWHERE = {"IF", "THEN", "IS", "AND", "OR", "NOT", "WITH"}
 def _tokens(text: str, name: str) -> tuple[list[Token], list[FileMistake]]:
     """Return the tokens of a text that some statement can hold, and the others."""
     tokens: list[Token] = []
-    found: list[FileMistake] = []
+    mistakes: list[FileMistake] = []
     for token in itertools.islice(grammar().lex(text), MOST_TOKENS + 1):
         if token.type == "STRANGE":
-            if len(found) < 1000:
-                found.append((*place(token), f"{str(token)!r} has no meaning here"))
+            if len(mistakes) < 1000:
+                mistakes.append((*place(token), f"{str(token)!r} has no meaning here"))
         elif token.type == "OPEN_COMMENT":
-            found.append((*place(token), f"the comment {token[:2]} is never closed"))
+            mistakes.append((*place(token), f"the comment {token[:2]} is never closed"))
         else:
             if len(token) > LONGEST_NAME:
                 sentence = f"a word of more than {LONGEST_NAME} characters"
-                found.append((*place(token), sentence))
+                mistakes.append((*place(token), sentence))
             tokens.append(token)
     if len(tokens) > MOST_TOKENS:
         raise ReadError(f"{name}: more than the {MOST_TOKENS:,} words that are read")
-    return tokens, found
+    return tokens, mistakes
 
 
 def _groups(tokens: Sequence[Token]) -> Iterator[list[Token]]:
@@ -636,16 +636,16 @@ def place_of(one: Statement) -> tuple[int, int]:
 
 def _check(block: FclBlock, notes: ReaderNotes) -> None:
     """Note what cannot stand in a block, or stands twice."""
-    seen: set[str] = set()
+    earlier: set[str] = set()
     for one in block.statements:
         if not _belongs(one, block.kind):
             sentence = f"{_shown(one)} cannot stand in {block.kind}"
             notes.mistake(place_of(one), sentence)
         elif isinstance(one, Setting):
-            if one.keyword.type in seen:
+            if one.keyword.type in earlier:
                 sentence = f"a second {one.keyword.type} in one block"
                 notes.mistake(place(one.keyword), sentence)
-            seen.add(one.keyword.type)
+            earlier.add(one.keyword.type)
 
 
 def _belongs(one: Statement, kind: str) -> bool:

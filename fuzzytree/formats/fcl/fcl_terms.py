@@ -105,7 +105,7 @@ _FUNCTIONS = {"LN": "log", "LOG": "log10"}
 
 def _formula_words(text: TermStatement, dialect: Dialect) -> list[Word]:
     """Return a formula's words as fuzzylite writes them, on one line."""
-    found: list[Word] = []
+    results: list[Word] = []
     column = place(text.tokens[0])[1]
     tokens = text.tokens[1:]
     for index, one in enumerate(tokens):
@@ -116,9 +116,9 @@ def _formula_words(text: TermStatement, dialect: Dialect) -> list[Word]:
         line, start = place(one)
         is_far = line != place(text.tokens[0])[0]
         column = max(column + 1, 0 if is_far else start)
-        found.append(Word(shown, place(text.tokens[0])[0], column))
+        results.append(Word(shown, place(text.tokens[0])[0], column))
         column += len(shown)
-    return found
+    return results
 
 
 def _shape(text: TermStatement, where: TermScope) -> FclTerm:

@@ -79,12 +79,12 @@ def _label(
     if written is None:
         return SystemTerm(entry.key, _WRONG)
     name = written.name or entry.key
-    found = numbered(name, taken)
-    if found != written.name:
+    result = numbered(name, taken)
+    if result != written.name:
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
-        notes.remark(f"{what}; here it is {found!r}")
+        notes.remark(f"{what}; here it is {result!r}")
     curve = _curve(written, entry, about, notes)
-    return SystemTerm(found, _WRONG if curve is None else curve)
+    return SystemTerm(result, _WRONG if curve is None else curve)
 
 
 def _curve(
@@ -99,25 +99,25 @@ def _curve(
         what = f"no kind of curve {kind[:40]!r}; {name_choice(kind[:40], known)}"
         notes.mistake(entry.position, what)
         return None
-    before = len(notes.mistakes)
+    mistake_count = len(notes.mistakes)
     numbers = text.numbers_of(written.inside, *place, notes.mistakes)
-    if len(notes.mistakes) > before:
+    if len(notes.mistakes) > mistake_count:
         return None
     if kind in ("constant", "linear"):
-        found = _conclusion_number(kind, numbers, about, notes)
+        result = _conclusion_number(kind, numbers, about, notes)
     else:
-        found = words.curve_of(kind, numbers)
+        result = words.curve_of(kind, numbers)
         if about[2] is not None and about[2][0] and about[1] != "fuzzylite":
-            found = f"a Sugeno system concludes constant and linear, not {kind!r}"
-    if isinstance(found, str):
-        notes.mistake(place, found)
+            result = f"a Sugeno system concludes constant and linear, not {kind!r}"
+    if isinstance(result, str):
+        notes.mistake(place, result)
         return None
-    if isinstance(found, SigmoidDifference) and about[1] != "fuzzylite":
+    if isinstance(result, SigmoidDifference) and about[1] != "fuzzylite":
         notes.remark(
             f"term {written.name!r} of {about[0]!r}: where the second sigmoid is above "
             "the first, MATLAB takes their distance, as here, and Octave 0"
         )
-    return found
+    return result
 
 
 def _conclusion_number(
@@ -197,8 +197,8 @@ def rules_of(
     for number, entry in enumerate(lines, 1):
         line = _line(entry, variables, notes)
         if line is not None:
-            made = _rules(line, (number, entry), variables, dialect, notes)
-            rules += ((entry, rule) for rule in made)
+            result = _rules(line, (number, entry), variables, dialect, notes)
+            rules += ((entry, rule) for rule in result)
     return rules
 
 
@@ -211,13 +211,13 @@ def _line(entry: FisEntry, variables: Variables, notes: ReaderNotes) -> _Line | 
         what = f"{entry.value.strip()[:60]!r} is no rule, such as 1 2, 1 (1) : 1"
         notes.mistake((entry.line, 1), what)
         return None
-    found = len(notes.mistakes)
+    mistake_count = len(notes.mistakes)
     places: list[list[float]] = []
     column = 1
     for part in (before, behind, weight, rest.replace(":", " ", 1)):
         places.append(text.numbers_of(part, entry.line, column, notes.mistakes))
         column += len(part) + 1
-    if len(notes.mistakes) > found:
+    if len(notes.mistakes) > mistake_count:
         return None
     needed = (len(variables[0]), len(variables[1]), 1, 1)
     names = (
@@ -230,7 +230,7 @@ def _line(entry: FisEntry, variables: Variables, notes: ReaderNotes) -> _Line | 
         if len(numbers) != count:
             what = f"{count} numbers stand {where}, not {len(numbers)}"
             notes.mistake((entry.line, 1), what.replace("1 numbers", "1 number"))
-    if len(notes.mistakes) > found:
+    if len(notes.mistakes) > mistake_count:
         return None
     (share,), (connection,) = places[2:]
     if not 0.0 <= share <= 1.0:
@@ -239,7 +239,7 @@ def _line(entry: FisEntry, variables: Variables, notes: ReaderNotes) -> _Line | 
     if connection not in (1.0, 2.0):
         what = f"the last number is 1 (and) or 2 (or), not {connection!r}"
         notes.mistake((entry.line, len(entry.value)), what)
-    if len(notes.mistakes) > found:
+    if len(notes.mistakes) > mistake_count:
         return None
     return _Line(places[0], places[1], share, connection)
 
@@ -252,7 +252,7 @@ def _rules(
     notes: ReaderNotes,
 ) -> Iterator[SystemRule]:
     number, _ = where
-    found = len(notes.mistakes)
+    mistake_count = len(notes.mistakes)
     questions = [
         proposition
         for variable, code in zip(variables[0], line.antecedent, strict=True)
@@ -263,7 +263,7 @@ def _rules(
         for output, code in zip(variables[1], line.concluded, strict=True)
         if (one := _conclusion(output, code, where, dialect, notes)) is not None
     ]
-    if len(notes.mistakes) > found:
+    if len(notes.mistakes) > mistake_count:
         return
     if not conclusions:
         notes.loss(f"rule {number}", "it concludes nothing; left out")
@@ -325,17 +325,17 @@ def _question(
     """Return the proposition on an input; None if there is none."""
     if code == 0.0:
         return None
-    found = _code(code, variable, where, notes)
-    if found is None or (not found.place and dialect != "fuzzylite"):
+    result = _code(code, variable, where, notes)
+    if result is None or (not result.place and dialect != "fuzzylite"):
         return None
-    hedges = _hedges(words.HEDGES[dialect], found, (variable.name, where), notes)
-    if not found.place:
+    hedges = _hedges(words.HEDGES[dialect], result, (variable.name, where), notes)
+    if not result.place:
         if hedges[-1:] == ("any",):
             return Is(variable.name, None, hedges)
         what = f"rule {where[0]}: a hedge of no term of {variable.name!r}"
         notes.mistake((where[1].line, 1), what)
         return None
-    return Is(variable.name, variable.labels[found.place - 1].name, hedges)
+    return Is(variable.name, variable.labels[result.place - 1].name, hedges)
 
 
 def _conclusion(
@@ -347,10 +347,10 @@ def _conclusion(
 ) -> Conclusion | None:
     if code == 0.0:
         return None
-    found = _code(code, output, where, notes)
-    if found is None or not found.place:
+    result = _code(code, output, where, notes)
+    if result is None or not result.place:
         return None
-    is_changed = found.is_negated or found.hundredths
+    is_changed = result.is_negated or result.hundredths
     if is_changed and dialect != "fuzzylite" and not output.defuzzifier.is_weighted:
         what = (
             f"rule {where[0]}: a term of {output.name!r} that is negated or hedged; "
@@ -361,8 +361,8 @@ def _conclusion(
     table = words.HEDGES[dialect]
     if dialect == "octave":
         table = words.CONCLUDING_HEDGES
-    hedges = _hedges(table, found, (output.name, where), notes)
-    return Conclusion(output.name, output.labels[found.place - 1].name, hedges)
+    hedges = _hedges(table, result, (output.name, where), notes)
+    return Conclusion(output.name, output.labels[result.place - 1].name, hedges)
 
 
 def _hedges(
@@ -372,10 +372,10 @@ def _hedges(
     notes: ReaderNotes,
 ) -> tuple[Hedge, ...]:
     """Return what hundredths and a sign do to a degree."""
-    found = table.get(code.hundredths)
-    if found is None:
+    result = table.get(code.hundredths)
+    if result is None:
         variable, (number, _) = about
         what = f"no hedge is known by .{code.hundredths:02d}; it is left out"
         notes.loss(f"rule {number}, {variable!r}", what)
-        found = ()
-    return ("not", *found) if code.is_negated else found
+        result = ()
+    return ("not", *result) if code.is_negated else result

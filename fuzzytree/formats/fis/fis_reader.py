@@ -121,9 +121,9 @@ def _dialect(page: text.FisFile, notes: ReaderNotes) -> Dialect:
         if f"{DIALECT}{known}" in page.comments:
             notes.remark(f"read as {known}'s, as the file says")
             return known
-    found, why = _signs(page)
-    notes.remark(f"read as {found}'s: {why}")
-    return found
+    result, why = _signs(page)
+    notes.remark(f"read as {result}'s: {why}")
+    return result
 
 
 def _signs(page: text.FisFile) -> tuple[Dialect, str]:
@@ -182,13 +182,13 @@ def _system(
         for one in parts["output"]
     )
     lines = single["rules"].entries if "rules" in single else []
-    found = rules_of(lines, (inputs, outputs), dialect, notes)
+    result = rules_of(lines, (inputs, outputs), dialect, notes)
     _check_counts(methods, (len(inputs), len(outputs), len(lines)), dialect, notes)
     if notes.mistakes:
         return None
     is_weighted = methods.defuzzifier.is_weighted
     block = RuleBlock(
-        tuple(rule for _, rule in found),
+        tuple(rule for _, rule in result),
         methods.conjunction,
         methods.disjunction,
         None if is_weighted else methods.implication,
@@ -199,7 +199,7 @@ def _system(
     if dialect == "fuzzylite":
         for output in outputs:
             notes.losses.extend(fuzzylite_losses(output))
-    entries = [entry for entry, _ in found]
+    entries = [entry for entry, _ in result]
     positions = functools.partial(
         text.positions_of, parts["input"], parts["output"], entries
     )
@@ -215,7 +215,7 @@ def _keyed(
     section: FisSection, known: Sequence[str], notes: ReaderNotes
 ) -> tuple[dict[str, FisEntry], list[FisEntry]]:
     """Return the entries by key, and those of terms."""
-    found: dict[str, FisEntry] = {}
+    results: dict[str, FisEntry] = {}
     terms: list[FisEntry] = []
     for entry in section.entries:
         if section.kind != "system" and text.TERM.fullmatch(entry.key):
@@ -223,12 +223,12 @@ def _keyed(
         elif entry.key not in known and entry.key not in _PRIVATE_KEYS:
             what = f"no key {entry.key[:40]!r}; {name_choice(entry.key[:40], known)}"
             notes.mistake((entry.line, 1), what)
-        elif entry.key in found:
+        elif entry.key in results:
             what = f"{entry.key} stands twice; the first is in line"
-            notes.mistake((entry.line, 1), f"{what} {found[entry.key].line}")
+            notes.mistake((entry.line, 1), f"{what} {results[entry.key].line}")
         else:
-            found[entry.key] = entry
-    return found, terms
+            results[entry.key] = entry
+    return results, terms
 
 
 def _methods(
@@ -240,12 +240,12 @@ def _methods(
         return text.unquoted(entries[key], notes.mistakes) if key in entries else ""
 
     def norm(key: str, known: Mapping[str, str]) -> str | None:
-        given = word(key)
-        if given and given not in known:
+        source = word(key)
+        if source and source not in known:
             entry = entries[key]
-            what = f"no {key} {given[:40]!r}; {name_choice(given[:40], known)}"
+            what = f"no {key} {source[:40]!r}; {name_choice(source[:40], known)}"
             notes.mistake(entry.position, what)
-        return known.get(given)
+        return known.get(source)
 
     title = word("Name")
     if not title:
@@ -286,9 +286,12 @@ def _methods(
 
 
 def _check_counts(
-    methods: _Methods, found: tuple[int, int, int], dialect: Dialect, notes: ReaderNotes
+    methods: _Methods,
+    result: tuple[int, int, int],
+    dialect: Dialect,
+    notes: ReaderNotes,
 ) -> None:
-    for key, count in zip(("NumInputs", "NumOutputs", "NumRules"), found, strict=True):
+    for key, count in zip(("NumInputs", "NumOutputs", "NumRules"), result, strict=True):
         entry = methods.counts.get(key)
         if entry is None or entry.value.split("%")[0].strip() == str(count):
             continue
@@ -327,11 +330,11 @@ def _name(
     if not name:
         name = f"{section.kind} {section.number}"
         notes.remark(f"{name} has no name of its own")
-    found = numbered(name, taken)
-    if found != name:
+    result = numbered(name, taken)
+    if result != name:
         what = f"{section.kind} {section.number} is called {name!r} like another"
-        notes.remark(f"{what}; here it is {found!r}")
-    return found
+        notes.remark(f"{what}; here it is {result!r}")
+    return result
 
 
 def _input(
@@ -401,18 +404,18 @@ def _with_middles(
     outputs: Iterable[SystemOutput], rules: Sequence[SystemRule], notes: ReaderNotes
 ) -> tuple[SystemOutput, ...]:
     """Return outputs with what MATLAB answers where no rule fires."""
-    found = []
+    results = []
     always = always_concluded(rules)
     for one in outputs:
         default = one.default
         if default is None and one.name not in always:
             default = middle(one.low, one.high)
-        found.append(msgspec.structs.replace(one, default=default))
-    if any(one.default is not None for one in found):
+        results.append(msgspec.structs.replace(one, default=default))
+    if any(one.default is not None for one in results):
         notes.remark(
             "where no rule fires, an output is the middle of its range, as in MATLAB"
         )
-    return tuple(found)
+    return tuple(results)
 
 
 def always_concluded(rules: Iterable[SystemRule]) -> set[str]:

@@ -70,11 +70,11 @@ def read_page(content: bytes, name: str, notes: ReaderNotes) -> FisFile:
     """
     text, remarks = decoded(content, name, MOST_BYTES, reads_utf16=True)
     notes.remarks.extend(remarks)
-    found = notes.mistakes
+    result = notes.mistakes
     check_characters(text, name, _FORBIDDEN)
     sections: list[FisSection] = []
     comments: list[str] = []
-    seen: dict[tuple[str, int], int] = {}
+    earlier: dict[tuple[str, int], int] = {}
     lines = split_lines(text)
     if len(lines) > MOST_LINES:
         raise ReadError(
@@ -86,12 +86,14 @@ def read_page(content: bytes, name: str, notes: ReaderNotes) -> FisFile:
         if plain.startswith(("#", "%", "//")):
             comments.append(plain.lstrip("#%/").strip())
         elif plain.startswith("["):
-            _start_section((sections, seen), plain, number, line.index("[") + 1, found)
+            _start_section(
+                (sections, earlier), plain, number, line.index("[") + 1, result
+            )
         elif plain and not sections:
             what = f"{plain[:40]!r} stands before the first section, [System]"
-            found.append((number, 1, what))
+            result.append((number, 1, what))
         elif plain:
-            _add_entry(sections[-1], line, number, found)
+            _add_entry(sections[-1], line, number, result)
     return FisFile(tuple(sections), tuple(comments))
 
 
@@ -100,9 +102,9 @@ def _start_section(
     plain: str,
     line: int,
     column: int,
-    found: list[FileMistake],
+    mistakes: list[FileMistake],
 ) -> None:
-    sections, seen = so_far
+    sections, earlier = so_far
     inside = plain[1:].partition("]")[0].strip().lower()
     numbered = _NUMBERED.fullmatch(inside)
     kind, number = inside, 0
@@ -110,16 +112,16 @@ def _start_section(
         kind, number = numbered.group(1), int(numbered.group(2))
     elif kind not in ("system", "rules"):
         what = f"no section [{inside[:40]}]; there is System, Input1, Output1, Rules"
-        found.append((line, column, what))
-    first = seen.setdefault((kind, number), line)
+        mistakes.append((line, column, what))
+    first = earlier.setdefault((kind, number), line)
     if first != line:
         what = f"section [{inside[:40]}] stands twice; the first is in line {first}"
-        found.append((line, column, what))
+        mistakes.append((line, column, what))
     sections.append(FisSection(kind, number, line, []))
 
 
 def _add_entry(
-    section: FisSection, line: str, number: int, found: list[FileMistake]
+    section: FisSection, line: str, number: int, mistakes: list[FileMistake]
 ) -> None:
     start = len(line) - len(line.lstrip())
     if section.kind == "rules":
@@ -129,14 +131,14 @@ def _add_entry(
     key, sign, value = line.partition("=")
     if not sign:
         what = f"{line.strip()[:40]!r} is no key and value, such as Name='tip'"
-        found.append((number, start + 1, what))
+        mistakes.append((number, start + 1, what))
         return
     column = len(key) + 2 + len(value) - len(value.lstrip())
     section.entries.append(FisEntry(key.strip(), value.strip(), number, column))
 
 
 def numbers_of(
-    text: str, line: int, column: int, found: list[FileMistake]
+    text: str, line: int, column: int, mistakes: list[FileMistake]
 ) -> list[float]:
     """Return the numbers of a text, parted by blanks or commas."""
     numbers: list[float] = []
@@ -144,18 +146,18 @@ def numbers_of(
         value = number_of(token.group())
         if value is None:
             what = f"{token.group()[:40]!r} is no number"
-            found.append((line, column + token.start(), what))
+            mistakes.append((line, column + token.start(), what))
         else:
             numbers.append(value)
     return numbers
 
 
-def unquoted(entry: FisEntry, found: list[FileMistake]) -> str:
+def unquoted(entry: FisEntry, mistakes: list[FileMistake]) -> str:
     """Return the text between the quotes of a value."""
     value = entry.value
     if value.find("'", 1) > LONGEST_NAME + 1:
         what = f"{entry.key} has more than {LONGEST_NAME} characters"
-        found.append((entry.line, entry.column, what))
+        mistakes.append((entry.line, entry.column, what))
     if len(value) >= 2 and value[0] == "'":
         end = value.find("'", 1)
         rest = value[end + 1 :].strip() if end > 0 else ""
@@ -164,7 +166,7 @@ def unquoted(entry: FisEntry, found: list[FileMistake]) -> str:
         if value[-1] == "'":
             return value[1:-1]  # a quote within the quotes
     what = f"{entry.key} must stand in quotes, such as 'tip', not {value[:40]!r}"
-    found.append((entry.line, entry.column, what))
+    mistakes.append((entry.line, entry.column, what))
     return value.strip("'")
 
 
@@ -177,7 +179,7 @@ class FisTerm(msgspec.Struct, frozen=True):
     column: int
 
 
-def term_of(entry: FisEntry, found: list[FileMistake]) -> FisTerm | None:
+def term_of(entry: FisEntry, mistakes: list[FileMistake]) -> FisTerm | None:
     """Return the parts of a term; the last quotes are the kind's."""
     value = entry.value
     open_, close = value.rfind("["), value.rfind("]")
@@ -189,7 +191,7 @@ def term_of(entry: FisEntry, found: list[FileMistake]) -> FisTerm | None:
     is_whole = len(name) >= 2 and name[0] == "'" and name[-1] == "'"
     if not is_whole or open_ < last or close < open_ or between not in (",", ""):
         what = f"{entry.key} must be like 'low':'trimf',[0 1 2], not {value[:60]!r}"
-        found.append((entry.line, entry.column, what))
+        mistakes.append((entry.line, entry.column, what))
         return None
     kind = value[first + 1 : last].strip()
     column = entry.column + open_ + 1

@@ -116,8 +116,8 @@ def _is_infinite_at_zero(label: SystemTerm) -> bool:
         uses_degree = "x" in names_in(label.curve.expression)
         functions = {call.function for call in _calls([label.curve])}
         return uses_degree and bool(functions & {"/", "^", "log", "log10", "%", "fmod"})
-    found = value_at(label.curve, 0.0)
-    return found is not None and not math.isfinite(found)
+    result = value_at(label.curve, 0.0)
+    return result is not None and not math.isfinite(result)
 
 
 def _inverse_remarks(

@@ -206,13 +206,15 @@ def read_variables(
     sections: Sequence[FllSection], notes: ReaderNotes
 ) -> list[ReadVariable]:
     """Return the inputs and outputs of a file; their mistakes are noted."""
-    found = [one for one in sections if one.kind in ("InputVariable", "OutputVariable")]
-    if len(found) > MOST_VARIABLES:
+    results = [
+        one for one in sections if one.kind in ("InputVariable", "OutputVariable")
+    ]
+    if len(results) > MOST_VARIABLES:
         sentence = f"more variables than the {MOST_VARIABLES:,} that are read"
-        notes.mistake(found[MOST_VARIABLES].head.position, sentence)
+        notes.mistake(results[MOST_VARIABLES].head.position, sentence)
         return []
-    names = [_variable_name(one, notes) for one in found]
-    pairs = list(zip(names, found, strict=True))
+    names = [_variable_name(one, notes) for one in results]
+    pairs = list(zip(names, results, strict=True))
     inputs = tuple(name for name, one in pairs if one.kind == "InputVariable")
     known: set[str] = set()
     for name, one in pairs:
@@ -229,7 +231,7 @@ def read_variables(
 
 def vocabulary_of(variables: Sequence[ReadVariable]) -> Vocabulary:
     """Return the variables by the words that stand for them in rules."""
-    found: dict[str, FllVariable] = {}
+    results: dict[str, FllVariable] = {}
     for one in variables:
         terms: dict[str, str] = {}
         for term, said in zip(one.terms, one.said, strict=True):
@@ -237,23 +239,25 @@ def vocabulary_of(variables: Sequence[ReadVariable]) -> Vocabulary:
                 terms.setdefault(word, term.label.name)
         entry = FllVariable(one.name, terms, one.is_output)
         for word in (one.name, one.section.head.value, *_other_names(one.name)):
-            found.setdefault(word, entry)
-    return found
+            results.setdefault(word, entry)
+    return results
 
 
 def _variable_name(section: FllSection, notes: ReaderNotes) -> str:
-    given = section.head.value
-    if not given or len(given) > LONGEST_NAME:
-        what = "a name" if not given else f"a name of at most {LONGEST_NAME} characters"
+    source = section.head.value
+    if not source or len(source) > LONGEST_NAME:
+        what = (
+            "a name" if not source else f"a name of at most {LONGEST_NAME} characters"
+        )
         notes.mistake(section.head.position, f"{section.kind} needs {what}")
-    return _cleaned(given, notes)
+    return _cleaned(source, notes)
 
 
-def _cleaned(given: str, notes: ReaderNotes) -> str:
+def _cleaned(value: str, notes: ReaderNotes) -> str:
     """Return a name without the characters that the engines drop."""
-    name = _DROPPED.sub("", given) or "_"
-    if name != given:
-        notes.remark(f"the name {given!r} is read as {name!r}, as the engines do")
+    name = _DROPPED.sub("", value) or "_"
+    if name != value:
+        notes.remark(f"the name {value!r} is read as {name!r}, as the engines do")
     return name
 
 
@@ -278,7 +282,7 @@ def _variable(
             is_weighted=is_weighted,
             is_inverse=is_weighted and how[1] != "TakagiSugeno",
         )
-    terms, kept, said = _terms(section, place, notes)
+    terms, kept, content = _terms(section, place, notes)
     low, high = _range(section.one_of("range"), notes)
     clips = fll.truth(section.one_of("lock-range"), False, notes)
     labels = tuple(term.label for term in terms)
@@ -302,7 +306,7 @@ def _variable(
         name,
         tuple(terms),
         tuple(kept),
-        tuple(said),
+        tuple(content),
         variable,
         kind,
         is_enabled,
@@ -313,22 +317,22 @@ def _terms(
     section: FllSection, place: TermScope, notes: ReaderNotes
 ) -> tuple[list[FllTerm], list[FllEntry], list[tuple[str, ...]]]:
     """Return the terms of a variable, where they stand, and what stands for each."""
-    found: dict[str, tuple[FllTerm, FllEntry, tuple[str, ...]]] = {}
+    results: dict[str, tuple[FllTerm, FllEntry, tuple[str, ...]]] = {}
     for entry in section.all_of("term"):
         term = _term(entry, place, notes)
         if term is not None:
             name = term.label.name
-            if name in found:
-                _note_second(name, found.pop(name)[1], entry, notes)
+            if name in results:
+                _note_second(name, results.pop(name)[1], entry, notes)
             words = (name, entry.words()[0].text, *_other_names(name))
-            found[name] = (term, entry, words)
+            results[name] = (term, entry, words)
         if notes.is_full:
             break
-    terms = [term for term, _, _ in found.values()]
+    terms = [term for term, _, _ in results.values()]
     return (
         terms,
-        [one for _, one, _ in found.values()],
-        [w for _, _, w in found.values()],
+        [one for _, one, _ in results.values()],
+        [w for _, _, w in results.values()],
     )
 
 
@@ -345,9 +349,9 @@ def _note_second(
 def _defuzzifier(
     section: FllSection, name: str, notes: ReaderNotes
 ) -> tuple[Defuzzifier, str]:
-    found = fll.defuzzifier(section.one_of("defuzzifier"), notes)
-    if found is not None:
-        return found
+    result = fll.defuzzifier(section.one_of("defuzzifier"), notes)
+    if result is not None:
+        return result
     entry = section.one_of("defuzzifier") or section.head
     if fll.truth(section.one_of("enabled"), True, ReaderNotes()):
         notes.mistake(entry.position, f"output {name!r} needs a defuzzifier")
@@ -356,17 +360,17 @@ def _defuzzifier(
 
 def _term(entry: FllEntry, place: TermScope, notes: ReaderNotes) -> FllTerm | None:
     """Return a term; None where not even its name is known. Mistakes are noted."""
-    found = entry.words()
-    if len(found) < 2:
+    result = entry.words()
+    if len(result) < 2:
         sentence = "a term is a name, a class such as Triangle, and numbers"
         notes.mistake(entry.position, sentence)
         return None
-    given, kind, *rest = found
-    if len(given.text) > LONGEST_NAME:
+    source, kind, *rest = result
+    if len(source.text) > LONGEST_NAME:
         sentence = f"a term needs a name of at most {LONGEST_NAME} characters"
-        notes.mistake(given.position, sentence)
+        notes.mistake(source.position, sentence)
         return None
-    name = _cleaned(given.text, notes)
+    name = _cleaned(source.text, notes)
     try:
         formula = entry.value[rest[0].column - entry.start :] if rest else ""
         term = read_term(name, kind, rest, place, formula)
@@ -406,11 +410,11 @@ def _range(
     """Return the ends of a range; None for one that is not finite."""
     if entry is None:
         return None, None
-    found = entry.words()
-    if len(found) != 2:
-        notes.mistake(entry.position, f"a range has 2 numbers, not {len(found)}")
+    result = entry.words()
+    if len(result) != 2:
+        notes.mistake(entry.position, f"a range has 2 numbers, not {len(result)}")
         return None, None
-    low, high = (fll.number(word, notes) for word in found)
+    low, high = (fll.number(word, notes) for word in result)
     if low > high:
         sentence = f"the range starts at {low!r} and ends below it, at {high!r}"
         notes.mistake(entry.position, sentence)
@@ -424,11 +428,11 @@ def _range(
 def _default(entry: FllEntry | None, notes: ReaderNotes) -> float | None:
     if entry is None or entry.value == "":
         return None
-    found = entry.words()
-    if len(found) != 1:
-        notes.mistake(entry.position, f"a default is 1 number, not {len(found)}")
+    result = entry.words()
+    if len(result) != 1:
+        notes.mistake(entry.position, f"a default is 1 number, not {len(result)}")
         return None
-    value = fll.number(found[0], notes)
+    value = fll.number(result[0], notes)
     if math.isinf(value):
         notes.mistake(entry.position, "a default cannot be infinite")
     return value if math.isfinite(value) else None

@@ -206,11 +206,11 @@ def _term(rule: _Rule, place: int, variable: FllVariable) -> str:
     word = rule.words[place]
     if word.text in ("", "(", ")", *RULE_WORDS):
         raise rule.error(place, f"a term of {variable.name!r}")
-    found = variable.terms.get(word.text)
-    if found is None:
+    result = variable.terms.get(word.text)
+    if result is None:
         if variable.name in {one.name for one in rule.vocabulary.values()}:
             choice = name_choice(word.text, dict.fromkeys(variable.terms.values()))
             sentence = f"{variable.name!r} has no term {word.text!r}; {choice}"
             rule.note(word.mistake(sentence))
         return word.text
-    return found
+    return result

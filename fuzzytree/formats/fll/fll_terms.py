@@ -123,9 +123,9 @@ def read_term(
         case _:
             choice = name_choice(kind.text, CLASSES)
             raise _error(kind, f"no term {kind.text!r}; {choice}")
-    found = SystemTerm(name, curve, height)
-    _check(kind, found, place)
-    return FllTerm(found, kind.text)
+    result = SystemTerm(name, curve, height)
+    _check(kind, result, place)
+    return FllTerm(result, kind.text)
 
 
 def _error(word: Word, sentence: str) -> PartError:
@@ -150,15 +150,15 @@ def _check_count(
 
 def _numbers(words: Sequence[Word]) -> list[float]:
     values: list[float] = []
-    found: list[FileMistake] = []
+    mistakes: list[FileMistake] = []
     for word in words:
         value = number_of(word.text)
         if value is None or math.isnan(value):
-            found.append(word.mistake(f"{word.text!r} where a number must stand"))
+            mistakes.append(word.mistake(f"{word.text!r} where a number must stand"))
         else:
             values.append(value)
-    if found:
-        raise PartError(*found)
+    if mistakes:
+        raise PartError(*mistakes)
     return values
 
 

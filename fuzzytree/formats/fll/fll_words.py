@@ -127,8 +127,8 @@ class FllEntry(msgspec.Struct, frozen=True):
 
     def words(self, signs: str = "") -> tuple[Word, ...]:
         """Return the words of the value, as many as a line may have."""
-        found = words(self.value, self.line, self.start, signs)
-        return tuple(itertools.islice(found, MOST_WORDS))
+        result = words(self.value, self.line, self.start, signs)
+        return tuple(itertools.islice(result, MOST_WORDS))
 
     @property
     def end(self) -> Word:
@@ -169,16 +169,16 @@ def read_page(text: str, notes: ReaderNotes) -> FllFile:
     heads: list[tuple[FllEntry, list[FllEntry]]] = []
     count = max(text.count("\n"), text.count("\r"))
     if count > MOST_LINES:
-        found = f"{count:,} lines are more than the {MOST_LINES:,} that are read"
-        notes.mistake((MOST_LINES + 1, 1), found)
+        result = f"{count:,} lines are more than the {MOST_LINES:,} that are read"
+        notes.mistake((MOST_LINES + 1, 1), result)
         return FllFile((), ())
     for number, line in enumerate(split_lines(text), 1):
-        said, sign, comment = line.partition("#")
+        content, sign, comment = line.partition("#")
         if sign:
             comments.append(comment.strip())
-        if not said.strip() or notes.is_full:
+        if not content.strip() or notes.is_full:
             continue
-        entry = _entry(said, number, notes)
+        entry = _entry(content, number, notes)
         if entry is None or _is_too_long(entry, notes):
             continue
         if entry.key in KEYS:
@@ -187,8 +187,8 @@ def read_page(text: str, notes: ReaderNotes) -> FllFile:
             heads[-1][1].append(entry)
     sections = tuple(FllSection(head, tuple(entries)) for head, entries in heads)
     for extra in [one for one in sections if one.kind == "Engine"][1:]:
-        found = "a second Engine; a file holds one"
-        notes.mistake((extra.head.line, extra.head.column), found)
+        result = "a second Engine; a file holds one"
+        notes.mistake((extra.head.line, extra.head.column), result)
     return FllFile(sections, tuple(comments))
 
 
@@ -206,8 +206,8 @@ def _entry(text: str, line: int, notes: ReaderNotes) -> FllEntry | None:
 def _is_too_long(entry: FllEntry, notes: ReaderNotes) -> bool:
     if len(entry.value) < MOST_WORDS:
         return False
-    found = words(entry.value, entry.line, entry.start, "()")
-    extra = next(itertools.islice(found, MOST_WORDS - 1, None), None)
+    result = words(entry.value, entry.line, entry.start, "()")
+    extra = next(itertools.islice(result, MOST_WORDS - 1, None), None)
     if extra is not None:
         sentence = f"a line of more words than the {MOST_WORDS:,} that are read"
         notes.mistake(extra.position, sentence)

@@ -123,9 +123,9 @@ def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
         what = f"the root is <{root.name[:40]}>; that of FML is <fuzzySystem>"
         notes.mistake(root.position, what)
     elif root.namespace != words.NAMESPACE:
-        given = repr(root.namespace) if root.namespace else "none"
+        value = repr(root.namespace) if root.namespace else "none"
         what = (
-            f"the namespace is {given} and not {words.NAMESPACE!r}; read as if it was"
+            f"the namespace is {value} and not {words.NAMESPACE!r}; read as if it was"
         )
         notes.remark(what)
     parts = None if notes.mistakes else _parts(root, notes)
@@ -162,14 +162,14 @@ def _parts(root: FmlElement, notes: ReaderNotes) -> _Parts | None:
             )
     names: dict[str, str] = {}
     for element in elements:
-        given = element.attributes.get("name", "")
-        if not given:
+        value = element.attributes.get("name", "")
+        if not value:
             notes.mistake(
                 element.position, f"<{element.name}> needs the attribute name"
             )
-        elif given in names:
-            notes.mistake(element.position, f"variable {given!r} stands twice")
-        names[given] = given
+        elif value in names:
+            notes.mistake(element.position, f"variable {value!r} stands twice")
+        names[value] = value
     inputs = [one for one in elements if not _is_output(one)]
     outputs = [one for one in elements if _is_output(one)]
     variables = FmlVariables({}, {}, {})
@@ -210,17 +210,17 @@ def _terms(
             notes.mistake(
                 other.position, f"<{other.name[:40]}> stands where <{kind}> does"
             )
-    given = [term.attributes.get("name", "") for term in terms]
-    is_ours = all(one.startswith(start) and len(one) > len(start) for one in given)
+    value = [term.attributes.get("name", "") for term in terms]
+    is_ours = all(one.startswith(start) and len(one) > len(start) for one in value)
     taken: dict[str, int] = {}
     called: list[str] = []
-    for term, one in zip(terms, given, strict=True):
+    for term, one in zip(terms, value, strict=True):
         plain = one.removeprefix(start) if is_ours else one
         if not one or plain in taken:
             what = "stands twice" if one else "has no name"
             notes.mistake(term.position, f"term {one!r} of {variable!r} {what}")
         called.append(numbered(plain, taken))
-    variables.labels[variable] = dict(zip(given, called, strict=True))
+    variables.labels[variable] = dict(zip(value, called, strict=True))
     return [*zip(called, terms, strict=True)]
 
 
@@ -275,13 +275,13 @@ def _output(
             continue
         match element.name:
             case "tskVariable":
-                found = _tsk_term(term, plain, inputs, notes)
+                result = _tsk_term(term, plain, inputs, notes)
             case "tsukamotoVariable":
-                found = _tsukamoto_term(term, plain, where, notes)
+                result = _tsukamoto_term(term, plain, where, notes)
             case _:
                 curve = curve_of(term, where, notes)
-                found = None if curve is None else SystemTerm(plain, curve)
-        labels += [found] if found is not None else []
+                result = None if curve is None else SystemTerm(plain, curve)
+        labels += [result] if result is not None else []
     default = number(element, "defaultValue", notes, 0.0)
     low, high = (
         (None, None) if element.name == "tskVariable" else _range(element, notes)
@@ -322,11 +322,11 @@ def _word(
     default: str,
     notes: ReaderNotes,
 ) -> _T | None:
-    given = element.attributes.get(key, default)
-    if given.upper() not in known:
-        choice = name_choice(given[:40].upper(), known)
-        notes.mistake(element.position, f"no {key} {given[:40]!r}; {choice}")
-    return known.get(given.upper())
+    value = element.attributes.get(key, default)
+    if value.upper() not in known:
+        choice = name_choice(value[:40].upper(), known)
+        notes.mistake(element.position, f"no {key} {value[:40]!r}; {choice}")
+    return known.get(value.upper())
 
 
 def _tsk_term(

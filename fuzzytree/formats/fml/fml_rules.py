@@ -99,14 +99,14 @@ def blocks_of(
                     element.position, f"<{element.name[:40]}> is no <{rule_name}>"
                 )
                 continue
-            made = _rule(base, element, variables, notes)
-            if made is None:
+            result = _rule(base, element, variables, notes)
+            if result is None:
                 continue
-            rule, meant = made
-            if norms is not None and meant != norms:
+            rule, meaning = result
+            if norms is not None and meaning != norms:
                 blocks.append(_block(run, norms, name))
                 run = []
-            norms = meant
+            norms = meaning
             run.append(rule)
         if norms is not None and run:
             blocks.append(_block(run, norms, name))
@@ -167,7 +167,7 @@ def _rule(
         what = "its else is left out"
         notes.loss(f"rule {name!r}, line {one.line}", what)
     wanted = _only(concluded, then, notes)
-    found = [
+    results = [
         conclusion
         for child in ([] if wanted is None else wanted.all(clause))
         if (conclusion := _conclusion(child, about[0], name, notes)) is not None
@@ -190,7 +190,7 @@ def _rule(
     when: Condition = parts[0] if len(parts) == 1 else joined
     own = None if len(parts) == 1 else connector
     norms = _with_inner(norms, own, inner, notes)
-    return SystemRule(when, tuple(found), weight, name), norms
+    return SystemRule(when, tuple(results), weight, name), norms
 
 
 def _with_inner(
@@ -217,12 +217,12 @@ def _with_inner(
 
 
 def _only(element: FmlElement, name: str, notes: ReaderNotes) -> FmlElement | None:
-    found = element.all(name)
-    if len(found) != 1:
-        what = f"<{element.name}> needs one <{name}>, and has {len(found)}"
+    result = element.all(name)
+    if len(result) != 1:
+        what = f"<{element.name}> needs one <{name}>, and has {len(result)}"
         notes.mistake(element.position, what)
         return None
-    return found[0]
+    return result[0]
 
 
 def _named(
@@ -343,11 +343,11 @@ def _joined(
             what = f"{variable!r} has no term {element.text[:40]!r}; {choice}"
             notes.mistake(element.position, what)
             return None
-        found = _condition_of((variable, element.text), about, notes, level + 1)
+        result = _condition_of((variable, element.text), about, notes, level + 1)
         is_not = element.attributes.get("complement", "false").lower() == "true"
-        if is_not and isinstance(found, Is):
-            return Is(variable, found.label, ("not", *found.hedges))
-        return Not(found) if is_not and found is not None else found
+        if is_not and isinstance(result, Is):
+            return Is(variable, result.label, ("not", *result.hedges))
+        return Not(result) if is_not and result is not None else result
     if element.name not in ("and", "or"):
         notes.mistake(
             element.position, f"<{element.name[:40]}> is no <and>, <or> or <termName>"

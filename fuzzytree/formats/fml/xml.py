@@ -109,7 +109,7 @@ class _Building:
         if len(self.open) >= MOST_LEVELS:
             raise self._refuse(f"nested deeper than {MOST_LEVELS} levels")
         namespace, _, name = full.rpartition(" ")
-        found = FmlElement(
+        result = FmlElement(
             name,
             namespace,
             {key: value for key, value in attributes.items() if " " not in key},
@@ -118,10 +118,10 @@ class _Building:
             [],
         )
         if self.open:
-            self.open[-1].children.append(found)
+            self.open[-1].children.append(result)
         else:
-            self.root = found
-        self.open.append(found)
+            self.root = result
+        self.open.append(result)
         self.texts.append([])
 
     def _end(self, _: str) -> None:

@@ -27,23 +27,23 @@ Entries = dict[str, Node]
 _LONGEST_DIGITS: Final = 18
 
 
-def bind(node: Node, kind: type[R], found: list[FileMistake]) -> R | None:
+def bind(node: Node, kind: type[R], mistakes: list[FileMistake]) -> R | None:
     """Return a mapping as a record, or None if it cannot be one.
 
     Args:
         node: The mapping.
         kind: The record.
-        found: Where mistakes are added. An unknown key is one, and the record is
+        mistakes: Where mistakes are added. An unknown key is one, and the record is
             returned without it.
     """
     if not isinstance(node, MappingNode):
-        _expected(node, f"{kind.noun} must be a mapping", found)
+        _expected(node, f"{kind.noun} must be a mapping", mistakes)
         return None
-    return record(entries(node, kind, found), kind, found)
+    return record(entries(node, kind, mistakes), kind, mistakes)
 
 
 def entries(
-    node: MappingNode, kind: type[FileRecord], found: list[FileMistake]
+    node: MappingNode, kind: type[FileRecord], mistakes: list[FileMistake]
 ) -> Entries:
     """Return the values of a mapping by key; check its keys and their choice."""
     known = _fields(kind)
@@ -51,31 +51,31 @@ def entries(
     is_known = True
     for key, value in node.pairs:
         if not isinstance(key, Scalar):
-            _expected(key, f"a key of {kind.noun} must be text", found)
+            _expected(key, f"a key of {kind.noun} must be text", mistakes)
         elif key.text in kept:
-            _add(found, key, f"key {shortened(key.text)} stands twice")
+            _add(mistakes, key, f"key {shortened(key.text)} stands twice")
         elif key.text not in known:
             is_known = False
-            choice = _choice(key.text, known, has_hint=len(found) < MOST_SHOWN)
+            choice = _choice(key.text, known, has_hint=len(mistakes) < MOST_SHOWN)
             text = f"{kind.noun} has no key {shortened(key.text)}; {choice}"
-            _add(found, key, text)
+            _add(mistakes, key, text)
         else:
             kept[key.text] = value
     for name, field in known.items():
         if field.required and name not in kept:
-            _add(found, node, f"{kind.noun} needs {shortened(name)}")
+            _add(mistakes, node, f"{kind.noun} needs {shortened(name)}")
     if is_known and not _fits_a_form(kind, kept):
-        _add(found, node, _form_mistake(kind, kept))
+        _add(mistakes, node, _form_mistake(kind, kept))
     return kept
 
 
-def record(kept: Entries, kind: type[R], found: list[FileMistake]) -> R | None:
+def record(kept: Entries, kind: type[R], mistakes: list[FileMistake]) -> R | None:
     """Return the record of checked entries; entries of no field are left alone."""
     values: dict[str, object] = {}
     is_whole = True
     for name, field in _fields(kind).items():
         if name in kept:
-            value = _value(kept[name], shortened(name), field.type, found)
+            value = _value(kept[name], shortened(name), field.type, mistakes)
             is_whole = is_whole and value is not None
             values[field.name] = value
         elif field.required:
@@ -115,27 +115,31 @@ def _keys(form: KeyForm) -> frozenset[str]:
 
 
 def _value(
-    node: Node, what: str, kind: inspect.Type, found: list[FileMistake], about: str = ""
+    node: Node,
+    what: str,
+    kind: inspect.Type,
+    mistakes: list[FileMistake],
+    about: str = "",
 ) -> object | None:
     """Return a value of a type, or None after adding why there is none."""
     match kind:
         case inspect.Metadata():
             about = str((kind.extra_json_schema or {}).get("description", ""))
-            return _value(node, what, kind.type, found, about)
+            return _value(node, what, kind.type, mistakes, about)
         case inspect.UnionType():
-            return _value(node, what, _chosen(node, kind), found)
+            return _value(node, what, _chosen(node, kind), mistakes)
         case inspect.StructType():
-            return bind(node, _record_type(kind), found)
+            return bind(node, _record_type(kind), mistakes)
         case inspect.VarTupleType():
-            return _list(node, what, kind, found)
+            return _list(node, what, kind, mistakes)
         case inspect.StrType():
-            return _text(node, what, kind, about, found)
+            return _text(node, what, kind, about, mistakes)
         case inspect.IntType():
-            return _integer(node, what, kind, found)
+            return _integer(node, what, kind, mistakes)
         case inspect.FloatType():
-            return _number(node, what, kind, found)
+            return _number(node, what, kind, mistakes)
         case inspect.LiteralType():
-            return _literal(node, what, kind, found)
+            return _literal(node, what, kind, mistakes)
         case _:
             raise TypeError(f"no rule for {kind}")
 
@@ -156,90 +160,94 @@ def _chosen(node: Node, union: inspect.UnionType) -> inspect.Type:
 
 
 def _list(
-    node: Node, what: str, kind: inspect.VarTupleType, found: list[FileMistake]
+    node: Node, what: str, kind: inspect.VarTupleType, mistakes: list[FileMistake]
 ) -> tuple[object, ...] | None:
     if not isinstance(node, ListNode):
-        _expected(node, f"{what} must be a list", found)
+        _expected(node, f"{what} must be a list", mistakes)
         return None
     least, most = kind.min_length or 0, kind.max_length
     size = len(node.items)
     if size < least or (most is not None and size > most):
         size_text = f"at least {least}" if most is None else f"{least} to {most}"
         size_text = str(least) if least == most else size_text
-        _add(found, node, f"{what} needs {size_text} entries, not {size}")
+        _add(mistakes, node, f"{what} needs {size_text} entries, not {size}")
         return None
     item = f"an entry of {what}"
-    values = [_value(one, item, kind.item_type, found) for one in node.items]
+    values = [_value(one, item, kind.item_type, mistakes) for one in node.items]
     return None if None in values else tuple(values)
 
 
 def _text(
-    node: Node, what: str, kind: inspect.StrType, about: str, found: list[FileMistake]
+    node: Node,
+    what: str,
+    kind: inspect.StrType,
+    about: str,
+    mistakes: list[FileMistake],
 ) -> str | None:
     if not isinstance(node, Scalar):
-        _expected(node, f"{what} must be text", found)
+        _expected(node, f"{what} must be text", mistakes)
         return None
     if meaning(node) != "text":
         hint = f"; in quotes it is text: '{node.text}'" if node.text else ""
-        _expected(node, f"{what} must be text", found, hint)
+        _expected(node, f"{what} must be text", mistakes, hint)
         return None
     size = len(node.text)
     if size < (kind.min_length or 0):
-        _add(found, node, f"{what} must not be empty")
+        _add(mistakes, node, f"{what} must not be empty")
     elif kind.max_length is not None and size > kind.max_length:
         text = f"{what} is longer than {kind.max_length} characters"
-        _add(found, node, text)
+        _add(mistakes, node, text)
     elif kind.pattern is not None and not re.search(kind.pattern, node.text):
-        _add(found, node, f"{what} cannot be {shortened(node.text)}; it is {about}")
+        _add(mistakes, node, f"{what} cannot be {shortened(node.text)}; it is {about}")
     else:
         return node.text
     return None
 
 
 def _integer(
-    node: Node, what: str, kind: inspect.IntType, found: list[FileMistake]
+    node: Node, what: str, kind: inspect.IntType, mistakes: list[FileMistake]
 ) -> int | None:
     if not isinstance(node, Scalar) or meaning(node) != "an integer":
-        _expected(node, f"{what} must be an integer", found)
+        _expected(node, f"{what} must be an integer", mistakes)
         return None
     text = node.text
     if len(text) > _LONGEST_DIGITS:
-        _add(found, node, f"{what} has more than {_LONGEST_DIGITS} digits")
+        _add(mistakes, node, f"{what} has more than {_LONGEST_DIGITS} digits")
         return None
     value = _read_integer(text)
     if kind.ge is not None and value < kind.ge:
-        _add(found, node, f"{what} must be at least {kind.ge}, not {value}")
+        _add(mistakes, node, f"{what} must be at least {kind.ge}, not {value}")
         return None
     if kind.le is not None and value > kind.le:
-        _add(found, node, f"{what} must be at most {kind.le}, not {value}")
+        _add(mistakes, node, f"{what} must be at most {kind.le}, not {value}")
         return None
     return value
 
 
 def _number(
-    node: Node, what: str, kind: inspect.FloatType, found: list[FileMistake]
+    node: Node, what: str, kind: inspect.FloatType, mistakes: list[FileMistake]
 ) -> float | None:
     is_number = isinstance(node, Scalar) and meaning(node) in (
         "a number",
         "an integer",
     )
     if not (isinstance(node, Scalar) and is_number):
-        _expected(node, f"{what} must be a number", found)
+        _expected(node, f"{what} must be a number", mistakes)
         return None
     text = node.text
     if text.startswith(("0o", "0x")):
         if len(text) > _LONGEST_DIGITS:
-            _add(found, node, f"{what} has more than {_LONGEST_DIGITS} digits")
+            _add(mistakes, node, f"{what} has more than {_LONGEST_DIGITS} digits")
             return None
         value = float(_read_integer(text))
     else:
         value = float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
     # Not a number is neither.
     if kind.ge is not None and not value >= kind.ge:
-        _add(found, node, f"{what} must be at least {kind.ge:g}, not {value:g}")
+        _add(mistakes, node, f"{what} must be at least {kind.ge:g}, not {value:g}")
         return None
     if kind.le is not None and not value <= kind.le:
-        _add(found, node, f"{what} must be at most {kind.le:g}, not {value:g}")
+        _add(mistakes, node, f"{what} must be at most {kind.le:g}, not {value:g}")
         return None
     return value
 
@@ -251,7 +259,7 @@ def _read_integer(text: str) -> int:
 
 
 def _literal(
-    node: Node, what: str, kind: inspect.LiteralType, found: list[FileMistake]
+    node: Node, what: str, kind: inspect.LiteralType, mistakes: list[FileMistake]
 ) -> str | int | None:
     if isinstance(node, Scalar):
         for value in kind.values:
@@ -259,16 +267,18 @@ def _literal(
             if node.text == str(value) and meaning(node) == expected:
                 return value
     allowed = " or ".join(shortened(str(value)) for value in kind.values)
-    _expected(node, f"{what} must be {allowed}", found)
+    _expected(node, f"{what} must be {allowed}", mistakes)
     return None
 
 
-def not_a_list(node: Node, key: str, found: list[FileMistake]) -> None:
+def not_a_list(node: Node, key: str, mistakes: list[FileMistake]) -> None:
     """Add that the value of a key must be a list."""
-    _expected(node, f"{shortened(key)} must be a list", found)
+    _expected(node, f"{shortened(key)} must be a list", mistakes)
 
 
-def _expected(node: Node, what: str, found: list[FileMistake], hint: str = "") -> None:
+def _expected(
+    node: Node, what: str, mistakes: list[FileMistake], hint: str = ""
+) -> None:
     """Add that a node is not what it must be; a refused one was added before."""
     match node:
         case Scalar():
@@ -280,11 +290,11 @@ def _expected(node: Node, what: str, found: list[FileMistake], hint: str = "") -
             it = "a mapping"
         case Refused():
             return
-    _add(found, node, f"{what}, not {it}{hint}")
+    _add(mistakes, node, f"{what}, not {it}{hint}")
 
 
-def _add(found: list[FileMistake], node: Node, sentence: str) -> None:
-    found.append((node.line, node.column, sentence))
+def _add(mistakes: list[FileMistake], node: Node, sentence: str) -> None:
+    mistakes.append((node.line, node.column, sentence))
 
 
 def shortened(text: str) -> str:
@@ -322,23 +332,23 @@ def value_of(node: Node, key: str) -> Node | None:
 
 
 def record_at(
-    kept: Entries, key: str, kind: type[R], found: list[FileMistake]
+    kept: Entries, key: str, kind: type[R], mistakes: list[FileMistake]
 ) -> R | None:
     """Return the record under a key, None if it is broken or left out."""
-    return bind(kept[key], kind, found) if key in kept else None
+    return bind(kept[key], kind, mistakes) if key in kept else None
 
 
 def records_at(
-    kept: Entries, key: str, kind: type[R], found: list[FileMistake]
+    kept: Entries, key: str, kind: type[R], mistakes: list[FileMistake]
 ) -> list[R | None] | None:
     """Return the records of a list, None for a broken one; None if it is no list."""
     node = kept.get(key)
     if node is None:
         return None if key in ("rules", "leaves") else []
     if not isinstance(node, ListNode):
-        not_a_list(node, key, found)
+        not_a_list(node, key, mistakes)
         return None
-    return [bind(item, kind, found) for item in node.items]
+    return [bind(item, kind, mistakes) for item in node.items]
 
 
 def located(
@@ -366,5 +376,5 @@ def _child(node: Node, step: str | int) -> Node | None:
         items = node.items if isinstance(node, ListNode) else ()
         return items[step] if step < len(items) else None
     keys = (*_KEYS.get(step, ()), step)
-    found = (value_of(node, key) for key in keys)
-    return next((one for one in found if one is not None), None)
+    result = (value_of(node, key) for key in keys)
+    return next((one for one in result if one is not None), None)

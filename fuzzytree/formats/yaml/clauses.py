@@ -59,19 +59,19 @@ def readings(text: str, vocabulary: Vocabulary) -> tuple[Clause, ...]:
         >>> readings("grip is not firm", {"grip": words(["soft", "firm"])})
         (Clause(variable='grip', terms=('firm',), negated=True),)
     """
-    found: list[Clause] = []
+    results: list[Clause] = []
     end = text.find(_IS)
-    while 0 <= end <= LONGEST_NAME and len(found) < 2:
+    while 0 <= end <= LONGEST_NAME and len(results) < 2:
         variable = text[:end]
         known = vocabulary.get(variable)
         if known is not None and known.most_ors <= _MOST_ORS:
             rest = text[end + len(_IS) :]
-            found += [Clause(variable, terms) for terms in _lists(rest, known)]
+            results += [Clause(variable, terms) for terms in _lists(rest, known)]
             if rest.startswith(_NOT):
                 lists = _lists(rest[len(_NOT) :], known)
-                found += [Clause(variable, terms, negated=True) for terms in lists]
+                results += [Clause(variable, terms, negated=True) for terms in lists]
         end = text.find(_IS, end + 1)
-    return tuple(found[:2])
+    return tuple(results[:2])
 
 
 def guess(text: str, vocabulary: Vocabulary) -> Clause | None:
@@ -236,10 +236,10 @@ def read_rules(
         for index, clause in enumerate(one.if_):
             path: Path = ("rules", position, "when", index)
             if clause not in cache:
-                meant = _clause(clause, vocabulary)
-                cache[clause] = meant if isinstance(meant, Clause) else None
-                if isinstance(meant, str):
-                    mistakes.append((path, f"rule {position + 1}: {meant}"))
+                meaning = _clause(clause, vocabulary)
+                cache[clause] = meaning if isinstance(meaning, Clause) else None
+                if isinstance(meaning, str):
+                    mistakes.append((path, f"rule {position + 1}: {meaning}"))
             read_clause = cache[clause]
             if read_clause is not None:
                 clauses.append(read_clause)
@@ -247,24 +247,24 @@ def read_rules(
     return tuple(rules)
 
 
-def _clause(given: str | layout.WrittenOut, vocabulary: Vocabulary) -> Clause | str:
+def _clause(value: str | layout.WrittenOut, vocabulary: Vocabulary) -> Clause | str:
     """Return a clause, or why the sentence cannot be one."""
-    if isinstance(given, layout.WrittenOut):
-        terms = given.is_ if given.is_ is not None else given.is_not or ()
-        return Clause(given.variable, terms, negated=given.is_ is None)
-    found = readings(given, vocabulary)
-    if len(found) == 1:
-        return found[0]
-    if found:
-        either = " or ".join(map(_written_out, found))
-        return f"{shortened(given)} can be read in two ways; write {either}"
-    meant = guess(given, vocabulary)
-    if meant is None or not [*unknown_terms([((), "", meant)], vocabulary)]:
+    if isinstance(value, layout.WrittenOut):
+        terms = value.is_ if value.is_ is not None else value.is_not or ()
+        return Clause(value.variable, terms, negated=value.is_ is None)
+    result = readings(value, vocabulary)
+    if len(result) == 1:
+        return result[0]
+    if result:
+        either = " or ".join(map(_written_out, result))
+        return f"{shortened(value)} can be read in two ways; write {either}"
+    meaning = guess(value, vocabulary)
+    if meaning is None or not [*unknown_terms([((), "", meaning)], vocabulary)]:
         return (
-            f"{shortened(given)} is no clause; a clause is 'VARIABLE is TERM or TERM', "
+            f"{shortened(value)} is no clause; a clause is 'VARIABLE is TERM or TERM', "
             "or the same with 'is not'"
         )
-    return meant
+    return meaning
 
 
 def _written_out(clause: Clause) -> str:

@@ -77,9 +77,9 @@ def parse_condition(text: str) -> Condition | None:
     sentence = _Sentence(text)
     if [token.text for token in sentence.tokens] == [ALWAYS, ""]:
         return None
-    found = sentence.condition(1)
+    result = sentence.condition(1)
     sentence.end("'and', 'or' or the end")
-    return found
+    return result
 
 
 def parse_conclusions(text: str) -> tuple[Conclusion, ...]:
@@ -93,11 +93,11 @@ def parse_conclusions(text: str) -> tuple[Conclusion, ...]:
         Conclusion(output='fan', label='off', hedges=())
     """
     sentence = _Sentence(text)
-    found = [sentence.conclusion()]
+    results = [sentence.conclusion()]
     while sentence.takes("and"):
-        found.append(sentence.conclusion())
+        results.append(sentence.conclusion())
     sentence.end("'and' or the end")
-    return tuple(found)
+    return tuple(results)
 
 
 def condition_text(condition: Condition | None) -> str:
@@ -143,7 +143,7 @@ def _clause(variable: str, label: str | None, hedges: tuple[Hedge, ...]) -> str:
 
 def _quoted(name: str) -> str:
     """Return a name, in quotes unless each of its words is an ordinary one."""
-    words = [found.group() for found in _TOKEN.finditer(name) if found["word"]]
+    words = [match.group() for match in _TOKEN.finditer(name) if match["word"]]
     if words and " ".join(words) == name and _KEYWORDS.isdisjoint(words):
         return name
     doubled = name.replace('"', '""')
@@ -158,12 +158,14 @@ class _Sentence:
         self.place = 0
         place = 0
         while place < len(text):
-            found = _TOKEN.match(text, place)
-            if found is None:
+            token_match = _TOKEN.match(text, place)
+            if token_match is None:
                 raise SentenceError(f"the quote {text[place]} is not closed")
-            if not found["blank"]:
-                self.tokens.append(_Token(found.group(), found.lastgroup or ""))
-            place = found.end()
+            if not token_match["blank"]:
+                self.tokens.append(
+                    _Token(token_match.group(), token_match.lastgroup or "")
+                )
+            place = token_match.end()
         self.tokens.append(_Token(""))
 
     @property
@@ -184,10 +186,10 @@ class _Sentence:
 
     def unexpected(self, wanted: str) -> SentenceError:
         """Return what was found in the place of what was wanted."""
-        found = repr(self.next.text) if self.next.text else "the end"
+        result = repr(self.next.text) if self.next.text else "the end"
         before = " ".join(token.text for token in self.tokens[: self.place][-6:])
         behind = f" behind {before!r}" if before else ""
-        return SentenceError(f"{found} where {wanted} must stand{behind}")
+        return SentenceError(f"{result} where {wanted} must stand{behind}")
 
     def condition(self, level: int) -> Condition:
         """Read parts that are joined by OR."""
@@ -215,11 +217,11 @@ class _Sentence:
             return self.question()
         self.place += 1
         kind = And if self.takes("and") else Or if self.takes("or") else None
-        found = self.condition(level + 1) if kind is None else self.part(level + 1)
+        result = self.condition(level + 1) if kind is None else self.part(level + 1)
         if not self.next.is_sign(")"):
             raise self.unexpected("')'" if kind else "'and', 'or' or ')'")
         self.place += 1
-        return found if kind is None else kind((found,))
+        return result if kind is None else kind((result,))
 
     def question(self) -> Is:
         """Read `variable is hedge ... term`."""

@@ -118,16 +118,16 @@ def compose(content: bytes, name: str) -> tuple[Node, list[FileMistake]]:
     if text.count(",") + text.count("\n") > 2 * MOST_NODES:
         raise report(name, [(1, 1, f"more than {MOST_NODES:,} entries")])
     root: list[Node] = []
-    found: list[FileMistake] = []
+    mistakes: list[FileMistake] = []
     open_: list[tuple[Event, list[Node]]] = []
     count = 0
     for event in _events(text, name):
         siblings = open_[-1][1] if open_ else root
         match event:
             case DocumentStartEvent():
-                found += _document_mistakes(event, is_first=not root)
+                mistakes += _document_mistakes(event, is_first=not root)
                 if root:
-                    raise report(name, found)
+                    raise report(name, mistakes)
                 continue
             case ScalarEvent():
                 siblings.append(
@@ -143,14 +143,14 @@ def compose(content: bytes, name: str) -> tuple[Node, list[FileMistake]]:
                 continue
             case _:
                 continue
-        found += _refused(event)
+        mistakes += _refused(event)
         count += 1
         too_much = _limit_passed(count, len(open_))
         if too_much:
-            raise report(name, [*found, (*_start(event), too_much)])
+            raise report(name, [*mistakes, (*_start(event), too_much)])
     if not root:
         raise report(name, [(1, 1, "the file is empty")])
-    return root[0], found
+    return root[0], mistakes
 
 
 def _limit_passed(count: int, levels: int) -> str:

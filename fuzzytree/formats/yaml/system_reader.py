@@ -66,42 +66,47 @@ from fuzzytree.model.system import (
 )
 
 
-def read_system(root: MappingNode, found: list[FileMistake]) -> FuzzySystem | None:
+def read_system(
+    root: MappingNode, file_mistakes: list[FileMistake]
+) -> FuzzySystem | None:
     """Return the system of a file of `kind: system`.
 
     Returns:
         The system, or None after adding why there is none. With mistakes added it may
         be one with placeholders.
     """
-    kept = entries(root, layout.SystemFile, found)
-    head = record(kept, layout.SystemHead, found)
-    record_at(kept, "semantics", layout.SystemSemantics, found)
+    kept = entries(root, layout.SystemFile, file_mistakes)
+    head = record(kept, layout.SystemHead, file_mistakes)
+    record_at(kept, "semantics", layout.SystemSemantics, file_mistakes)
     mistakes: list[Mistake] = []
     broken: set[Path] = set()
-    inputs = _inputs(kept, found, mistakes, broken)
-    outputs = _outputs(kept, found, mistakes, broken)
-    blocks = _blocks(kept, found, mistakes, broken, _spare(outputs or ()))
-    found += located(root, mistakes)
+    inputs = _inputs(kept, file_mistakes, mistakes, broken)
+    outputs = _outputs(kept, file_mistakes, mistakes, broken)
+    blocks = _blocks(kept, file_mistakes, mistakes, broken, _spare(outputs or ()))
+    file_mistakes += located(root, mistakes)
     if head is None or inputs is None or outputs is None or blocks is None:
         return None
     unknown = [*_unknown(inputs, outputs, blocks)]
     variables: list[SystemInput | SystemOutput] = [*inputs, *outputs]
     if is_flood(unknown, sum(1 + len(one.labels) for one in variables)):
-        found += located(root, unknown)
+        file_mistakes += located(root, unknown)
         return None
     try:
         return FuzzySystem(head.name, inputs, outputs, blocks, head.note or "")
     except InvalidModelError as error:
-        found += located(root, error.mistakes, broken)
+        file_mistakes += located(root, error.mistakes, broken)
         return None
 
 
 def _inputs(
-    kept: Entries, found: list[FileMistake], mistakes: list[Mistake], broken: set[Path]
+    kept: Entries,
+    file_mistakes: list[FileMistake],
+    mistakes: list[Mistake],
+    broken: set[Path],
 ) -> tuple[SystemInput, ...] | None:
     """Return the inputs; a broken one has its name and those of its terms only."""
     inputs: list[SystemInput] = []
-    bound = records_at(kept, "inputs", layout.InputOfSystem, found)
+    bound = records_at(kept, "inputs", layout.InputOfSystem, file_mistakes)
     for position, one in enumerate(bound or ()):
         path: Path = ("inputs", position)
         if one is None:
@@ -114,17 +119,20 @@ def _inputs(
         low, high, clips = _range(one.range)
         parts = tuple(Part(p.input, p.weight, p.centre) for p in one.sum_of)
         labels = _labels(path, one.terms, mistakes)
-        made = SystemInput(one.name, labels, low, high, clips, one.unit or "", parts)
-        inputs.append(made)
+        result = SystemInput(one.name, labels, low, high, clips, one.unit or "", parts)
+        inputs.append(result)
     return None if bound is None else tuple(inputs)
 
 
 def _outputs(
-    kept: Entries, found: list[FileMistake], mistakes: list[Mistake], broken: set[Path]
+    kept: Entries,
+    file_mistakes: list[FileMistake],
+    mistakes: list[Mistake],
+    broken: set[Path],
 ) -> tuple[SystemOutput, ...] | None:
     """Return the outputs; a broken one has its name and those of its terms only."""
     outputs: list[SystemOutput] = []
-    bound = records_at(kept, "outputs", layout.OutputOfSystem, found)
+    bound = records_at(kept, "outputs", layout.OutputOfSystem, file_mistakes)
     for position, one in enumerate(bound or ()):
         path: Path = ("outputs", position)
         if one is None:
@@ -190,9 +198,9 @@ def _labels(
 def _curve(one: layout.LabelOfVariable) -> Curve:
     """Return the one curve that is given."""
     for field, build in _CURVES.items():
-        given = getattr(one, field)
-        if given is not None:
-            return build(given)
+        value = getattr(one, field)
+        if value is not None:
+            return build(value)
     return values.shape(one)
 
 
@@ -242,7 +250,7 @@ def _spare(outputs: Sequence[SystemOutput]) -> SystemRule | None:
 
 def _blocks(
     kept: Entries,
-    found: list[FileMistake],
+    file_mistakes: list[FileMistake],
     mistakes: list[Mistake],
     broken: set[Path],
     spare: SystemRule | None,
@@ -254,16 +262,16 @@ def _blocks(
     node = kept.get("blocks")
     if not isinstance(node, ListNode):
         if node is not None:
-            not_a_list(node, "blocks", found)
+            not_a_list(node, "blocks", file_mistakes)
         return None
     blocks: list[RuleBlock] = []
     for position, item in enumerate(node.items):
         if not isinstance(item, MappingNode):
-            bind(item, layout.BlockOfSystem, found)
+            bind(item, layout.BlockOfSystem, file_mistakes)
             return None
-        own = entries(item, layout.BlockOfSystem, found)
-        head = record(own, layout.BlockHead, found)
-        bound = records_at(own, "rules", layout.RuleOfSystem, found)
+        own = entries(item, layout.BlockOfSystem, file_mistakes)
+        head = record(own, layout.BlockHead, file_mistakes)
+        bound = records_at(own, "rules", layout.RuleOfSystem, file_mistakes)
         rules: list[SystemRule] = []
         for index, one in enumerate(bound or ()):
             path: Path = ("blocks", position, "rules", index)

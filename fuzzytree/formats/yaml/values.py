@@ -63,15 +63,15 @@ def _side(side: layout.HalfSet) -> Side:
     return Side(side.spread, side.curve, side.reach)
 
 
-def semantics(given: layout.RuleSemantics | layout.TreeSemantics | None) -> Semantics:
+def semantics(value: layout.RuleSemantics | layout.TreeSemantics | None) -> Semantics:
     """Return the semantics, the defaults if there are none."""
-    if given is None:
+    if value is None:
         return Semantics()
     return Semantics(
-        given.and_,
-        _answer(given.uncovered),
-        _answer(given.missing),
-        given.label_type or msgspec.UNSET,
+        value.and_,
+        _answer(value.uncovered),
+        _answer(value.missing),
+        value.label_type or msgspec.UNSET,
     )
 
 

@@ -115,14 +115,14 @@ def _check_format(root: MappingNode) -> None:
     if node is None:
         text = "no 'format: fuzzytree/1' says what this file is"
         raise _UnreadableError((root.line, root.column, text))
-    given = node.text if isinstance(node, Scalar) else ""
-    if given == layout.FORMAT:
+    value = node.text if isinstance(node, Scalar) else ""
+    if value == layout.FORMAT:
         return
     text = f"'format' must be {layout.FORMAT!r}"
-    if re.fullmatch(r"fuzzytree/[1-9][0-9]{0,8}", given):
+    if re.fullmatch(r"fuzzytree/[1-9][0-9]{0,8}", value):
         text = (
-            f"a file of format {given!r} needs a newer fuzzytree, one that reads "
-            f"{given!r}; this one reads {layout.FORMAT!r}"
+            f"a file of format {value!r} needs a newer fuzzytree, one that reads "
+            f"{value!r}; this one reads {layout.FORMAT!r}"
         )
     raise _UnreadableError((node.line, node.column, text))
 
@@ -136,26 +136,26 @@ def _kind(root: MappingNode) -> str:
     raise _UnreadableError((place.line, place.column, text))
 
 
-def _rule_base(root: MappingNode, found: list[FileMistake]) -> RuleBase | None:
-    kept = entries(root, RuleBaseFile, found)
-    head = record(kept, layout.RuleBaseHead, found)
-    semantics = record_at(kept, "semantics", layout.RuleSemantics, found)
-    bound = records_at(kept, "rules", layout.RuleOfModel, found)
-    known = _variables(kept, found)
+def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase | None:
+    kept = entries(root, RuleBaseFile, file_mistakes)
+    head = record(kept, layout.RuleBaseHead, file_mistakes)
+    semantics = record_at(kept, "semantics", layout.RuleSemantics, file_mistakes)
+    bound = records_at(kept, "rules", layout.RuleOfModel, file_mistakes)
+    known = _variables(kept, file_mistakes)
     if head is None or bound is None or known is None:
         return None
     variables, broken = known
     vocabulary = vocabulary_of(variables)
     mistakes: list[Mistake] = []
     rules = read_rules(bound, head.classes[0], vocabulary, mistakes)
-    found += located(root, mistakes)
+    file_mistakes += located(root, mistakes)
     unknown = [
         *unknown_inputs(variables, head.columns),
         *unknown_classes(rules, head.classes),
         *unknown_terms(clauses_of_rules(rules), vocabulary),
     ]
     if is_flood(unknown, _names_declared(head, vocabulary)):
-        found += located(root, unknown)
+        file_mistakes += located(root, unknown)
         return None
     return _built(
         lambda: RuleBase(
@@ -167,20 +167,20 @@ def _rule_base(root: MappingNode, found: list[FileMistake]) -> RuleBase | None:
             kind=head.terms,
             columns=head.columns,
         ),
-        root, found, broken,
+        root, file_mistakes, broken,
     )  # fmt: skip
 
 
-def _tree(root: MappingNode, found: list[FileMistake]) -> FuzzyTree | None:
-    kept = entries(root, TreeFile, found)
-    head = record(kept, layout.TreeHead, found)
-    semantics = record_at(kept, "semantics", layout.TreeSemantics, found)
-    questions = records_at(kept, "nodes", layout.NodeOfTree, found)
-    ends = records_at(kept, "leaves", layout.End, found)
-    groups = records_at(kept, "sets", layout.SetsOfVariable, found)
-    known = _variables(kept, found)
+def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | None:
+    kept = entries(root, TreeFile, file_mistakes)
+    head = record(kept, layout.TreeHead, file_mistakes)
+    semantics = record_at(kept, "semantics", layout.TreeSemantics, file_mistakes)
+    questions = records_at(kept, "nodes", layout.NodeOfTree, file_mistakes)
+    ends = records_at(kept, "leaves", layout.End, file_mistakes)
+    groups = records_at(kept, "sets", layout.SetsOfVariable, file_mistakes)
+    known = _variables(kept, file_mistakes)
     if questions is not None and ends is not None:
-        found += located(root, [*_number_mistakes(questions, ends)])
+        file_mistakes += located(root, [*_number_mistakes(questions, ends)])
     if head is None or known is None:
         return None
     variables, broken = known
@@ -199,15 +199,15 @@ def _tree(root: MappingNode, found: list[FileMistake]) -> FuzzyTree | None:
     ]
     unknown = [*unknown_inputs(variables, head.columns), *astray]
     if is_flood(unknown, _names_declared(head, vocabulary, patterns)):
-        found += located(root, unknown)
+        file_mistakes += located(root, unknown)
         return None
-    meant = values.semantics(semantics)
+    meaning = values.semantics(semantics)
     if nodes is None or leaves is None or fitted is None or broken:
         mistakes = [
-            *naming_mistakes(head.name, head.classes, meant),
+            *naming_mistakes(head.name, head.classes, meaning),
             *variable_mistakes(variables, head.columns),
         ]
-        found += located(root, [*mistakes, *astray], broken)
+        file_mistakes += located(root, [*mistakes, *astray], broken)
         return None
     return _built(
         lambda: FuzzyTree(
@@ -217,10 +217,10 @@ def _tree(root: MappingNode, found: list[FileMistake]) -> FuzzyTree | None:
             nodes=tree_nodes,
             leaves=tuple(map(values.leaf, leaves)),
             sets=sets,
-            semantics=meant,
+            semantics=meaning,
             columns=head.columns,
         ),
-        root, found, broken,
+        root, file_mistakes, broken,
     )  # fmt: skip
 
 
@@ -228,13 +228,16 @@ M = TypeVar("M", RuleBase, FuzzyTree)
 
 
 def _built(
-    build: Callable[[], M], root: Node, found: list[FileMistake], broken: set[Path]
+    build: Callable[[], M],
+    root: Node,
+    file_mistakes: list[FileMistake],
+    broken: set[Path],
 ) -> M | None:
     """Return the model, or None after adding what is wrong with it."""
     try:
         return build()
     except InvalidModelError as error:
-        found += located(root, error.mistakes, broken)
+        file_mistakes += located(root, error.mistakes, broken)
         return None
 
 
@@ -259,14 +262,14 @@ def _whole(items: list[R | None] | None) -> list[R] | None:
 
 
 def _variables(
-    kept: Entries, found: list[FileMistake]
+    kept: Entries, mistakes: list[FileMistake]
 ) -> tuple[tuple[Variable, ...], set[Path]] | None:
     """Return the variables and which are broken; None if names cannot be known.
 
     In the place of a broken variable stands one of its name and its terms' names, so
     that what speaks of it can be checked.
     """
-    bound = records_at(kept, "variables", layout.VariableOfModel, found)
+    bound = records_at(kept, "variables", layout.VariableOfModel, mistakes)
     if bound is None:
         return None
     variables: list[Variable] = []

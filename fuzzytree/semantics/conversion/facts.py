@@ -161,23 +161,23 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
         return _recognised(system)
     system, _ = flattened(system)
     try:
-        found = _decoded(facts)
+        result = _decoded(facts)
     except (msgspec.DecodeError, UnicodeEncodeError, RecursionError):
         return None
-    if found is None or not _may_fit(system, found):
+    if result is None or not _may_fit(system, result):
         return None
-    places = _places(found)
-    curves = _shapes(system, [len(found.variables[place].terms) for place in places])
+    places = _places(result)
+    curves = _shapes(system, [len(result.variables[place].terms) for place in places])
     if curves is None:
         return None
     try:
-        rules = _rules(found, dict(zip(places, curves, strict=True)))
-        expected, _ = flattened(as_system(rules, found.scores, always=found.always))
+        rules = _rules(result, dict(zip(places, curves, strict=True)))
+        expected, _ = flattened(as_system(rules, result.scores, always=result.always))
     except (FuzzyTreeError, IndexError, ValueError):
         return None
-    is_winner = found.scores == "winner"
-    given, wanted = (_plain(one, has_default=is_winner) for one in (system, expected))
-    return rules if given == wanted else None
+    is_winner = result.scores == "winner"
+    value, wanted = (_plain(one, has_default=is_winner) for one in (system, expected))
+    return rules if value == wanted else None
 
 
 def as_written(
@@ -210,14 +210,16 @@ def numbers_of(facts: str) -> tuple[int, ...]:
         >>> numbers_of(facts_of(rules)), numbers_of(facts_of(rules, "winner"))
         ((1, 2), (0, 1))
     """
-    found = _decoded(facts)
-    if found is None:
+    result = _decoded(facts)
+    if result is None:
         return ()
-    labels = [label for _, label, _ in found.rules]
-    if found.scores == "class":  # behind the rule that always holds, one for each class
+    labels = [label for _, label, _ in result.rules]
+    if (
+        result.scores == "class"
+    ):  # behind the rule that always holds, one for each class
         used = sorted(set(labels))
         return tuple(1 + used.index(label) for label in labels)
-    first = 0 if found.scores == "winner" else 1
+    first = 0 if result.scores == "winner" else 1
     return tuple(range(first, first + len(labels)))
 
 
@@ -231,19 +233,19 @@ def places_of(facts: str) -> tuple[int | None, ...]:
         >>> places_of(facts_of(rules))
         (None, None, None, 0)
     """
-    found = _decoded(facts)
-    if found is None:
+    result = _decoded(facts)
+    if result is None:
         return ()
-    places = {place: k for k, place in enumerate(_places(found))}
-    return tuple(places.get(place) for place in range(len(found.variables)))
+    places = {place: k for k, place in enumerate(_places(result))}
+    return tuple(places.get(place) for place in range(len(result.variables)))
 
 
 def _decoded(facts: str) -> _Facts | None:
     data = facts.encode()
     if len(data) > _MOST:
         return None
-    found = msgspec.json.decode(data, type=_Facts)
-    return found if found.fuzzytree == 1 else None
+    result = msgspec.json.decode(data, type=_Facts)
+    return result if result.fuzzytree == 1 else None
 
 
 def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
@@ -261,13 +263,13 @@ def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
         needed += sum(sizes[k] for k in clauses) if clauses else 1
     if len(_places(facts)) != len(system.inputs):
         return False
-    found = sum(1 for rule in system.rules for _ in questions(rule.when))
-    return needed <= found + 2 * len(facts.rules) + 1
+    result = sum(1 for rule in system.rules for _ in questions(rule.when))
+    return needed <= result + 2 * len(facts.rules) + 1
 
 
 def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | None:
     """Return the curves of each input's first labels, as terms, if all are shapes."""
-    found: list[list[Term]] = []
+    results: list[list[Term]] = []
     for one, count in zip(system.inputs, counts, strict=True):
         terms: list[Term] = []
         for label in one.labels[:count]:
@@ -277,8 +279,8 @@ def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | No
             terms.append(Term(label.name, shape))
         if len(terms) < count or one.clips:
             return None
-        found.append(terms)
-    return found
+        results.append(terms)
+    return results
 
 
 def _places(facts: _Facts) -> list[int]:
@@ -359,12 +361,12 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
         rules = tuple(
             Rule(tuple(_clauses(rule.when)), rule.then[0].label) for rule in block.rules
         )
-        found = RuleBase(system.name, classes, variables, rules, semantics)
-        expected = as_system(found, "winner")
+        result = RuleBase(system.name, classes, variables, rules, semantics)
+        expected = as_system(result, "winner")
     except (FuzzyTreeError, LookupError, ValueError):
         return None
-    given, wanted = (_plain(one, has_default=True) for one in (system, expected))
-    return found if given == wanted else None
+    value, wanted = (_plain(one, has_default=True) for one in (system, expected))
+    return result if value == wanted else None
 
 
 def _clauses(condition: Condition | None) -> Iterator[Clause]:
@@ -473,20 +475,20 @@ class _Flat:
     def _joined(
         self, word: str, parts: tuple[Condition, ...], norm: str | None
     ) -> tuple[object, ...]:
-        found: list[object] = []
+        results: list[object] = []
         for position, part in enumerate(parts):
             flat = self.condition(part)
             is_same = norm in ("minimum", "maximum") or position == 0
             if is_same and flat[:1] == (word,):
-                found += flat[1:]
+                results += flat[1:]
             else:
-                found.append(flat)
+                results.append(flat)
         if len(parts) == 1:
             return self.condition(parts[0])
         if norm in ("minimum", "maximum"):
-            found.sort(key=repr)  # in any order they give the same bits
+            results.sort(key=repr)  # in any order they give the same bits
         self.used.add(f"{word} {norm}")
-        return (word, *found)
+        return (word, *results)
 
 
 def _activation(activation: Activation) -> object:

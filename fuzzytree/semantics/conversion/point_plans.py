@@ -427,16 +427,16 @@ def _error(curve: SigmoidDifference | SigmoidProduct) -> Error:
         value_1, slope_1, bend_1 = _ranges(first, a, b)
         value_2, slope_2, bend_2 = _ranges(second, a, b)
         if isinstance(curve, SigmoidDifference):
-            found = bend_1.scaled(k * k).plus(bend_2.scaled(-m * m))
+            result = bend_1.scaled(k * k).plus(bend_2.scaled(-m * m))
         else:
-            found = (
+            result = (
                 bend_1.times(value_2)
                 .scaled(k * k)
                 .plus(slope_1.times(slope_2).scaled(2.0 * k * m))
                 .plus(value_1.times(bend_2).scaled(m * m))
             )
         width = b - a
-        return max(-found.low, found.high) * width * width / 8.0
+        return max(-result.low, result.high) * width * width / 8.0
 
     return error
 

@@ -95,7 +95,7 @@ def pointed(
     """
     check_tolerance(tolerance)
     change: _Change = _Change(tolerance, (Points, *allowed))
-    found: D = (
+    result: D = (
         _pointed_rules(document, change)
         if isinstance(document, RuleBase)
         else _pointed_system(document, change)
@@ -103,7 +103,7 @@ def pointed(
     if change.reasons:
         head = f"cannot write the curves of {document.name} as points:"
         raise LossError("\n  ".join([head, *change.reasons]))
-    return found, tuple(change.losses)
+    return result, tuple(change.losses)
 
 
 def check_tolerance(tolerance: float) -> None:
@@ -149,28 +149,28 @@ class _Change:
         self.reasons: list[str] = []
 
     def term(self, variable: str, term: Term) -> Term:
-        found = self._curve(variable, term.name, term.shape)
-        return Term(term.name, found) if isinstance(found, Points) else term
+        result = self._curve(variable, term.name, term.shape)
+        return Term(term.name, result) if isinstance(result, Points) else term
 
     def label(self, variable: str, label: SystemTerm) -> SystemTerm:
-        found = self._curve(variable, label.name, label.curve)
-        return replace(label, curve=found)
+        result = self._curve(variable, label.name, label.curve)
+        return replace(label, curve=result)
 
     def _curve(self, variable: str, name: str, curve: Curve) -> Curve:
         if isinstance(curve, self.allowed):
             return curve
         where = f"term {name!r} of {variable!r}"
         try:
-            found = points_for(curve, self.tolerance)
+            result = points_for(curve, self.tolerance)
         except LossError as error:
             self.reasons.append(f"{where}: {error}")
             return curve
-        if found.bound > EXACT:
-            count = len(found.points.values)
-            tail = f"; {found.tail}" if found.tail else ""
+        if result.bound > EXACT:
+            count = len(result.points.values)
+            tail = f"; {result.tail}" if result.tail else ""
             what = f"it becomes {count} points joined by lines{tail}"
-            self.losses.append(Loss(where, what, found.bound))
-        return found.points
+            self.losses.append(Loss(where, what, result.bound))
+        return result.points
 
 
 class PlacedPoints(NamedTuple):
@@ -311,22 +311,22 @@ def _furthest(
     if whole <= room:
         return end, whole
     good, bad = start, end
-    found = math.inf
+    result = math.inf
     for _ in range(1100):  # halving reaches any double
         middle = good + (bad - good) / 2
         if not good < middle < bad:
             break
         here = error(start, middle)
         if here <= room:
-            good, found = middle, here
+            good, result = middle, here
         else:
             bad = middle
-        if found < math.inf and bad - good <= (good - start) * 2.0**-6:
+        if result < math.inf and bad - good <= (good - start) * 2.0**-6:
             break
     if good == start:
         following = math.nextafter(start, math.inf)
         return following, 0.0  # no double lies between
-    return good, found
+    return good, result
 
 
 _Pairs = list[tuple[float, float]]
@@ -377,12 +377,12 @@ def stepped(values: Iterable[float]) -> tuple[float, ...]:
         >>> stepped((0.0, 1.0, math.nextafter(1.0, 2.0), 2.0))
         (0.0, 1.0, 1.0, 2.0)
     """
-    found: list[float] = []
+    results: list[float] = []
     for value in values:
-        is_second = len(found) > 1 and found[-1] == found[-2]
-        is_next = bool(found) and value == math.nextafter(found[-1], math.inf)
-        found.append(found[-1] if is_next and not is_second else value)
-    return tuple(found)
+        is_second = len(results) > 1 and results[-1] == results[-2]
+        is_next = bool(results) and value == math.nextafter(results[-1], math.inf)
+        results.append(results[-1] if is_next and not is_second else value)
+    return tuple(results)
 
 
 def _rise(start: float, end: float) -> _Pairs:
@@ -423,7 +423,7 @@ def straightened(model: D) -> D | None:
     """
     others = tuple(kind for kind in get_args(Curve) if kind not in (Band, LR))
     try:
-        found, losses = pointed(model, _COARSE, allowed=others)
+        result, losses = pointed(model, _COARSE, allowed=others)
     except LossError:
         return None
-    return None if losses or found == model else found
+    return None if losses or result == model else result

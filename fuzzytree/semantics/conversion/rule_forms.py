@@ -112,10 +112,10 @@ def _first_terms(system: FuzzySystem) -> dict[tuple[str, str], str]:
     for output in system.outputs:
         if not output.defuzzifier.is_weighted or output.aggregation in (None, "sum"):
             continue
-        seen: dict[tuple[Curve, float], str] = {}
+        earlier: dict[tuple[Curve, float], str] = {}
         for label in output.labels:
-            found = seen.setdefault((label.curve, label.height), label.name)
-            first[output.name, label.name] = found
+            result = earlier.setdefault((label.curve, label.height), label.name)
+            first[output.name, label.name] = result
     return first
 
 
@@ -151,10 +151,10 @@ def split(
     )
     if rule.when is None or not is_monotone:
         return (rule,)
-    found = alternatives(rule.when)
-    if not 1 < len(found) <= MOST_RULES:
+    result = alternatives(rule.when)
+    if not 1 < len(result) <= MOST_RULES:
         return (rule,)
-    return tuple(replace(rule, when=when) for when in found)
+    return tuple(replace(rule, when=when) for when in result)
 
 
 def alternatives(condition: Condition) -> list[And]:
@@ -174,13 +174,13 @@ def _alternatives(condition: Condition, nots: int) -> list[tuple[Condition, ...]
         case Not(part=part):
             return _alternatives(part, nots + 1)
         case And(parts=parts) | Or(parts=parts):
-            found = [_alternatives(part, nots) for part in parts]
+            results = [_alternatives(part, nots) for part in parts]
             whole: Iterable[tuple[Condition, ...]]
             if isinstance(condition, Or) != bool(nots % 2):
-                whole = itertools.chain.from_iterable(found)
+                whole = itertools.chain.from_iterable(results)
             else:
                 whole = (
                     tuple(itertools.chain.from_iterable(several))
-                    for several in itertools.product(*found)
+                    for several in itertools.product(*results)
                 )
             return [*itertools.islice(whole, MOST_RULES + 1)]

@@ -103,18 +103,18 @@ def as_system(
     conditions = _conditions(rules, tautology)
     if scores == "winner":
         outputs: tuple[SystemOutput, ...] = (_class_output(rules, taken),)
-        made = tuple(
+        winner_rules = tuple(
             SystemRule(when, (Conclusion(outputs[0].name, rule.then),))
             for when, rule in zip(conditions, rules.rules, strict=True)
         )
-        block = _block(rules, made, Activation("highest"))
+        block = _block(rules, winner_rules, Activation("highest"))
     else:
-        found = _scored(rules, scores, conditions, tautology)
-        outputs = _score_outputs([one.name for one in found], taken)
+        result = _scored(rules, scores, conditions, tautology)
+        outputs = _score_outputs([one.name for one in result], taken)
         absent = tuple(Conclusion(one.name, "absent") for one in outputs)
         present = tuple(
             SystemRule(one.when, (Conclusion(output.name, "present"),))
-            for one, output in zip(found, outputs, strict=True)
+            for one, output in zip(result, outputs, strict=True)
             if one.has_rules
         )
         block = _block(rules, (SystemRule(tautology, absent), *present), Activation())
@@ -177,14 +177,14 @@ def _cast_losses(rules: RuleBase, scores: Scores) -> Iterator[Loss]:
 
 def cast_remarks(rules: RuleBase, scores: Scores = "rule") -> tuple[str, ...]:
     """Return how the numbers of `as_system` are to be read, a sentence each."""
-    found = [_note(rules, scores)]
+    results = [_note(rules, scores)]
     if rules.semantics.missing is None:
-        found.append("a row with a missing value answers NaN, which is no class")
+        results.append("a row with a missing value answers NaN, which is no class")
     if scores == "rule" and rules.kind != "relative":
-        found.append(
+        results.append(
             "rules whose strengths differ by less than 1 part in 2^50 may change places"
         )
-    return tuple(found)
+    return tuple(results)
 
 
 def refuse_singletons(system: FuzzySystem, to: str) -> None:
@@ -326,17 +326,17 @@ def _conditions(rules: RuleBase, tautology: Condition | None) -> list[Condition 
     """Return the condition of each rule; rules share what their clauses become."""
     is_product = rules.semantics.conjunction == "product"
     known: dict[int, tuple[Condition, ...]] = {}
-    found: list[Condition | None] = []
+    results: list[Condition | None] = []
     for rule in rules.rules:
         parts: list[Condition] = []
         for clause in rule.when:
             if id(clause) not in known:
                 known[id(clause)] = _clause(clause, is_product=is_product)
             parts += known[id(clause)]
-        found.append(
+        results.append(
             And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else tautology
         )
-    return found
+    return results
 
 
 def _clause(clause: Clause, *, is_product: bool) -> tuple[Condition, ...]:
@@ -369,11 +369,11 @@ def _score_outputs(names: list[str], taken: list[str]) -> tuple[SystemOutput, ..
         SystemTerm("present", Singleton(1.0)),
     )
     used = set(taken)
-    found: list[SystemOutput] = []
+    results: list[SystemOutput] = []
     for name in names:
-        found.append(SystemOutput(unlike(name, used), labels, 0.0, 1.0, _AVERAGE))
-        used.add(found[-1].name)
-    return tuple(found)
+        results.append(SystemOutput(unlike(name, used), labels, 0.0, 1.0, _AVERAGE))
+        used.add(results[-1].name)
+    return tuple(results)
 
 
 class _Score(NamedTuple):
@@ -420,9 +420,9 @@ def _any_of(
 
 
 def _block(
-    rules: RuleBase, made: tuple[SystemRule, ...], activation: Activation
+    rules: RuleBase, result: tuple[SystemRule, ...], activation: Activation
 ) -> RuleBlock:
     conjunction: TNorm = (
         "product" if rules.semantics.conjunction == "product" else "minimum"
     )
-    return RuleBlock(made, conjunction, "maximum", None, activation)
+    return RuleBlock(result, conjunction, "maximum", None, activation)

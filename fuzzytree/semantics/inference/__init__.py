@@ -202,8 +202,8 @@ class _Run:
         order = range(len(block.rules))
         if how.method in ("highest", "lowest", "proportional"):
             # Which rules are activated is known when all degrees are.
-            found = [self._rule_degree(block, index) for index in order]
-            degrees = _chosen(how, found)
+            results = [self._rule_degree(block, index) for index in order]
+            degrees = _chosen(how, results)
             for index in order:
                 self._conclude(block, index, places[index], degrees[index])
         else:
@@ -249,8 +249,8 @@ class _Run:
         return hedges_applied(proposition.hedges, degree)
 
     def _label_degree(self, variable: str, label: str, value: float) -> float:
-        found = self.labels[variable, label]
-        return found.height * curve_degree(found.curve, value, self.values)
+        result = self.labels[variable, label]
+        return result.height * curve_degree(result.curve, value, self.values)
 
     def _so_far(self, output: SystemOutput, label: str) -> float:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
@@ -376,9 +376,9 @@ class _Run:
             case Formula(expression=expression):
                 return value_of(expression, {**self.values, "x": degree})
             case curve:
-                found = value_at(curve, degree / label.height)
-                if found is not None:
-                    return found
+                result = value_at(curve, degree / label.height)
+                if result is not None:
+                    return result
                 return self._label_degree(output.name, label.name, degree)
 
 
@@ -393,16 +393,16 @@ def _passes(how: Activation, degree: float, count: int) -> bool:
             return True
 
 
-def _chosen(how: Activation, found: Sequence[float]) -> list[float]:
+def _chosen(how: Activation, result: Sequence[float]) -> list[float]:
     """Return the degrees of the activated rules, 0 for the others."""
-    positive = [index for index, degree in enumerate(found) if degree > 0.0]
+    positive = [index for index, degree in enumerate(result) if degree > 0.0]
     if how.method == "proportional":
-        total = _left_to_right([found[index] for index in positive])
-        return [degree / total if degree > 0.0 else 0.0 for degree in found]
+        total = _left_to_right([result[index] for index in positive])
+        return [degree / total if degree > 0.0 else 0.0 for degree in result]
     sign = -1.0 if how.method == "highest" else 1.0
     # Sorting keeps the order of equals: the first of them comes first.
-    ranked = sorted(positive, key=lambda index: sign * found[index])[: how.count]
-    return [degree if index in ranked else 0.0 for index, degree in enumerate(found)]
+    ranked = sorted(positive, key=lambda index: sign * result[index])[: how.count]
+    return [degree if index in ranked else 0.0 for index, degree in enumerate(result)]
 
 
 def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, SystemTerm]]:
@@ -496,8 +496,8 @@ def _of_maximum(method: str, xs: Sequence[float], degrees: Sequence[float]) -> f
     chosen = [degree == highest for degree in degrees]
     if method == "mean of maximum":
         return _mean(xs, chosen)
-    found = [x for x, is_chosen in zip(xs, chosen, strict=True) if is_chosen]
-    return found[0] if method == "smallest of maximum" else found[-1]
+    results = [x for x, is_chosen in zip(xs, chosen, strict=True) if is_chosen]
+    return results[0] if method == "smallest of maximum" else results[-1]
 
 
 def _mean(xs: Sequence[float], chosen: Sequence[bool]) -> float:

@@ -110,22 +110,22 @@ def _or_pole(function: Callable[[float], float], a: float, pole: float) -> float
 def _or_nan(function: Callable[[float], float]) -> Callable[[float], float]:
     """Return a function that is NaN where Python's has no value."""
 
-    def found(a: float) -> float:
+    def result(a: float) -> float:
         try:
             return function(a)
         except ValueError:
             return math.nan
 
-    return found
+    return result
 
 
 def _rounded(function: Callable[[float], int]) -> Callable[[float], float]:
     """Return a function to whole numbers, with the sign of 0 kept."""
 
-    def found(a: float) -> float:
+    def result(a: float) -> float:
         return math.copysign(float(function(a)), a) if math.isfinite(a) else a
 
-    return found
+    return result
 
 
 def _fmod(a: float, b: float) -> float:

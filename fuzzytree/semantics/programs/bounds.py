@@ -107,67 +107,67 @@ def error_bounds(
     if not rows:
         return np.empty((len(program.results), 0))
     some = max(_WORKING_SET // max(program.size, 1), 1)
-    found = np.empty((len(program.results), rows))
+    result = np.empty((len(program.results), rows))
     with np.errstate(all="ignore"):
         for start in range(0, rows, some):
             part = slice(start, start + some)
             for line, bound in enumerate(_bounds(program, values[:, part])):
-                found[line, part] = bound
-    return found
+                result[line, part] = bound
+    return result
 
 
 def _bounds(program: Program, values: npt.NDArray[np.float64]) -> list[Array]:
-    found: list[Pair] = []
+    pairs: list[Pair] = []
     marks: list[Array] = []
     stills = still_results(program)
     for place, (step, still) in enumerate(zip(program.steps, stills, strict=True)):
-        given = [found[one] for one in step.arguments]
+        operands = [pairs[one] for one in step.arguments]
         given_marks = [marks[one] for one in step.arguments]
         if still is not None:  # computed once, by the same functions
             value = np.array(still)
             value = value.reshape(-1, 1) if isinstance(still, list) else value
-            found.append((value, np.zeros(value.shape, value.dtype)))
+            pairs.append((value, np.zeros(value.shape, value.dtype)))
         elif step.operation == "input":
             line = values[program.inputs.index(step.name)]
-            found.append((line, np.zeros(line.shape)))
+            pairs.append((line, np.zeros(line.shape)))
         elif step.operation in _COMPARISONS:
-            (one, two), copied = given, same(*given_marks)
-            found.append(_compared(step.operation, one, two, copied))
+            (one, two), copied = operands, same(*given_marks)
+            pairs.append(_compared(step.operation, one, two, copied))
         else:
-            found.append(_pair(step, given))
-        marks.append(marks_of(step, place, found[-1], given, given_marks))
-    return [found[one.step][1] for one in program.results]
+            pairs.append(_pair(step, operands))
+        marks.append(marks_of(step, place, pairs[-1], operands, given_marks))
+    return [pairs[one.step][1] for one in program.results]
 
 
-def _pair(step: Step, given: Sequence[Pair]) -> Pair:
+def _pair(step: Step, operands: Sequence[Pair]) -> Pair:
     if step.kind == "truth":
-        return _truth(step.operation, given)
-    value, error = _number(step, given)
+        return _truth(step.operation, operands)
+    value, error = _number(step, operands)
     is_exact = np.ones(value.shape, np.bool_)
-    for place, (_, other) in enumerate(given):
+    for place, (_, other) in enumerate(operands):
         if not (step.operation == "where" and place == 0):
             is_exact = is_exact & _all_exact(step, other, value)
     error = np.where(np.isnan(error), np.inf, error)
     if step.operation in _UNROUNDED:
         return value, error
-    is_exact = is_exact | _is_certain(step.operation, given)
-    own = _own_error(step.operation, value, [one for one, _ in given])
+    is_exact = is_exact | _is_certain(step.operation, operands)
+    own = _own_error(step.operation, value, [one for one, _ in operands])
     rounding = np.where(np.isfinite(value), np.spacing(np.abs(value) + error), 0.0)
     moved = error + rounding
     moved = np.where(np.isnan(moved), np.inf, moved)
     return value, np.where(is_exact, 0.0, moved) + own
 
 
-def _is_certain(operation: str, given: Sequence[Pair]) -> Array:
+def _is_certain(operation: str, operands: Sequence[Pair]) -> Array:
     """Return where a sure 0, infinity or NaN decides for the result, error or not."""
     certain: Array = np.zeros(1, np.bool_)
     if operation not in ("add", "subtract", "multiply", "divide"):
         return certain
-    (a, error_a), (b, error_b) = given
-    for one, error in given:
+    (a, error_a), (b, error_b) = operands
+    for one, error in operands:
         certain = certain | (np.isnan(one) & (error == 0.0))
     if operation == "multiply":
-        for (one, error), (other, unsure) in (given, given[::-1]):
+        for (one, error), (other, unsure) in (operands, operands[::-1]):
             is_sure = error == 0.0
             certain = certain | (is_sure & (one == 0.0) & np.isfinite(other + unsure))
             certain = certain | (is_sure & np.isinf(one) & (np.abs(other) > unsure))
@@ -184,7 +184,7 @@ def _all_exact(step: Step, error: Array, value: Array) -> Array:
     return np.equal(error, 0.0)
 
 
-def _own_error(operation: str, value: Array, given: Sequence[Array]) -> Array:
+def _own_error(operation: str, value: Array, operands: Sequence[Array]) -> Array:
     """Return by how much two libraries differ for the same arguments."""
     if operation not in INEXACT:
         return np.zeros(value.shape)
@@ -192,19 +192,19 @@ def _own_error(operation: str, value: Array, given: Sequence[Array]) -> Array:
     units: Array = np.array(PAIR_ULPS.get(operation, 8.0) * np.spacing(size))
     is_one: Array = ~np.isfinite(value)  # what all libraries agree on
     if operation == "exponential":
-        is_one = is_one | (given[0] < _SURELY_0)
+        is_one = is_one | (operands[0] < _SURELY_0)
     if operation == "power":
-        base, exponent = given
+        base, exponent = operands
         is_one = is_one | (base == 0.0) | (base == 1.0)
         is_one = is_one | (exponent == 0.0) | (exponent == 1.0)
     else:
-        is_one = is_one | (given[0] == 0.0)
+        is_one = is_one | (operands[0] == 0.0)
     units[is_one] = 0.0
     return units
 
 
-def _truth(operation: str, given: Sequence[Pair]) -> Pair:
-    (a, unsure_a), *others = given
+def _truth(operation: str, operands: Sequence[Pair]) -> Pair:
+    (a, unsure_a), *others = operands
     if operation == "not":
         return ~a, unsure_a
     if operation == "is_finite":
@@ -227,27 +227,27 @@ def _compared(operation: str, one: Pair, two: Pair, is_same: Array) -> Pair:
     return _COMPARISONS[operation](a, b), unsure
 
 
-def _number(step: Step, given: Sequence[Pair]) -> Pair:
+def _number(step: Step, operands: Sequence[Pair]) -> Pair:
     operation = step.operation
     if operation in _MONOTONE:
-        return _monotone(_MONOTONE[operation], *given[0])
+        return _monotone(_MONOTONE[operation], *operands[0])
     if operation in _WAVES:
-        a, error = given[0]
+        a, error = operands[0]
         return _WAVES[operation](a), np.minimum(error, 2.0)
     if operation in _ROUGH:
-        value = _ROUGH[operation](*[one for one, _ in given])
-        unsure = sum(error for _, error in given)
+        value = _ROUGH[operation](*[one for one, _ in operands])
+        unsure = sum(error for _, error in operands)
         return value, np.where(unsure == 0.0, 0.0, np.inf)
     if step.table:
-        return _looked_up(step, *given[0])
+        return _looked_up(step, *operands[0])
     if operation in ("total", "running", "last", "highest", "lowest"):
-        return _over_samples(operation, *given[0])
+        return _over_samples(operation, *operands[0])
     if operation == "where":
-        return _where(*given)
+        return _where(*operands)
     if operation in ("negate", "absolute"):
-        a, error = given[0]
+        a, error = operands[0]
         return (-a if operation == "negate" else np.abs(a)), error
-    return _of_two(operation, *given[0], *given[1])
+    return _of_two(operation, *operands[0], *operands[1])
 
 
 def _monotone(function: Callable[..., Array], a: Array, error: Array) -> Pair:
@@ -366,7 +366,11 @@ def same(one: Array, two: Array) -> Array:
 
 
 def marks_of(
-    step: Step, place: int, found: Pair, given: Sequence[Pair], marks: Sequence[Array]
+    step: Step,
+    place: int,
+    result: Pair,
+    operands: Sequence[Pair],
+    marks: Sequence[Array],
 ) -> Array:
     """Return a mark for each number of a step; copies of a number share its mark.
 
@@ -380,7 +384,7 @@ def marks_of(
         >>> marks_of(Step("minimum", (0, 1)), 2, pairs[0], pairs, both).tolist()
         [11]
     """
-    value, error = np.broadcast_arrays(*found)
+    value, error = np.broadcast_arrays(*result)
     if step.kind == "truth":
         return np.zeros(1, np.uint64)
     bits = np.asarray(value, np.float64, order="C").view(np.uint64)
@@ -389,21 +393,21 @@ def marks_of(
     own = _own_marks(step, place, value.shape, marks)
     match step.operation:
         case "minimum" | "maximum":
-            (a, error_a), (b, error_b) = given
+            (a, error_a), (b, error_b) = operands
             is_first = a < b if step.operation == "minimum" else a > b
             is_sure = (np.abs(a - b) > error_a + error_b) | same(*marks)
-            made = np.where(is_sure, np.where(is_first, *marks), own)
+            new_marks = np.where(is_sure, np.where(is_first, *marks), own)
         case "where":
-            condition, unsure = given[0]
+            condition, unsure = operands[0]
             is_sure = ~unsure | same(marks[1], marks[2])
-            made = np.where(is_sure, np.where(condition, marks[1], marks[2]), own)
+            new_marks = np.where(is_sure, np.where(condition, marks[1], marks[2]), own)
         case "highest" | "lowest":
-            made = _of_many(value, given[0], marks[0], own)
+            new_marks = _of_many(value, operands[0], marks[0], own)
         case "last":
-            made = marks[0][-1]
+            new_marks = marks[0][-1]
         case _:
-            made = own
-    return np.where(error == 0.0, _mixed(bits), made)
+            new_marks = own
+    return np.where(error == 0.0, _mixed(bits), new_marks)
 
 
 def _own_marks(

@@ -17,10 +17,10 @@ from fuzzytree.semantics.programs.operations import (
 )
 from fuzzytree.semantics.programs.steps import Program, ResultKind, Step
 
-Found = float | bool | list[float] | list[bool]
+StepValue = float | bool | list[float] | list[bool]
 
 
-class Numbers(msgspec.Struct, frozen=True):
+class ProgramNumbers(msgspec.Struct, frozen=True):
     """The results of a program for one row."""
 
     program: Program
@@ -32,7 +32,7 @@ class Numbers(msgspec.Struct, frozen=True):
         return tuple(value for result, value in pairs if result.kind == kind)
 
 
-def evaluate(program: Program, row: Mapping[str, float]) -> Numbers:
+def evaluate(program: Program, row: Mapping[str, float]) -> ProgramNumbers:
     """Run a program on one row.
 
     Raises:
@@ -51,19 +51,21 @@ def evaluate(program: Program, row: Mapping[str, float]) -> Numbers:
         >>> evaluate(from_rules(rules), {"force": 2.0}).of("strength")
         (0.5,)
     """
-    found: list[Found] = []
+    step_values: list[StepValue] = []
     for step in program.steps:
-        found.append(_result(step, [found[place] for place in step.arguments], row))
+        step_values.append(
+            _result(step, [step_values[place] for place in step.arguments], row)
+        )
     values: list[float] = []
     for result in program.results:
-        value = found[result.step]
+        value = step_values[result.step]
         if isinstance(value, list):  # a program cannot be made of such results
             raise TypeError(f"{result.name} has many samples")
         values.append(float(value))
-    return Numbers(program, tuple(values))
+    return ProgramNumbers(program, tuple(values))
 
 
-def still_results(program: Program) -> tuple[Found | None, ...]:
+def still_results(program: Program) -> tuple[StepValue | None, ...]:
     """Return the results that no input enters, by step; None for the other steps.
 
     Runners compute these once, here, and so with Python's own functions.
@@ -77,16 +79,18 @@ def still_results(program: Program) -> tuple[Found | None, ...]:
         >>> still_results(program)
         ([0.0, 1.0, 2.0], 0.5, [0.0, 0.5, 1.0], None, None, None)
     """
-    found: list[Found | None] = []
+    results: list[StepValue | None] = []
     for step in program.steps:
-        given = [found[place] for place in step.arguments]
-        known = [value for value in given if value is not None]
-        is_moving = step.operation == "input" or len(known) < len(given)
-        found.append(None if is_moving else _result(step, known, {}))
-    return tuple(found)
+        operands = [results[place] for place in step.arguments]
+        known = [value for value in operands if value is not None]
+        is_moving = step.operation == "input" or len(known) < len(operands)
+        results.append(None if is_moving else _result(step, known, {}))
+    return tuple(results)
 
 
-def _result(step: Step, given: list[Found], row: Mapping[str, float]) -> Found:
+def _result(
+    step: Step, operands: list[StepValue], row: Mapping[str, float]
+) -> StepValue:
     match step.operation:
         case "constant":
             return step.number
@@ -95,26 +99,28 @@ def _result(step: Step, given: list[Found], row: Mapping[str, float]) -> Found:
         case "index":
             return [float(place) for place in range(step.samples)]
         case "total" | "running" | "last" | "highest" | "lowest":
-            (samples,) = given
+            (samples,) = operands
             if not isinstance(samples, list):  # a program cannot be made of such steps
                 raise TypeError(f"{step.operation} of a single number")
             return _over_samples(step.operation, list(map(float, samples)))
         case _ if not step.samples:
-            return _one(step, given)
+            return _one(step, operands)
         case _:
             return [
-                _one(step, [one[i] if isinstance(one, list) else one for one in given])
+                _one(
+                    step, [one[i] if isinstance(one, list) else one for one in operands]
+                )
                 for i in range(step.samples)
             ]
 
 
-def _one(step: Step, given: list[Found]) -> float | bool:
+def _one(step: Step, operands: list[StepValue]) -> float | bool:
     if step.table:
-        (value,) = given
+        (value,) = operands
         return of_table(step.operation, step.table, float(value))  # type: ignore[arg-type] # no list
     if step.operation in LOGICAL:
-        return LOGICAL[step.operation](*given)
-    return NUMERIC[step.operation](*given)
+        return LOGICAL[step.operation](*operands)
+    return NUMERIC[step.operation](*operands)
 
 
 def _over_samples(operation: str, samples: list[float]) -> float | list[float]:

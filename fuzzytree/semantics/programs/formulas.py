@@ -55,10 +55,10 @@ def value_of(make: Maker, expression: Expression, names: Mapping[str, int]) -> i
         case Name(name=name):
             return names[name]
         case Call(function=function, arguments=arguments):
-            given = [value_of(make, argument, names) for argument in arguments]
+            operands = [value_of(make, argument, names) for argument in arguments]
             if function in _SAME:
-                return make(_SAME[function], *given)
-            return _OTHERS[function](make, *given)
+                return make(_SAME[function], *operands)
+            return _OTHERS[function](make, *operands)
 
 
 def is_nan(make: Maker, a: int) -> int:

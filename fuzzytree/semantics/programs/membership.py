@@ -183,15 +183,15 @@ def _trapezoid(make: Maker, curve: Trapezoid, x: int) -> int:
         rest = make("subtract", make.constant(d), x)
         slopes.append(make("divide", rest, make.constant(d - c)))
     zero, one = make.constant(0.0), make.constant(1.0)
-    found = one
+    result = one
     if slopes:
         is_peak = len(slopes) == 2 and b == c
-        found = smaller_slope(make, slopes, is_peak=is_peak)
+        result = smaller_slope(make, slopes, is_peak=is_peak)
     if a is not None and a == b:
-        found = make("where", make("less", x, make.constant(a)), zero, found)
+        result = make("where", make("less", x, make.constant(a)), zero, result)
     if d is not None and c == d:
-        found = make("where", make("less", make.constant(d), x), zero, found)
-    return found
+        result = make("where", make("less", make.constant(d), x), zero, result)
+    return result
 
 
 def _gaussian(make: Maker, x: int, mean: float, deviation: float) -> int:
@@ -208,9 +208,9 @@ def _s(make: Maker, x: int, start: float, end: float) -> int:
     rest = _scaled(make, x, end, end - start)
     low = make("multiply", two, make("multiply", t, t))
     high = make("subtract", one, make("multiply", two, make("multiply", rest, rest)))
-    found = make("where", make("at_most", one, t), one, high)
-    found = make("where", make("at_most", t, make.constant(0.5)), low, found)
-    return make("where", make("at_most", t, zero), zero, found)
+    result = make("where", make("at_most", one, t), one, high)
+    result = make("where", make("at_most", t, make.constant(0.5)), low, result)
+    return make("where", make("at_most", t, zero), zero, result)
 
 
 def _pi(make: Maker, curve: PiCurve, x: int) -> int:
@@ -246,8 +246,8 @@ def _arc(make: Maker, u: int) -> int:
     zero, one = make.constant(0.0), make.constant(1.0)
     rest = make("subtract", make.constant(2.0), u)
     root = make("square_root", make("multiply", u, rest))
-    found = make("where", make("at_most", one, u), one, root)
-    return make("where", make("at_most", u, zero), zero, found)
+    result = make("where", make("at_most", one, u), one, root)
+    return make("where", make("at_most", u, zero), zero, result)
 
 
 def _semi_ellipse(make: Maker, x: int, start: float, end: float) -> int:
@@ -307,14 +307,16 @@ def horner(make: Maker, coefficients: Sequence[float], x: int) -> int:
 
 
 def _band(make: Maker, band: Band, x: int) -> int:
-    found = make.constant(1.0)
+    result = make.constant(1.0)
     if band.high is not None:
         right = _flank(make, band.right, x)
-        found = make("where", make("less", make.constant(band.high), x), right, found)
+        result = make("where", make("less", make.constant(band.high), x), right, result)
     if band.low is not None:
         left = _flank(make, band.left, x)
-        found = make("where", make("at_most", x, make.constant(band.low)), left, found)
-    return found
+        result = make(
+            "where", make("at_most", x, make.constant(band.low)), left, result
+        )
+    return result
 
 
 def _flank(make: Maker, flank: Flank | None, x: int) -> int:
@@ -345,10 +347,10 @@ def smaller_slope(make: Maker, slopes: Sequence[int], *, is_peak: bool) -> int:
 
     Rounding keeps order, so a slope is at least 1 wherever the other one counts.
     """
-    found = make.chain("minimum", slopes)
+    result = make.chain("minimum", slopes)
     if not is_peak:
-        found = make("minimum", found, make.constant(1.0))
-    return make("maximum", found, make.constant(0.0))
+        result = make("minimum", result, make.constant(1.0))
+    return make("maximum", result, make.constant(0.0))
 
 
 def _points_degree(make: Maker, points: Points, x: int) -> int:
@@ -357,15 +359,15 @@ def _points_degree(make: Maker, points: Points, x: int) -> int:
     slopes = _slopes(make, points, x)
     if slopes:
         return smaller_slope(make, slopes, is_peak=len(points.values) == 3)
-    found = make.constant(points.degrees[-1])
+    result = make.constant(points.degrees[-1])
     pairs = list(zip(points.values, points.degrees, strict=True))
     for (left, below), (right, above) in reversed(list(itertools.pairwise(pairs))):
         if left < right:
             line = _piece(make, left, below, right, above, x)
             inside = make("at_most", x, make.constant(right))
-            found = make("where", inside, line, found)
+            result = make("where", inside, line, result)
     first = make("at_most", x, make.constant(points.values[0]))
-    return make("where", first, make.constant(points.degrees[0]), found)
+    return make("where", first, make.constant(points.degrees[0]), result)
 
 
 def _piece(

@@ -219,11 +219,13 @@ def ranked(make: Maker, how: Activation, degrees: Sequence[int]) -> list[int]:
         pairs = list(zip(left, degrees, strict=True))
         values = [make("where", free, degree, outside) for free, degree in pairs]
         best = make.chain("maximum" if is_highest else "minimum", values)
-        seen: int | None = None
+        earlier: int | None = None
         for index, (free, degree) in enumerate(pairs):
             hit = make("and", free, make("equal", degree, best))
-            is_first = hit if seen is None else make("and", hit, make("not", seen))
-            seen = hit if seen is None else make("or", seen, hit)
+            is_first = (
+                hit if earlier is None else make("and", hit, make("not", earlier))
+            )
+            earlier = hit if earlier is None else make("or", earlier, hit)
             before = chosen[index]
             chosen[index] = is_first if before is None else make("or", before, is_first)
             left[index] = make("and", free, make("not", is_first))

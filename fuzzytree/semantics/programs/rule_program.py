@@ -92,11 +92,11 @@ def _strengths(make: Maker, rules: RuleBase, axes: dict[str, int]) -> list[int]:
 
 def _first(make: Maker, hits: list[int], numbers: list[int]) -> int:
     """Return the number of the first hit, 0 without one."""
-    found = make.constant(float(numbers[-1]))
+    result = make.constant(float(numbers[-1]))
     pairs = list(zip(hits, numbers, strict=True))
     for hit, number in reversed(pairs[:-1]):
-        found = make("where", hit, make.constant(float(number)), found)
-    return found
+        result = make("where", hit, make.constant(float(number)), result)
+    return result
 
 
 def _answer(make: Maker, rules: RuleBase, rule: int) -> int:

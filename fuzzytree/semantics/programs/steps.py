@@ -169,22 +169,22 @@ class Maker:
     def table(self, operation: str, argument: int, table: Iterable[float]) -> int:
         """Return the place of `below` or `pick`."""
         numbers = tuple(table)
-        given = self._steps[argument]
-        if given.operation == "constant":
-            return self.constant(of_table(operation, numbers, given.number))
-        step = Step(operation, (argument,), table=numbers, samples=given.samples)
+        operands = self._steps[argument]
+        if operands.operation == "constant":
+            return self.constant(of_table(operation, numbers, operands.number))
+        step = Step(operation, (argument,), table=numbers, samples=operands.samples)
         return self._added(step)
 
     def __call__(self, operation: str, *arguments: int) -> int:
         """Return the place of an operation on earlier steps."""
-        given = [self._steps[argument] for argument in arguments]
-        if all(step.operation == "constant" for step in given):
-            numbers = [step.number for step in given]
+        operands = [self._steps[argument] for argument in arguments]
+        if all(step.operation == "constant" for step in operands):
+            numbers = [step.number for step in operands]
             if operation in NUMERIC:
                 return self.constant(NUMERIC[operation](*numbers))
-        if _is_neutral(operation, given):
+        if _is_neutral(operation, operands):
             return arguments[0]
-        if operation == "multiply" and _is_neutral(operation, given[::-1]):
+        if operation == "multiply" and _is_neutral(operation, operands[::-1]):
             return arguments[1]
         if operation in ("minimum", "maximum", "where"):
             *_, one, two = arguments
@@ -192,7 +192,7 @@ class Maker:
                 return one
         samples = 0
         if operation not in OVER_SAMPLES:
-            samples = max((step.samples for step in given), default=0)
+            samples = max((step.samples for step in operands), default=0)
         return self._added(Step(operation, arguments, samples=samples))
 
     @contextlib.contextmanager
@@ -284,11 +284,11 @@ def _moved(step: Step, new: dict[int, int]) -> Step:
     )
 
 
-def _is_neutral(operation: str, given: Sequence[Step]) -> bool:
+def _is_neutral(operation: str, operands: Sequence[Step]) -> bool:
     """Return whether an operation gives its first argument as it is."""
-    if len(given) != 2 or given[1].operation != "constant":
+    if len(operands) != 2 or operands[1].operation != "constant":
         return False
-    number = given[1].number
+    number = operands[1].number
     if operation in ("multiply", "divide"):
         return number == 1.0
     return operation == "subtract" and number == 0.0 and math.copysign(1, number) > 0
@@ -305,14 +305,14 @@ def _mistakes(program: Program) -> Iterator[str]:
         if any(not 0 <= argument < place for argument in step.arguments):
             yield f"{where}: {step.operation} needs steps before it"
             return
-        given = [program.steps[argument] for argument in step.arguments]
-        if tuple(one.kind for one in given) != known.takes:
+        operands = [program.steps[argument] for argument in step.arguments]
+        if tuple(one.kind for one in operands) != known.takes:
             yield f"{where}: {step.operation} takes {', '.join(known.takes)}"
         if step.operation == "input" and step.name not in program.inputs:
             yield f"{where}: no input {step.name!r}"
         if step.operation in ("below", "pick") and not step.table:
             yield f"{where}: {step.operation} needs a table"
-        lengths = {one.samples for one in given} - {0}
+        lengths = {one.samples for one in operands} - {0}
         expected = max(lengths, default=0)
         if step.operation in OVER_SAMPLES:
             expected = 0 if expected else -1

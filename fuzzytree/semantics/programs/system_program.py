@@ -116,17 +116,17 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
 
 def _values(make: Maker, system: FuzzySystem) -> tuple[int, dict[str, int]]:
     """Return whether all values are finite, and each input's value in its range."""
-    found: list[int] = []
+    results: list[int] = []
     values: dict[str, int] = {}
     for one in system.inputs:
         with make.topic(one.name):
             value = _combined(make, one, values) if one.parts else make.input(one.name)
             make.titled(value, one.name)
-            found.append(value)
+            results.append(value)
             values[one.name] = _clamped(make, one, value) if one.clips else value
             make.titled(values[one.name], f"{one.name} clamped")
     with make.topic("inputs"):
-        return known_row(make, found), values
+        return known_row(make, results), values
 
 
 def _combined(make: Maker, one: SystemInput, values: dict[str, int]) -> int:
@@ -202,11 +202,11 @@ class _Run:
         order = range(len(block.rules))
         if how.method in ("highest", "lowest", "proportional"):
             # Which rules are activated is known when all degrees are.
-            found = [
+            results = [
                 self._rule_degree(block, rule, number)
                 for number, rule in enumerate(block.rules, first + 1)
             ]
-            degrees = self._chosen(how, found)
+            degrees = self._chosen(how, results)
             for index in order:
                 with self.make.topic(f"rule {first + index + 1}"):
                     self._conclude(block, index, first + index, degrees[index])
@@ -222,15 +222,15 @@ class _Run:
                     self._conclude(block, index, first + index, degrees[index])
         self.activations += degrees
 
-    def _chosen(self, how: Activation, found: Sequence[int]) -> list[int]:
-        if not found:
+    def _chosen(self, how: Activation, result: Sequence[int]) -> list[int]:
+        if not result:
             return []
         if how.method == "proportional":
-            degrees = proportional(self.make, found)
+            degrees = proportional(self.make, result)
         else:
-            degrees = ranked(self.make, how, found)
+            degrees = ranked(self.make, how, result)
         for degree in degrees:
-            self._unit(degree, if_all=found)
+            self._unit(degree, if_all=result)
         return degrees
 
     def _passed(self, how: Activation, degree: int, count: int) -> tuple[int, int]:
@@ -244,8 +244,8 @@ class _Run:
             limit = make.constant(float(how.count))
             active = make("and", active, make("less", count, limit))
             count = make("add", count, as_number(make, active))
-        found = make("where", active, degree, zero)
-        return self._unit(found, if_all=[degree]), count
+        result = make("where", active, degree, zero)
+        return self._unit(result, if_all=[degree]), count
 
     def _positive(self, degree: int) -> int:
         """Return a degree where it is above 0, else 0."""
@@ -263,9 +263,9 @@ class _Run:
         when = rule.when
         with make.topic(f"rule {number}"):
             degree = make.constant(1.0) if when is None else self._degree(when, block)
-            found = make("multiply", make.constant(rule.weight), degree)
-            make.titled(found, f"rule {number} strength")
-        return self._unit(found, if_all=[degree])
+            result = make("multiply", make.constant(rule.weight), degree)
+            make.titled(result, f"rule {number} strength")
+        return self._unit(result, if_all=[degree])
 
     def _degree(self, condition: Condition, block: RuleBlock) -> int:
         match condition:
@@ -281,8 +281,8 @@ class _Run:
                 return self._joined(either, S_NORMS[either], degrees)
             case Not(part=part):
                 degree = self._degree(part, block)
-                found = self.make("subtract", self.make.constant(1.0), degree)
-                return self._unit(found, if_all=[degree])
+                result = self.make("subtract", self.make.constant(1.0), degree)
+                return self._unit(result, if_all=[degree])
 
     def _joined(self, name: str, norm: Norm, degrees: Sequence[int]) -> int:
         total = degrees[0]
@@ -311,11 +311,11 @@ class _Run:
             proposition.label or "",
         )
         with self.make.topic(" ".join(words)):
-            found = hedged(self.make, proposition.hedges, degree)
-            self.make.titled(found, " ".join(words))
+            result = hedged(self.make, proposition.hedges, degree)
+            self.make.titled(result, " ".join(words))
         if proposition.variable not in self.outputs:  # of those, each rule changes it
-            self.propositions[proposition] = found
-        return self._unit(found, if_all=[degree])
+            self.propositions[proposition] = result
+        return self._unit(result, if_all=[degree])
 
     def _label_degree(self, variable: str, label: SystemTerm, x: int) -> int:
         key = variable, label.name, x
@@ -323,21 +323,21 @@ class _Run:
             with self.make.topic(f"{variable} is {label.name}"):
                 degree = curve_degree(self.make, label.curve, x, self.values)
                 height = self.make.constant(label.height)
-                found = self.make("multiply", height, degree)
-                self.make.titled(found, f"{variable} is {label.name}")
+                result = self.make("multiply", height, degree)
+                self.make.titled(result, f"{variable} is {label.name}")
             if is_unit(label.curve):
-                self.units.add(found)
-            self.degrees[key] = found
+                self.units.add(result)
+            self.degrees[key] = result
         return self.degrees[key]
 
     def _so_far(self, output: SystemOutput, label: str) -> int:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
-        found = [one for one in self._of(output) if one.label == label]
-        return self._aggregate(output, found)
+        results = [one for one in self._of(output) if one.label == label]
+        return self._aggregate(output, results)
 
-    def _aggregate(self, output: SystemOutput, found: Sequence[_Concluded]) -> int:
+    def _aggregate(self, output: SystemOutput, result: Sequence[_Concluded]) -> int:
         name = output.aggregation or "sum"
-        degrees = [one.degree for one in found]
+        degrees = [one.degree for one in result]
         if not degrees or degrees[0] not in self.units:
             degrees.insert(0, self.make.constant(0.0))
         # 0 OR the first is the first, if that lies in [0, 1].
@@ -418,17 +418,17 @@ class _Run:
         The larger of two cut curves is the curve cut at the larger degree, to the last
         bit, because minimum and product keep order in rounded numbers too.
         """
-        found = self._of(output)
+        result = self._of(output)
         if output.aggregation != "maximum":
-            return found
-        if not all(one.degree in self.units for one in found):
-            return found
+            return result
+        if not all(one.degree in self.units for one in result):
+            return result
         gathered: dict[tuple[str, str], _Concluded] = {}
-        for one in found:
+        for one in result:
             if one.implication not in ("minimum", "product"):
-                return found
+                return result
             if not is_unit(self.labels[output.name, one.label].curve):
-                return found
+                return result
             key = one.label, one.implication
             if key in gathered:
                 pair = [gathered[key].degree, one.degree]
@@ -464,13 +464,13 @@ class _Run:
         self, output: SystemOutput
     ) -> Iterator[tuple[SystemTerm, int, list[_Concluded]]]:
         """Yield labels and degrees, and the conclusions that they come from."""
-        found = self._of(output)
+        result = self._of(output)
         if output.aggregation is None:
-            for one in found:
+            for one in result:
                 yield self.labels[output.name, one.label], one.degree, [one]
             return
         owners: dict[str, list[_Concluded]] = {}
-        for one in found:
+        for one in result:
             owners.setdefault(one.label, []).append(one)
         for label in output.labels:
             if own := owners.get(label.name):
@@ -497,9 +497,9 @@ class _Run:
                 return value_of(make, expression, {**self.values, "x": degree})
             case curve:
                 height = make.constant(label.height)
-                found = value_at(make, curve, make("divide", degree, height))
-                if found is not None:
-                    return found
+                result = value_at(make, curve, make("divide", degree, height))
+                if result is not None:
+                    return result
                 return self._label_degree(output.name, label, degree)
 
 
@@ -533,11 +533,11 @@ def defuzzified(make: Maker, output: SystemOutput, xs: int, degrees: int) -> int
     highest = make("highest", degrees)
     chosen = make("equal", degrees, highest)
     if method == "mean of maximum":
-        found = _mean(make, xs, chosen)
+        result = _mean(make, xs, chosen)
     else:
-        found = _end(make, output, xs, chosen, is_first=method.startswith("smallest"))
+        result = _end(make, output, xs, chosen, is_first=method.startswith("smallest"))
     is_any = make("less", make.constant(0.0), highest)
-    return make("where", is_any, found, make.constant(math.nan))
+    return make("where", is_any, result, make.constant(math.nan))
 
 
 def centroid_of_lines(
@@ -583,12 +583,12 @@ def centroid_of_lines(
 
 def _sorted(make: Maker, numbers: Sequence[int]) -> list[int]:
     """Return numbers in rising order, by exchanging neighbours."""
-    found = [*numbers]
-    for last in range(len(found) - 1, 0, -1):
+    results = [*numbers]
+    for last in range(len(results) - 1, 0, -1):
         for k in range(last):
-            pair = found[k], found[k + 1]
-            found[k], found[k + 1] = make("minimum", *pair), make("maximum", *pair)
-    return found
+            pair = results[k], results[k + 1]
+            results[k], results[k + 1] = make("minimum", *pair), make("maximum", *pair)
+    return results
 
 
 def _areas(make: Maker, output: SystemOutput, degrees: int) -> int:
