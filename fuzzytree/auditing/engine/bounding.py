@@ -26,7 +26,7 @@ from fuzzytree.auditing.engine.arrangement import (
 )
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Point
-from fuzzytree.auditing.engine.space import BoxReach, RulePair, Space
+from fuzzytree.auditing.engine.space import BoxReach, RivalPair, Space
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -246,7 +246,7 @@ class _Lead:
         self.rule, self.rivals = rule, tuple(sorted(rivals))
         self.base = arrange(rules, domain)
         self.chosen = (rule - 1, *(number - 1 for number in self.rivals))
-        self.pairs = [RulePair(rule - 1, other) for other in self.chosen[1:]]
+        self.pairs = [RivalPair(rule - 1, other) for other in self.chosen[1:]]
         self.space = Space(self.base, self.chosen, self.pairs)
 
     def search(

@@ -57,7 +57,7 @@ _NOTHING: Final = 2.0**-1000
 _CHUNK: Final = 1 << 15  # points that are evaluated at once
 
 
-class StrengthBounds:
+class BoxBounds:
     """Rules, on boxes of a domain."""
 
     def __init__(self, rules: RuleBase, domain: Domain) -> None:
@@ -338,7 +338,7 @@ class _Rivalry:
         self.base = base
         self.is_own = np.array([rule.then == label for rule in base.rules.rules])
         ends = ends_of(base.rules, base.domain)
-        reached = StrengthBounds(base.rules, base.domain).reached(*ends)
+        reached = BoxBounds(base.rules, base.domain).reached(*ends)
         self.low, self.high = reached.low[:, 0], reached.high[:, 0]
         own = self.low[self.is_own]
         self.least = float(own.max(initial=0.0))

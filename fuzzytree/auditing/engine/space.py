@@ -39,7 +39,7 @@ _FINEST = 2.0**-52  # the share of a line that is not parted any more
 _WIDEST = 20.0  # a logarithm: what can be 0 is not infinitely worth parting
 
 
-class RulePair(NamedTuple):
+class RivalPair(NamedTuple):
     """Two rules that are compared, by position: is `one` above `other`?"""
 
     one: int
@@ -103,7 +103,7 @@ class VariableUse:
         rules: RuleBase,
         variable: Variable,
         chosen: Sequence[int],
-        pairs: Sequence[RulePair],
+        pairs: Sequence[RivalPair],
         ordered: Sequence[Intervals] = (),
     ) -> None:
         self.is_product = rules.semantics.conjunction == "product"
@@ -409,7 +409,7 @@ class Space:
         self,
         base: Arrangement,
         chosen: Sequence[int],
-        pairs: Sequence[RulePair] = (),
+        pairs: Sequence[RivalPair] = (),
         *,
         is_ordered: bool = False,
     ) -> None:
@@ -557,7 +557,7 @@ class Space:
 
 
 def _ordered(
-    base: Arrangement, pairs: Sequence[RulePair]
+    base: Arrangement, pairs: Sequence[RivalPair]
 ) -> dict[str, list[Intervals]]:
     """Return, for each variable and pair, where `other` is at least as large.
 

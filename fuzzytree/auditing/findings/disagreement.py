@@ -16,7 +16,7 @@ from fuzzytree.auditing.engine.arrangement import (
 )
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.decisions import (
-    StrengthBounds,
+    BoxBounds,
     columns,
     decision_at,
     other_decision,
@@ -75,7 +75,7 @@ class TreeAndRules:
         self.tree, self.domain, self.found = tree, domain, found
         self.given = arrange(raw, domain)
         self.crisp = CrispDecider(tree, domain)
-        self.around = StrengthBounds(raw, domain)
+        self.around = BoxBounds(raw, domain)
 
     def claims(self, point: Mapping[str, Fraction]) -> tuple[Claim, Claim]:
         """Return what both decide at a point."""

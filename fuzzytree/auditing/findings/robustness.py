@@ -12,7 +12,7 @@ import numpy as np
 from fuzzytree.auditing.engine.arrangement import arrange, restricted, strengths_at
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.decisions import (
-    StrengthBounds,
+    BoxBounds,
     columns,
     decision_at,
     other_decision,
@@ -148,7 +148,7 @@ class RuleDecider:
     def __init__(self, subject: Subject) -> None:
         self.subject = subject
         self.given = arrange(subject.rules, subject.domain)
-        self.around = StrengthBounds(subject.rules, subject.domain)
+        self.around = BoxBounds(subject.rules, subject.domain)
         self.ahead: dict[tuple[Fraction, ...], tuple[Point, float]] = {}
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:

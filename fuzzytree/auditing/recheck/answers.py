@@ -67,7 +67,9 @@ def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     for number in answer.rules:
         expect(1 <= number <= count, f"{where}: there is no rule {number}")
     variables = [
-        v for representation in case.carriers.values() for v in representation.variables
+        v
+        for representation in case.representations.values()
+        for v in representation.variables
     ]
     terms = {(v.name, t.name) for v in variables for t in v.terms}
     for label in answer.terms:

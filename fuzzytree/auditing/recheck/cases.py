@@ -81,15 +81,15 @@ class Case:
             self.view = View(model, audit)
             model = self.view.rules
         self.audit, self.model = audit, model
-        self.carriers: dict[str, Model] = {}
+        self.representations: dict[str, Model] = {}
         if isinstance(model, Tree):
             self.rules = rules_of(model, "relative")
-            self.carriers = {"tree": model}
+            self.representations = {"tree": model}
             if model.sets:
-                self.carriers["raw rules"] = rules_of(model, "raw")
+                self.representations["raw rules"] = rules_of(model, "raw")
         else:
             self.rules = model
-        self.carriers["rules"] = self.rules
+        self.representations["rules"] = self.rules
         self.variables = {v.name: v for v in model.variables}
         self.sides = {side.variable: side for side in audit.domain.sides}
         self.is_free = not any(v.parts for v in model.variables)

@@ -109,7 +109,7 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
     Raises:
         DoesNotHoldError: If it is no claim about this model.
     """
-    model = case.carriers.get(claim.of)
+    model = case.representations.get(claim.of)
     if model is None:
         raise DoesNotHoldError(f"there are no {claim.of} to claim something of")
     coordinates = {n for n, one in zip(claim._fields, claim, strict=True) if one}

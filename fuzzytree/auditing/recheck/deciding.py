@@ -441,7 +441,7 @@ def superfluous(case: Case, answer: Answer) -> None:
         raise UndecidedError("it ties with a later rule, and its place may decide")
 
 
-def tied(case: Case, answer: Answer) -> None:
+def ties_of_classes(case: Case, answer: Answer) -> None:
     """Count the pairs of rules of two classes, and those with a finding."""
     pairs = len(case.pairs(alike=False))
     entries = sum(bool(one.rules) for one in case.coded("FT202"))
@@ -565,7 +565,7 @@ AGAIN: dict[str, Callable[[Case, Answer], None]] = {
     "FT106": copied,
     "FT107": needless,
     "FT201": apart,
-    "FT202": tied,
+    "FT202": ties_of_classes,
     "FT301": covered,
     "FT401": heights,
     "FT403": overlaps,

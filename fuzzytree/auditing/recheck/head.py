@@ -306,7 +306,7 @@ def _clauses(case: Case, answer: Answer) -> float:
 
 def _ids(case: Case, report: Report) -> None:
     """Check each id: its code and a hash of what the rules and terms say."""
-    representations = [c for c in case.carriers.values() if isinstance(c, Rules)]
+    representations = [c for c in case.representations.values() if isinstance(c, Rules)]
     shapes: dict[tuple[str, str], Shape] = {}
     for one in representations:  # the rules' own terms come last
         shapes |= {(v.name, t.name): t.shape for v in one.variables for t in v.terms}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
-from fuzzytree.auditing.engine.decisions import StrengthBounds, columns, decision_at
+from fuzzytree.auditing.engine.decisions import BoxBounds, columns, decision_at
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
 from fuzzytree.auditing.engine.nearest import distance
 from fuzzytree.auditing.engine.probes import drawn_in
@@ -48,7 +48,7 @@ def test_no_point_of_a_box_is_outside_the_bounds(
 ) -> None:
     rules = _rules(seed, conjunction)
     given = arrange(rules, _box(rules))
-    around = StrengthBounds(rules, given.domain)
+    around = BoxBounds(rules, given.domain)
     draw = random.Random(seed)
     centres = np.array([[draw.uniform(-3, 3) for _ in range(6)] for _ in rules.inputs])
     for radius in (0.0, 0.01, 0.3):
@@ -65,7 +65,7 @@ def test_no_point_of_a_box_is_outside_the_bounds(
 
 def test_a_ball_holds_all_points_within_its_radius() -> None:
     rules = _rules(0)
-    around = StrengthBounds(rules, _box(rules))
+    around = BoxBounds(rules, _box(rules))
     centre = Fraction(0.1)
     low, high = around.ball(np.full((len(rules.inputs), 1), 0.1), 1 / 3)
     reach = Fraction(1 / 3) * 6
@@ -77,7 +77,7 @@ def test_a_ball_holds_all_points_within_its_radius() -> None:
 def test_a_clear_box_has_no_other_decision(seed: int) -> None:
     rules = _rules(seed)
     given = arrange(rules, _box(rules))
-    around = StrengthBounds(rules, given.domain)
+    around = BoxBounds(rules, given.domain)
     draw = random.Random(seed)
     points = [
         dict(zip(rules.inputs, map(Fraction, row), strict=True))
@@ -99,7 +99,7 @@ def test_a_clear_box_has_no_other_decision(seed: int) -> None:
 def test_steps_towards_another_class_end_where_it_is_ahead(seed: int) -> None:
     rules = random_base(seed, 6, 3, kind="mixed", shared=0.5)
     given = arrange(rules, Domain(tuple(DomainSide(n, 0.0, 1.0) for n in rules.inputs)))
-    around = StrengthBounds(rules, given.domain)
+    around = BoxBounds(rules, given.domain)
     draw = random.Random(seed)
     points = [
         {name: Fraction(draw.random()) for name in rules.inputs} for _ in range(20)
