@@ -276,7 +276,7 @@ def _accu_losses(
 ) -> Iterator[Loss]:
     """Yield the aggregation of an output that the dialect cannot express."""
     where = f"output {output.name!r}"
-    norm, written = output.aggregation, output.aggregation
+    norm, file_norm = output.aggregation, output.aggregation
     is_weighted = output.defuzzifier.is_weighted
     if has_accu(words):
         blocks = [
@@ -284,11 +284,11 @@ def _accu_losses(
             for block in system.blocks
         ]
         result = [accu_of(system, one, words) for one in blocks if output.name in one]
-        written = next(filter(None, result), None)
-        if written == "sum" and is_weighted:
-            written = None
+        file_norm = next(filter(None, result), None)
+        if file_norm == "sum" and is_weighted:
+            file_norm = None
     elif is_weighted:
-        written = None
+        file_norm = None
     curves = {one.name: one.curve for one in output.labels}
     counts = Counter(
         curves[one.label]
@@ -298,8 +298,8 @@ def _accu_losses(
     )
     if is_weighted and max(counts.values(), default=0) < 2:
         return  # there is nothing to join
-    if written != norm and counts:
-        meant = "summed one by one" if written is None else f"joined by {written!r}"
+    if file_norm != norm and counts:
+        meant = "summed one by one" if file_norm is None else f"joined by {file_norm!r}"
         wanted = "one by one" if norm is None else f"by {norm!r}"
         yield Loss(where, f"its conclusions are {meant}, and not {wanted}")
     elif norm is None and words.name == "iec":

@@ -134,10 +134,10 @@ class OnnxGraph:
         if not (named or attributes or domain):
             self._results[key] = result
         # Some versions of onnxruntime mistake nodes without a name for one another.
-        message = helper.make_node(op, inputs, [result], name=result, domain=domain)
+        node = helper.make_node(op, inputs, [result], name=result, domain=domain)
         for name in sorted(attributes):
-            message.attribute.append(helper.make_attribute(name, attributes[name]))
-        self.nodes.append(message)
+            node.attribute.append(helper.make_attribute(name, attributes[name]))
+        self.nodes.append(node)
         return result
 
     def constant(self, value: Constant, hint: str) -> str:
@@ -182,13 +182,13 @@ class OnnxGraph:
     def texts(self, values: Sequence[str], hint: str) -> str:
         """Return the name of a new constant list of texts."""
         name = self._fresh(hint)
-        message = onnx.TensorProto(
+        tensor = onnx.TensorProto(
             name=name,
             data_type=onnx.TensorProto.STRING,
             dims=[len(values)],
             string_data=[value.encode() for value in values],
         )
-        self.tensors.append(message)
+        self.tensors.append(tensor)
         return name
 
     def numbers(self, values: Sequence[int], hint: str) -> str:

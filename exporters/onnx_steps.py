@@ -411,18 +411,18 @@ class Blocks:
     def _chains(self) -> dict[int, tuple[list[int], list[int]]]:
         """Return the operands of each long chain by its last step, and its others."""
         links = chain_links(self.program, self._still, {*CHAINS, *_TRUTHS})
-        known_value: dict[int, tuple[list[int], list[int]]] = {}
+        chains: dict[int, tuple[list[int], list[int]]] = {}
         for place, step in enumerate(self.program.steps):
             if step.arguments and step.arguments[0] in links:
                 first, *rest = step.arguments
                 start = [*self.program.steps[first].arguments]
-                operands, inner = known_value.pop(first, (start, []))
+                operands, inner = chains.pop(first, (start, []))
                 operands += rest
                 inner.append(first)
-                known_value[place] = (operands, inner)
+                chains[place] = (operands, inner)
         return {
             place: chain
-            for place, chain in known_value.items()
+            for place, chain in chains.items()
             if len(chain[0]) >= _SHORTEST_CHAIN
             and not self.program.steps[place].samples
         }

@@ -50,8 +50,8 @@ def element(tag: str, *children: PmmlElement, **attributes: str | None) -> PmmlE
           <True/>
         </Node>
     """
-    coefficients = {name: text for name, text in attributes.items() if text is not None}
-    return PmmlElement(tag, coefficients, children)
+    known = {name: text for name, text in attributes.items() if text is not None}
+    return PmmlElement(tag, known, children)
 
 
 def text_of(root: PmmlElement) -> str:
