@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.model.naming import DIGITS, LETTERS, Names
+from fuzzytree.model.naming import DIGITS, LETTERS, NameMap
 from fuzzytree.numerics.narrowing import rounded
 
 _WIDTH = 88
@@ -88,7 +88,7 @@ def prefix_of(name: str) -> str:
         small = f"model_{small}"
     letters = string.ascii_lowercase
     rest = letters + DIGITS + "_"
-    result = Names.of([small], first=letters, rest=rest, longest=_LONGEST_PREFIX)
+    result = NameMap.of([small], first=letters, rest=rest, longest=_LONGEST_PREFIX)
     return result[small].rstrip("_")
 
 
@@ -101,7 +101,7 @@ def constants(prefix: str, names: Sequence[str]) -> list[str]:
     """
     every = LETTERS + DIGITS + "_"
     longest = _LONGEST_CONSTANT - len(prefix)
-    result = Names.of(names, first=every, longest=longest, ignores_case=True)
+    result = NameMap.of(names, first=every, longest=longest, ignores_case=True)
     return [prefix + result[name].upper() for name in names]
 
 

@@ -34,7 +34,7 @@ from fuzzytree.formats.fcl.fcl_dialects import MARK
 from fuzzytree.formats.fcl.fcl_reader import FACTS, places, read
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import Names
+from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem, Or, SystemInput, SystemOutput
 from fuzzytree.semantics.conversion import (
@@ -153,8 +153,8 @@ class _FclNames(FileNames, frozen=True):
 
 
 def _naming(system: FuzzySystem, words: FclWords) -> _FclNames:
-    def named(names: list[str], taken: Iterable[str] = ()) -> Names:
-        return Names.of(
+    def named(names: list[str], taken: Iterable[str] = ()) -> NameMap:
+        return NameMap.of(
             names,
             taken=taken,
             first="abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",

@@ -41,7 +41,7 @@ from fuzzytree.formats.fis.fis_words import (
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import Names
+from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import (
     Activation,
@@ -146,12 +146,12 @@ def write(
 def _naming(system: FuzzySystem, terms: FisTerms) -> FileNames:
     labels = {**terms.labels, **{one.name: one.labels for one in system.outputs}}
     return FileNames(
-        Names.of([one.name for one in system.variables], reserved=_RESERVED),
+        NameMap.of([one.name for one in system.variables], reserved=_RESERVED),
         {
-            name: Names.of([one.name for one in own], reserved=_RESERVED)
+            name: NameMap.of([one.name for one in own], reserved=_RESERVED)
             for name, own in labels.items()
         },
-        Names.of([system.name]),
+        NameMap.of([system.name]),
     )
 
 

@@ -32,7 +32,7 @@ from fuzzytree.formats.fll.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NOR
 from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import Names
+from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import LR, Band, Points, RuleBase
 from fuzzytree.model.system import (
     FUNCTIONS,
@@ -142,11 +142,11 @@ def _naming(system: FuzzySystem) -> FileNames:
     )
 
 
-def _accepted(names: Sequence[str]) -> Names:
+def _accepted(names: Sequence[str]) -> NameMap:
     # Words are reserved in small letters only: a variable may be called X.
     taken = {name.lower() for name in names if name != name.lower()} - {*names}
     reserved = [word for word in _RESERVED if word not in taken]
-    return Names.of(names, reserved=reserved, longest=LONGEST_NAME)
+    return NameMap.of(names, reserved=reserved, longest=LONGEST_NAME)
 
 
 def _with_pointed_numbers(

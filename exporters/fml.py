@@ -26,7 +26,7 @@ from fuzzytree.formats.fml.fml_words import (
 )
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import DIGITS, LETTERS, Names
+from fuzzytree.model.naming import DIGITS, LETTERS, NameMap
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.model.system import (
     Activation,
@@ -138,10 +138,10 @@ def _naming(system: FuzzySystem, rules: FmlRules) -> _Ids:
     return _Ids(variables, labels, title)
 
 
-def _ids(names: Iterable[str], taken: Iterable[str] = ()) -> Names:
+def _ids(names: Iterable[str], taken: Iterable[str] = ()) -> NameMap:
     """Return names without a dot, which parts a variable from its term."""
     first, rest = LETTERS + "_", LETTERS + DIGITS + "_-"
-    return Names.of(names, first=first, rest=rest, taken=taken)
+    return NameMap.of(names, first=first, rest=rest, taken=taken)
 
 
 def _with_known_curves(

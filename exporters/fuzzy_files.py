@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Loss
-from fuzzytree.model.naming import Names, changes_text
+from fuzzytree.model.naming import NameMap, changes_text
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     And,
@@ -36,9 +36,9 @@ class FileNames(msgspec.Struct, frozen=True):
         system: Of the system, where the file has a place for it.
     """
 
-    variables: Names
-    labels: Mapping[str, Names]
-    system: Names = Names({})
+    variables: NameMap
+    labels: Mapping[str, NameMap]
+    system: NameMap = NameMap({})
 
     def words(self, variable: str, label: str | None) -> tuple[str, str]:
         """Return the words for a variable and one of its terms, `any` for none."""

@@ -14,7 +14,7 @@ import numpy.typing as npt
 import onnx
 from onnx import helper, numpy_helper
 
-from fuzzytree.model.naming import Names
+from fuzzytree.model.naming import NameMap
 
 DOMAIN = "fuzzytree"
 """The domain of our own functions, in readable files."""
@@ -57,7 +57,7 @@ def identifier(title: str) -> str:
         >>> identifier("Größe (mm) is not very big")
         'Grosse_mm_is_not_very_big'
     """
-    return Names.of([title], longest=_LONGEST_NAME).accepted[title]
+    return NameMap.of([title], longest=_LONGEST_NAME).accepted[title]
 
 
 def _number_name(value: Constant, hint: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.model.naming import Names
+from fuzzytree.model.naming import NameMap
 from fuzzytree.numerics.narrowing import rounded
 
 _WIDTH = 88
@@ -102,7 +102,7 @@ LONG = StNumbers("LREAL", np.float64, 1.0 - 2.0**-53, float(np.finfo("d").max))
 SINGLE = StNumbers("REAL", np.float32, 1.0 - 2.0**-24, float(np.finfo("f").max))
 
 
-def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> Names:
+def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> NameMap:
     """Return names that the standard takes: ASCII, unlike in any case, no keywords.
 
     Example:
@@ -114,7 +114,7 @@ def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> Names:
     odd = [
         name for name in given if "__" in name or name[:1] == "_" or name[-1:] == "_"
     ]
-    return Names.of(
+    return NameMap.of(
         given,
         first="abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
         longest=_LONGEST_NAME,

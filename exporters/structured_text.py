@@ -28,7 +28,7 @@ from fuzzytree.exporters.st_text import (
 )
 from fuzzytree.formats.formulas import text_of
 from fuzzytree.model.contracts import Document, Format, Model, Written
-from fuzzytree.model.naming import Names
+from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint
 from fuzzytree.model.system import Formula, FuzzySystem, SystemInput, SystemOutput
 from fuzzytree.model.tree import FuzzyTree
@@ -117,7 +117,7 @@ def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
     return [*_OUTPUTS, *_LOCALS, *combined.values(), *steps]
 
 
-def _interface(model: Model, names: Names, numbers: StNumbers) -> Iterator[str]:
+def _interface(model: Model, names: NameMap, numbers: StNumbers) -> Iterator[str]:
     inputs = [variable for variable in model.variables if not variable.parts]
     lines = [
         f"    {names[v.name]} : {numbers.name}; (* {remark(_described(v))} *)\n"
@@ -152,7 +152,7 @@ def _mixed_lines(
 
 def _guard(
     model: Model,
-    names: Names,
+    names: NameMap,
     mixed: list[Variable],
     combined: Mapping[str, str],
     numbers: StNumbers,
@@ -324,7 +324,7 @@ def _formulas(system: FuzzySystem) -> Iterator[str]:
 
 
 def _system_interface(
-    system: FuzzySystem, names: Names, numbers: StNumbers
+    system: FuzzySystem, names: NameMap, numbers: StNumbers
 ) -> Iterator[str]:
     columns = [one for one in system.inputs if not one.parts]
     yield from block_of("VAR_INPUT", list(_declared(columns, names, numbers)))
@@ -336,20 +336,20 @@ def _system_interface(
 
 
 def _declared(
-    variables: Sequence[SystemInput | SystemOutput], names: Names, numbers: StNumbers
+    variables: Sequence[SystemInput | SystemOutput], names: NameMap, numbers: StNumbers
 ) -> Iterator[str]:
     for one in variables:
         about = f"{one.name} ({one.unit})" if one.unit else one.name
         yield f"    {names[one.name]} : {numbers.name}; (* {remark(about)} *)\n"
 
 
-def _nothing(system: FuzzySystem, names: Names, numbers: StNumbers) -> Iterator[str]:
+def _nothing(system: FuzzySystem, names: NameMap, numbers: StNumbers) -> Iterator[str]:
     for number, output in enumerate(system.outputs, 1):
         yield f"    {names[output.name]} := {numbers.literal(0.0)};\n"
         yield f"    is_number[{number}] := FALSE;\n"
 
 
-def _results(system: FuzzySystem, steps: SystemSteps, names: Names) -> Iterator[str]:
+def _results(system: FuzzySystem, steps: SystemSteps, names: NameMap) -> Iterator[str]:
     program, numbers = steps.program, steps.numbers
     pairs = zip(system.outputs, program.of("output"), strict=True)
     for number, (output, place) in enumerate(pairs, 1):

@@ -28,7 +28,7 @@ _ROWS = 64  # of the width of the first one, in a block of wide rows
 _NEW_LINE, _RETURN, _QUOTE = b'\n\r"'
 
 
-class Rows(msgspec.Struct, frozen=True, eq=False):
+class CsvRows(msgspec.Struct, frozen=True, eq=False):
     """Some whole rows of a CSV file.
 
     Attributes:
@@ -186,7 +186,7 @@ class Rows(msgspec.Struct, frozen=True, eq=False):
 
 def blocks(
     head: bytes, read: Callable[[int], bytes], mark: bytes, name: str
-) -> Iterator[Rows]:
+) -> Iterator[CsvRows]:
     """Yield a file in blocks of whole rows; the first one holds the names.
 
     Args:
@@ -201,9 +201,9 @@ def blocks(
     size = max(BLOCK, min(_ROWS * len(head.split(b"\n", 1)[0]), LONGEST))
     rest, line = head + read(max(size - len(head), 0)), 1
     while True:
-        whole = _whole(Rows(name, rest, line, mark))
+        whole = _whole(CsvRows(name, rest, line, mark))
         if whole and not _is_blank(rest[:whole]):
-            yield Rows(name, rest[:whole], line, mark)
+            yield CsvRows(name, rest[:whole], line, mark)
         if whole:
             line += count_breaks(rest[:whole])
             rest = rest[whole:]
@@ -215,7 +215,7 @@ def blocks(
             break
         rest += more
     if rest and not _is_blank(rest):
-        last = Rows(name, rest, line, mark)
+        last = CsvRows(name, rest, line, mark)
         last.refuse_open_quote()
         yield last
 
@@ -225,7 +225,7 @@ def _is_blank(text: bytes) -> bool:
     return text.isspace() and not text.strip(b"\r\n")
 
 
-def _whole(rows: Rows) -> int:
+def _whole(rows: CsvRows) -> int:
     """Return how many bytes of a text are whole rows for sure."""
     text = rows.content
     if b'"' not in text:

@@ -24,7 +24,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.csv_rows import BLOCK, Rows, blocks
+from fuzzytree.csv_rows import BLOCK, CsvRows, blocks
 from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
 from fuzzytree.model.naming import as_names
@@ -62,7 +62,7 @@ _ARROW, _PARQUET = b"ARROW1", b"PAR1"
 _NO_DELIMITER = '"\r\n\0'
 
 
-class Piece(msgspec.Struct, frozen=True, eq=False):
+class TablePiece(msgspec.Struct, frozen=True, eq=False):
     """Some rows of a table, column by column, as they came.
 
     Attributes:
@@ -130,7 +130,7 @@ class Batch(msgspec.Struct, frozen=True, eq=False):
     values: FloatArray
     missing: int
     extras: int
-    piece: Piece
+    piece: TablePiece
 
 
 class TableSource(msgspec.Struct, frozen=True, eq=False):
@@ -317,7 +317,7 @@ def pieces(
     delimiter: str | None = None,
     name: str | None = None,
     only: Only = None,
-) -> Iterator[Piece]:
+) -> Iterator[TablePiece]:
     """Yield a table in pieces; at least one, of no rows if the table has none.
 
     Args:
@@ -463,7 +463,7 @@ class _Numbers:
         self.missing = 0
         self._parts: list[FloatArray] = []
 
-    def add(self, piece: Piece, chosen: Sequence[int]) -> None:
+    def add(self, piece: TablePiece, chosen: Sequence[int]) -> None:
         """Take the chosen columns of a piece."""
         if piece.whole is not None:
             is_all = list(chosen) == list(range(len(piece.columns)))
@@ -610,7 +610,7 @@ def _number(cell: object) -> float | None:
     return float(cast("float", cell)) if is_number else None
 
 
-def trimmed(piece: Piece) -> list[tuple[str, str]]:
+def trimmed(piece: TablePiece) -> list[tuple[str, str]]:
     """Return a remark on names that stand between blanks, if there are any."""
     pairs = zip(piece.written, piece.columns, strict=True)
     found = [title for title, name in pairs if title != name and title.strip()]
@@ -618,7 +618,7 @@ def trimmed(piece: Piece) -> list[tuple[str, str]]:
     return [(repr(title), text) for title in found[:1]]
 
 
-def _is_count(piece: Piece, column: int, values: FloatArray) -> bool:
+def _is_count(piece: TablePiece, column: int, values: FloatArray) -> bool:
     """Return whether a column without a name counts the rows, from 0 or 1.
 
     Raises:
@@ -642,7 +642,7 @@ def _some(names: Iterable[str]) -> list[str]:
 
 
 def _learnt_columns(
-    piece: Piece,
+    piece: TablePiece,
     target: str | Sequence[object] | npt.NDArray[np.generic],
     ignore: Sequence[str],
 ) -> list[int]:
@@ -656,7 +656,7 @@ def _learnt_columns(
 
 
 def _needed_columns(
-    piece: Piece, inputs: Sequence[str], trained: Sequence[str]
+    piece: TablePiece, inputs: Sequence[str], trained: Sequence[str]
 ) -> list[int]:
     columns: Sequence[str] = piece.columns
     if not piece.is_named and not set(inputs) <= set(columns):
@@ -674,7 +674,7 @@ def _needed_columns(
     return [position[name] for name in inputs]
 
 
-def _refuse_absent(piece: Piece, wanted: Sequence[str], why: str) -> None:
+def _refuse_absent(piece: TablePiece, wanted: Sequence[str], why: str) -> None:
     known_names = frozenset(piece.columns)
     absent = [name for name in wanted if name not in known_names]
     if not absent:
@@ -712,7 +712,7 @@ def _refuse_repeated(name: str, columns: Sequence[str]) -> None:
 
 def _file_pieces(
     path: str | os.PathLike[str], delimiter: str | None, name: str | None, only: Only
-) -> Iterator[Piece]:
+) -> Iterator[TablePiece]:
     title = name or os.fspath(path)
     with _opened(path, title) as stream:
         try:
@@ -734,7 +734,7 @@ def _stream_pieces(
     name: str,
     delimiter: str | None,
     only: Only,
-) -> Iterator[Piece]:
+) -> Iterator[TablePiece]:
     head = stream.read(BLOCK)
     if not head.startswith((_PARQUET, _ARROW)):
         if Path(name).suffix.lower() in (".parquet", ".pq"):
@@ -757,7 +757,7 @@ def _stream_pieces(
 
 def _text_pieces(
     text: io.TextIOBase, name: str, delimiter: str | None, only: Only
-) -> Iterator[Piece]:
+) -> Iterator[TablePiece]:
     def read(size: int) -> bytes:
         return text.read(size).encode(errors="surrogatepass")
 
@@ -767,7 +767,7 @@ def _text_pieces(
         raise TableError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
 
 
-def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[Piece]:
+def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[TablePiece]:
     """Yield a Parquet file, or an Arrow file of record batches (also Feather)."""
     import pyarrow as pa
 
@@ -814,7 +814,7 @@ def _csv_pieces(
     name: str,
     delimiter: str | None,
     only: Only,
-) -> Iterator[Piece]:
+) -> Iterator[TablePiece]:
     """Yield the rows of a CSV file, of which `head` has been read already."""
     try:
         head = head.removeprefix(codecs.BOM_UTF8)
@@ -837,8 +837,8 @@ def _csv_pieces(
 
 
 def _rows_pieces(
-    rows: Rows, written: tuple[str, ...], only: Only, *, is_first: bool
-) -> Iterator[Piece]:
+    rows: CsvRows, written: tuple[str, ...], only: Only, *, is_first: bool
+) -> Iterator[TablePiece]:
     """Yield the rows of a block; at least one piece, if it is the first one."""
     columns = _named(rows.name, written)
     wanted = [k for k, column in enumerate(columns) if only is None or column in only]
@@ -853,7 +853,7 @@ def _rows_pieces(
         def where(row: int, first: int = first) -> str:
             return f"{rows.name}:{rows.line_of(first + row)}"
 
-        yield Piece(rows.name, columns, tuple(cells), count, where, written)
+        yield TablePiece(rows.name, columns, tuple(cells), count, where, written)
 
 
 def _delimiter(line: str, name: str) -> str:
@@ -873,13 +873,13 @@ def _delimiter(line: str, name: str) -> str:
 
 def _array_piece(
     array: npt.NDArray[np.generic], columns: Sequence[str] | None, name: str
-) -> Piece:
+) -> TablePiece:
     where, count = _row_names(name), len(array) if array.ndim else 0
     if array.dtype.names is not None:
         written = array.dtype.names
         fields = cast("npt.NDArray[np.void]", array)
         cells = tuple(unmasked(fields[column]) for column in written)
-        return Piece(name, _named(name, written), cells, count, where, written)
+        return TablePiece(name, _named(name, written), cells, count, where, written)
     if array.ndim != 2:
         raise TableError(f"{name} has shape {array.shape}, not (rows, columns)")
     width = array.shape[1]
@@ -893,7 +893,7 @@ def _array_piece(
         array.astype(np.float64, copy=False).T if array.dtype.kind in _REAL else None
     )
     named = _named(name, written)
-    return Piece(name, named, cells, count, where, written, is_named, whole)
+    return TablePiece(name, named, cells, count, where, written, is_named, whole)
 
 
 def _frame_piece(
@@ -902,7 +902,7 @@ def _frame_piece(
     first: int = 0,
     only: Only = None,
     written: tuple[str, ...] | None = None,
-) -> Piece:
+) -> TablePiece:
     """Return a frame's columns; `written` are those of the table it is part of."""
     import narwhals as nw
     from narwhals.exceptions import DuplicateError
@@ -934,7 +934,7 @@ def _frame_piece(
         series = frame.get_column(there[title])
         is_number = series.dtype.is_numeric()
         cells.append(series.to_numpy() if is_number else series.to_list())
-    return Piece(
+    return TablePiece(
         name, columns, tuple(cells), len(frame), _row_names(name, first), written
     )
 

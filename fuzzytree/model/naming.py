@@ -77,7 +77,7 @@ def printable_json(text: str) -> str:
     )
 
 
-class Names(msgspec.Struct, frozen=True):
+class NameMap(msgspec.Struct, frozen=True):
     """A map from the names of a model to names of a target, and back.
 
     Attributes:
@@ -97,7 +97,7 @@ class Names(msgspec.Struct, frozen=True):
         longest: int | None = None,
         taken: Iterable[str] = (),
         ignores_case: bool = False,
-    ) -> Names:
+    ) -> NameMap:
         """Return a map for some names; a name that stands twice has one entry.
 
         Names that are accepted as they are keep themselves, wherever they stand; of
@@ -139,7 +139,7 @@ class Names(msgspec.Struct, frozen=True):
             if name not in found:
                 found[name] = _unlike(allowed, allowed.made(name), words, used, counts)
                 used.add(allowed.key(found[name]))
-        return Names({name: found[name] for name in given})
+        return NameMap({name: found[name] for name in given})
 
     def __getitem__(self, name: str) -> str:
         """Return the target's name for one of the model's."""

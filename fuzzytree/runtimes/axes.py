@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PartsAt:
     """The parts at one position of all combinations that are long enough."""
 
     inputs: IntArray
@@ -48,7 +48,7 @@ class Axes:
 
     line: dict[str, int]
     inputs: int
-    steps: tuple[Step, ...]
+    steps: tuple[PartsAt, ...]
     chains: tuple[tuple[tuple[int, float, float], ...], ...]
     dtype: Real
 
@@ -84,8 +84,8 @@ def _step(
     parts: Sequence[Part],
     line: dict[str, int],
     dtype: Real,
-) -> Step:
-    return Step(
+) -> PartsAt:
+    return PartsAt(
         np.array([line[part.input] for part in parts], np.int64),
         np.array([[part.weight] for part in parts], dtype),
         np.array([[part.centre] for part in parts], dtype),

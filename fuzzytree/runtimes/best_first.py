@@ -39,7 +39,7 @@ from fuzzytree.model.rulebase import (
     shapes_of,
 )
 from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
-from fuzzytree.runtimes.descent import Split, plan_descent
+from fuzzytree.runtimes.descent import AxisSplit, plan_descent
 from fuzzytree.runtimes.envelope import (
     Envelope,
     cells_of,
@@ -65,7 +65,7 @@ _ALWAYS = Clause("", ())
 
 
 @dataclass(slots=True)
-class Fork:
+class PrefixNode:
     """A common beginning of rules.
 
     Attributes:
@@ -113,7 +113,7 @@ class Net:
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class CellRows:
     """Values of the variables, and their cells, of some rows without missing ones."""
 
     lines: FloatArray
@@ -135,7 +135,7 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class Frontier:
     """Rows at forks, and bounds of the strength of the way there."""
 
     row: IntArray
@@ -143,9 +143,9 @@ class Places:
     low: FloatArray
     high: FloatArray
 
-    def take(self, which: IntArray) -> Places:
+    def take(self, which: IntArray) -> Frontier:
         """Return some of them."""
-        return Places(
+        return Frontier(
             self.row.take(which),
             self.fork.take(which),
             self.low.take(which),
@@ -206,9 +206,9 @@ def search(rules: RuleBase) -> Run:
     return run
 
 
-def _forks(rules: RuleBase) -> list[Fork]:
+def _forks(rules: RuleBase) -> list[PrefixNode]:
     """Return the tree of the rules' beginnings; the first fork is the empty one."""
-    forks = [Fork()]
+    forks = [PrefixNode()]
     known: dict[tuple[int, Clause], int] = {}
     for number, rule in enumerate(rules.rules, 1):
         here = 0
@@ -218,20 +218,20 @@ def _forks(rules: RuleBase) -> list[Fork]:
                 known[key] = len(forks)
                 forks[here].clauses.append(clause)
                 forks[here].targets.append(len(forks))
-                forks.append(Fork())
+                forks.append(PrefixNode())
             here = known[key]
         forks[here].rules.append(number)
     return forks
 
 
 def _splits(
-    rules: RuleBase, forks: Sequence[Fork], line: dict[str, int]
-) -> list[Split] | None:
+    rules: RuleBase, forks: Sequence[PrefixNode], line: dict[str, int]
+) -> list[AxisSplit] | None:
     """Return the forks as splits if the plateaus of each divide its axis, or None."""
     shapes = shapes_of(rules.variables)
     inner = [number for number, fork in enumerate(forks) if fork.clauses]
     place = {number: position for position, number in enumerate(inner)}
-    splits: list[Split] = []
+    splits: list[AxisSplit] = []
     for number, fork in enumerate(forks):
         if len(fork.rules) != (number not in place):
             return None
@@ -245,12 +245,12 @@ def _splits(
             for _, target in plateaus
         )
         cuts = tuple(high for high, _ in plateaus if high is not None)
-        splits.append(Split(line[fork.clauses[0].variable], cuts, targets))
+        splits.append(AxisSplit(line[fork.clauses[0].variable], cuts, targets))
     return splits
 
 
 def _plateaus(
-    fork: Fork, shapes: dict[tuple[str, str], Shape]
+    fork: PrefixNode, shapes: dict[tuple[str, str], Shape]
 ) -> list[tuple[float | None, int]] | None:
     """Return where each plateau ends and which fork it leads to.
 
@@ -301,7 +301,7 @@ def _plateau(shape: Shape) -> tuple[float | None, float | None] | None:
             )
 
 
-def _net(rules: RuleBase, forks: Sequence[Fork], at_line: dict[str, int]) -> Net:
+def _net(rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int]) -> Net:
     """Return the forks as arrays; rules that end at no leaf get a branch."""
     ends = [list(fork.rules) for fork in forks]
     branches = [list(zip(f.clauses, f.targets, strict=True)) for f in forks]
@@ -354,7 +354,7 @@ def _paths(rule: IntArray, target: IntArray, source: IntArray) -> list[IntArray]
 
 def _search(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
     """Return rule and status of rows without missing values, and those to be fired."""
-    rows = Rows(lines, lines.ravel(), cells_of(net.envelope.grid, lines).ravel())
+    rows = CellRows(lines, lines.ravel(), cells_of(net.envelope.grid, lines).ravel())
     rule, floor, rival = _run_down(net, rows)
     status = np.zeros(lines.shape[1], np.int64)
     unsure = np.flatnonzero(rival >= floor)
@@ -369,7 +369,7 @@ def _search(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
     return rule, status, np.concatenate(crowded)
 
 
-def _run_down(net: Net, rows: Rows) -> tuple[IntArray, FloatArray, FloatArray]:
+def _run_down(net: Net, rows: CellRows) -> tuple[IntArray, FloatArray, FloatArray]:
     """Follow each row's best branches to a rule.
 
     Returns:
@@ -399,7 +399,7 @@ def _run_down(net: Net, rows: Rows) -> tuple[IntArray, FloatArray, FloatArray]:
 
 
 def _best(
-    net: Net, rows: Rows, row: IntArray, fork: IntArray
+    net: Net, rows: CellRows, row: IntArray, fork: IntArray
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """Return the branch with the largest bound, its entry, the bound and the next."""
     upper = net.envelope.upper
@@ -431,7 +431,7 @@ def _join(net: Net, before: FloatArray, degree: FloatArray) -> FloatArray:
 
 def _follow(
     net: Net,
-    rows: Rows,
+    rows: CellRows,
     found: tuple[IntArray, IntArray, FloatArray],
     unsure: IntArray,
 ) -> IntArray:
@@ -459,8 +459,8 @@ def _follow(
 
 
 def _reachable(
-    net: Net, rows: Rows, floor: FloatArray, unsure: IntArray
-) -> tuple[Places, IntArray]:
+    net: Net, rows: CellRows, floor: FloatArray, unsure: IntArray
+) -> tuple[Frontier, IntArray]:
     """Return the ends that some rows may reach with their floor at least.
 
     Rows with too many branches at once come second, and are at no end.
@@ -468,7 +468,7 @@ def _reachable(
     limit = max(_CROWD, len(net.length) // _SHARE)
     is_crowded = np.zeros(len(floor), np.bool_)
     ones = np.ones(len(unsure))
-    here = Places(unsure, np.zeros(len(unsure), np.int64), ones, ones)
+    here = Frontier(unsure, np.zeros(len(unsure), np.int64), ones, ones)
     ends = [here.take(unsure[:0])]
     while len(here.row):
         owner, offset, _ = spread(net.count.take(here.fork))
@@ -480,12 +480,12 @@ def _reachable(
         low = net.envelope.lower.take(entry.take(stay)).astype(np.float64)
         low = _join(net, here.low.take(stay), low)
         fork = net.target.take(branch.take(stay))
-        here = Places(here.row.take(stay), fork, low, high.take(stay))
+        here = Frontier(here.row.take(stay), fork, low, high.take(stay))
         is_crowded |= np.bincount(here.row, minlength=len(floor)) > limit
         is_end = net.rule.take(fork) > 0
         ends.append(here.take(np.flatnonzero(is_end)))
         here = here.take(np.flatnonzero(~is_end & ~is_crowded.take(here.row)))
-    joined = Places(
+    joined = Frontier(
         np.concatenate([part.row for part in ends]),
         np.concatenate([part.fork for part in ends]),
         np.concatenate([part.low for part in ends]),
@@ -513,7 +513,7 @@ def _compare(
     status[row[tied]] = 1
 
 
-def _strengths(net: Net, rows: Rows, row: IntArray, rule: IntArray) -> FloatArray:
+def _strengths(net: Net, rows: CellRows, row: IntArray, rule: IntArray) -> FloatArray:
     """Return the strength of a rule in each row, bit-equal to firing."""
     found = np.empty(len(row))
     for start in range(0, len(row), _PAIRS):
@@ -522,7 +522,9 @@ def _strengths(net: Net, rows: Rows, row: IntArray, rule: IntArray) -> FloatArra
     return found
 
 
-def _part_strengths(net: Net, rows: Rows, row: IntArray, path: IntArray) -> FloatArray:
+def _part_strengths(
+    net: Net, rows: CellRows, row: IntArray, path: IntArray
+) -> FloatArray:
     """Return strengths; what is never the smallest degree of a path is left out."""
     envelope = net.envelope
     owner, offset, begin = spread(net.length.take(path))

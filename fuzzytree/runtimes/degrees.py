@@ -45,7 +45,7 @@ _TINY = 1 << 9  # numbers up to which it is faster anyway
 
 
 @dataclass(frozen=True, slots=True)
-class Numbers:
+class NumberTypes:
     """The types of one evaluation.
 
     Attributes:
@@ -65,15 +65,15 @@ class Numbers:
 DOUBLE: Real = np.dtype(np.float64)
 SINGLE: Real = np.dtype(np.float32)
 
-NUMBERS: dict[Dtype, Numbers] = {
-    "float64": Numbers(DOUBLE, DOUBLE),
-    "mixed": Numbers(DOUBLE, SINGLE),
-    "float32": Numbers(SINGLE, SINGLE),
+NUMBERS: dict[Dtype, NumberTypes] = {
+    "float64": NumberTypes(DOUBLE, DOUBLE),
+    "mixed": NumberTypes(DOUBLE, SINGLE),
+    "float32": NumberTypes(SINGLE, SINGLE),
 }
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class BandEdge:
     """One end of a band on one variable; `flank` None is a step."""
 
     line: int
@@ -83,7 +83,7 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True)
-class Slope:
+class SetSide:
     """One side of an LR set; `sign` 0 is both sides at once, which are equal."""
 
     line: int
@@ -100,11 +100,11 @@ class Polyline:
     points: Points
 
 
-Atom = Edge | Slope | Polyline
+Atom = BandEdge | SetSide | Polyline
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class AtomBlock:
     """Atoms of one kind and one length of curve.
 
     Attributes:
@@ -122,21 +122,21 @@ def atoms_of(line: int, shape: Shape) -> tuple[Atom, ...]:
     if isinstance(shape, LR):
         mean, left, right = shape.mean, shape.left, shape.right
         if left == right:
-            return (Slope(line, mean, 0, left),)
-        return Slope(line, mean, -1, left), Slope(line, mean, 1, right)
+            return (SetSide(line, mean, 0, left),)
+        return SetSide(line, mean, -1, left), SetSide(line, mean, 1, right)
     if isinstance(shape, Points):
         return (Polyline(line, shape),)
     found: list[Atom] = []
     if shape.low is not None:
-        found.append(Edge(line, shape.low, False, shape.left))
+        found.append(BandEdge(line, shape.low, False, shape.left))
     if shape.high is not None:
-        found.append(Edge(line, shape.high, True, shape.right))
+        found.append(BandEdge(line, shape.high, True, shape.right))
     return tuple(found)
 
 
 def plan_blocks(
-    atoms: Sequence[Atom], numbers: Numbers, rows: int
-) -> tuple[list[Atom], tuple[Block, ...]]:
+    atoms: Sequence[Atom], numbers: NumberTypes, rows: int
+) -> tuple[list[Atom], tuple[AtomBlock, ...]]:
     """Return atoms in the order in which blocks compute them, and the blocks.
 
     Args:
@@ -145,7 +145,7 @@ def plan_blocks(
         rows: How many rows a chunk has.
     """
     ordered = sorted(atoms, key=_kind)
-    blocks: list[Block] = []
+    blocks: list[AtomBlock] = []
     for (kind, _), group in itertools.groupby(ordered, key=_kind):
         members = list(group)
         size = max((BLOCK if kind < 4 else _LARGE_BLOCK) // rows, 1)
@@ -153,30 +153,30 @@ def plan_blocks(
             checkpoint()
             part = members[start : start + size]
             lines = np.array([atom.line for atom in part], np.int64)
-            blocks.append(Block(lines, _made(kind, part, numbers)))
+            blocks.append(AtomBlock(lines, _made(kind, part, numbers)))
     return ordered, tuple(blocks)
 
 
 def _made(
-    kind: int, atoms: Sequence[Atom], numbers: Numbers
+    kind: int, atoms: Sequence[Atom], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     if kind <= 1:
-        edges = [atom for atom in atoms if isinstance(atom, Edge)]
+        edges = [atom for atom in atoms if isinstance(atom, BandEdge)]
         return _steps(edges, numbers) if kind == 0 else _flanks(edges, numbers)
     if kind <= 3:
-        return _slopes([atom for atom in atoms if isinstance(atom, Slope)], numbers)
+        return _slopes([atom for atom in atoms if isinstance(atom, SetSide)], numbers)
     return _polylines([atom for atom in atoms if isinstance(atom, Polyline)], numbers)
 
 
 def _kind(atom: Atom) -> tuple[int, int]:
     match atom:
-        case Edge(flank=Flank() as flank):
+        case BandEdge(flank=Flank() as flank):
             return 1, 0 if flank.curve == (1.0,) else len(flank.curve)
-        case Edge():
+        case BandEdge():
             return 0, 0
-        case Slope(sign=0):
+        case SetSide(sign=0):
             return 2, len(atom.side.curve)
-        case Slope():
+        case SetSide():
             return 3, len(atom.side.curve)
         case Polyline():
             return (4 if len(atom.points.values) < _MANY else 5), 0
@@ -194,7 +194,7 @@ def _curve(curves: Sequence[tuple[float, ...]], kind: Real) -> list[Reals]:
     return [_column(line, kind) for line in zip(*curves, strict=True)]
 
 
-def _core(edges: Sequence[Edge], numbers: Numbers) -> Callable[[Reals], Reals]:
+def _core(edges: Sequence[BandEdge], numbers: NumberTypes) -> Callable[[Reals], Reals]:
     """Return what finds where edges are on the plateau: x > low, or x <= high."""
     bound = _column([edge.bound for edge in edges], numbers.axis)
     is_right = np.array([[edge.is_right] for edge in edges])
@@ -208,7 +208,7 @@ def _core(edges: Sequence[Edge], numbers: Numbers) -> Callable[[Reals], Reals]:
 
 
 def _steps(
-    edges: Sequence[Edge], numbers: Numbers
+    edges: Sequence[BandEdge], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     core = _core(edges, numbers)
 
@@ -219,7 +219,7 @@ def _steps(
 
 
 def _flanks(
-    edges: Sequence[Edge], numbers: Numbers
+    edges: Sequence[BandEdge], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     core = _core(edges, numbers)
     flanks = [edge.flank for edge in edges if edge.flank is not None]
@@ -261,7 +261,7 @@ def _horner(curve: Sequence[Reals], x: Reals, out: Reals) -> None:
 
 
 def _slopes(
-    slopes: Sequence[Slope], numbers: Numbers
+    slopes: Sequence[SetSide], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     """Return what computes sides of LR sets (paper, 2.2.2, with a tail)."""
     is_both = slopes[0].sign == 0
@@ -300,7 +300,7 @@ def _slopes(
 
 
 def _polylines(
-    atoms: Sequence[Polyline], numbers: Numbers
+    atoms: Sequence[Polyline], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     shapes = [atom.points for atom in atoms]
     lines = segments(shapes, numbers.axis, numbers.degree)

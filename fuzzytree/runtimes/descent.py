@@ -36,7 +36,7 @@ CHUNK = 1 << 15
 
 
 @dataclass(frozen=True, slots=True)
-class Split:
+class AxisSplit:
     """A node: interval i of its cuts leads to `targets[i]`.
 
     Attributes:
@@ -100,14 +100,14 @@ class Descent:
         is_whole: Whether the top has every test.
     """
 
-    splits: tuple[Split, ...]
+    splits: tuple[AxisSplit, ...]
     walk: Walk
     top: tuple[CutTest, ...]
     exits: IntArray
     is_whole: bool
 
 
-def plan_descent(splits: Sequence[Split], kind: Real) -> Descent:
+def plan_descent(splits: Sequence[AxisSplit], kind: Real) -> Descent:
     """Return a tree as lists of tests.
 
     Args:
@@ -155,7 +155,7 @@ class _Draft:
         self.child[place], self.weight[place] = self.child[source], self.weight[source]
 
 
-def _plan_walk(splits: Sequence[Split]) -> _Draft:
+def _plan_walk(splits: Sequence[AxisSplit]) -> _Draft:
     """Lay the tests out breadth-first, so that early rounds touch few lines."""
     weights = _leaves_below(splits)
     draft = _Draft([], [], [], [], [])
@@ -191,7 +191,7 @@ def _plan_walk(splits: Sequence[Split]) -> _Draft:
     return draft
 
 
-def _leaves_below(splits: Sequence[Split]) -> list[int]:
+def _leaves_below(splits: Sequence[AxisSplit]) -> list[int]:
     weights = [0] * len(splits)
     for number in range(len(splits) - 1, -1, -1):
         targets = set(splits[number].targets)
@@ -380,11 +380,11 @@ def _walk_on(
             spare = 3 - spare
 
 
-def descend_row(splits: Sequence[Split], row: Sequence[float]) -> int:
+def descend_row(splits: Sequence[AxisSplit], row: Sequence[float]) -> int:
     """Return the number of the leaf of one row of finite values, in plain Python.
 
     Example:
-        >>> descend_row([Split(0, (1.0, 2.0), (-1, -2, -1))], [1.5])
+        >>> descend_row([AxisSplit(0, (1.0, 2.0), (-1, -2, -1))], [1.5])
         2
     """
     number = 0 if splits else -1

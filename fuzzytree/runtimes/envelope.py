@@ -65,7 +65,7 @@ _FAR = 0.95  # the share of landmarks within a unit of the grid's centre
 
 
 @dataclass(frozen=True, slots=True)
-class Grid:
+class AxisCells:
     """Cells of every axis: equal parts of z / (1 + |z|) with z = (x - centre) / unit.
 
     Attributes:
@@ -145,7 +145,7 @@ class Envelope:
         shapes: The shapes.
     """
 
-    grid: Grid
+    grid: AxisCells
     line: IntArray
     negated: Bools
     lower: Singles
@@ -199,7 +199,7 @@ def plan_envelope(
     )
 
 
-def cells_of(grid: Grid, lines: FloatArray) -> IntArray:
+def cells_of(grid: AxisCells, lines: FloatArray) -> IntArray:
     """Return the cell of each value on its axis, of the shape of `lines`."""
     half = grid.count / 2
     z = lines - grid.centre
@@ -214,7 +214,7 @@ def cells_of(grid: Grid, lines: FloatArray) -> IntArray:
     return far.astype(np.int64)
 
 
-def cell_ends(grid: Grid, line: int) -> tuple[FloatArray, FloatArray]:
+def cell_ends(grid: AxisCells, line: int) -> tuple[FloatArray, FloatArray]:
     """Return numbers between which all values of each cell of an axis lie."""
     share = np.linspace(-1.0, 1.0, grid.count + 1)
     centre, unit = grid.centre[line, 0], grid.unit[line, 0]
@@ -385,7 +385,7 @@ def _grid(
     members: Sequence[IntArray],
     shapes: Shapes,
     axes: int,
-) -> Grid:
+) -> AxisCells:
     """Return cells that are narrow where means, ends of bands and points are."""
     slopes, edges = shapes.slopes, shapes.edges
     centre, unit = np.zeros((axes, 1)), np.ones((axes, 1))
@@ -405,7 +405,7 @@ def _grid(
             far = max(far, np.median(widths)) if len(widths) else far
             unit[axis] = far if np.isfinite(far) and far > 0 else 1.0
     count = min(max(_ENTRIES // max(len(line), 1), _FEWEST), _MOST)
-    return Grid(centre, unit, count)
+    return AxisCells(centre, unit, count)
 
 
 def _by_kind(shapes: Shapes, used: IntArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -416,7 +416,7 @@ def _by_kind(shapes: Shapes, used: IntArray) -> tuple[IntArray, IntArray, IntArr
 
 
 def _tables(
-    grid: Grid,
+    grid: AxisCells,
     line: IntArray,
     members: Sequence[IntArray],
     shapes: Shapes,

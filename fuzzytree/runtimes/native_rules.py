@@ -19,8 +19,8 @@ from fuzzytree.runtimes.axes import Axes, axis_lines, missing_rows, plan_axes
 from fuzzytree.runtimes.degrees import (
     NUMBERS,
     Atom,
-    Block,
-    Numbers,
+    AtomBlock,
+    NumberTypes,
     atoms_of,
     plan_blocks,
 )
@@ -39,7 +39,7 @@ _WIDE = 8  # terms of a clause from which each clause is reduced by itself
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class PrefixLevel:
     """Prefixes of one length: the shorter prefix and the last clause of each."""
 
     parents: IntArray
@@ -55,7 +55,7 @@ class Prefixes:
         rules: The number of the prefix that is the whole of each rule.
     """
 
-    levels: tuple[Level, ...]
+    levels: tuple[PrefixLevel, ...]
     rules: IntArray
 
     @property
@@ -65,7 +65,7 @@ class Prefixes:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class JoinedTerms:
     """Clauses with equally many terms: the line of each term, position by position."""
 
     terms: IntArray
@@ -80,19 +80,19 @@ class Degrees:
     terms; then clauses that are negated.
     """
 
-    blocks: tuple[Block, ...]
+    blocks: tuple[AtomBlock, ...]
     atoms: int
     left: IntArray
     right: IntArray
-    choices: tuple[Choice, ...]
+    choices: tuple[JoinedTerms, ...]
     negated: IntArray
     line: dict[Clause, int]
     count: int
-    numbers: Numbers
+    numbers: NumberTypes
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class RulePlan:
     """A rule base, ready to be fired."""
 
     axes: Axes
@@ -144,7 +144,7 @@ def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
     return run
 
 
-def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> Plan:
+def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> RulePlan:
     """Return what firing a rule base needs, computed once."""
     numbers = NUMBERS[dtype]
     axes = plan_axes(rules.variables, numbers.axis)
@@ -154,7 +154,7 @@ def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> Plan:
     size = len(clauses) + len(rules.rules)
     rows = min(max(_WORKING_SET // size, _SMALLEST_CHUNK), _LARGEST_CHUNK)
     degrees = plan_degrees(rules, clauses, axes.line, numbers, rows)
-    return Plan(
+    return RulePlan(
         axes,
         degrees,
         _plan_prefixes(rules, degrees.line),
@@ -167,7 +167,7 @@ def plan_degrees(
     rules: RuleBase,
     clauses: Sequence[Clause],
     at_line: Mapping[str, int],
-    numbers: Numbers,
+    numbers: NumberTypes,
     rows: int,
 ) -> Degrees:
     """Return how to compute the degrees of some clauses.
@@ -210,7 +210,7 @@ def plan_degrees(
 
 def _plan_choices(
     clauses: Sequence[Clause], at: dict[tuple[str, str], int]
-) -> tuple[dict[Clause, int], tuple[Choice, ...]]:
+) -> tuple[dict[Clause, int], tuple[JoinedTerms, ...]]:
     """Return the line of each clause without its negation, and how terms are joined."""
     plain = dict.fromkeys(Clause(c.variable, c.terms) for c in clauses)
     line = {c: at[c.variable, c.terms[0]] for c in plain if len(c.terms) == 1}
@@ -218,11 +218,11 @@ def _plan_choices(
     for clause in plain:
         if clause not in line:
             joined.setdefault(len(clause.terms), []).append(clause)
-    choices: list[Choice] = []
+    choices: list[JoinedTerms] = []
     first = len(at)
     for group in joined.values():
         lines = [[at[c.variable, term] for term in c.terms] for c in group]
-        choices.append(Choice(np.array(lines, np.int64), first))
+        choices.append(JoinedTerms(np.array(lines, np.int64), first))
         line |= {clause: first + position for position, clause in enumerate(group)}
         first += len(group)
     return line, tuple(choices)
@@ -232,7 +232,7 @@ def _plan_prefixes(rules: RuleBase, line: dict[Clause, int]) -> Prefixes:
     """Return the distinct beginnings of the rules, level by level."""
     current: list[tuple[Clause, ...]] = [rule.when for rule in rules.rules]
     number = [0] * len(current)
-    levels: list[Level] = []
+    levels: list[PrefixLevel] = []
     used = 1
     for depth in range(max(map(len, current))):
         known: dict[tuple[int, int], int] = {}
@@ -242,11 +242,11 @@ def _plan_prefixes(rules: RuleBase, line: dict[Clause, int]) -> Prefixes:
                 number[rule] = known.setdefault(key, used + len(known))
         used += len(known)
         pairs = np.array(list(known), np.int64)
-        levels.append(Level(pairs[:, 0].copy(), pairs[:, 1].copy()))
+        levels.append(PrefixLevel(pairs[:, 0].copy(), pairs[:, 1].copy()))
     return Prefixes(tuple(levels), np.array(number, np.int64))
 
 
-def strengths_of(plan: Plan, lines: Reals) -> Reals:
+def strengths_of(plan: RulePlan, lines: Reals) -> Reals:
     """Return the strength of every rule, of shape (rules, rows)."""
     degrees = clause_degrees(plan.degrees, lines)
     prefixes = plan.prefixes

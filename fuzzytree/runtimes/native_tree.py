@@ -19,9 +19,9 @@ from fuzzytree.runtimes.axes import (
 from fuzzytree.runtimes.degrees import NUMBERS
 from fuzzytree.runtimes.descent import (
     CHUNK,
+    AxisSplit,
     Descent,
     Desk,
-    Split,
     descend_row,
     descend_rows,
     plan_descent,
@@ -84,19 +84,19 @@ def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
     return run
 
 
-def _one(splits: tuple[Split, ...], row: list[float]) -> Outcome:
+def _one(splits: tuple[AxisSplit, ...], row: list[float]) -> Outcome:
     if math.isfinite(sum(row)) or all(map(math.isfinite, row)):
         return Outcome(np.array([descend_row(splits, row)]), np.array([0]))
     return Outcome(np.array([0]), np.array([3]))
 
 
-def _splits(tree: FuzzyTree, axes: Axes) -> list[Split]:
-    found: list[Split] = []
+def _splits(tree: FuzzyTree, axes: Axes) -> list[AxisSplit]:
+    found: list[AxisSplit] = []
     for node in tree.nodes:
         ends = [
             -branch.leaf if branch.leaf is not None else (branch.node or 0) - 1
             for branch in node.branches
         ]
         targets = tuple(ends[owner] for owner in node.owners)
-        found.append(Split(axes.line[node.variable], node.cuts, targets))
+        found.append(AxisSplit(axes.line[node.variable], node.cuts, targets))
     return found

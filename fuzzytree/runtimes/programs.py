@@ -157,7 +157,7 @@ class _Shelf:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ProgramPlan:
     """A program, ready to be run.
 
     Attributes:
@@ -178,7 +178,7 @@ class Plan:
     rows: int
 
 
-def plan_program(program: Program) -> Plan:
+def plan_program(program: Program) -> ProgramPlan:
     """Return what running a program needs, computed once."""
     still = _still_values(program)
     moving = [place for place, value in enumerate(still) if value is None]
@@ -196,7 +196,7 @@ def plan_program(program: Program) -> Plan:
     size = sum(shelf.count * max(shelf.samples, 1) for shelf in shelves)
     widest = max((program.steps[place].samples for place in moving), default=0)
     rows = _WORKING_SET // max(size, 2 * widest, 1)
-    return Plan(
+    return ProgramPlan(
         still,
         tuple(inputs),
         tuple(calls),
@@ -206,7 +206,7 @@ def plan_program(program: Program) -> Plan:
     )
 
 
-def run_program(plan: Plan, values: FloatArray) -> FloatArray:
+def run_program(plan: ProgramPlan, values: FloatArray) -> FloatArray:
     """Return the results for many rows, of shape (results, rows).
 
     Args:
@@ -233,7 +233,7 @@ def run_program(plan: Plan, values: FloatArray) -> FloatArray:
     return found
 
 
-def _run_chunk(plan: Plan, values: FloatArray, out: FloatArray) -> None:
+def _run_chunk(plan: ProgramPlan, values: FloatArray, out: FloatArray) -> None:
     rows = values.shape[1]
     known: list[Any] = list(plan.still)
     for place, line in plan.inputs:

@@ -36,7 +36,7 @@ Options = Mapping[str, "Option"]
 _LONGEST_WAIT = 600.0  # seconds
 
 
-class Result(NamedTuple):
+class ProgramOutcome(NamedTuple):
     """What a program answered.
 
     Attributes:
@@ -50,7 +50,7 @@ class Result(NamedTuple):
     has_status: bool = True
 
 
-Engine = Callable[[bytes, Model, Options, "FloatArray"], Result]
+Engine = Callable[[bytes, Model, Options, "FloatArray"], ProgramOutcome]
 
 _PYTHON = """
 import array, json, runpy
@@ -135,10 +135,12 @@ def numbers_of(
 
 
 def _script(language: str) -> Engine:
-    def run(content: bytes, model: Model, _: Options, values: FloatArray) -> Result:
+    def run(
+        content: bytes, model: Model, _: Options, values: FloatArray
+    ) -> ProgramOutcome:
         found = numbers_of(content, language, values, model.classes)
         labels = tuple(None if k < 0 else model.classes[int(k)] for k in found[:, 0])
-        return Result(_outcome(model, found[:, 1:].tolist()), labels)
+        return ProgramOutcome(_outcome(model, found[:, 1:].tolist()), labels)
 
     return run
 
@@ -165,13 +167,17 @@ def _outcome(model: Model, rows: Sequence[Sequence[float | None]]) -> Outcome:
     return Outcome(rule, status, strengths)
 
 
-def _c(content: bytes, model: Model, options: Options, values: FloatArray) -> Result:
+def _c(
+    content: bytes, model: Model, options: Options, values: FloatArray
+) -> ProgramOutcome:
     dtype: c.Dtype = "float32" if options.get("dtype") == "float32" else "float64"
     run = c.load_content(content, model, dtype, prefix=beginning(model.name, None))
-    return Result(run(values), None)
+    return ProgramOutcome(run(values), None)
 
 
-def _sql(content: bytes, model: Model, options: Options, values: FloatArray) -> Result:
+def _sql(
+    content: bytes, model: Model, options: Options, values: FloatArray
+) -> ProgramOutcome:
     """Answer by the standard library's sqlite3, or by duckdb, in memory."""
     dialect = options.get("dialect", "sqlite")
     if dialect == "duckdb":
@@ -192,7 +198,7 @@ def _sql(content: bytes, model: Model, options: Options, values: FloatArray) -> 
 
 def _queried(
     connection: Any, content: bytes, model: Model, kind: str, values: FloatArray
-) -> Result:
+) -> ProgramOutcome:
     quoted = ['"' + name.replace('"', '""') + '"' for name in model.inputs]
     columns = ", ".join(f"{name} {kind}" for name in quoted)
     connection.execute(f"CREATE TABLE data ({columns})")
@@ -205,10 +211,12 @@ def _queried(
     if not np.array_equal(kept, values.T, equal_nan=True):
         raise FuzzyTreeError("it does not give each row with its inputs, in order")
     outcome = _outcome(model, [row[width + 1 :] for row in found])
-    return Result(outcome, tuple(row[width] for row in found))
+    return ProgramOutcome(outcome, tuple(row[width] for row in found))
 
 
-def _pmml(content: bytes, model: Model, _: Options, values: FloatArray) -> Result:
+def _pmml(
+    content: bytes, model: Model, _: Options, values: FloatArray
+) -> ProgramOutcome:
     for package in ("jpmml_evaluator", "pandas"):
         _need(package, "running PMML")
     if shutil.which("java") is None:
@@ -229,7 +237,7 @@ def _pmml(content: bytes, model: Model, _: Options, values: FloatArray) -> Resul
         status = Status.DECIDED if rule else Status.UNCOVERED
         fired = [line[name] if known[place] else math.nan for name in names]
         rows.append([rule, status if known[place] else Status.MISSING, *fired])
-    return Result(_outcome(model, rows), labels, has_status=False)
+    return ProgramOutcome(_outcome(model, rows), labels, has_status=False)
 
 
 def _need(package: str, purpose: str) -> None:

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzytree.model.naming import DIGITS, LETTERS, Names, changes_text, unlike
+from fuzzytree.model.naming import DIGITS, LETTERS, NameMap, changes_text, unlike
 
 
 def made(*names: str, **options: object) -> list[str]:
-    return list(Names.of(names, **options).accepted.values())  # type: ignore[arg-type]
+    return list(NameMap.of(names, **options).accepted.values())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -65,12 +65,12 @@ def test_a_target_without_a_filler_gets_names_of_letters_and_digits() -> None:
 
 
 def test_only_changed_names_are_listed() -> None:
-    assert Names.of(["a", "b c"]).changed == {"b c": "b_c"}
+    assert NameMap.of(["a", "b c"]).changed == {"b c": "b_c"}
 
 
 def test_a_name_that_nothing_became_cannot_be_restored() -> None:
     with pytest.raises(KeyError, match="b"):
-        Names.of(["a"]).restored("b")
+        NameMap.of(["a"]).restored("b")
 
 
 def test_unlike_keeps_a_name_that_is_free() -> None:
@@ -88,7 +88,7 @@ def test_all_names_are_accepted_unlike_and_restored(
     names: list[str], ignores_case: bool, longest: int | None, reserved: list[str]
 ) -> None:
     first, rest = LETTERS + "_", LETTERS + DIGITS + "_"
-    found = Names.of(
+    found = NameMap.of(
         names,
         reserved=reserved,
         longest=longest,
@@ -111,7 +111,7 @@ def test_all_names_are_accepted_unlike_and_restored(
 @pytest.mark.heavy
 def test_many_names_that_become_alike_are_numbered_at_once() -> None:
     start = time.process_time()
-    found = Names.of("%" * count for count in range(1, 3000))
+    found = NameMap.of("%" * count for count in range(1, 3000))
     assert len(set(found.accepted.values())) == 2999
     assert time.process_time() - start < 2.0
 

@@ -23,8 +23,8 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.runtimes.envelope import (
+    AxisCells,
     Envelope,
-    Grid,
     cell_ends,
     cells_of,
     exact_degrees,
@@ -128,7 +128,7 @@ def marks_of(shapes: list[Shape]) -> list[float]:
     return found
 
 
-def values_near(shapes: list[Shape], grid: Grid) -> FloatArray:
+def values_near(shapes: list[Shape], grid: AxisCells) -> FloatArray:
     """Return landmarks, ends of cells, their neighbours, and values far and between."""
     low, high = cell_ends(grid, 0)
     chance = np.random.default_rng(0)

@@ -25,7 +25,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.runtimes import descent, find_runtime
 from fuzzytree.runtimes.degrees import DOUBLE, shape_degrees
-from fuzzytree.runtimes.descent import Desk, Split, descend_row, descend_rows
+from fuzzytree.runtimes.descent import AxisSplit, Desk, descend_row, descend_rows
 from fuzzytree.runtimes.native import load, load_best_first
 from fuzzytree.runtimes.reference import load as load_reference
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -51,7 +51,7 @@ def test_the_degrees_of_a_shape_have_the_bits_of_the_reference(shape: Shape) -> 
     assert shape_degrees(shape, values).tolist() == expected
 
 
-def random_splits(seed: int, leaves: int) -> list[Split]:
+def random_splits(seed: int, leaves: int) -> list[AxisSplit]:
     """Return splits of two to five intervals, some of which share a target."""
     chance = random.Random(seed)
     drafts: list[list[int]] = []
@@ -73,7 +73,7 @@ def random_splits(seed: int, leaves: int) -> list[Split]:
 
     grow(leaves)
     return [
-        Split(
+        AxisSplit(
             chance.randrange(3),
             tuple(sorted(chance.uniform(-2.0, 2.0) for _ in targets[1:])),
             tuple(targets),
@@ -98,7 +98,7 @@ def test_many_rows_descend_like_each_alone(leaves: int) -> None:
 def test_a_nest_of_shared_branches_is_planned_in_little_room() -> None:
     # Each node's first branch owns both ends: as a tree, 2**40 places.
     splits = [
-        Split(
+        AxisSplit(
             0, (-1.0 / k, 1.0 / k), (k if k < 40 else -1, -k - 1, k if k < 40 else -1)
         )
         for k in range(1, 41)
