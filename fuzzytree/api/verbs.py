@@ -156,7 +156,7 @@ def learn(
         ['soft', 'firm']
     """
     from fuzzytree.learning import LearningSettings
-    from fuzzytree.learning.suitability import remarks
+    from fuzzytree.learning.findings import remarks
 
     found = read_table(table, target=target, ignore=ignore)
     for column, text in remarks(found, lambda column: f"ignore=[{column!r}]"):

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+import difflib
 import functools
+import importlib.util
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
+from msgspec.structs import replace
 
+from fuzzytree.benchmarking.judging import MOST_ROWS
 from fuzzytree.benchmarking.records import (
     Bound,
     Candidate,
     Found,
+    Kind,
     Loaded,
     Omission,
     Question,
 )
+from fuzzytree.errors import install_hint
 from fuzzytree.model.contracts import Dtype, Model, Outcome, Prepared, Runtime
-from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.rulebase import LR, Band, RuleBase
+from fuzzytree.numerics.approximation import Approximated, by_degree, by_points
+from fuzzytree.numerics.bounds import certify
 from fuzzytree.runtimes import all_runtimes, is_installed, needed_by
 from fuzzytree.runtimes.answers import answers_of
 from fuzzytree.semantics.lowering import forms
@@ -202,3 +213,351 @@ def _ends(model: Model) -> Iterator[str]:
         yield from (rule.then for rule in model.rules)
     else:
         yield from (leaf.label for leaf in model.leaves)
+
+
+READING = "floor: the columns read once"
+SESSION = "floor: an empty session call"
+
+
+def floors(question: Question) -> tuple[list[Candidate], list[Omission]]:
+    """Return the floors; they answer nothing and have no error.
+
+    Args:
+        question: The one to list them under.
+
+    Example:
+        >>> found, omitted = floors("tree")
+        >>> found[0].name
+        'floor: the columns read once'
+    """
+    found = [
+        Candidate(
+            READING, question, "floor", _load_reading, note="the sum of each column"
+        )
+    ]
+    if not all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
+        return found, [Omission(SESSION, f"not installed ({install_hint('onnx')})")]
+    note = "onnxruntime hands the same table back"
+    session = Candidate(
+        SESSION, question, "floor", _load_session, note=note, is_foreign=True
+    )
+    return [*found, session], []
+
+
+def _nothing(values: FloatArray) -> Found:
+    return Found(np.full(values.shape[1], -1))
+
+
+def _load_reading(threads: int) -> Loaded:
+    def call(values: FloatArray) -> Callable[[], object]:
+        return partial(values.sum, axis=1)
+
+    return Loaded(_nothing, call)
+
+
+def _load_session(threads: int) -> Loaded:
+    from onnx import TensorProto, helper
+
+    from fuzzytree.exporters.onnx_session import open_bare
+
+    shapes = [
+        helper.make_tensor_value_info(name, TensorProto.DOUBLE, ["rows", "columns"])
+        for name in ("inputs", "same")
+    ]
+    node = helper.make_node("Identity", ["inputs"], ["same"])
+    graph = helper.make_graph([node], "empty", shapes[:1], shapes[1:])
+    imports = [helper.make_opsetid("", 17)]
+    made = helper.make_model(graph, ir_version=8, opset_imports=imports)
+    content = made.SerializeToString()
+    bare = open_bare(content, threads)
+
+    def call(values: FloatArray) -> Callable[[], object]:
+        table = np.ascontiguousarray(values.T)
+        return partial(bare, ["same"], {"inputs": table})
+
+    return Loaded(_nothing, call, len(content))
+
+
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+"""Of a degree, where curves become points."""
+
+_MOST_TERMS = 400  # their points take seconds
+
+Make = Callable[[RuleBase], Approximated]
+
+
+class Approximations:
+    """Approximated rule bases: each is made once, when it is first loaded."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Question, str], Approximated] = {}
+
+    def get(
+        self, question: Question, what: str, make: Make, rules: RuleBase
+    ) -> Approximated:
+        """Return one of them.
+
+        Raises:
+            LossError: If the rule base cannot be approximated so.
+        """
+        key = (question, what)
+        if key not in self._known:
+            self._known[key] = make(rules)
+        return self._known[key]
+
+
+def variants(
+    model: Model, bounds: Bounds, layouts: Layouts
+) -> tuple[list[Candidate], list[Omission]]:
+    """Return the variants of each rule base that a model gives.
+
+    Args:
+        model: A tree or a rule base.
+        bounds: Certifies the strengths of a rule base.
+        layouts: Where sessions share their tables.
+
+    Returns:
+        The candidates, whose bounds are known once they are loaded, and what makes no
+        variant of its own.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> found, _ = variants(random_tree(1), lambda rules, dtype: None, Layouts())
+        >>> found[0].name
+        'native, points 1e-01: relative rules'
+    """
+    found: list[Candidate] = []
+    omitted: list[Omission] = []
+    known = Approximations()
+    for question, rules in questions(model).items():
+        if not isinstance(rules, RuleBase):
+            continue
+        terms = sum(len(variable.terms) for variable in rules.variables)
+        if terms > _MOST_TERMS:
+            why = f"{terms:,} terms, and {_MOST_TERMS} are the most to approximate"
+            omitted.append(Omission(f"variants: {question}", why))
+            continue
+        for what, make in _makers(rules).items():
+            approximate = partial(known.get, question, what, make, rules)
+            for runtime in all_runtimes():
+                if runtime.in_variants and is_installed(runtime):
+                    load = partial(_load, runtime, approximate, bounds, layouts)
+                    one = Candidate(
+                        title(f"{runtime.name}, {what}", question),
+                        question,
+                        "variant",
+                        load,
+                        is_parallel=runtime.prepare is not None,
+                    )
+                    found.append(one)
+    return found, omitted
+
+
+def _makers(rules: RuleBase) -> dict[str, Make]:
+    """Return what makes each variant: points, and degrees below the largest there is.
+
+    Without curves there is nothing to approximate.
+    """
+    largest = _largest_degree(rules)
+    found: dict[str, Make] = {}
+    if largest:
+        for tolerance in TOLERANCES:
+            found[f"points {tolerance:.0e}"] = partial(by_points, tolerance=tolerance)
+    for degree in range(1, largest):
+        found[f"degree {degree}"] = partial(by_degree, degree=degree)
+    return found
+
+
+def _largest_degree(rules: RuleBase) -> int:
+    largest = 0
+    for variable in rules.variables:
+        for term in variable.terms:
+            match term.shape:
+                case Band(left=left, right=right):
+                    curves = [side.curve for side in (left, right) if side is not None]
+                case LR(left=left, right=right):
+                    curves = [left.curve, right.curve]
+                case _:
+                    curves = []
+            largest = max([largest, *map(len, curves)])
+    return largest
+
+
+def _load(
+    runtime: Runtime,
+    approximate: Callable[[], Approximated],
+    bounds: Bounds,
+    layouts: Layouts,
+    threads: int,
+) -> Loaded:
+    found = approximate()
+    loaded = load_runtime(runtime, found.model, layouts, threads)
+
+    def bound() -> Bound | None:
+        certified = bounds(found.model, runtime.dtype)
+        if certified is None:
+            return None
+        error, origin = certified
+        return min(found.bound + error, 1.0), f"{found.origin}, and {origin}"
+
+    return replace(loaded, bound=bound)
+
+
+Candidates = tuple[list[Candidate], list[Omission]]
+"""What can be measured, and what cannot be, each with its reason."""
+
+Peers = Callable[[Model, Bounds], Candidates]
+"""Returns candidates of third-party libraries for a model."""
+
+_GROUPS = (*get_args(Question), *get_args(Kind))
+_MOST_DEGREES = 10_000_000  # whose errors are bounded in about a second
+
+
+def gather(model: Model, values: FloatArray, peers: str | None = None) -> Candidates:
+    """Return every candidate for a model, and what cannot be one.
+
+    Args:
+        model: A tree or a rule base.
+        values: The rows of the study: certified bounds hold on them, or on the first
+            of them where the model is large.
+        peers: The path of a module with further candidates; see `load_peers`.
+    """
+    layouts = Layouts()
+    main = next(iter(questions(model)))
+    found, omitted = floors(main)
+    bounds = _bounds(values)
+    mine, absent = own(model, bounds, layouts)
+    others, missing = load_peers(peers)(model, bounds)
+    changed, left = variants(model, bounds, layouts)
+    return [*found, *mine, *others, *changed], [*omitted, *absent, *missing, *left]
+
+
+def foreign(model: Model, peers: str | None) -> list[Candidate]:
+    """Return the candidates that a child process tries; see `trial`."""
+    main = next(iter(questions(model)))
+    mine = own(model, _no_bounds, Layouts())[0]
+    return [*floors(main)[0], *mine, *load_peers(peers)(model, _no_bounds)[0]]
+
+
+def load_peers(path: str | None) -> Peers:
+    """Run a Python module or package and return its function `peers`.
+
+    The function takes a model and a function that certifies the error of its strengths
+    in a number type. It returns further candidates, and omissions with their reasons.
+
+    Args:
+        path: The module's file or the package's folder. None: no further candidates.
+
+    Raises:
+        ValueError: If there is no such module, it cannot be run or has no function
+            `peers`, or another module of its name is loaded.
+    """
+    if path is None:
+        return lambda _model, _bounds: ([], [])
+    folder = Path(path).resolve()
+    file = folder / "__init__.py" if folder.is_dir() else folder
+    spec = spec_from_file_location(folder.stem, file)
+    if not file.is_file() or spec is None or spec.loader is None:
+        raise ValueError(f"peers: {path!r} is not a Python module or package")
+    module = sys.modules.get(spec.name)
+    if module is None:
+        module = sys.modules[spec.name] = module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:  # whatever the user's code raises
+            del sys.modules[spec.name]
+            raise ValueError(f"peers: {path!r} cannot be run: {error}") from error
+    elif getattr(module, "__file__", None) != str(file):
+        raise ValueError(
+            f"peers: another module {spec.name!r} is loaded; rename {path!r}"
+        )
+    peers: Peers | None = getattr(module, "peers", None)
+    if peers is None:
+        raise ValueError(f"peers: {path!r} has no function 'peers'")
+    return peers
+
+
+def _no_bounds(rules: RuleBase, dtype: Dtype) -> None:
+    """Certify nothing."""
+
+
+def chosen(
+    candidates: Sequence[Candidate], only: Sequence[str], skip: Sequence[str]
+) -> tuple[list[Candidate], list[Omission]]:
+    """Return the candidates that are wanted, and a line about the others.
+
+    Args:
+        candidates: All there are.
+        only: Names, parts before the colon, questions or kinds; all if none.
+        skip: The same, for what is not wanted.
+
+    Raises:
+        ValueError: If a word names nothing that could be there, or nothing is left;
+            the message lists what there is.
+    """
+    known = set().union(_GROUPS, *map(_words, candidates))
+    for word in (*only, *skip):
+        if word not in known:
+            raise ValueError(_unknown(word, candidates))
+    kept = [
+        one
+        for one in candidates
+        if (not only or not _words(one).isdisjoint(only))
+        and _words(one).isdisjoint(skip)
+    ]
+    if not kept:
+        raise ValueError("no candidate is left to measure")
+    left = len(candidates) - len(kept)
+    if not left:
+        return kept, []
+    return kept, [Omission(_counted(left), "not asked for")]
+
+
+def _unknown(word: str, candidates: Sequence[Candidate]) -> str:
+    """Say what there is, without the variants of each number, and what was meant."""
+    names = [_short(one) for one in candidates if one.kind != "variant"]
+    groups = [group for one in candidates for group in _groups(one)]
+    known = [*dict.fromkeys((*names, *groups))]
+    close = difflib.get_close_matches(word, known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return (
+        f"no candidate {word!r}; there is {', '.join(dict.fromkeys(names))}, "
+        f"or all of {', '.join(dict.fromkeys(groups))}{hint}"
+    )
+
+
+def _counted(count: int) -> str:
+    return f"{count} candidate{'' if count == 1 else 's'}"
+
+
+def _words(one: Candidate) -> set[str]:
+    return {one.name, _short(one), *_groups(one)}
+
+
+def _short(one: Candidate) -> str:
+    return one.name.removesuffix(f": {one.question}")
+
+
+def _groups(one: Candidate) -> tuple[str, str]:
+    return one.question, one.kind
+
+
+def _bounds(values: FloatArray) -> Bounds:
+    """Return what certifies rule bases on these rows, each but once.
+
+    Of many terms only the first rows are certified, which the bound's origin counts;
+    candidates are judged on fewer.
+    """
+    known: dict[tuple[RuleBase, Dtype], Bound | None] = {}
+
+    def bounds(rules: RuleBase, dtype: Dtype) -> Bound | None:
+        key = (rules, dtype)
+        if key not in known:
+            terms = sum(len(variable.terms) for variable in rules.variables)
+            rows = max(_MOST_DEGREES // max(terms, 1), MOST_ROWS)
+            found = certify(rules, dtype, values[:, :rows])
+            delta = None if found.unbounded else found.delta
+            known[key] = None if delta is None else (delta, found.origin)
+        return known[key]
+
+    return bounds

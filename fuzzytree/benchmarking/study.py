@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fuzzytree.benchmarking import trial
-from fuzzytree.benchmarking.candidates import questions, title
+from fuzzytree.benchmarking.candidates import chosen, gather, questions, title
 from fuzzytree.benchmarking.clock import (
     SURE,
     Call,
@@ -20,8 +20,7 @@ from fuzzytree.benchmarking.clock import (
     time_calls,
 )
 from fuzzytree.benchmarking.front import advice, fronts
-from fuzzytree.benchmarking.gather import chosen, gather
-from fuzzytree.benchmarking.judging import Judge
+from fuzzytree.benchmarking.judging import Judge, made_rows, repeated
 from fuzzytree.benchmarking.machine import after, machine, noise
 from fuzzytree.benchmarking.records import (
     Candidate,
@@ -33,7 +32,6 @@ from fuzzytree.benchmarking.records import (
     Study,
     Timing,
 )
-from fuzzytree.benchmarking.rows import made_rows, repeated
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.interrupts import noticed
 from fuzzytree.model.naming import as_names

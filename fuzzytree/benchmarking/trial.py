@@ -22,7 +22,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO, TYPE_CHECKING, cast
 
-from fuzzytree.benchmarking.gather import foreign
+from fuzzytree.benchmarking.candidates import foreign
 from fuzzytree.benchmarking.records import Candidate
 from fuzzytree.model.contracts import Model
 

@@ -8,7 +8,7 @@ from typing import Literal, cast
 import msgspec
 
 from fuzzytree.checking.converting import formed, kind_of
-from fuzzytree.checking.likeness import likeness
+from fuzzytree.checking.equivalence import likeness
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.model.contracts import Document, Format, Written
 from fuzzytree.model.options import options_of

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator
 from typing import get_args
 
 from fuzzytree.checking.converting import kind_of
-from fuzzytree.checking.likeness import likeness
+from fuzzytree.checking.equivalence import likeness
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
 from fuzzytree.model.contracts import (
     Document,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import msgspec
 
-from fuzzytree.checking.likeness import likeness
+from fuzzytree.checking.equivalence import likeness
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded

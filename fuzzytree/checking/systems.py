@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.checking.comparing import Rows, counted, judged, same_bits
-from fuzzytree.checking.likeness import is_alike
+from fuzzytree.checking.equivalence import is_alike
 from fuzzytree.checking.models import first_difference
 from fuzzytree.checking.programs import ProgramFile, check_program
 from fuzzytree.errors import FuzzyTreeError, LossError

@@ -201,7 +201,7 @@ def command(
     """
     from fuzzytree.api.holdout import accuracy
     from fuzzytree.api.verbs import export, learn_table
-    from fuzzytree.learning.suitability import remarks
+    from fuzzytree.learning.findings import remarks
     from fuzzytree.tables import read_table
 
     form = wanted_format(output, None)

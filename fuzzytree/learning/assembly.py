@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.shapes import (
     REACH,
@@ -21,7 +20,7 @@ from fuzzytree.learning.shapes import (
 from fuzzytree.learning.sketch import Axis, Sketch, Split
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.sums import Totals, totals_of
-from fuzzytree.learning.units import Units
+from fuzzytree.learning.units import FloatArray, IntArray, Units
 from fuzzytree.learning.windows import window_counts
 from fuzzytree.model.rulebase import LR, Band, Flank, Part, Side, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets, interval_names

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.cuts import rounded_to, tail
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.sketch import Axis, single
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _ROUNDS = 10
 _PLACES = 32

@@ -14,7 +14,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 NEGLIGIBLE = 0.01
 """An outer interval that holds less of each of its patterns is a far reversal."""

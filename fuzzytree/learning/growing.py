@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.combination import (
     NodeView,
     best_bipartition,
@@ -19,6 +18,7 @@ from fuzzytree.learning.cuts import Cuts, crossing_cuts, smoothed_cuts
 from fuzzytree.learning.induction import Grouping, most_powerful, threshold
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.sketch import Axis, Sketch, Split, single
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _CLEAN = 0.005
 _CLEAN_FACTOR = 8.0

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.units import FloatArray, IntArray
 
 _BRUTE = 512
 

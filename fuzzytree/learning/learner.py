@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import LearningError
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.assembly import Assembled, Names, assembled
 from fuzzytree.learning.findings import LearningReport
 from fuzzytree.learning.growing import Grown
@@ -18,6 +17,7 @@ from fuzzytree.learning.patterns import usable_features
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
+from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.learning.validation import Choice, chosen_tree
 from fuzzytree.model.rulebase import text_fault
 from fuzzytree.model.tree import FuzzyTree

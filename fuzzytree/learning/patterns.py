@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.statistics import Moments, grouped_moments
-from fuzzytree.learning.units import Units
+from fuzzytree.learning.units import FloatArray, IntArray, Units
 
 SCATTER_NUMBERS = 1 << 23
 """Scatter matrices are kept per pattern up to this many numbers (64 MiB)."""

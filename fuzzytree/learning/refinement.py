@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.combination import axis_of
 from fuzzytree.learning.cuts import smoothed_cuts
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.sketch import Axis, Sketch, Split
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _MOST_ROWS = 20_000
 _NEWTON_STEPS = 8

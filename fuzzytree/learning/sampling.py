@@ -21,9 +21,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.sums import runs
-from fuzzytree.learning.units import Units, units_of
+from fuzzytree.learning.units import FloatArray, IntArray, Units, units_of
 
 Hashes = npt.NDArray[np.uint64]
 

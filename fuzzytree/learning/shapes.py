@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.units import FloatArray, IntArray
 
 REACH = 5.0
 """Where a set's tail ends, in spreads."""

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.cuts import Cuts, settled_cuts, without_empty
-from fuzzytree.learning.units import Units
+from fuzzytree.learning.units import FloatArray, IntArray, Units
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.sampling import DistinctRows, Sample
 from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, runs
-from fuzzytree.learning.units import Units
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, Units
 
 BLOCK_VALUES = 1 << 18
 """A block holds about this many numbers (2 MiB), and never more than 2^13 rows."""

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 MOST_ROWS = 1 << 13
 """How many rows may be added at once, for their limbs to add up exactly."""

@@ -12,8 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
+import numpy.typing as npt
 
 _WIDEST = 900
 
@@ -70,3 +69,8 @@ def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> Units:
     is_sound = (lows < highs) & np.isfinite(ranges)
     exponents = np.frexp(np.where(is_sound, ranges, 1.0))[1].astype(np.int64)
     return Units(origins, np.where(is_sound, exponents, 0), is_sound)
+
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]

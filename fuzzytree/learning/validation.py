@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.growing import Grown, GrowthRules, grow
 from fuzzytree.learning.patterns import (
     Patterns,
@@ -27,6 +26,7 @@ from fuzzytree.learning.refinement import refined
 from fuzzytree.learning.sampling import Sample, hashed
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, grouped_moments
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 LADDER = (1, 2, 3, 5, 8, 12, 16)
 """Numbers of patterns that are tried for a class."""

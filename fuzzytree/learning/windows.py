@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.sums import Totals, whole
+from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _SLACK = 16 * 2.0**-52
 """What a step may be wrong by, relative to what it is made of; it is by less."""

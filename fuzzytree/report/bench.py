@@ -6,9 +6,8 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import get_args
 
-from fuzzytree.benchmarking.candidates import title
+from fuzzytree.benchmarking.candidates import READING, title
 from fuzzytree.benchmarking.clock import CONFIDENCE, times_faster
-from fuzzytree.benchmarking.floors import READING
 from fuzzytree.benchmarking.records import (
     Machine,
     Omission,

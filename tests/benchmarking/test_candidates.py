@@ -10,19 +10,21 @@ import numpy as np
 import pytest
 
 from fuzzytree.benchmarking.candidates import (
+    READING,
+    SESSION,
     Layouts,
+    floors,
     found_of,
+    gather,
     load_runtime,
     own,
     questions,
+    variants,
 )
-from fuzzytree.benchmarking.floors import READING, SESSION, floors
-from fuzzytree.benchmarking.gather import gather
+from fuzzytree.benchmarking.judging import made_rows
 from fuzzytree.benchmarking.machine import after, machine, noise
 from fuzzytree.benchmarking.records import Candidate, Machine
-from fuzzytree.benchmarking.rows import made_rows
 from fuzzytree.benchmarking.study import BenchSettings, bench, faults
-from fuzzytree.benchmarking.variants import variants
 from fuzzytree.errors import install_hint
 from fuzzytree.model.contracts import Dtype, Outcome, Run, Runtime
 from fuzzytree.model.rulebase import RuleBase
@@ -171,7 +173,7 @@ def test_nothing_is_certified_before_it_is_asked_for(
         asked.append(values.shape[1])
         return bounds.certify(rules, dtype, values)
 
-    monkeypatch.setattr("fuzzytree.benchmarking.gather.certify", certify)
+    monkeypatch.setattr("fuzzytree.benchmarking.candidates.certify", certify)
     found, _ = gather(TREE, VALUES)
     assert asked == []
     bounds_of_raw = [o.bound for o in found if o.bound and o.question == "raw rules"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.benchmarking.gather import foreign, load_peers
+from fuzzytree.benchmarking.candidates import foreign, load_peers
 from fuzzytree.testing import random_tree
 
 PEERS = """

@@ -17,11 +17,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.benchmarking.candidates import found_of
+from fuzzytree.benchmarking.candidates import chosen, found_of, gather
 from fuzzytree.benchmarking.clock import Clock, Tell
-from fuzzytree.benchmarking.gather import chosen, gather
+from fuzzytree.benchmarking.judging import made_rows, repeated
 from fuzzytree.benchmarking.records import Candidate, Found, Loaded, Omission, Study
-from fuzzytree.benchmarking.rows import made_rows, repeated
 from fuzzytree.benchmarking.study import (
     BenchSettings,
     bench,

@@ -583,7 +583,7 @@ def test_generated_c_without_a_compiler_is_left_out(
 def test_the_list_of_peers_is_made_without_loading_any() -> None:
     code = (
         "from fuzzytree.testing import random_tree; "
-        "from fuzzytree.benchmarking.gather import load_peers; import sys; "
+        "from fuzzytree.benchmarking.candidates import load_peers; import sys; "
         "load_peers(sys.argv[1])(random_tree(1), lambda rules, dtype: None); "
         "import fuzzytree.report.plots; "
         "names = 'sklearn skl2onnx treelite m2cgen fuzzylite simpful onnx onnxruntime "

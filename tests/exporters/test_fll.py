@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fuzzytree.checking.anonymous import anonymous
+from fuzzytree.checking.equivalence import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.anonymous import anonymous
+from fuzzytree.checking.equivalence import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fml import write

@@ -22,7 +22,7 @@ from fuzzytree.checking.converting import export, formed
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, find_format
 from fuzzytree.learning import learn_arrays
-from fuzzytree.learning.arrays import FloatArray
+from fuzzytree.learning.units import FloatArray
 from fuzzytree.model.contracts import Document, Loss, Written
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem

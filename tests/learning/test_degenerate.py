@@ -15,10 +15,10 @@ import pytest
 
 from fuzzytree.errors import LearningError
 from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.combination import fisher_direction, node_view
 from fuzzytree.learning.patterns import Patterns, make_patterns
 from fuzzytree.learning.statistics import Statistics
+from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree, descend, evaluate

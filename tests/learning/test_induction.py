@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fuzzytree.learning import induction
-from fuzzytree.learning.arrays import FloatArray
 from fuzzytree.learning.induction import components, most_powerful, threshold
+from fuzzytree.learning.units import FloatArray
 
 
 def test_the_threshold_falls_with_the_level_and_never_below_zero() -> None:

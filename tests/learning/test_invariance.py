@@ -15,7 +15,7 @@ from sklearn import datasets
 
 from fuzzytree.exporters import yaml
 from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
-from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.reference import descend
 

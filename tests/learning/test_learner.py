@@ -14,7 +14,7 @@ from sklearn.model_selection import StratifiedKFold
 
 from fuzzytree.errors import LearningError
 from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
-from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.crisp_regions import grid
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fuzzytree.learning import sampling
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.sampling import (
     DistinctRows,
     Sample,
     hashed_digits,
     hashed_rows,
 )
+from fuzzytree.learning.units import FloatArray, IntArray
 
 TABLES = {
     "different": lambda rng, rows: rng.normal(size=(rows, 3)),

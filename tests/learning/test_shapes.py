@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.shapes import (
     REACH,
     SAMPLES,
@@ -17,6 +16,7 @@ from fuzzytree.learning.shapes import (
     fitted_flanks,
     fitted_sets,
 )
+from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model.rulebase import LR, Side
 from fuzzytree.semantics.reference import degree
 

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fuzzytree.learning import statistics as module
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.statistics import Statistics
+from fuzzytree.learning.units import FloatArray, IntArray
 
 Bits = tuple[bytes, ...]
 

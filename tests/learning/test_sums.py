@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.sums import (
     MOST_ROWS,
     Sums,
@@ -21,6 +20,7 @@ from fuzzytree.learning.sums import (
     runs,
     totals_of,
 )
+from fuzzytree.learning.units import FloatArray, IntArray
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzytree.learning.arrays import FloatArray
-from fuzzytree.learning.units import Units, units_of
+from fuzzytree.learning.units import FloatArray, Units, units_of
 
 STEPS = st.lists(st.integers(-1000, 1000), min_size=2, max_size=20, unique=True)
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzytree.learning.arrays import FloatArray
 from fuzzytree.learning.sums import totals_of
+from fuzzytree.learning.units import FloatArray
 from fuzzytree.learning.windows import window_counts
 
 

@@ -27,9 +27,8 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.numerics.approximation import by_degree, by_points
+from fuzzytree.numerics.approximation import by_degree, by_points, lower_curve
 from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.numerics.fitting import lower_curve
 from fuzzytree.numerics.placing import points_of
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load

@@ -1,15 +1,28 @@
-"""N8: rows on every edge, and the user's own, against the exact answers."""
+"""N2 and N8: every runtime stays within its bound, near zero and far from it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.checking.stability.carriers import ready, unequal
-from fuzzytree.checking.stability.judging import Observed, observed
-from fuzzytree.checking.stability.results import Criterion, judged
+import numpy as np
+
+from fuzzytree.checking.stability.results import Criterion, OffsetCost, judged
+from fuzzytree.checking.stability.runs import (
+    Observed,
+    first_line,
+    made_ready,
+    observed,
+    ready,
+    unequal,
+)
+from fuzzytree.checking.stability.sensitivity import Scale, input_scales
+from fuzzytree.checking.stability.transforms import moved
+from fuzzytree.errors import InvalidModelError
 from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
 from fuzzytree.numerics.oracle import Decided, decide
+from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics.probing import probe_values
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -78,3 +91,116 @@ def _fact(name: str, found: Sequence[Observed]) -> str:
     if unbounded:
         text += f"; no bound in {unbounded}, beyond the type or near a step"
     return text
+
+
+RATIOS = tuple(10.0**-k for k in range(1, 13))
+"""Spread over distance from zero, the same for every input."""
+
+_PROBES = 150
+_DATA = 300
+_TOLD: tuple[float, ...] = tuple(10.0**-k for k in (1, 3, 5, 7, 9, 11))
+_ADVICE_OFFSETS = (
+    "take differences before anything is divided or raised to a power: polynomials in "
+    "the raw value lose every digit far from zero"
+)
+
+
+def offsets(
+    model: Model, runtimes: Sequence[Runtime], data: FloatArray
+) -> tuple[Criterion, tuple[OffsetCost, ...]]:
+    """Move every input until its narrowest term is 1e-1 to 1e-12 of its distance (N2).
+
+    The moved model is a model of its own, whose numbers are rounded once; a runtime
+    is held against the exact answers of that model, on probes of its edges and on the
+    rows of data, moved as well.
+
+    Args:
+        model: A tree or a rule base.
+        runtimes: What to run; those that are slow get a share of the rows.
+        data: Rows of one's own, shape (inputs, rows); there may be none.
+
+    Returns:
+        The criterion, and what each distance costs in each number type.
+    """
+    faults: list[str] = []
+    skipped: list[str] = []
+    costs: list[OffsetCost] = []
+    cases, worst = 0, 0.0
+    scales = input_scales(model, data)
+    rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
+    for representation, form in forms(model).items():
+        for ratio in RATIOS:
+            steps = {name: _step(scale, ratio) for name, scale in scales.items()}
+            try:
+                far = moved(form, steps)
+            except InvalidModelError as error:
+                skipped.append(f"{representation} at {ratio:.0e}: {first_line(error)}")
+                continue
+            away = rows + np.array([[steps[name]] for name in model.inputs])
+            values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
+            found = _observed(representation, far, runtimes, values, skipped, ratio)
+            cases += sum(one.rows for one, _ in found)
+            worst = max([worst, *(one.worst for one, _ in found)])
+            for one, _ in found:
+                faults += [f"spread over distance {ratio:.0e}: {f}" for f in one.faults]
+            if ratio in _TOLD and representation != "tree":
+                costs.append(_cost(representation, ratio, found, values.shape[1]))
+    criterion = judged(
+        "N2", cases, faults, worst=worst, advice=_ADVICE_OFFSETS, skipped=skipped
+    )
+    return criterion, tuple(costs)
+
+
+def _step(scale: Scale, ratio: float) -> float:
+    """Return what takes the middle of an input to its spread over a ratio."""
+    if not np.isfinite(scale.spread):
+        return 0.0
+    return scale.spread / ratio - (0.5 * scale.low + 0.5 * scale.high)
+
+
+def _observed(
+    representation: str,
+    form: Model,
+    runtimes: Sequence[Runtime],
+    values: FloatArray,
+    skipped: list[str],
+    ratio: float,
+) -> list[tuple[Observed, Dtype]]:
+    lost: list[str] = []
+    exact = decide(form, values)
+    found: list[tuple[Observed, Dtype]] = []
+    for runtime in runtimes:
+        if runtime.bound is not None:
+            continue  # its bound covers points and lines, not its arithmetic at 1e12
+        one = made_ready(representation, form, runtime, lost)
+        if one is not None:
+            some = one.some(values)
+            same = exact if some.shape == values.shape else None
+            found.append((observed(one, some, same), runtime.dtype))
+    told = {text.partition(": spread")[0] for text in skipped}
+    for text in lost:  # the first distance at which a type gives up is enough
+        name = ": ".join(text.split(": ")[:2])
+        if name not in told:
+            skipped.append(f"{name}: spread over distance {ratio:.0e}: {text}")
+    return found
+
+
+def _cost(
+    representation: str,
+    ratio: float,
+    found: Sequence[tuple[Observed, Dtype]],
+    rows: int,
+) -> OffsetCost:
+    def largest(dtype: Dtype) -> float | None:
+        return max((one.largest for one, kind in found if kind == dtype), default=None)
+
+    flips = max((one.flips for one, kind in found if kind == "float32"), default=0)
+    return OffsetCost(
+        representation,
+        ratio,
+        largest("float32"),
+        largest("mixed"),
+        largest("float64"),
+        flips,
+        rows,
+    )

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, cast, get_args
 
 from fuzzytree.checking.comparing import strength_gap
-from fuzzytree.checking.likeness import is_alike
-from fuzzytree.checking.stability.carriers import first_line, unequal
+from fuzzytree.checking.equivalence import is_alike
 from fuzzytree.checking.stability.results import Criterion, judged
+from fuzzytree.checking.stability.runs import first_line, unequal
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.model.contracts import Dtype, Format, Model, Outcome, Run, Written
 from fuzzytree.model.rulebase import RuleBase

@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.checking.stability.curves import curves
-from fuzzytree.checking.stability.degenerate import degenerate
-from fuzzytree.checking.stability.edges import edges
-from fuzzytree.checking.stability.exactness import exactness
-from fuzzytree.checking.stability.offsets import offsets
-from fuzzytree.checking.stability.order import order
+from fuzzytree.checking.stability.exactness import exactness, offsets
 from fuzzytree.checking.stability.results import (
     TITLES,
     Criterion,
@@ -23,9 +18,9 @@ from fuzzytree.checking.stability.results import (
     judged,
 )
 from fuzzytree.checking.stability.roundtrips import roundtrips
-from fuzzytree.checking.stability.scaling import decades, scaling
-from fuzzytree.checking.stability.specials import specials
-from fuzzytree.checking.stability.stiffness import stiffness
+from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
+from fuzzytree.checking.stability.sensitivity import curves, stiffness
+from fuzzytree.checking.stability.term_checks import degenerate, edges
 from fuzzytree.model.contracts import Format, Model, Runtime
 from fuzzytree.model.naming import as_names
 from fuzzytree.model.rulebase import fingerprint

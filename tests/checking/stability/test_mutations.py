@@ -8,23 +8,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.checking.stability import learning
-from fuzzytree.checking.stability.curves import curves
-from fuzzytree.checking.stability.degenerate import degenerate
-from fuzzytree.checking.stability.edges import edges
-from fuzzytree.checking.stability.exactness import exactness
-from fuzzytree.checking.stability.offsets import offsets
-from fuzzytree.checking.stability.order import order
+from fuzzytree.checking.stability.exactness import exactness, offsets
 from fuzzytree.checking.stability.roundtrips import roundtrips
-from fuzzytree.checking.stability.scaling import decades, scaling
-from fuzzytree.checking.stability.specials import specials
+from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
+from fuzzytree.checking.stability.sensitivity import curves
+from fuzzytree.checking.stability.term_checks import degenerate, edges
 from fuzzytree.exporters import find_format
 from fuzzytree.model.contracts import Model, Runtime
 from fuzzytree.model.rulebase import LR, Band, Flank, Side, Term
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree
-from tests.checking.stability import defects
+from tests.checking.stability import defects, learners
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -173,44 +168,44 @@ def test_n9_finds_a_writer_of_six_digits(rows: FloatArray) -> None:
 def test_n1_finds_a_learner_with_a_fixed_threshold() -> None:
     table = defects.learning_table()
     bad = defects.tiny_learner(least=1e-6)
-    assert learning.learner_scaling(bad, *table).verdict == "FAILS"
+    assert learners.learner_scaling(bad, *table).verdict == "FAILS"
     sound = defects.tiny_learner()
-    assert learning.learner_scaling(sound, *table).verdict == "holds"
+    assert learners.learner_scaling(sound, *table).verdict == "holds"
 
 
 def test_n2_finds_a_learner_that_subtracts_squares() -> None:
     table = defects.learning_table()
     bad = defects.tiny_learner(spread=defects.one_pass)
-    assert learning.learner_offsets(bad, *table).verdict == "FAILS"
+    assert learners.learner_offsets(bad, *table).verdict == "FAILS"
     sound = defects.tiny_learner()
-    assert learning.learner_offsets(sound, *table).verdict == "holds"
+    assert learners.learner_offsets(sound, *table).verdict == "holds"
 
 
 def test_n3_finds_a_learner_whose_sums_have_an_order() -> None:
     table = defects.learning_table()
     bad = defects.tiny_learner(is_sorted=False)
-    assert learning.learner_order(bad, *table).verdict == "FAILS"
+    assert learners.learner_order(bad, *table).verdict == "FAILS"
     sound = defects.tiny_learner()
-    assert learning.learner_order(sound, *table).verdict == "holds"
+    assert learners.learner_order(sound, *table).verdict == "holds"
 
 
 def test_n4_finds_a_learner_that_warns() -> None:
-    found = learning.learner_degenerate(defects.tiny_learner(is_loud=True))
+    found = learners.learner_degenerate(defects.tiny_learner(is_loud=True))
     assert found.verdict == "FAILS"
     assert found.detail[0] == "a column of 0.1: it warns: invalid value"
-    assert learning.learner_degenerate(defects.tiny_learner()).verdict == "holds"
+    assert learners.learner_degenerate(defects.tiny_learner()).verdict == "holds"
 
 
 def test_n5_finds_half_open_windows() -> None:
     def closed(values: FloatArray, n: int) -> list[int]:
-        return learning.rational_counts(values.tolist(), n)
+        return learners.rational_counts(values.tolist(), n)
 
     def half_open(values: FloatArray, n: int) -> list[int]:
         counts = closed(values, n)
-        at_ends = learning.rational_counts([-v for v in values.tolist()], n)
+        at_ends = learners.rational_counts([-v for v in values.tolist()], n)
         return [
             max(count - end % 2, 0) for count, end in zip(counts, at_ends, strict=True)
         ]
 
-    assert learning.window_counts(half_open).verdict == "FAILS"
-    assert learning.window_counts(closed).verdict == "holds"
+    assert learners.window_counts(half_open).verdict == "FAILS"
+    assert learners.window_counts(closed).verdict == "holds"

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.checking.stability.learning import learner_criteria, window_counts
 from fuzzytree.checking.stability.results import TITLES, Stability
-from fuzzytree.checking.stability.stiffness import stiffness
+from fuzzytree.checking.stability.sensitivity import stiffness
 from fuzzytree.checking.stability.suite import examine
 from fuzzytree.exporters import all_formats
 from fuzzytree.learning.sums import totals_of
@@ -36,6 +35,7 @@ from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes import all_runtimes, find_runtime
 from fuzzytree.testing import random_tree
 from tests.checking.stability.defects import learning_table, one_rule, small_rules
+from tests.checking.stability.learners import learner_criteria, window_counts
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.checking.stability.carriers import first_line
 from fuzzytree.checking.stability.results import Criterion, judged
-from fuzzytree.checking.stability.terms import broken
+from fuzzytree.checking.stability.runs import first_line
+from fuzzytree.checking.stability.term_checks import broken
 from fuzzytree.checking.stability.transforms import scaled
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model.rulebase import LR

@@ -7,7 +7,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.likeness import is_alike, likeness
+from fuzzytree.checking.equivalence import is_alike, likeness
 from fuzzytree.model.contracts import Document, Reading, Written
 from fuzzytree.model.rulebase import (
     Band,

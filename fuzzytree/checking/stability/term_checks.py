@@ -9,14 +9,24 @@ from __future__ import annotations
 import itertools
 import math
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from fractions import Fraction
 from typing import TYPE_CHECKING, Literal, NamedTuple, assert_never
 
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.stability.carriers import Ready, answered
-from fuzzytree.model.contracts import Dtype
+from fuzzytree.checking.stability.results import Criterion, judged
+from fuzzytree.checking.stability.runs import (
+    Ready,
+    allowed_errors,
+    answered,
+    made_ready,
+    ready,
+    unequal,
+)
+from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -30,6 +40,8 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.numerics.oracle import exact_degree
+from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.probing import landmarks, neighbours
 
 if TYPE_CHECKING:
@@ -278,3 +290,178 @@ def _single(value: float) -> float:
     except OverflowError:
         return math.copysign(math.inf, value)
     return single
+
+
+_ADVICE = (
+    "compare with <= where the model says <=, clip before evaluating, and make the end "
+    "of a term a comparison and not a cancellation"
+)
+
+
+def edges(model: Model, runtimes: Sequence[Runtime]) -> Criterion:
+    """Ask each term at its mean, its edges and its ends, and beside them (N5).
+
+    Every landmark comes with the neighbouring floats, in double and in float32. On a
+    plateau, at a mean and at a point the degree is exactly what is stored; off a
+    plateau it is below 1; at an end and beyond exactly 0; elsewhere within the bound
+    of the exact one.
+    """
+    faults: list[str] = []
+    skipped: list[str] = []
+    cases, worst = 0, 0.0
+    for representation, form in forms(model).items():
+        question = asked(form) if isinstance(form, RuleBase) else None
+        if question is None:
+            continue
+        exact = _Exact(question)
+        for runtime in runtimes:
+            one = made_ready(
+                f"terms of {representation}", question.rules, runtime, skipped
+            )
+            if one is None:
+                continue
+            allowed = allowed_errors(one, question.values)
+            tell = exact.difference(allowed, question.values)
+            told = held(one, question, skipped, difference=tell)
+            cases += told.cases
+            worst = max(worst, told.worst)
+            faults += told.faults
+    return judged("N5", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped)
+
+
+class _Exact:
+    """The exact degrees of a question's terms, each computed once."""
+
+    def __init__(self, question: Asked) -> None:
+        self.degrees = [
+            {
+                value: exact_degree(shape, Fraction(value))
+                for value in question.values[line, rows].tolist()
+            }
+            for line, shape, rows in question.places
+        ]
+        self.lines = [line for line, _, _ in question.places]
+
+    def difference(
+        self, allowed: FloatArray, values: FloatArray
+    ) -> Callable[[int, float, float], tuple[float, float]]:
+        """Return what tells the error of a degree and the allowed one in its row."""
+        limits = [
+            dict(zip(reversed(line.tolist()), reversed(allowed.tolist()), strict=True))
+            for line in values
+        ]
+
+        def tell(number: int, value: float, degree: float) -> tuple[float, float]:
+            gap = abs(Fraction(degree) - self.degrees[number][value])
+            return float(gap), limits[self.lines[number]][value]
+
+        return tell
+
+
+_COPIES = 50  # rows of a table whose columns are all constant
+_FEW = 8  # units in the last place: a spread below is that of a single sample
+_ADVICE_DEGENERATE = (
+    "a set made from one value must keep degree 1 at that value: compare values with "
+    "the mean before dividing by the spread"
+)
+
+
+def degenerate(
+    model: Model, runtimes: Sequence[Runtime], values: FloatArray
+) -> Criterion:
+    """Collapse every term to its narrowest and every table to its smallest (N4).
+
+    A collapsed set keeps degree exactly 1 at its mean or on its plateau, is exactly 0
+    from its end on, and no runtime warns. A table of equal rows, given without copies
+    (its columns have no stride), is answered like one of them; so are tables of two,
+    one and no rows.
+    """
+    faults: list[str] = []
+    skipped: list[str] = []
+    cases = 0
+    for representation, form in forms(model).items():
+        question = asked(form, shape=collapsed) if isinstance(form, RuleBase) else None
+        if question is None:
+            continue
+        for runtime in runtimes:
+            one = made_ready(
+                f"{representation}, collapsed", question.rules, runtime, skipped
+            )
+            if one is not None:
+                told = held(one, question, skipped)
+                cases += told.cases
+                faults += told.faults
+    for one in ready(model, runtimes, skipped):
+        for said, is_wrong in _small_tables(one, one.some(values)):
+            cases += 1
+            faults += [f"{one.title}: {said}"] if is_wrong else []
+    facts = [*_thin_terms(model), *_constant_columns(model)]
+    return judged(
+        "N4", cases, faults, facts=facts, advice=_ADVICE_DEGENERATE, skipped=skipped
+    )
+
+
+def _small_tables(one: Ready, values: FloatArray) -> Iterator[tuple[str, bool]]:
+    """Yield what was tried with small tables, and whether it went wrong."""
+    width, count = values.shape
+    for row in range(min(count, 3)):
+        column = values[:, row : row + 1]
+        alone = one.run(np.ascontiguousarray(column))
+        many = one.run(np.broadcast_to(column, (width, _COPIES)))
+        is_other = bool(unequal(many, repeated(alone, _COPIES)).any())
+        yield f"{_COPIES} equal rows are not answered like one of them", is_other
+    for size in (0, 1, 2):
+        try:
+            found = one.run(np.ascontiguousarray(values[:, :size]))
+        except FuzzyTreeError as error:
+            yield f"a table of {size} rows is refused: {error}", True
+            continue
+        shape = (min(size, count),)
+        wrong = found.rule.shape != shape or found.status.shape != shape
+        yield f"a table of {size} rows gets {found.rule.shape[0]} answers", wrong
+
+
+def repeated(alone: Outcome, count: int) -> Outcome:
+    """Return the answer to one row, so many times."""
+    strengths = alone.strengths
+    return Outcome(
+        np.repeat(alone.rule, count),
+        np.repeat(alone.status, count),
+        None if strengths is None else np.repeat(strengths, count, axis=1),
+    )
+
+
+def _thin_terms(model: Model) -> Iterator[str]:
+    """Yield the model's own terms that are as good as made from a single value."""
+    for representation, form in forms(model).items():
+        for variable in form.variables if isinstance(form, RuleBase) else ():
+            for term in variable.terms:
+                ulps = width_in_ulps(term.shape)
+                if ulps < _FEW:
+                    yield (
+                        f"{representation}: {variable.name} is {term.name} changes "
+                        f"within "
+                        f"{ulps:.3g} units in the last place, as if from one value"
+                    )
+
+
+def width_in_ulps(shape: Shape) -> float:
+    """Return the shortest change of a degree, in units in the last place."""
+    match shape:
+        case Band(left=left, right=right):
+            widths = [
+                abs(flank.start - flank.end) / math.ulp(flank.start)
+                for flank in (left, right)
+                if flank is not None
+            ]
+        case LR(mean=mean, left=below, right=above):
+            widths = [side.spread / math.ulp(mean) for side in (below, above)]
+        case Points():
+            widths = []
+    return min(widths, default=math.inf)
+
+
+def _constant_columns(model: Model) -> Iterator[str]:
+    for variable in model.variables:
+        if variable.low is not None and variable.low == variable.high:
+            yield f"{variable.name} was {variable.low!r} wherever it was seen"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.anonymous import anonymous
+from fuzzytree.checking.equivalence import anonymous
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.model.system import (

@@ -7,7 +7,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.errors import LearningError
-from fuzzytree.learning.suitability import remarks
+from fuzzytree.learning.findings import remarks
 from fuzzytree.tables import read_table
 
 CHANCE = np.random.default_rng(0)

@@ -1,0 +1,369 @@
+"""N1, N2b, N3 and N6: rows in other units and orders, and special values."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.checking.stability.results import Criterion, Usable, judged
+from fuzzytree.checking.stability.runs import (
+    Ready,
+    answered,
+    made_ready,
+    missing_rows,
+    ready,
+    row_text,
+    unequal,
+)
+from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
+from fuzzytree.errors import InvalidModelError, LossError
+from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
+from fuzzytree.semantics.reference import Status
+
+if TYPE_CHECKING:
+    from fuzzytree.checking.stability.runs import BoolArray
+    from fuzzytree.model.contracts import FloatArray
+
+BATCHES = (1, 7, 33, 1000)
+"""Rows answered at a time."""
+
+_CALLS = 40  # batches of each size, taken from all over the rows
+_ADVICE = (
+    "the runtime's answer to a row depends on the rows beside it; fix the order of its "
+    "sums, or use another one"
+)
+
+
+def order(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Criterion:
+    """Permute, repeat and cut up the rows, and reorder the inputs; demand equal bits.
+
+    Args:
+        model: A tree or a rule base.
+        runtimes: What to run.
+        values: Shape (inputs, rows).
+    """
+    faults: list[str] = []
+    skipped: list[str] = []
+    cases = 0
+    for one in ready(model, runtimes, skipped):
+        rows = one.some(values)
+        whole = one.run(rows)
+        for said, wrong in (*_tries(one, rows, whole), *_renumbered(one, rows, whole)):
+            cases += wrong.size
+            if wrong.any():
+                faults.append(
+                    f"{one.title}: {int(wrong.sum())} of {wrong.size} rows are "
+                    f"answered differently {said}"
+                )
+    return judged("N3", cases, faults, advice=_ADVICE, skipped=skipped)
+
+
+def _tries(
+    one: Ready, rows: FloatArray, whole: Outcome
+) -> Iterator[tuple[str, BoolArray]]:
+    """Yield what was done to the rows, and which were then answered differently."""
+    count = rows.shape[1]
+    mixed = np.random.default_rng(0).permutation(count)
+    yield "in another order", unequal(one.run(rows[:, mixed]), whole.part(mixed))
+    twice = np.repeat(np.arange(count), 2)
+    yield (
+        "when each stands twice",
+        unequal(one.run(rows[:, twice]), whole.part(twice)),
+    )
+    large = max(BATCHES)
+    if count < large and not one.runtime.is_slow:
+        many = np.resize(np.arange(count), large)
+        yield f"among {large}", unequal(one.run(rows[:, many]), whole.part(many))
+    for size in BATCHES:
+        starts = np.arange(0, count, size)
+        for start in starts[:: -(-len(starts) // _CALLS)] if size < count else ():
+            some = np.arange(start, min(start + size, count))
+            found = one.run(np.ascontiguousarray(rows[:, some]))
+            yield f"in a batch of {len(some)}", unequal(found, whole.part(some))
+
+
+def _renumbered(
+    one: Ready, rows: FloatArray, whole: Outcome
+) -> Iterator[tuple[str, BoolArray]]:
+    """Yield the same for a model whose inputs stand in the opposite order."""
+    inputs = [v for v in one.model.variables if not v.parts]
+    if len(inputs) < 2:
+        return
+    others = [v for v in one.model.variables if v.parts]
+    turned = msgspec.structs.replace(one.model, variables=(*reversed(inputs), *others))
+    after = made_ready(one.representation, turned, one.runtime, [])
+    if after is not None:
+        found = after.run(np.ascontiguousarray(rows[::-1]))
+        yield "when the inputs stand in another order", unequal(found, whole)
+
+
+_STEPS = (-300, -40, -7, 7, 40, 300)  # and the ends of the range
+_DECADES = 20.0
+_BINARY_DECADES = int(np.ceil(_DECADES * np.log2(10.0)))  # 67 doublings
+_ADVICE_SCALING = (
+    "the runtime compares with a fixed number somewhere, or leaves the number range "
+    "in between; use one whose steps are differences, quotients and comparisons"
+)
+_NO_INPUT = "the model has no input"
+
+
+def scaling(
+    model: Model, runtimes: Sequence[Runtime], values: FloatArray
+) -> tuple[Criterion, tuple[Usable, ...]]:
+    """Multiply the inputs of a model and of rows by 2**k; demand equal bits (N1).
+
+    k runs over a ladder up to both ends of the range in which every number of the
+    model stays normal; last, every input has a k of its own.
+
+    Args:
+        model: A tree or a rule base.
+        runtimes: What to run.
+        values: Shape (inputs, rows).
+
+    Returns:
+        The criterion, and the range of k for each form and number type.
+    """
+    if not model.inputs:
+        return judged("N1", 0, (), skipped=(_NO_INPUT,)), ()
+    faults: list[str] = []
+    skipped: list[str] = []
+    usable: dict[tuple[str, Dtype], Usable] = {}
+    cases = 0
+    for one in ready(model, runtimes, skipped):
+        low, high = exponent_range(one.model, one.runtime.dtype)
+        if low > high:
+            skipped.append(f"{one.title}: its numbers span more than the type does")
+            continue
+        key = (one.representation, one.runtime.dtype)
+        usable[key] = Usable(one.representation, one.runtime.dtype, low, high)
+        ks = [k for k in _STEPS if low < k < high]
+        # An engine of others divides and multiplies in between as it likes.
+        ks += [] if one.runtime.bound is not None else [low, high]
+        plans = [dict.fromkeys(model.inputs, k) for k in ks]
+        middle = min(max(0, low), high)
+        least, most = max(low, middle - 60), min(high, middle + 60)
+        plans.append(_apart(model.inputs, least, most, seed=0))
+        for plan in plans:
+            count, fault = _tried(one, plan, values, skipped)
+            cases += count
+            faults += [fault] if fault else []
+    facts = [
+        f"{name}: inputs times 2**{low} to 2**{high} change nothing"
+        for name, low, high in _together(tuple(usable.values()))
+    ]
+    criterion = judged(
+        "N1", cases, faults, facts=facts, advice=_ADVICE_SCALING, skipped=skipped
+    )
+    return criterion, tuple(usable.values())
+
+
+def decades(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Criterion:
+    """Spread the units of a model's inputs over 20 decades; demand equal bits (N2b).
+
+    The inputs of one combination are spread as well.
+    """
+    faults: list[str] = []
+    skipped: list[str] = []
+    cases = 0
+    if len(model.inputs) < 2:
+        skipped.append("a model of one input has no features apart")
+        return judged("N2b", 0, (), skipped=skipped)
+    places = np.linspace(0, _BINARY_DECADES, len(model.inputs))
+    order = random.Random(0).sample(range(len(places)), len(places))
+    for one in ready(model, runtimes, skipped):
+        low, high = exponent_range(one.model, one.runtime.dtype)
+        start = min(max(-_BINARY_DECADES // 2, low), high - _BINARY_DECADES)
+        if start < low:
+            skipped.append(f"{one.title}: its own numbers leave no room for 20 decades")
+            continue
+        ks = [start + int(places[k]) for k in order]
+        plan = dict(zip(model.inputs, ks, strict=True))
+        count, fault = _tried(one, plan, values, skipped)
+        cases += count
+        faults += [fault] if fault else []
+    return judged("N2b", cases, faults, advice=_ADVICE_SCALING, skipped=skipped)
+
+
+def _together(usable: Sequence[Usable]) -> Iterator[tuple[str, int, int]]:
+    """Yield the range that all forms share, for double axes and for float32."""
+    for name, kinds in (("double", ("float64", "mixed")), ("float32", ("float32",))):
+        found = [one for one in usable if one.dtype in kinds]
+        if found:
+            lowest, highest = (one.lowest for one in found), (u.highest for u in found)
+            yield name, max(lowest), min(highest)
+
+
+def _apart(inputs: Sequence[str], low: int, high: int, seed: int) -> dict[str, int]:
+    chance = random.Random(seed)
+    return {name: chance.randint(low, high) for name in inputs}
+
+
+def _tried(
+    one: Ready, plan: Mapping[str, int], values: FloatArray, skipped: list[str]
+) -> tuple[int, str | None]:
+    """Return how many rows were compared, and what was wrong."""
+    ks = [plan[name] for name in one.model.inputs]
+    said = (
+        f"2**{ks[0]}" if len(set(ks)) == 1 else f"2**k, k from {min(ks)} to {max(ks)}"
+    )
+    try:
+        other = scaled(one.model, plan)
+    except (LossError, InvalidModelError) as error:
+        return 1, f"{one.title}, inputs times {said}: {error}"
+    lost: list[str] = []
+    after = made_ready(one.representation, other, one.runtime, lost)
+    if after is None:
+        return 1, f"inputs times {said}: {lost[0]}"
+    some = one.some(values)
+    rows = some[:, _is_normal(some, ks, one.runtime.dtype)]
+    if not rows.shape[1]:
+        skipped.append(f"{one.title}, inputs times {said}: no row stays in range")
+        return 0, None
+    factors = np.array(ks, np.int64)[:, np.newaxis]
+    wrong = unequal(one.run(rows), after.run(np.ldexp(rows, factors)))
+    if not wrong.any():
+        return int(wrong.size), None
+    fault = (
+        f"{one.title}, inputs times {said}: {int(wrong.sum())} of {wrong.size} rows "
+        "are answered differently"
+    )
+    return int(wrong.size), fault
+
+
+def _is_normal(values: FloatArray, ks: Sequence[int], dtype: Dtype) -> BoolArray:
+    """Return the rows whose numbers are normal or 0, before and after; NaN may be."""
+    low, high = NORMAL[dtype]
+    exponents = np.frexp(values)[1]
+    free = (values == 0.0) | ~np.isfinite(values)
+    fits = np.ones(values.shape[1], np.bool_)
+    for line, k in enumerate(ks):
+        here = exponents[line]
+        inside = (here >= low) & (here <= high)
+        inside &= (here + k >= low) & (here + k <= high)
+        fits &= inside | free[line]
+    return fits
+
+
+SPECIALS = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    0.0,
+    -0.0,
+    5e-324,
+    -5e-324,
+    2.225073858507201e-308,
+    1e-310,
+    1e-45,
+    1e-40,
+    3.4028234663852886e38,
+    3.5e38,
+    -3.5e38,
+    1e39,
+    1e300,
+    -1e300,
+    1.7976931348623157e308,
+)
+"""No number, no finite one, both zeros, subnormal in double and in float32, the largest
+float32 and beyond, and the largest double."""
+
+_BASES = 4  # rows in which a value is replaced
+_ADVICE_SPECIALS = (
+    "ask for missing values before anything is compared: NaN answers every comparison "
+    "with no, and each minimum in its own way"
+)
+
+
+def specials(
+    model: Model, runtimes: Sequence[Runtime], values: FloatArray
+) -> Criterion:
+    """Put each special value into each input; demand the declared answer (N6).
+
+    A row is missing exactly where an input, or a combination computed step by step in
+    the runtime's type of axes, is not finite; then there is no rule, and no strength is
+    a number. -0.0 is answered like 0.0. Runtimes of one number type that promise equal
+    bits give each other's rules.
+
+    Args:
+        model: A tree or a rule base.
+        runtimes: What to run.
+        values: Shape (inputs, rows); some of them are changed.
+    """
+    if not model.inputs:
+        return judged("N6", 0, (), skipped=("the model has no input",))
+    rows = _with_specials(values)
+    faults: list[str] = []
+    skipped: list[str] = []
+    cases = 0
+    first: dict[tuple[str, Dtype, bool], tuple[str, Outcome]] = {}
+    for one in ready(model, runtimes, skipped):
+        asked = one.some(rows)
+        found, warning = answered(one, asked)
+        cases += asked.shape[1]
+        faults += [f"{one.title}: it warns: {warning}"] if warning else []
+        faults += _broken_policy(one, asked, found)
+        is_zero = asked == 0.0
+        if is_zero.any():
+            turned = np.where(is_zero, -asked, asked)
+            wrong = unequal(one.run(turned), found)
+            if wrong.any():
+                faults.append(f"{one.title}: 0.0 and -0.0 are not answered alike")
+        if one.runtime.bound is None:
+            key = (one.representation, one.runtime.dtype, one.runtime.is_slow)
+            title, other = first.setdefault(key, (one.title, found))
+            faults += _disagreement(one, asked, found, title, other)
+    return judged("N6", cases, faults, advice=_ADVICE_SPECIALS, skipped=skipped)
+
+
+def _with_specials(values: FloatArray) -> FloatArray:
+    """Return rows in which one input at a time has each special value, and all have."""
+    plain = values[:, np.isfinite(values).all(axis=0)]
+    if not plain.shape[1]:
+        plain = np.zeros((values.shape[0], 1))
+    bases = plain[:, :: -(-plain.shape[1] // _BASES)]
+    made = [bases]
+    for value in SPECIALS:
+        for line in range(len(bases)):
+            changed = bases.copy()
+            changed[line] = value
+            made.append(changed)
+        made.append(np.full_like(bases[:, :1], value))
+    return np.concatenate(made, axis=1)
+
+
+def _broken_policy(one: Ready, rows: FloatArray, found: Outcome) -> Iterator[str]:
+    expected = missing_rows(one.model, rows, one.runtime.dtype)
+    is_missing = found.status == Status.MISSING
+    wrong = is_missing != expected
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        verb = "is not" if expected[row] else "is"
+        yield (
+            f"{one.title}: {int(wrong.sum())} rows break the policy on missing values; "
+            f"{row_text(one.model.inputs, rows, row)} {verb} taken as missing"
+        )
+    if (found.rule[is_missing] != 0).any():
+        yield f"{one.title}: a row with a missing value has a rule"
+    if found.strengths is not None:
+        if not np.isnan(found.strengths[:, is_missing]).all():
+            yield f"{one.title}: a strength of a row with a missing value is a number"
+        told = found.strengths[:, ~is_missing]
+        if not ((told >= 0.0) & (told <= 1.0)).all():
+            yield f"{one.title}: a strength is not between 0 and 1"
+
+
+def _disagreement(
+    one: Ready, rows: FloatArray, found: Outcome, title: str, other: Outcome
+) -> Iterator[str]:
+    wrong = unequal(found, other)
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        yield (
+            f"{one.title}: {int(wrong.sum())} rows are answered differently from "
+            f"{title}, first {row_text(one.model.inputs, rows, row)}"
+        )

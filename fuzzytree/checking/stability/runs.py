@@ -1,0 +1,255 @@
+"""The forms of a model loaded in runtimes, and their distance from the exact degrees.
+
+A strength may differ from the exact one by `numerics.bounds.strength_bounds`, for the
+runtime's number type; a runtime with a bound of its own adds that to the one of double.
+A class may differ where the exact margin is at most twice the bound, and nowhere else;
+the path of a tree only in rows within rounding of a cut.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.checking.comparing import Answers, labels, same_bits
+from fuzzytree.errors import LossError
+from fuzzytree.model.contracts import Dtype, Model, Outcome, Run, Runtime
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.numerics.bounds import open_paths, strength_bounds
+from fuzzytree.numerics.oracle import Decided, decide, strength_errors
+from fuzzytree.runtimes import is_installed, needed_by
+from fuzzytree.semantics.lowering import forms
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+_SLOW_ROWS = 60  # rows that a slow runtime is given, whatever the others get
+
+
+class Ready(msgspec.Struct, frozen=True):
+    """A form of a model in a runtime, ready to answer.
+
+    Attributes:
+        title: What to call it, such as `onnxruntime float32: raw rules`.
+        representation: What to call the form.
+        runtime: The runtime.
+        model: The form.
+        loud: Its answers, with whatever warnings it lets out.
+    """
+
+    title: str
+    representation: str
+    runtime: Runtime
+    model: Model
+    loud: Run
+
+    def run(self, values: FloatArray) -> Outcome:
+        """Answer rows, and keep warnings in; criterion N4 asks for them."""
+        return answered(self, values)[0]
+
+    def some(self, values: FloatArray) -> FloatArray:
+        """Return the rows to ask: a share of them if the runtime is slow."""
+        rows = values.shape[1]
+        if not self.runtime.is_slow or rows <= _SLOW_ROWS:
+            return values
+        return values[:, :: -(-rows // _SLOW_ROWS)]
+
+
+def ready(
+    model: Model, runtimes: Sequence[Runtime], skipped: list[str]
+) -> Iterator[Ready]:
+    """Yield each form of a model in each runtime that can run it.
+
+    Args:
+        model: A tree or a rule base.
+        runtimes: The runtimes.
+        skipped: Gets a sentence for each that is not installed or cannot.
+    """
+    for representation, form in forms(model).items():
+        for runtime in runtimes:
+            found = made_ready(representation, form, runtime, skipped)
+            if found is not None:
+                yield found
+
+
+def made_ready(
+    representation: str, form: Model, runtime: Runtime, skipped: list[str]
+) -> Ready | None:
+    """Return one form in one runtime; None if that cannot be, with a reason kept."""
+    kind = "tree" if isinstance(form, FuzzyTree) else "rules"
+    if kind not in runtime.runs:
+        return None
+    if not is_installed(runtime):
+        skipped.append(f"{runtime.name} is not installed ({needed_by(runtime)})")
+        return None
+    title = f"{runtime.name}: {representation}"
+    try:
+        run = runtime.load(form)
+    except LossError as error:
+        skipped.append(f"{title}: {first_line(error)}")
+        return None
+    return Ready(title, representation, runtime, form, run)
+
+
+def answered(one: Ready, values: FloatArray) -> tuple[Outcome, str | None]:
+    """Return a runtime's answers, and the first warning that it let out, if any."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = one.loud(values)
+    return found, str(caught[0].message) if caught else None
+
+
+def unequal(one: Outcome, two: Outcome) -> BoolArray:
+    """Return the rows in which two outcomes differ, by a single bit if in no more."""
+    wrong: BoolArray = (one.rule != two.rule) | (one.status != two.status)
+    first, second = one.strengths, two.strengths
+    if first is None or second is None:
+        return wrong
+    if first.shape != second.shape:
+        return np.ones_like(wrong)
+    wrong |= ~same_bits(first, second).all(axis=0)
+    return wrong
+
+
+def first_line(error: Exception) -> str:
+    """Return what went wrong, without the advice that follows it."""
+    return str(error).partition("\n")[0]
+
+
+def row_text(inputs: Sequence[str], values: FloatArray, row: int) -> str:
+    """Return a row as people read it, each number with all its digits."""
+    found = values[:, row].tolist()
+    shown = [f"{n} {v!r}" for n, v in zip(inputs, found, strict=True)][:8]
+    return ", ".join(shown) + (", ..." if len(inputs) > 8 else "")
+
+
+class Observed(NamedTuple):
+    """How far a runtime was from the exact answers.
+
+    Attributes:
+        rows: Rows that were asked.
+        worst: The largest error of a strength that is certain, in rows with a bound; 0
+            for a tree.
+        allowed: The bound in the row of that error.
+        largest: The same in all rows.
+        flips: Rows whose class differs from the exact one.
+        unbounded: Rows in which the bound is 1 and proves nothing.
+        faults: What is beyond the bound, in sentences.
+        outcome: What the runtime answered.
+    """
+
+    rows: int
+    worst: float
+    allowed: float
+    largest: float
+    flips: int
+    unbounded: int
+    faults: tuple[str, ...]
+    outcome: Outcome
+
+
+def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Observed:
+    """Run rows and hold the answers against the exact ones.
+
+    Rows that are missing in the number type and not in double (beyond float32) are
+    left to criterion N6.
+
+    Args:
+        one: The runtime, with its model.
+        values: Shape (inputs, rows).
+        exact: The exact answers to these rows, if they are known already.
+    """
+    truth = decide(one.model, values) if exact is None else exact
+    found = one.run(values)
+    dtype = one.runtime.dtype
+    known = ~missing_rows(one.model, values, dtype)
+    allowed = allowed_errors(one, values)
+    flips = (labels(Answers(one.title, one.model, found)) != truth.label) & known
+    if isinstance(one.model, RuleBase):
+        excused = truth.margin <= 2.0 * allowed
+    else:
+        excused = open_paths(one.model, dtype, values)
+    wrong = flips & ~excused
+    low = np.zeros(values.shape[1])
+    if found.strengths is not None and isinstance(one.model, RuleBase):
+        low = strength_errors(one.model, values, found.strengths)[0]
+        low[~known] = 0.0
+        wrong |= low > allowed
+    bounded = np.where(allowed < 1.0, low, 0.0)
+    faults = [_fault(one, values, found, wrong, low, allowed)] if wrong.any() else []
+    worst = int(np.argmax(bounded)) if low.size else 0
+    return Observed(
+        values.shape[1],
+        float(bounded[worst]) if low.size else 0.0,
+        float(allowed[worst]) if low.size else 0.0,
+        float(low.max(initial=0.0)),
+        int(flips.sum()),
+        int((known & (allowed >= 1.0)).sum()),
+        tuple(faults),
+        found,
+    )
+
+
+def allowed_errors(one: Ready, values: FloatArray) -> FloatArray:
+    """Return by how much a strength may differ from the exact one, for each row."""
+    if not isinstance(one.model, RuleBase):
+        return np.zeros(values.shape[1])
+    own = one.runtime.bound
+    dtype: Dtype = one.runtime.dtype if own is None else "float64"
+    allowed, _ = strength_bounds(one.model, dtype, values)
+    if own is not None:
+        allowed = np.minimum(allowed + own(one.model)[0], 1.0)
+    return allowed
+
+
+def _fault(
+    one: Ready,
+    values: FloatArray,
+    found: Outcome,
+    wrong: BoolArray,
+    low: FloatArray,
+    allowed: FloatArray,
+) -> str:
+    row = int(np.flatnonzero(wrong)[np.argmax(low[wrong])])
+    text = f"{one.title}: {int(wrong.sum())} of {wrong.size} rows are beyond the bound"
+    where = row_text(one.model.inputs, values, row)
+    if low[row] > allowed[row]:
+        sizes = f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
+        return f"{text}: {sizes}: {where}"
+    return f"{text}: rule {found.rule[row]} wins and another is right: {where}"
+
+
+def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
+    """Return which rows count as missing, by the declared policy.
+
+    A row is missing if the value of any variable is not finite in the type of axes:
+    inputs rounded to it, combinations added up in their order, each step rounded.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, inputs=1, leaves=2)
+        >>> missing_rows(tree, np.array([[1.0, math.nan, 1e39]]), "float32").tolist()
+        [False, True, True]
+    """
+    kind = np.dtype(np.float32 if dtype == "float32" else np.float64)
+    with np.errstate(all="ignore"):
+        axes = dict(zip(model.inputs, values.astype(kind), strict=True))
+        known = np.ones(values.shape[1], np.bool_)
+        for variable in model.variables:
+            total = axes.get(variable.name)
+            for part in variable.parts:
+                weight, centre = (kind.type(n) for n in (part.weight, part.centre))
+                step = weight * (axes[part.input] - centre)
+                total = step if total is None else total + step
+            if total is not None:
+                known &= np.isfinite(total)
+    missing: BoolArray = ~known
+    return missing
