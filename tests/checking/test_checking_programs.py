@@ -34,13 +34,8 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def checked(model: Document, path: str, **options: Any) -> Agreement:
-    return ft.check(
-        model,
-        path,
-        runtimes=["native"],
-        **options,
-        settings=ft.CheckSettings(limit=300),
-    )
+    settings = ft.CheckSettings(limit=300, **options)
+    return ft.check(model, path, runtimes=["native"], settings=settings)
 
 
 def about(found: Agreement, path: str) -> list[tuple[str, str]]:

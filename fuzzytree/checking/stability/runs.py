@@ -236,7 +236,7 @@ def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1, inputs=1, leaves=2)
-        >>> missing_rows(tree, np.array([[1.0, math.nan, 1e39]]), "float32").tolist()
+        >>> missing_rows(tree, np.array([[1.0, np.nan, 1e39]]), "float32").tolist()
         [False, True, True]
     """
     kind = np.dtype(np.float32 if dtype == "float32" else np.float64)
