@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,28 +59,6 @@ from fuzzytree.numerics.exact import outwards
 Point = dict[str, Fraction]
 
 _HALVINGS = 16  # of a radius, to find one within which bounds decide the class
-
-
-class Decider(Protocol):
-    """A model whose decisions are evaluated exactly."""
-
-    of: Representation
-
-    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
-        """Return the answer at a point, and what gave it."""
-        ...
-
-    def leaves_out(self, label: str | None) -> bool:
-        """Return whether another answer may be where strengths only touch a class's."""
-        ...
-
-    def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
-        """Prepare the search for several points at once."""
-        ...
-
-    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
-        """Return how far the nearest point with another answer is."""
-        ...
 
 
 def decider_of(subject: Subject) -> Decider:
@@ -215,6 +193,8 @@ class RuleDecider:
         clear = self.around.is_clear(low, high, [label] * len(radii))
         return Fraction(radii[int(clear.argmax())]) if clear.any() else None
 
+
+Decider = CrispDecider | RuleDecider
 
 MOST_ROWS = 50
 """Rows whose radius is sought by strengths."""
