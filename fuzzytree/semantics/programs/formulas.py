@@ -58,7 +58,11 @@ def value_of(make: Maker, expression: Expression, names: Mapping[str, int]) -> i
             operands = [value_of(make, argument, names) for argument in arguments]
             if function in _SAME:
                 return make(_SAME[function], *operands)
-            return _OTHERS[function](make, *operands)
+            if function == "not":
+                zero = make.constant(0.0)
+                return as_number(make, make("equal", operands[0], zero))
+            one, other = operands
+            return _OTHERS[function](make, one, other)
 
 
 def is_nan(make: Maker, a: int) -> int:
@@ -96,7 +100,7 @@ def _modulo(make: Maker, a: int, b: int) -> int:
     return make("where", make("or", one, two), make("add", rest, b), rest)
 
 
-_OTHERS: Mapping[str, Callable[..., int]] = {
+_OTHERS: Mapping[str, Callable[[Maker, int, int], int]] = {
     "%": _modulo,
     "and": lambda make, a, b: as_number(
         make, make("and", _is_true(make, a), _is_true(make, b))
@@ -104,7 +108,6 @@ _OTHERS: Mapping[str, Callable[..., int]] = {
     "or": lambda make, a, b: as_number(
         make, make("or", _is_true(make, a), _is_true(make, b))
     ),
-    "not": lambda make, a: as_number(make, make("equal", a, make.constant(0.0))),
     "lt": lambda make, a, b: as_number(make, make("less", a, b)),
     "le": _le,
     "gt": lambda make, a, b: as_number(make, make("less", b, a)),
@@ -112,4 +115,4 @@ _OTHERS: Mapping[str, Callable[..., int]] = {
     "eq": lambda make, a, b: as_number(make, _is_same(make, a, b)),
     "neq": lambda make, a, b: as_number(make, make("not", _is_same(make, a, b))),
 }
-"""Functions of formulas that are several operations."""
+"""Functions of two numbers that are several operations."""
