@@ -33,8 +33,13 @@ from fuzzytree.exporters.c_text import (
 )
 from fuzzytree.exporters.c_tree import CTreeTest, cut_tests, tree_code
 from fuzzytree.exporters.reference_tables import places_of
-from fuzzytree.model.contracts import Document, Format, Model, Written
-from fuzzytree.model.losses import narrowing_refusal
+from fuzzytree.model.contracts import (
+    Document,
+    Format,
+    Model,
+    Written,
+    narrowing_refusal,
+)
 from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint, sentence
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree, outline

@@ -32,8 +32,7 @@ from fuzzytree.exporters.fll_text import speakable
 from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
 from fuzzytree.formats.fcl.fcl_dialects import MARK
 from fuzzytree.formats.fcl.fcl_reader import FACTS, places, read
-from fuzzytree.model.contracts import Format, Loss, Written
-from fuzzytree.model.losses import refusal
+from fuzzytree.model.contracts import Format, Loss, Written, refusal
 from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem, Or, SystemInput, SystemOutput

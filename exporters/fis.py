@@ -39,8 +39,7 @@ from fuzzytree.formats.fis.fis_words import (
     Dialect,
 )
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
-from fuzzytree.model.contracts import Format, Loss, Written
-from fuzzytree.model.losses import refusal
+from fuzzytree.model.contracts import Format, Loss, Written, refusal
 from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import (

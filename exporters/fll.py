@@ -30,8 +30,7 @@ from fuzzytree.formats.fll.fll_reader import places, read
 from fuzzytree.formats.fll.fll_rules import RULE_WORDS
 from fuzzytree.formats.fll.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
 from fuzzytree.formats.text_files import LONGEST_NAME
-from fuzzytree.model.contracts import Format, Loss, Written
-from fuzzytree.model.losses import refusal
+from fuzzytree.model.contracts import Format, Loss, Written, refusal
 from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import LR, Band, Points, RuleBase
 from fuzzytree.model.system import (

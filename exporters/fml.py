@@ -24,8 +24,7 @@ from fuzzytree.formats.fml.fml_words import (
     TNORMS,
     USUAL,
 )
-from fuzzytree.model.contracts import Format, Loss, Written
-from fuzzytree.model.losses import refusal
+from fuzzytree.model.contracts import Format, Loss, Written, refusal
 from fuzzytree.model.naming import DIGITS, LETTERS, NameMap
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.model.system import (

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import msgspec
 
 from fuzzytree.errors import MissingExtraError, install_hint
-from fuzzytree.model.contracts import Dtype, Format, Model, Written
-from fuzzytree.model.losses import narrowing_refusal
+from fuzzytree.model.contracts import Dtype, Format, Model, Written, narrowing_refusal
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree

@@ -32,8 +32,7 @@ from fuzzytree.exporters.pmml_elements import (
     text_of,
 )
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
-from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
-from fuzzytree.model.losses import refusal
+from fuzzytree.model.contracts import Document, Format, Loss, Model, Written, refusal
 from fuzzytree.model.naming import unlike
 from fuzzytree.model.rulebase import (
     Clause,

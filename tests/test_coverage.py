@@ -30,7 +30,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
-from fuzzytree.runtimes.systems import run_system
+from fuzzytree.runtimes.programs import run_system
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import Aim, range_rows
 from fuzzytree.semantics.samples import samples

@@ -9,8 +9,7 @@ import numpy as np
 
 from fuzzytree.benchmarking.records import Found
 from fuzzytree.errors import LossError
-from fuzzytree.runtimes.axes import Axes, axis_lines, axis_row
-from fuzzytree.runtimes.rows import checked
+from fuzzytree.runtimes.rows import Axes, axis_lines, axis_row, checked
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -60,7 +59,7 @@ def questions(tree: FuzzyTree, axes: Axes) -> Questions:
         LossError: If so many copies of branches would stand in it that it explodes.
 
     Example:
-        >>> from fuzzytree.runtimes.axes import plan_axes
+        >>> from fuzzytree.runtimes.rows import plan_axes
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1, leaves=3)
         >>> asked = questions(tree, plan_axes(tree.variables))

@@ -18,8 +18,7 @@ from fuzzytree.benchmarking.records import Found, Loaded
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Outcome
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape
-from fuzzytree.runtimes.axes import plan_axes
-from fuzzytree.runtimes.rows import checked, winners
+from fuzzytree.runtimes.rows import checked, plan_axes, winners
 from fuzzytree.runtimes.sampling import clause_shapes, line_error, samples, universe
 from peers.crisp import lines_of
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from fuzzytree.benchmarking.records import Loaded
 from fuzzytree.errors import LossError
-from fuzzytree.runtimes.axes import Axes, axis_row, plan_axes
+from fuzzytree.runtimes.rows import Axes, axis_row, plan_axes
 from peers.crisp import (
     Questions,
     guarded,

@@ -27,8 +27,8 @@ from fuzzytree.model.contracts import (
     ModelSource,
     Reading,
     Written,
+    loss_text,
 )
-from fuzzytree.model.losses import loss_text
 from fuzzytree.model.options import Option, check_options
 from fuzzytree.model.rulebase import Conjunction, Kind, RuleBase
 from fuzzytree.model.system import FuzzySystem, sampled_values

@@ -33,7 +33,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.tree import FuzzyTree, Use
 from fuzzytree.runtimes import find_runtime
-from fuzzytree.runtimes.axes import axis_lines, plan_axes
+from fuzzytree.runtimes.rows import axis_lines, plan_axes
 from fuzzytree.semantics.crisp_regions import free_axes
 from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.simplification import (
@@ -47,7 +47,7 @@ from fuzzytree.semantics.simplification import (
 if TYPE_CHECKING:
     from fuzzytree.exporters.onnx import Output
     from fuzzytree.model.contracts import FloatArray
-    from fuzzytree.runtimes.axes import Real
+    from fuzzytree.runtimes.rows import Real
 
 DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
 

@@ -25,7 +25,8 @@ from fuzzytree.model.contracts import Progress, Runtime, SystemOutcome, SystemRu
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.runtimes import chosen_runtimes, is_installed, needed_by
-from fuzzytree.runtimes.systems import infer_rows, run_system
+from fuzzytree.runtimes.programs import run_system
+from fuzzytree.runtimes.reference import infer_rows
 from fuzzytree.semantics.probing import Aim, Row, range_rows, system_probes
 from fuzzytree.semantics.programs.bounds import ORIGIN, error_bounds
 from fuzzytree.semantics.programs.system_program import from_system

@@ -190,7 +190,7 @@ def carry(
     """
     from fuzzytree.checking.converting import export, kind_of, proved
     from fuzzytree.cli.representation import represented
-    from fuzzytree.model.losses import loss_text
+    from fuzzytree.model.contracts import loss_text
     from fuzzytree.report import systems
 
     model = represented(
@@ -289,7 +289,7 @@ def _written(
 
 def _refuse(found: Reading, refusal: str, *, verbose: bool) -> None:
     """Report what would be lost, and that nothing is written."""
-    from fuzzytree.model.losses import loss_text
+    from fuzzytree.model.contracts import loss_text
 
     losses = [f"lost     {loss_text(loss)}" for loss in found.losses]
     if "--allow-loss" in refusal:

@@ -77,7 +77,7 @@ def _coverage(model: Document) -> Coverage | None:
 
 def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
     """Say on stderr what is not shown."""
-    from fuzzytree.model.losses import loss_text
+    from fuzzytree.model.contracts import loss_text
 
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")

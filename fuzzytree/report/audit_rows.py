@@ -10,7 +10,7 @@ from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import RuleBase, Variable
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes.axes import axis_lines, plan_axes
+from fuzzytree.runtimes.rows import axis_lines, plan_axes
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, IntArray

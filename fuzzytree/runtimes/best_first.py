@@ -38,8 +38,7 @@ from fuzzytree.model.rulebase import (
     Shape,
     shapes_of,
 )
-from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
-from fuzzytree.runtimes.descent import AxisSplit, plan_descent
+from fuzzytree.runtimes.descent import AxisSplit, descend_by, plan_descent
 from fuzzytree.runtimes.envelope import (
     Envelope,
     cells_of,
@@ -48,8 +47,7 @@ from fuzzytree.runtimes.envelope import (
     spread,
 )
 from fuzzytree.runtimes.native_rules import fire
-from fuzzytree.runtimes.native_tree import descend_by
-from fuzzytree.runtimes.rows import checked
+from fuzzytree.runtimes.rows import axis_lines, checked, missing_rows, plan_axes
 
 if TYPE_CHECKING:
     import numpy.typing as npt

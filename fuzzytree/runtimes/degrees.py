@@ -8,6 +8,8 @@ The operations on one number, and their order, are those of
   slope of |x - m| if its sides are equal. Points are one *polyline*.
 - `max(min(p, CAP), core)` with a core of 0 or 1 is both `min(max(p, 0), CAP)` off the
   plateau and 1 on it.
+- The line between points on which a value lies is found by comparing the value with
+  every point (`counted`, best for few points) or by halving (`halved`).
 - (-d) / s is d / (-s); x - x and similar signs of zero are compared equal.
 """
 
@@ -24,14 +26,11 @@ from fuzzytree.model.contracts import Dtype
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import LR, Flank, Points, Shape, Side
 from fuzzytree.numerics.segments import segments
-from fuzzytree.runtimes.polylines import counted, halved, join
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from fuzzytree.model.contracts import IntArray
+    from fuzzytree.numerics.segments import Reals, Segments
 
-    Reals = npt.NDArray[np.floating[Any]]
     Real = np.dtype[np.floating[Any]]
 
 BLOCK = 1 << 15
@@ -336,3 +335,72 @@ def shape_degrees(shape: Shape, values: Reals) -> Reals:
             block.run(lines, out, np.empty_like(lines))
             np.minimum(found, out.min(axis=0), out=found)
     return found
+
+
+def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
+    """Return the degree of each value on its line.
+
+    Args:
+        lines: The lines of all shapes.
+        place: The place of each value's line.
+        x: Finite values, in the lines' type.
+    """
+    position = _taken(lines.anchor, place)
+    np.subtract(x, position, out=position)
+    position /= _taken(lines.width, place)
+    near, far = _taken(lines.near, place), _taken(lines.far, place)
+    found = position.astype(near.dtype, copy=False)
+    found *= far - near
+    found += near
+    np.maximum(found, np.minimum(near, far), out=found)
+    np.minimum(found, np.maximum(near, far, out=far), out=found)
+    return found
+
+
+def counted(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
+    """Return the place of the line on which each value lies, by comparisons.
+
+    Args:
+        lines: The lines of all shapes.
+        shape: Numbers of shapes of less than 128 points, in a form that broadcasts to
+            that of the values.
+        x: The values.
+    """
+    first = lines.first.take(shape)
+    last = 2 * lines.room.take(shape) - 1  # a line without a further point
+    below = np.zeros(x.shape, np.int8)
+    is_above = np.empty(x.shape, np.bool_)
+    for number in range(int(last.max(initial=0))):
+        limit = lines.values.take(first + np.minimum(number, last))
+        if np.isinf(limit).all():
+            break
+        np.greater(x, limit, out=is_above)
+        below += is_above.view(np.int8)
+    return first + below
+
+
+def halved(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
+    """Return the place of the line on which each value lies, by halving.
+
+    Args:
+        lines: The lines of all shapes.
+        shape: Numbers of shapes, in a form that broadcasts to that of the values.
+        x: The values.
+    """
+    place = np.empty(x.shape, np.int64)
+    place[:] = lines.first.take(shape)
+    room = lines.room.take(shape)
+    probe = np.empty_like(place)
+    is_above = np.empty(x.shape, np.bool_)
+    for _ in range(int(room.max(initial=0)).bit_length()):
+        np.add(place, room - 1, out=probe)
+        np.greater(x, _taken(lines.values, probe), out=is_above)
+        np.multiply(is_above, room, out=probe)
+        place += probe
+        room = room >> 1
+    return place
+
+
+def _taken(table: Reals, place: IntArray) -> Reals:
+    """Return entries of a table; a place outside of it gives that at its end."""
+    return table.take(place, mode="clip")  # faster than a check of each place

@@ -45,8 +45,7 @@ from fuzzytree.model.rulebase import (
     shapes_of,
 )
 from fuzzytree.numerics.segments import Segments, segments
-from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS
-from fuzzytree.runtimes.polylines import halved, join
+from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS, halved, join
 
 if TYPE_CHECKING:
     import numpy.typing as npt

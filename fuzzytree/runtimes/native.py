@@ -9,9 +9,9 @@ from fuzzytree.model.contracts import Dtype, Model, Run, Runtime
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.numerics.narrowing import losses
 from fuzzytree.runtimes.best_first import search
+from fuzzytree.runtimes.descent import follow
 from fuzzytree.runtimes.native_rules import fire
-from fuzzytree.runtimes.native_tree import follow
-from fuzzytree.runtimes.systems import run_system
+from fuzzytree.runtimes.programs import run_system
 
 
 def load(model: Model, dtype: Dtype = "float64") -> Run:

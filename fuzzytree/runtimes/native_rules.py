@@ -15,7 +15,6 @@ import numpy as np
 
 from fuzzytree.model.contracts import Dtype, Outcome, Run
 from fuzzytree.model.rulebase import Clause, RuleBase, shapes_of
-from fuzzytree.runtimes.axes import Axes, axis_lines, missing_rows, plan_axes
 from fuzzytree.runtimes.degrees import (
     NUMBERS,
     Atom,
@@ -24,7 +23,14 @@ from fuzzytree.runtimes.degrees import (
     atoms_of,
     plan_blocks,
 )
-from fuzzytree.runtimes.rows import checked, winners
+from fuzzytree.runtimes.rows import (
+    Axes,
+    axis_lines,
+    checked,
+    missing_rows,
+    plan_axes,
+    winners,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -14,9 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fuzzytree.model.contracts import SystemOutcome, SystemRun
 from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.runtimes.rows import checked
 from fuzzytree.semantics.programs.evaluate import StepValue, still_results
 from fuzzytree.semantics.programs.steps import Program, Step
+from fuzzytree.semantics.programs.system_program import from_system
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -301,3 +305,31 @@ def _shelf(
         taken.append((place, buffer))
     dtype = np.bool_ if kind == "truth" else np.float64
     return _Shelf(dtype, samples, tuple(taken), len(busy) + len(free))
+
+
+def run_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
+    """Return a function that runs a system's program in numpy.
+
+    Args:
+        system: The system.
+        activations: Whether the degree of activation of each rule is wanted.
+
+    Example:
+        >>> import numpy as np
+        >>> from fuzzytree.testing import random_system
+        >>> run_system(random_system(3))(np.zeros((3, 2))).outputs.shape
+        (2, 2)
+    """
+    program = from_system(system, activations=activations)
+    plan = plan_program(program)
+    outputs, rules = len(system.outputs), len(system.rules)
+
+    def run(values: FloatArray) -> SystemOutcome:
+        found = run_program(plan, checked(values, system.columns))
+        return SystemOutcome(
+            found[:outputs],
+            found[-1].astype(np.int64),
+            found[outputs : outputs + rules] if activations else None,
+        )
+
+    return run

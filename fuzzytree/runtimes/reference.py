@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fuzzytree.model.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.model.contracts import (
+    Model,
+    Outcome,
+    Run,
+    Runtime,
+    SystemOutcome,
+    SystemRun,
+)
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.reference import Answer, descend, evaluate
 
 if TYPE_CHECKING:
@@ -35,6 +43,33 @@ def load(model: Model) -> Run:
             rule=np.array([answer.rule for answer in answers], np.int64),
             status=np.array([answer.status for answer in answers], np.int64),
             strengths=strengths,
+        )
+
+    return run
+
+
+def infer_rows(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
+    """Return a function that infers rows one after another.
+
+    Args:
+        system: The system.
+        activations: Whether the degree of activation of each rule is wanted.
+    """
+    names = system.columns
+
+    def run(values: FloatArray) -> SystemOutcome:
+        import numpy as np
+
+        from fuzzytree.runtimes.rows import checked
+
+        table = checked(values, names).T.tolist()
+        found = [infer(system, dict(zip(names, row, strict=True))) for row in table]
+        outputs = np.array([one.outputs for one in found], np.float64)
+        degrees = np.array([one.activations for one in found], np.float64)
+        return SystemOutcome(
+            outputs.reshape(len(found), len(system.outputs)).T,
+            np.array([one.status for one in found], np.int64),
+            degrees.reshape(len(found), len(system.rules)).T if activations else None,
         )
 
     return run

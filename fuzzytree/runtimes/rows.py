@@ -1,16 +1,27 @@
-"""Checks of the rows that a runtime gets, and the winner of each."""
+"""Checks of the rows that a runtime gets, values of all variables, and winners.
+
+A combination is a chain of single operations in the stored order of its parts, each
+rounded once. All combinations advance together, one part at a time, so that the
+operations are few and wide; the longer ones stand first.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from fuzzytree.model.rulebase import Part, Variable
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.model.contracts import FloatArray, IntArray
+
+    Reals = npt.NDArray[np.floating[Any]]
+    Real = np.dtype[np.floating[Any]]
 
 
 def checked(values: npt.ArrayLike, inputs: Sequence[str]) -> FloatArray:
@@ -64,3 +75,118 @@ def winners(
 def _shown(names: Sequence[str]) -> str:
     shown = ", ".join(names[:12])
     return shown + (", ..." if len(names) > 12 else "")
+
+
+@dataclass(frozen=True, slots=True)
+class PartsAt:
+    """The parts at one position of all combinations that are long enough."""
+
+    inputs: IntArray
+    weights: Reals
+    centres: Reals
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """How to compute the value of every variable of a model.
+
+    Attributes:
+        line: The line of each variable, by name: inputs first, in their order.
+        inputs: How many inputs there are.
+        steps: The parts of the combinations, position by position.
+        chains: The combinations again, for a single row: (line, weight, centre) of
+            each part.
+        dtype: In what the chain is computed.
+    """
+
+    line: dict[str, int]
+    inputs: int
+    steps: tuple[PartsAt, ...]
+    chains: tuple[tuple[tuple[int, float, float], ...], ...]
+    dtype: Real
+
+    @property
+    def count(self) -> int:
+        """The number of variables."""
+        return len(self.line)
+
+
+def plan_axes(
+    variables: Sequence[Variable],
+    dtype: Real | None = None,
+) -> Axes:
+    """Return how to compute the variables of a model; in double unless given."""
+    kind: Real = np.dtype(np.float64) if dtype is None else dtype
+    inputs = [v.name for v in variables if not v.parts]
+    mixed = [v for v in variables if v.parts]
+    mixed.sort(key=lambda v: -len(v.parts))
+    line = {name: i for i, name in enumerate([*inputs, *(v.name for v in mixed)])}
+    longest = len(mixed[0].parts) if mixed else 0
+    steps = tuple(
+        _step([v.parts[p] for v in mixed if len(v.parts) > p], line, kind)
+        for p in range(longest)
+    )
+    chains = tuple(
+        tuple((line[part.input], part.weight, part.centre) for part in v.parts)
+        for v in mixed
+    )
+    return Axes(line, len(inputs), steps, chains, kind)
+
+
+def _step(
+    parts: Sequence[Part],
+    line: dict[str, int],
+    dtype: Real,
+) -> PartsAt:
+    return PartsAt(
+        np.array([line[part.input] for part in parts], np.int64),
+        np.array([[part.weight] for part in parts], dtype),
+        np.array([[part.centre] for part in parts], dtype),
+    )
+
+
+def axis_lines(axes: Axes, values: FloatArray) -> Reals:
+    """Return the value of every variable, of shape (variables, rows).
+
+    Args:
+        axes: The plan.
+        values: Doubles of shape (inputs, rows); returned as they are if the plan has
+            no combinations and computes in doubles.
+    """
+    base: Reals = values.astype(axes.dtype, copy=False)
+    if not axes.steps:
+        return base
+    lines = np.empty((axes.count, values.shape[1]), axes.dtype)
+    lines[: axes.inputs] = base
+    chains = lines[axes.inputs :]
+    for position, step in enumerate(axes.steps):
+        term: Reals = base[step.inputs]
+        term -= step.centres
+        term *= step.weights
+        if position == 0:
+            chains[:] = term
+        else:
+            chains[: len(term)] += term
+    return lines
+
+
+def axis_row(axes: Axes, row: list[float]) -> list[float]:
+    """Return the value of every variable for a single row, in double."""
+    values = row.copy()
+    for (line, weight, centre), *others in axes.chains:
+        total = weight * (row[line] - centre)
+        for line, weight, centre in others:
+            total = total + weight * (row[line] - centre)
+        values.append(total)
+    return values
+
+
+def missing_rows(lines: Reals) -> npt.NDArray[np.bool_] | None:
+    """Return which rows hold a value that is not finite; None if no row does.
+
+    The sum is a fast first look: it is finite only if every summand is.
+    """
+    if np.isfinite(lines.sum()):
+        return None
+    missing = ~np.logical_and.reduce(np.isfinite(lines), axis=0)
+    return missing if missing.any() else None

@@ -55,8 +55,13 @@ def load(model: Model) -> Run:
         ) from error
     import numpy as np
 
-    from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
-    from fuzzytree.runtimes.rows import checked, winners
+    from fuzzytree.runtimes.rows import (
+        axis_lines,
+        checked,
+        missing_rows,
+        plan_axes,
+        winners,
+    )
 
     antecedents, fired = _build(rules)
     system = control.ControlSystem()

@@ -39,10 +39,10 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.numerics.oracle import decide
-from fuzzytree.runtimes.axes import axis_lines, plan_axes
 from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.runtimes.native import load as load_native
 from fuzzytree.runtimes.reference import RUNTIMES as REFERENCE
+from fuzzytree.runtimes.rows import axis_lines, plan_axes
 from fuzzytree.runtimes.sampling import lines_bound
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree, with_points

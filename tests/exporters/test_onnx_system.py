@@ -32,7 +32,7 @@ from fuzzytree.model.system import (
     SystemTerm,
 )
 from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.runtimes.reference import infer_rows
 from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.testing import random_rows, random_system
 

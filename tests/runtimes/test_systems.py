@@ -23,7 +23,8 @@ from fuzzytree.model.system import (
     SystemTerm,
 )
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
-from fuzzytree.runtimes.systems import infer_rows, run_system
+from fuzzytree.runtimes.programs import run_system
+from fuzzytree.runtimes.reference import infer_rows
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds

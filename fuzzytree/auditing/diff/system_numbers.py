@@ -37,7 +37,7 @@ from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sampled_share
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.numerics.exact import outwards
-from fuzzytree.runtimes.systems import run_system
+from fuzzytree.runtimes.programs import run_system
 from fuzzytree.semantics.probing import system_probes
 
 if TYPE_CHECKING:
