@@ -25,14 +25,14 @@ from fuzzytree.tactile.cli.sensors import (
 @click.argument("model", metavar="MODEL")
 @click.argument("files", metavar="FILE.onnx...", nargs=-1, required=True)
 @click.option(
-    "--data", metavar="FRAMES", help="Frames to check with, beside made ones."
+    "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
 )
 @sensor_options
 @click.option(
     "--reject",
     type=click.FloatRange(0.0, 1.0),
     default=0.0,
-    help="The reject that the files were exported with; 0 unless given.",
+    help="Value of `reject` that the files were exported with; default 0.",
 )
 @rows_only_option
 @json_option
@@ -52,8 +52,8 @@ def command(
 ) -> int:
     """Compare ONNX files that take frames with MODEL, as `tactile export` wrote them.
 
-    What a file says of itself, its graph, and its answers to frames must be those of
-    the model, bit by bit; made frames are aimed at bounds and cuts. Exit 1 if not.
+    Metadata, graph and predictions of a file must be those of the model, bit by bit;
+    generated frames are aimed at bounds and cuts. Exit 1 if not.
     """
     from fuzzytree.files import read_bounded
     from fuzzytree.report.text import agreement_lines, verdict_text
@@ -62,11 +62,11 @@ def command(
 
     is_named = any(one is not None for one in (board, size, full, threshold))
     sensor = sensor_of_options(board, size, full, threshold) if is_named else None
-    asked = frames_model(model)
+    source = frames_model(model)
     contents = {name: read_bounded(name) for name in files}
     frames = None if data is None else read_frames(data).presses.frames
     found = check_onnx_files(
-        asked, contents, frames, sensor=sensor, reject=reject, rows_only=rows_only
+        source, contents, frames, sensor=sensor, reject=reject, rows_only=rows_only
     )
     if as_json:
         answer_json({"check": found, "ok": found.ok})

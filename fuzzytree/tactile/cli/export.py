@@ -40,18 +40,21 @@ _SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
 @click.argument("model", metavar="MODEL")
 @click.argument("output", metavar="OUT")
 @click.option(
-    "--to", type=click.Choice(["onnx", "c"]), help="If not OUT's suffix says."
+    "--to",
+    type=click.Choice(["onnx", "c"]),
+    help="Format; default by the suffix of OUT.",
 )
 @sensor_options
 @click.option(
-    "--data", metavar="FRAMES", help="Frames to check with, beside made ones."
+    "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
 )
 @click.option(
     "--set",
     "settings",
     metavar="NAME=VALUE",
     multiple=True,
-    help="outputs, reject, opset, ir, plain of a graph; name, reject of C.",
+    help="Option (repeat): outputs, reject, opset, ir, plain of graphs; "
+    "name, reject of C.",
 )
 @json_option
 @quiet_option
@@ -70,8 +73,8 @@ def command(
 ) -> int:
     """Write MODEL as file OUT (.onnx or .c) that takes frames as a board sends them.
 
-    Every way from frame to class is checked first, bit by bit, and against exact
-    arithmetic. If one disagrees, nothing is written: exit 1. `-` is standard output.
+    All implementations from frame to class are compared first, bit by bit, and with
+    exact arithmetic. If one disagrees, nothing is written: exit 1. `-` is stdout.
     """
     from fuzzytree.report.text import verdict_text
     from fuzzytree.tactile.recognition.agreement import check_frames_agree

@@ -40,13 +40,18 @@ CLASS = "class"
     metavar="NAMES",
     default="paper",
     show_default=True,
-    help="Names and sets of features, with commas between them.",
+    help="Names and sets of features, separated by commas.",
 )
 @frames_options
 @click.option(
-    "--label", metavar="ARRAY", default="label", help="The classes in FRAMES; `label`."
+    "--label",
+    metavar="ARRAY",
+    default="label",
+    help="Array of FRAMES with the classes; default `label`.",
 )
-@click.option("-o", "--output", metavar="FILE", help="A CSV file; `-` is stdout.")
+@click.option(
+    "-o", "--output", metavar="FILE", help="CSV file to write; `-` is stdout."
+)
 @json_option
 @quiet_option
 def command(
@@ -62,9 +67,9 @@ def command(
 ) -> int:
     """Compute features of FRAMES, a numpy archive (.npz) or a recording.
 
-    With -o they become a table for `fuzzytree learn`; without it, what each feature
-    costs is listed. Frames on which nothing presses are left out and counted. Files
-    of one class each are written as CLASS=FILE: cup=cup.ftr pen=pen.ftr.
+    With -o they become a table for `fuzzytree learn`; without it, the cost of each
+    feature in operations is listed. Empty frames are left out and counted. For files
+    of one class each, write CLASS=FILE: cup=cup.ftr pen=pen.ftr.
     """
     from fuzzytree.tactile.features import costs
     from fuzzytree.tactile.features.names import names_of

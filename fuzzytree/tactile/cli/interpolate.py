@@ -40,22 +40,27 @@ MOST_BYTES = 2**30
     metavar="NUMBERS",
     default="3,5,7",
     show_default=True,
-    help="Points for a cell on each side, with commas between them.",
+    help="Points for a cell on each side, separated by commas.",
 )
 @click.option(
     "--frame",
     metavar="NUMBER",
     type=int,
-    help="From 0; a picture is of the first that something presses on if none.",
+    help="Number of the frame, from 0; a picture shows the first pressed one if none.",
 )
-@click.option("--axis", "is_marked", is_flag=True, help="Mark centre and axis as well.")
+@click.option(
+    "--axis",
+    "is_marked",
+    is_flag=True,
+    help="Mark the centre of pressure and the principal axis.",
+)
 @frames_options
 @click.option(
     "-o",
     "--output",
     metavar="FILE",
     required=True,
-    help="A picture (.svg, .png) of a frame, or numbers (.npz) of all.",
+    help="Picture of a frame (.svg, .png), or values of all frames (.npz).",
 )
 @json_option
 @quiet_option

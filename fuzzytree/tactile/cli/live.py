@@ -32,8 +32,13 @@ SWITCH_S = 2e-4
 
 @click.command("live", short_help="Recognise what lies on a sensor, on-line.")
 @click.argument("source", metavar="SOURCE")
-@click.option("--model", required=True, metavar="MODEL", help="A tree or rules.")
-@click.option("--board", metavar="BOARD.yaml", help="What is connected to the port.")
+@click.option(
+    "--model",
+    required=True,
+    metavar="MODEL",
+    help="Model to run: a tree or a rule base.",
+)
+@click.option("--board", metavar="BOARD.yaml", help="File of the board on the port.")
 @click.option(
     "--reject",
     type=click.FloatRange(0.0, 1.0),
@@ -47,17 +52,17 @@ SWITCH_S = 2e-4
     default=3,
     show_default=True,
     metavar="N",
-    help="A line for what has not changed for N frames.",
+    help="Frames that a result must last before its line is printed.",
 )
-@click.option("--lines", is_flag=True, help="Lines, also on a terminal.")
-@click.option("--json", "as_json", is_flag=True, help="Lines of JSON.")
+@click.option("--lines", is_flag=True, help="Print lines, also on a terminal.")
+@click.option("--json", "as_json", is_flag=True, help="Print each line as JSON.")
 @click.option(
     "--page",
     is_flag=False,
     flag_value=0,
     type=click.IntRange(0, 65535),
     metavar="[PORT]",
-    help="Serve a page for browsers of this computer; a free port if none.",
+    help="Serve a page on this computer; a free port if none is named.",
 )
 @click.option(
     "--times",
@@ -65,19 +70,29 @@ SWITCH_S = 2e-4
     default=3,
     show_default=True,
     metavar="N",
-    help="Points for a cell in the picture, at most.",
+    help="Largest number of picture points for a cell, on each side.",
 )
-@click.option("--record", metavar="FILE", help="Keep the frames in a recording.")
+@click.option("--record", metavar="FILE", help="Recording to write the frames to.")
 @click.option(
     "--speed",
     type=click.FloatRange(0.0),
     default=1.0,
     show_default=True,
     metavar="X",
-    help="Of a recording or the simulator; 0 for no pauses.",
+    help="Speed of a recording or the simulator; 0 for no pauses.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, help="Of the simulator.")
-@click.option("--frames", type=click.IntRange(1), metavar="N", help="End after N.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    help="Random seed of the simulator; default 0.",
+)
+@click.option(
+    "--frames",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Number of frames to recognise.",
+)
 @quiet_option
 def command(
     source: str,
@@ -95,7 +110,7 @@ def command(
     frames: int | None,
     quiet: bool,
 ) -> None:
-    """Recognise what SOURCE shows, frame by frame.
+    """Recognise the object on the sensor, frame by frame.
 
     SOURCE is a serial port, a recording, or `simulator`: the paper's objects one after
     another. A terminal shows a picture, the class and the strengths; elsewhere there

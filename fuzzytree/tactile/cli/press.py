@@ -27,10 +27,27 @@ if TYPE_CHECKING:
 
 @click.command("press", short_help="Press objects on a simulated sensor.")
 @click.argument("name", metavar="OBJECT")
-@click.option("--count", metavar="NUMBER", type=int, default=50, show_default=True)
-@click.option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
 @click.option(
-    "-o", "--output", metavar="FILE", required=True, help="`.npz`; `-` is stdout."
+    "--count",
+    metavar="NUMBER",
+    type=int,
+    default=50,
+    show_default=True,
+    help="Presses of each object.",
+)
+@click.option(
+    "--seed",
+    metavar="NUMBER",
+    type=click.IntRange(0),
+    default=0,
+    help="Random seed of the presses; default 0.",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    required=True,
+    help="Archive to write (.npz); `-` is stdout.",
 )
 @click.option(
     "--set",
@@ -53,7 +70,7 @@ def command(
     """Press OBJECT again and again on a sensor of 16 x 16 cells; `all` presses all.
 
     OBJECT is rectangle-0, rectangle-27, rectangle-45, circle, square, hand-0 or
-    hand-45. FILE holds the frames, their labels and what a full cell reads.
+    hand-45. FILE holds the frames, their labels and the reading of a saturated cell.
     """
     if output == "-" and as_json:
         raise click.UsageError("`-o -` leaves no room for --json on stdout")

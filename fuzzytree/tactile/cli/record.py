@@ -36,18 +36,22 @@ _LOOK_S = 0.1
 _WAITING_BYTES = 2**24  # of frames, while the disk is busy
 
 
-@click.command("record", short_help="Keep the frames of a board in a file.")
+@click.command("record", short_help="Record the frames of a board in a file.")
 @click.argument("board", metavar="BOARD.yaml")
 @click.argument("port", metavar="PORT")
-@click.option("-o", "--output", metavar="FILE", required=True, help="The recording.")
-@click.option("--frames", type=click.IntRange(1), metavar="N", help="End after N.")
+@click.option(
+    "-o", "--output", metavar="FILE", required=True, help="Recording to write."
+)
+@click.option(
+    "--frames", type=click.IntRange(1), metavar="N", help="Number of frames to record."
+)
 @click.option(
     "--seconds",
     type=click.FloatRange(0.0, min_open=True),
     metavar="S",
-    help="End after S seconds.",
+    help="Seconds to record.",
 )
-@click.option("--force", is_flag=True, help="Replace FILE if it is there.")
+@click.option("--force", is_flag=True, help="Replace FILE if it exists.")
 @click.option("--no-wait", is_flag=True, help="End when the port goes away.")
 @json_option
 @quiet_option
@@ -62,10 +66,10 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Keep what BOARD.yaml sends through PORT in FILE, until Ctrl-C.
+    """Record the frames that BOARD.yaml sends through PORT in FILE, until Ctrl-C.
 
-    First it is measured what the sensor reads at rest: let nothing lie on it. A port
-    that goes away is waited for. Exit 1 if it went away for good.
+    The first frames measure the baseline: leave the sensor empty. The recording waits
+    for a port that goes away. Exit 1 if the port does not come back.
     """
     from fuzzytree.tactile.board_file import load_board
     from fuzzytree.tactile.link import open_connection, start

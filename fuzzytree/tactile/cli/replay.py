@@ -35,14 +35,18 @@ _LAST_S = 0.2  # for the reader of a port to take the last bytes
     "-o",
     "--output",
     metavar="FILE",
-    help="Its frames as .csv or .npz, or its board as .yaml.",
+    help="File for the frames (.csv, .npz) or for the board (.yaml).",
 )
-@click.option("--to-port", is_flag=True, help="Send it through a port, as its board.")
+@click.option(
+    "--to-port",
+    is_flag=True,
+    help="Send the frames through a new port, as the board did.",
+)
 @click.option(
     "--speed",
     type=click.FloatRange(0.0, min_open=True),
     metavar="X",
-    help="How many times as fast as it came; 1.",
+    help="Speed of --to-port as a multiple of the recorded one; default 1.",
 )
 @json_option
 @quiet_option
@@ -56,8 +60,8 @@ def command(
 ) -> None:
     """Summarise a recording: board, frames, seconds, counters, gaps, damage.
 
-    With --to-port the frames go out through a new port, whose name is printed, once
-    something reads there, each when it came; Ctrl-C ends.
+    With --to-port the frames are sent through a new port, whose name is printed, at
+    their recorded times, once a host opens it; Ctrl-C ends.
     """
     from fuzzytree.tactile.link.recording import RecordingFile, review
 

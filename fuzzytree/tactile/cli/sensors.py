@@ -21,12 +21,22 @@ _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
 def sensor_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that say which sensor it is."""
     for option in (
-        click.option("--threshold", metavar="N", type=int, help="A cell counts above."),
         click.option(
-            "--full", metavar="N", type=int, help="The most a cell reads; 255."
+            "--threshold",
+            metavar="N",
+            type=int,
+            help="Reading above which a cell is pressed; default 0.",
         ),
-        click.option("--sensor", "size", metavar="16x16", help="Rows and columns."),
-        click.option("--board", metavar="FILE", help="The file of the board."),
+        click.option(
+            "--full",
+            metavar="N",
+            type=int,
+            help="Reading of a saturated cell; default 255.",
+        ),
+        click.option(
+            "--sensor", "size", metavar="16x16", help="Rows and columns of the sensor."
+        ),
+        click.option("--board", metavar="FILE", help="File of the board."),
     ):
         command = option(command)
     return command
@@ -66,9 +76,13 @@ def sensor_of_options(
 def frames_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options that say more of a file of frames than it does itself."""
     for option in (
-        click.option("--threshold", type=int, help="Above it a cell is pressed."),
-        click.option("--full", type=int, help="What a cell reads that takes no more."),
-        click.option("--board", metavar="FILE", help="The board of the frames."),
+        click.option(
+            "--threshold", type=int, help="Reading above which a cell is pressed."
+        ),
+        click.option("--full", type=int, help="Reading of a saturated cell."),
+        click.option(
+            "--board", metavar="FILE", help="File of the board of the frames."
+        ),
     ):
         command = option(command)
     return command

@@ -28,23 +28,39 @@ ALL = "all"
 _LOOK_S = 0.05
 
 
-@click.command("simulate", short_help="Be a board, with faults on request.")
+@click.command("simulate", short_help="Simulate a board on a new port.")
 @click.argument("board", metavar="BOARD.yaml")
-@click.option("--object", "name", metavar="NAME", help="Of the paper, or `all`.")
-@click.option("--recording", metavar="FILE", help="Send its frames, over and over.")
+@click.option(
+    "--object",
+    "name",
+    metavar="NAME",
+    help="Object of the paper to show, or `all` in turn.",
+)
+@click.option(
+    "--recording", metavar="FILE", help="Recording whose frames are repeated."
+)
 @click.option(
     "--fault",
     "faults",
     metavar="NAME=VALUE",
     multiple=True,
-    help="What goes wrong (repeat); docs/how-to/device.md lists them.",
+    help="Fault to simulate, `stall=SECONDS` or `unplug=SECONDS` (repeat).",
 )
-@click.option("--link", metavar="PATH", help="The name of the port.")
 @click.option(
-    "--seed", type=click.IntRange(0), default=0, help="Of all that is random."
+    "--link",
+    metavar="PATH",
+    help="Path of the port; a new one in a folder of its own if none.",
 )
-@click.option("--fast", is_flag=True, help="As fast as it is read.")
-@click.option("--frames", type=click.IntRange(1), metavar="N", help="End after N.")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    help="Random seed of the simulated object; default 0.",
+)
+@click.option("--fast", is_flag=True, help="Send as fast as the host reads.")
+@click.option(
+    "--frames", type=click.IntRange(1), metavar="N", help="Number of frames to send."
+)
 @json_option
 @quiet_option
 def command(
@@ -59,11 +75,11 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Send what BOARD.yaml would send, through a new port, until Ctrl-C.
+    """Simulate the board of BOARD.yaml on a new port, until Ctrl-C.
 
-    Something round wanders over the sensor, unless an object or a recording is named.
-    The first frames after a host has opened the port are those at rest, as many as
-    its baseline takes; --frames does not count them.
+    A disc wanders over the sensor, unless an object or a recording is named. After a
+    host has opened the port, the first frames are empty, as many as the baseline of
+    the board needs; --frames does not count them.
     """
     if name is not None and recording is not None:
         raise click.UsageError("--object and --recording exclude each other")
