@@ -57,7 +57,7 @@ def main() -> None:
 
     head("Run: the rules from their file, on the wines they were learnt from")
     answers = ft.run(OUT / "wine-rules.yaml", TABLE)
-    assert isinstance(answers, ft.Answers)  # a fuzzy system would answer numbers
+    assert isinstance(answers, ft.Predictions)  # a fuzzy system would answer numbers
     right = int((answers.codes == wine.codes).sum())
     print(f"{answers}\n{right} of {rows} are the grape that stands in the table")
 

@@ -44,15 +44,13 @@ if TYPE_CHECKING:
     from fuzzytree.model.rulebase import RuleBase
     from fuzzytree.model.system import FuzzySystem
     from fuzzytree.model.tree import FuzzyTree
-    from fuzzytree.runtimes.answers import Answers
-    from fuzzytree.runtimes.outputs import Outputs
+    from fuzzytree.runtimes.predictions import Outputs, Predictions
     from fuzzytree.tables import table
 
     __version__: str
 
 __all__ = [
     "Agreement",
-    "Answers",
     "AuditDomain",
     "AuditSelection",
     "AuditSettings",
@@ -64,6 +62,7 @@ __all__ = [
     "FuzzyTreeError",
     "LearningSettings",
     "Outputs",
+    "Predictions",
     "RuleBase",
     "__version__",
     "audit",
@@ -93,7 +92,7 @@ __all__ = [
 
 _HOMES = {
     "Agreement": "fuzzytree.model.agreement",
-    "Answers": "fuzzytree.runtimes.answers",
+    "Predictions": "fuzzytree.runtimes.predictions",
     "AuditDomain": "fuzzytree.auditing.findings.domains",
     "AuditSelection": "fuzzytree.auditing.findings.records",
     "AuditSettings": "fuzzytree.auditing.findings.records",
@@ -104,7 +103,7 @@ _HOMES = {
     "FuzzyTreeClassifier": "fuzzytree.estimator",
     "FuzzyTreeError": "fuzzytree.errors",
     "LearningSettings": "fuzzytree.learning.settings",
-    "Outputs": "fuzzytree.runtimes.outputs",
+    "Outputs": "fuzzytree.runtimes.predictions",
     "RuleBase": "fuzzytree.model.rulebase",
     "audit": "fuzzytree.api.verbs",
     "bench": "fuzzytree.api.verbs",

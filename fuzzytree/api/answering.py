@@ -25,9 +25,14 @@ from fuzzytree.model.contracts import (
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.runtimes import baseline, find_runtime, is_installed, needed_by
-from fuzzytree.runtimes.answers import Answers, answers_of, joined
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
-from fuzzytree.runtimes.outputs import Outputs, joined_outputs
+from fuzzytree.runtimes.predictions import (
+    Outputs,
+    Predictions,
+    joined,
+    joined_outputs,
+    predictions_of,
+)
 from fuzzytree.tables import Batch, batches
 
 if TYPE_CHECKING:
@@ -85,7 +90,7 @@ def run(
     columns: Sequence[str] | None = None,
     with_strengths: bool = True,
     allow_loss: bool = False,
-) -> Answers: ...
+) -> Predictions: ...
 
 
 @overload
@@ -97,7 +102,7 @@ def run(
     columns: Sequence[str] | None = None,
     with_strengths: bool = True,
     allow_loss: bool = False,
-) -> Answers | Outputs: ...
+) -> Predictions | Outputs: ...
 
 
 def run(
@@ -108,7 +113,7 @@ def run(
     columns: Sequence[str] | None = None,
     with_strengths: bool = True,
     allow_loss: bool = False,
-) -> Answers | Outputs:
+) -> Predictions | Outputs:
     """Answer the rows of a table: classes, or the numbers of a fuzzy system.
 
     Classes are numbers, booleans or text, as the labels that the model was learnt from.
@@ -142,12 +147,12 @@ class Answering(msgspec.Struct, frozen=True):
     Attributes:
         inputs: The columns that it needs, in order.
         trained: The columns of the table that it was learnt from, if any.
-        answer: Answers to values of shape (inputs, rows).
+        answer: Predicts for values of shape (inputs, rows).
     """
 
     inputs: tuple[str, ...]
     trained: tuple[str, ...]
-    answer: Callable[[FloatArray], Answers | Outputs]
+    answer: Callable[[FloatArray], Predictions | Outputs]
 
     def __call__(
         self,
@@ -156,7 +161,7 @@ class Answering(msgspec.Struct, frozen=True):
         columns: Sequence[str] | None = None,
         name: str | None = None,
         with_others: bool = False,
-    ) -> Iterator[tuple[Batch, Answers | Outputs]]:
+    ) -> Iterator[tuple[Batch, Predictions | Outputs]]:
         """Yield the rows of a table in batches, with the answers to them.
 
         The arguments are those of `fuzzytree.tables.batches`.
@@ -178,10 +183,10 @@ class Answering(msgspec.Struct, frozen=True):
             yield batch, self.join(found)
 
     @staticmethod
-    def join(parts: Sequence[Answers | Outputs]) -> Answers | Outputs:
+    def join(parts: Sequence[Predictions | Outputs]) -> Predictions | Outputs:
         """Return the answers to several pieces of a table as one."""
         numbers = [one for one in parts if isinstance(one, Outputs)]
-        classes = [one for one in parts if isinstance(one, Answers)]
+        classes = [one for one in parts if isinstance(one, Predictions)]
         return joined_outputs(numbers) if numbers else joined(classes)
 
 
@@ -208,8 +213,8 @@ def answering(
     else:
         ends = [leaf.label for leaf in model.leaves]
 
-    def answer(values: FloatArray) -> Answers:
-        return answers_of(
+    def answer(values: FloatArray) -> Predictions:
+        return predictions_of(
             execute(np.ascontiguousarray(values)),
             choices=model.classes,
             ends=ends,
@@ -260,9 +265,9 @@ def _answering_onnx(
         raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
     position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
 
-    def answer(values: FloatArray) -> Answers:
+    def answer(values: FloatArray) -> Predictions:
         outcome = model.run(values)
-        return Answers(
+        return Predictions(
             model.classes,
             np.array([position.get(name, -1) for name in label(values)], np.int64),
             outcome.rule,

@@ -32,7 +32,7 @@ from fuzzytree.model.rulebase import LR, Band, RuleBase
 from fuzzytree.numerics.approximation import Approximated, by_degree, by_points
 from fuzzytree.numerics.bounds import certify
 from fuzzytree.runtimes import all_runtimes, is_installed, needed_by
-from fuzzytree.runtimes.answers import answers_of
+from fuzzytree.runtimes.predictions import predictions_of
 from fuzzytree.semantics.lowering import forms
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ def _found(
 
 def found_of(outcome: Outcome, model: Model) -> Found:
     """Return a runtime's outcome as class numbers and strengths."""
-    answers = answers_of(
+    answers = predictions_of(
         outcome,
         choices=model.classes,
         ends=[*_ends(model)],

@@ -112,7 +112,7 @@ def self_test(has_onnx: bool) -> list[str]:
 
     from fuzzytree.api import verbs
     from fuzzytree.formats.yaml.yaml_reader import read
-    from fuzzytree.runtimes.answers import Answers
+    from fuzzytree.runtimes.predictions import Predictions
 
     table = np.array([[k, k % 3] for k in range(12)], np.float64)
     classes = ["low"] * 6 + ["high"] * 6
@@ -121,12 +121,12 @@ def self_test(has_onnx: bool) -> list[str]:
         content = verbs.export(tree, "yaml").content
         again = read(content, "self-test")
         answers = verbs.run(again, table)
-        found = answers.classes if isinstance(answers, Answers) else []
+        found = answers.classes if isinstance(answers, Predictions) else []
         faults = [] if again == tree else ["YAML does not give the tree back"]
         faults += [] if found == classes else ["the tree answers other classes"]
         if has_onnx:
             onnx = verbs.run(verbs.export(tree, "onnx").content, table)
-            same = isinstance(onnx, Answers) and onnx.classes == found
+            same = isinstance(onnx, Predictions) and onnx.classes == found
             faults += [] if same else ["ONNX answers other classes"]
     except FuzzyTreeError as error:
         return [str(error)]

@@ -31,9 +31,8 @@ from fuzzytree.semantics.lowering import rules_from_tree
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import Document
-    from fuzzytree.runtimes.answers import Answers, By
     from fuzzytree.runtimes.onnxruntime import OnnxModel
-    from fuzzytree.runtimes.outputs import Outputs
+    from fuzzytree.runtimes.predictions import By, Outputs, Predictions
     from fuzzytree.tables import Batch
 
 Columns = dict[str, Sequence[object]]
@@ -133,8 +132,10 @@ def command(
     tally.report(output, quiet=quiet)
 
 
-def _answered(answers: Answers | Outputs, strengths: By | None, model: str) -> Columns:
-    from fuzzytree.runtimes.outputs import Outputs
+def _answered(
+    answers: Predictions | Outputs, strengths: By | None, model: str
+) -> Columns:
+    from fuzzytree.runtimes.predictions import Outputs
 
     if isinstance(answers, Outputs):
         return answers.columns(with_activations=strengths is not None)
@@ -173,11 +174,10 @@ def _has_status(model: Document | OnnxModel) -> bool:
 
 def _reasons(
     path: str, model: Document | OnnxModel
-) -> Callable[[Batch, Answers | Outputs], list[str]]:
+) -> Callable[[Batch, Predictions | Outputs], list[str]]:
     from fuzzytree.report.systems import system_reasons
-    from fuzzytree.runtimes.answers import Answers, reasons
     from fuzzytree.runtimes.onnxruntime import OnnxModel
-    from fuzzytree.runtimes.outputs import Outputs
+    from fuzzytree.runtimes.predictions import Outputs, Predictions, reasons
 
     if isinstance(model, OnnxModel):
         raise click.UsageError(
@@ -185,11 +185,11 @@ def _reasons(
         )
     rules = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
 
-    def reason(batch: Batch, found: Answers | Outputs) -> list[str]:
+    def reason(batch: Batch, found: Predictions | Outputs) -> list[str]:
         if isinstance(rules, FuzzySystem):
             assert isinstance(found, Outputs)  # a system answers nothing else
             return system_reasons(rules, found)
-        assert isinstance(found, Answers)
+        assert isinstance(found, Predictions)
         return reasons(rules, batch.values, found)
 
     return reason
@@ -276,9 +276,9 @@ class _Tally:
         self.spans: dict[str, tuple[float, float]] = {}
         self.statuses: dict[int, int] = {}
 
-    def add(self, batch: Batch, answers: Answers | Outputs) -> None:
+    def add(self, batch: Batch, answers: Predictions | Outputs) -> None:
         """Take the answers to a piece."""
-        from fuzzytree.runtimes.outputs import Outputs
+        from fuzzytree.runtimes.predictions import Outputs
         from fuzzytree.tables import trimmed
 
         self.rows += len(answers)

@@ -32,7 +32,7 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.text import aligned, counted, depth, number, shape_text
-from fuzzytree.runtimes.outputs import Outputs
+from fuzzytree.runtimes.predictions import Outputs
 from fuzzytree.semantics.reference import Status
 
 

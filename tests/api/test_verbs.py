@@ -214,7 +214,7 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
         "FuzzyTree(5 nodes, 7 leaves, 3 inputs, 3 classes)",
         "RuleBase(7 rules, 3 inputs, 3 classes)",
         "FuzzySystem(8 rules, 3 inputs, 2 outputs)",
-        "Answers(20 rows, 3 classes)",
+        "Predictions(20 rows, 3 classes)",
         "Outputs(4 rows, 2 outputs)",
         f"Agreement({len(found.comparisons)} comparisons, agrees)",
         "Audit(1 answer, 0 findings)",
@@ -269,7 +269,7 @@ def test_every_representation_of_a_tree_predicts_alike(
         open_onnx(content, "tree.onnx"),
     ):
         found = ft.run(representation, rows)
-        assert isinstance(found, ft.Answers)
+        assert isinstance(found, ft.Predictions)
         assert found.classes == expected
 
 

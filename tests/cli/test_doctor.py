@@ -16,7 +16,7 @@ from fuzzytree.checking.abilities import Ability, abilities
 from fuzzytree.cli.doctor import CORE, EXTRAS
 from fuzzytree.exporters import TABLE, all_formats, find_format
 from fuzzytree.runtimes import all_runtimes
-from fuzzytree.runtimes.answers import Answers
+from fuzzytree.runtimes.predictions import Predictions
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -105,7 +105,7 @@ def test_the_doctor_reports_how_to_install_what_is_missing(
 def test_a_failed_self_test_is_exit_one(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Answers, "classes", property(lambda _: ["other"]))
+    monkeypatch.setattr(Predictions, "classes", property(lambda _: ["other"]))
     code, out, _ = call("doctor", "--json")
     assert code == 1
     assert json.loads(out)["faults"] == ["the tree answers other classes"]

@@ -63,7 +63,7 @@ def test_a_tree_for_its_path_alone_keeps_its_cuts(call: Call) -> None:
     words = " ".join(out.split())
     assert "the flanks of term 'low' of 'force' only relative rules need them" in words
     found = ft.run("path.yaml", "grasps.csv")
-    assert isinstance(found, ft.Answers)
+    assert isinstance(found, ft.Predictions)
     assert found.classes == ["soft", "firm", "loose", None]
 
 

@@ -13,7 +13,7 @@ from fuzzytree.api.answering import answering
 from fuzzytree.errors import LossError
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.report.systems import system_lines, system_reasons
-from fuzzytree.runtimes.outputs import Outputs, joined_outputs
+from fuzzytree.runtimes.predictions import Outputs, joined_outputs
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.random_systems import random_rows, random_system
 from fuzzytree.semantics.reference import Status

@@ -1,4 +1,4 @@
-"""Answers name classes, count what is odd, and say why."""
+"""Predictions name classes, count what is odd, and say why."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.runtimes.answers import Answers, joined, reasons
+from fuzzytree.runtimes.predictions import Predictions, joined, reasons
 from fuzzytree.semantics.reference import Status, evaluate
 from fuzzytree.testing import random_tree
 
@@ -94,7 +94,7 @@ def test_strengths_of_classes_are_those_of_their_strongest_rules(seed: int) -> N
     assert answers.classes == [expected.label]
 
 
-def test_batches_join_to_the_answers_of_the_whole() -> None:
+def test_batches_join_to_the_predictions_of_the_whole() -> None:
     rules = ft.rules_from_tree(random_tree(2))
     values = np.random.default_rng(0).normal(size=(10, 4))
     whole = ft.run(rules, values)
@@ -112,7 +112,7 @@ def test_reasons_show_ties_gaps_and_missing_values() -> None:
 
 
 def test_a_degree_just_below_one_is_not_shown_as_one() -> None:
-    answers = Answers(("soft",), np.array([0]), np.array([1]), np.array([0]))
+    answers = Predictions(("soft",), np.array([0]), np.array([1]), np.array([0]))
     values = np.array([[1.0000001]])
     assert reasons(RULES, values, answers) == ["IF force is low (<1) THEN soft"]
 

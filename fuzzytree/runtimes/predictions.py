@@ -1,4 +1,4 @@
-"""What a model answered to the rows of a table, and why."""
+"""The predictions of a model for the rows of a table: classes or numbers, and why."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ By = Literal["class", "rule"]
 T = TypeVar("T")
 
 
-class Answers(msgspec.Struct, frozen=True, eq=False):
-    """What a model answered to some rows.
+class Predictions(msgspec.Struct, frozen=True, eq=False):
+    """The classes that a model predicts for some rows.
 
     Attributes:
-        choices: The classes that the model can answer.
+        choices: The classes that the model can predict.
         codes: The position in `choices` of each row's class; -1 for no class.
         rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
         status: A `fuzzytree.semantics.reference.Status` for each row.
@@ -103,19 +103,14 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         return found | ({"no class": counts[0]} if counts[0] else {})
 
     def to_csv(self, strengths: By | None = None) -> str:
-        """Return the answers as CSV: class, rule, status and, if requested, strengths.
+        """Return them as CSV: class, rule, status and, if requested, strengths.
 
         No class and an unknown strength are empty cells.
 
         Raises:
             ValueError: If strengths are requested that are not there.
         """
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        columns = self.columns(strengths)
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
-        return text.getvalue()
+        return _csv_text(self.columns(strengths))
 
     def columns(self, strengths: By | None = None) -> dict[str, Sequence[object]]:
         """Return the columns that `to_csv` writes, by name.
@@ -165,7 +160,7 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
 
     def __repr__(self) -> str:
         """Show how many rows there are; `str` shows how many rows got which class."""
-        return summary("Answers", rows=len(self), classes=len(self.choices))
+        return summary("Predictions", rows=len(self), classes=len(self.choices))
 
     def __str__(self) -> str:
         """Show how many rows got which class, and what was out of the ordinary."""
@@ -175,22 +170,30 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         return f"{len(self)} rows: {counts}" + (f"; {odd}" if odd else "")
 
 
-def odd_text(answers: Answers) -> str:
+def _csv_text(columns: Mapping[str, Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue()
+
+
+def odd_text(predictions: Predictions) -> str:
     """Return the counts of ties, uncovered and missing rows that are not 0."""
     names = {
         Status.TIE: "decided by the order of the rules",
         Status.UNCOVERED: "uncovered",
         Status.MISSING: "with missing values",
     }
-    counts = {text: answers.count(status) for status, text in names.items()}
+    counts = {text: predictions.count(status) for status, text in names.items()}
     return ", ".join(f"{count} {text}" for text, count in counts.items() if count)
 
 
-def joined(parts: Sequence[Answers]) -> Answers:
-    """Return the answers to several batches of rows of one model, one after another."""
+def joined(parts: Sequence[Predictions]) -> Predictions:
+    """Return the predictions for several batches of rows, one after another."""
     first = parts[0]
     strengths = [p.strengths for p in parts if p.strengths is not None]
-    return Answers(
+    return Predictions(
         first.choices,
         np.concatenate([p.codes for p in parts]),
         np.concatenate([p.rule for p in parts]),
@@ -201,14 +204,14 @@ def joined(parts: Sequence[Answers]) -> Answers:
     )
 
 
-def answers_of(
+def predictions_of(
     outcome: Outcome,
     *,
     choices: tuple[str, ...],
     ends: Sequence[str],
     semantics: Semantics,
     with_strengths: bool,
-) -> Answers:
+) -> Predictions:
     """Name the classes of an outcome.
 
     Args:
@@ -228,7 +231,7 @@ def answers_of(
         code = -1 if answer is None else position[answer]
         codes[outcome.status == status] = code
     strengths = outcome.strengths if with_strengths else None
-    return Answers(
+    return Predictions(
         choices,
         codes,
         outcome.rule,
@@ -239,13 +242,13 @@ def answers_of(
     )
 
 
-def reasons(rules: RuleBase, values: FloatArray, answers: Answers) -> list[str]:
+def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> list[str]:
     """Return, for each row, its rule as a sentence with the degree of each clause.
 
     Args:
         rules: The rules that answered, or those of the tree that did.
         values: Shape (inputs, rows), in the order of `rules.inputs`.
-        answers: The answers to these rows.
+        predictions: Those for these rows.
 
     Example:
         >>> from fuzzytree.model.rulebase import Band, Clause, Flank, Rule
@@ -255,13 +258,16 @@ def reasons(rules: RuleBase, values: FloatArray, answers: Answers) -> list[str]:
         ...     "grip", ("soft",), (Variable("force", (low,)),),
         ...     (Rule((Clause("force", ("low",)),), "soft"),),
         ... )
-        >>> found = Answers(("soft",), np.array([0]), np.array([1]), np.array([0]))
+        >>> found = Predictions(("soft",), np.array([0]), np.array([1]), np.array([0]))
         >>> reasons(rules, np.array([[2.0]]), found)
         ['IF force is low (0.5) THEN soft']
     """
     shapes = shapes_of(rules.variables)
     found = zip(
-        values.T.tolist(), answers.rule.tolist(), answers.status.tolist(), strict=True
+        values.T.tolist(),
+        predictions.rule.tolist(),
+        predictions.status.tolist(),
+        strict=True,
     )
     return [
         _reason(rules, shapes, dict(zip(rules.inputs, row, strict=True)), rule, status)
@@ -299,3 +305,133 @@ def _reason(
 def _short(degree: float) -> str:
     text = f"{degree:.3g}"
     return "<1" if text == "1" and degree < 1.0 else text
+
+
+class Outputs(msgspec.Struct, frozen=True, eq=False):
+    """The numbers that a fuzzy system computes for some rows.
+
+    Attributes:
+        names: The outputs.
+        values: Shape (outputs, rows); NaN where a value is missing, and where no rule
+            concludes an output that has no default.
+        status: A `fuzzytree.semantics.reference.Status` for each row: decided;
+            uncovered, if an output got no conclusion and has its default; or
+            missing.
+        activations: The degree of activation of each rule, shape (rules, rows); None
+            if they were not requested.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    status: IntArray
+    activations: FloatArray | None = None
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.status)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return the numbers of an output, one for each row."""
+        numbers: FloatArray = self.values[self.names.index(name)]
+        return numbers
+
+    def count(self, status: int) -> int:
+        """Return how many rows have this `fuzzytree.semantics.reference.Status`."""
+        return int(np.count_nonzero(self.status == status))
+
+    def columns(self, *, with_activations: bool = False) -> dict[str, Sequence[object]]:
+        """Return the columns that `to_csv` writes, by name.
+
+        Args:
+            with_activations: Whether each rule has a column.
+
+        Raises:
+            ValueError: If activations are requested that are not there.
+        """
+        found: dict[str, Sequence[object]] = {
+            name: _cells(row) for name, row in zip(self.names, self.values, strict=True)
+        }
+        words = [status.name.lower() for status in Status]
+        title = "status"
+        while title in found:  # an output may have that name
+            title += "_"
+        found[title] = [words[status] for status in self.status.tolist()]
+        if not with_activations:
+            return found
+        if self.activations is None:
+            raise ValueError("there are no degrees of activation; ask for them")
+        for number, row in enumerate(self.activations, 1):
+            found[f"strength of rule {number}"] = _cells(row)
+        return found
+
+    def spans(self) -> dict[str, tuple[float, float]]:
+        """Return the least and the largest number of each output that has one."""
+        known = {
+            name: row[~np.isnan(row)]
+            for name, row in zip(self.names, self.values, strict=True)
+        }
+        return {
+            name: (float(row.min()), float(row.max()))
+            for name, row in known.items()
+            if row.size
+        }
+
+    def to_csv(self, *, with_activations: bool = False) -> str:
+        """Return the outputs as CSV: each output and the status; NaN is an empty cell.
+
+        Raises:
+            ValueError: If activations are requested that are not there.
+        """
+        return _csv_text(self.columns(with_activations=with_activations))
+
+    def to_arrow(self, *, with_activations: bool = False) -> pa.Table:
+        """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
+
+        Raises:
+            ValueError: If activations are requested that are not there.
+        """
+        return arrow_table(self.columns(with_activations=with_activations))
+
+    def to_pandas(self, *, with_activations: bool = False) -> pd.DataFrame:
+        """Return the columns of `to_csv` as a frame of pandas; needs pandas.
+
+        Raises:
+            ValueError: If activations are requested that are not there.
+        """
+        return pandas_frame(self.columns(with_activations=with_activations))
+
+    def __repr__(self) -> str:
+        """Show how many rows there are; `str` shows the range of each output."""
+        return summary("Outputs", rows=len(self), outputs=len(self.names))
+
+    def __str__(self) -> str:
+        """Show the range of each output, and what was out of the ordinary."""
+        found = self.spans().items()
+        spans = ", ".join(
+            f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in found
+        )
+        odd = [
+            f"{count} {what}"
+            for count, what in (
+                (self.count(Status.UNCOVERED), "uncovered"),
+                (self.count(Status.MISSING), "with missing values"),
+            )
+            if count
+        ]
+        return "; ".join([f"{len(self)} rows: {spans or 'no number'}", *odd])
+
+
+def _cells(row: FloatArray) -> list[object]:
+    return ["" if math.isnan(value) else value for value in row.tolist()]
+
+
+def joined_outputs(parts: Sequence[Outputs]) -> Outputs:
+    """Return the outputs for several batches of rows, one after another."""
+    first = parts[0]
+    degrees = [part.activations for part in parts if part.activations is not None]
+    return Outputs(
+        first.names,
+        np.hstack([part.values for part in parts]),
+        np.concatenate([part.status for part in parts]),
+        np.hstack(degrees) if len(degrees) == len(parts) else None,
+    )
