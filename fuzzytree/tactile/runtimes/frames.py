@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.runtimes.one_row import row_runner
-from fuzzytree.runtimes.programs import Plan, plan_program, run_program
+from fuzzytree.runtimes.programs import ProgramPlan, plan_program, run_program
 from fuzzytree.tactile.features import FrameProgram, frame_program
 from fuzzytree.tactile.sensor import Cells, Sensor, check_frames, pressed
 
@@ -55,7 +55,7 @@ class FramePlan:
 
     def __init__(self, sensor: Sensor, names: Sequence[str]) -> None:
         self.made: FrameProgram = frame_program(sensor, names)
-        self._plan: Plan = plan_program(self.made.program)
+        self._plan: ProgramPlan = plan_program(self.made.program)
         self._run_row = row_runner(self.made.program)
         weighted = [one.weights for one in self.made.sums if one.of == "cells"]
         self._weights = np.array(weighted, np.float64).T.copy()
