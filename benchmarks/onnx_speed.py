@@ -18,7 +18,7 @@ from onnx import TensorProto, helper
 
 from fuzzytree.benchmarking.clock import measure
 from fuzzytree.benchmarking.machine import machine
-from fuzzytree.exporters.onnx import write
+from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.exporters.onnx_session import open_session
 from fuzzytree.model.contracts import Dtype
@@ -175,7 +175,7 @@ def main() -> None:
         dtypes: tuple[Dtype, ...] = ("float32", "mixed", "float64")
         for dtype in dtypes:
             for what, model in (("rules", rules_from_tree(tree)), ("tree", tree)):
-                made = write(
+                made = write_onnx(
                     model, dtype=dtype, signature="all", outputs=("rule",), verify=False
                 )
                 _line(f"  {what} {dtype}", made.content, dtype, leaves)

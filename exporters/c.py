@@ -122,7 +122,7 @@ name_answer name_strengths(const name_real *x, name_real *strengths);
 """
 
 
-def write(
+def write_c(
     model: Document,
     /,
     *,
@@ -151,7 +151,7 @@ def write(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> text = write(random_tree(0), name="grip").content.decode()
+        >>> text = write_c(random_tree(0), name="grip").content.decode()
         >>> "grip_answer grip_decide(const grip_real *x)" in text
         True
     """
@@ -439,6 +439,6 @@ FORMAT = Format(
     name="c",
     suffixes=(".c",),
     carries=("tree", "rules", "system"),
-    write=write,
+    write=write_c,
     dtype="float64",
 )

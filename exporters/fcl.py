@@ -31,7 +31,7 @@ from fuzzytree.exporters.fcl_terms import (
 from fuzzytree.exporters.fll_text import speakable
 from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
 from fuzzytree.formats.fcl.fcl_dialects import MARK
-from fuzzytree.formats.fcl.fcl_reader import FACTS, places, read
+from fuzzytree.formats.fcl.fcl_reader import FACTS, fcl_places, read_fcl
 from fuzzytree.model.contracts import Format, Loss, Written, refusal
 from fuzzytree.model.naming import NameMap
 from fuzzytree.model.rulebase import RuleBase
@@ -312,8 +312,8 @@ FORMAT = Format(
     suffixes=(".fcl",),
     carries=("rules", "system"),
     write=write,
-    read=read,
-    places=places,
+    read=read_fcl,
+    places=fcl_places,
     cannot=(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",

@@ -25,17 +25,17 @@ from fuzzytree.formats.fis.fis_reader import (
     DEFAULTS,
     DIALECT,
     always_concluded,
+    fis_places,
     middle,
-    places,
-    reading,
+    read_fis,
 )
 from fuzzytree.formats.fis.fis_words import (
     DIALECTS,
-    FAR,
-    METHODS,
+    FIS_FAR,
+    FIS_METHODS,
+    FIS_SNORMS,
+    FIS_TNORMS,
     PRIVATE,
-    SNORMS,
-    TNORMS,
     Dialect,
 )
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
@@ -254,7 +254,7 @@ def _block_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             yield Loss(where, "the file has one set of norms, those of the first block")
     for key, word in _methods(system, dialect).items():
         is_known = (
-            word in _MATLAB_NORMS or word not in {**TNORMS, **SNORMS}
+            word in _MATLAB_NORMS or word not in {**FIS_TNORMS, **FIS_SNORMS}
             if dialect == "matlab"
             else dialect == "fuzzylite" or word not in _FUZZYLITE_NORMS
         )
@@ -268,12 +268,12 @@ def _methods(system: FuzzySystem, dialect: Dialect) -> dict[str, str]:
     output = system.outputs[0]
     is_weighted = output.defuzzifier.is_weighted
     aggregation = output.aggregation or ("sum" if is_weighted else "maximum")
-    methods = {meant: word for word, meant in METHODS.items()}
+    methods = {meant: word for word, meant in FIS_METHODS.items()}
     return {
-        "AndMethod": inverse(TNORMS, block.conjunction or "minimum"),
+        "AndMethod": inverse(FIS_TNORMS, block.conjunction or "minimum"),
         "OrMethod": _s_norm(block.disjunction or "maximum", dialect),
         "ImpMethod": inverse(
-            TNORMS, block.implication or ("product" if is_weighted else "minimum")
+            FIS_TNORMS, block.implication or ("product" if is_weighted else "minimum")
         ),
         "AggMethod": _s_norm(aggregation, dialect),
         "DefuzzMethod": methods[output.defuzzifier.method],
@@ -281,7 +281,7 @@ def _methods(system: FuzzySystem, dialect: Dialect) -> dict[str, str]:
 
 
 def _s_norm(norm: SNorm, dialect: Dialect) -> str:
-    words = [word for word, meant in SNORMS.items() if meant == norm]
+    words = [word for word, meant in FIS_SNORMS.items() if meant == norm]
     return words[-1] if dialect == "octave" else words[0]
 
 
@@ -387,7 +387,7 @@ def _range(
         numbers += result[::2] if kind == "discretemf" else result
     near = [number for number in numbers if abs(number) < 1e290]
     if isinstance(one, SystemInput):
-        near = [-FAR, FAR]
+        near = [-FIS_FAR, FIS_FAR]
     low = one.low if one.low is not None else min(near, default=0.0)
     high = one.high if one.high is not None else max(near, default=1.0)
     if low >= high:
@@ -407,8 +407,8 @@ FORMAT = Format(
     suffixes=(".fis",),
     carries=("rules", "system"),
     write=write,
-    read=reading,
-    places=places,
+    read=read_fis,
+    places=fis_places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
         "maximum; a rule that tests an output",

@@ -14,7 +14,7 @@ import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fuzzy_files import operands
-from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, HEDGES, Dialect
+from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, FIS_HEDGES, Dialect
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.naming import unlike
 from fuzzytree.model.rulebase import Points
@@ -88,7 +88,7 @@ class FisTerms:
         """Return the number of a proposition with its hedges; None if it has none."""
         hedges = _merged(proposition.hedges)
         is_negated = hedges[:1] == ("not",)
-        hundredths = _hundredths(HEDGES[self.dialect], hedges[is_negated:])
+        hundredths = _hundredths(FIS_HEDGES[self.dialect], hedges[is_negated:])
         if hundredths is None:
             return None
         # Fuzzylite loads no rule with `any` before a term.
@@ -108,7 +108,7 @@ class FisTerms:
         variable = next(questions(whole)).variable
         try:
             lines, bound = self._lines(whole)
-            points, rounding = pointwise.rounded(lines)
+            points, rounding = pointwise.rounded_lines(lines)
         except LossError as error:
             raise LossError(
                 f"{variable!r} has several conditions, and {error}"
@@ -258,7 +258,7 @@ def _conclusions(rule: SystemRule, terms: FisTerms) -> list[tuple[str, str]]:
     outputs: Mapping[str, SystemOutput] = {
         one.name: one for one in terms.system.outputs
     }
-    table = HEDGES[terms.dialect]
+    table = FIS_HEDGES[terms.dialect]
     if terms.dialect == "octave":
         table = CONCLUDING_HEDGES
     so_far: tuple[Hedge, ...] = ()

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from fuzzytree.formats.fis.fis_words import FAR, Dialect, curve_of
+from fuzzytree.formats.fis.fis_words import FIS_FAR, Dialect, curve_of
 from fuzzytree.formats.formulas import fuzzylite_text_of
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import Points
@@ -170,10 +170,10 @@ def _corners(curve: Trapezoid | Singleton | Binary) -> _Corners | None:
             return _corners(Trapezoid(None, start, start, start))
         case Trapezoid(a=a, b=b, c=c, d=d):
             inner = [corner for corner in (a, b, c, d) if corner is not None]
-            if max(map(abs, inner)) >= FAR / 2:
+            if max(map(abs, inner)) >= FIS_FAR / 2:
                 return None
-            left = (-2 * FAR, -FAR) if a is None else (a, b)
-            right = (FAR, 2 * FAR) if d is None else (c, d)
+            left = (-2 * FIS_FAR, -FIS_FAR) if a is None else (a, b)
+            right = (FIS_FAR, 2 * FIS_FAR) if d is None else (c, d)
             if left[0] == left[1]:
                 left = (math.nextafter(b, -math.inf), b)
             if right[0] == right[1]:
@@ -184,11 +184,11 @@ def _corners(curve: Trapezoid | Singleton | Binary) -> _Corners | None:
 def _corners_of(points: Points) -> _Corners | None:
     """Return corners that are read back as these very points, if there are any."""
     degrees, values = points.degrees, points.values
-    if 1.0 not in degrees or max(map(abs, values)) >= FAR / 2:
+    if 1.0 not in degrees or max(map(abs, values)) >= FIS_FAR / 2:
         return None
     first = degrees.index(1.0)
     last = len(degrees) - 1 - degrees[::-1].index(1.0)
-    left, right = (-2 * FAR, -FAR), (FAR, 2 * FAR)
+    left, right = (-2 * FIS_FAR, -FIS_FAR), (FIS_FAR, 2 * FIS_FAR)
     if first > 0:
         a, b = values[first - 1], values[first]
         left = (a, b if a < b else math.nextafter(b, math.inf))

@@ -26,9 +26,9 @@ from fuzzytree.exporters.fll_text import (
 )
 from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
 from fuzzytree.formats.fll.fll_differences import differences
-from fuzzytree.formats.fll.fll_reader import places, read
+from fuzzytree.formats.fll.fll_reader import fll_places, read_fll
 from fuzzytree.formats.fll.fll_rules import RULE_WORDS
-from fuzzytree.formats.fll.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
+from fuzzytree.formats.fll.fll_words import ACTIVATIONS, FLL_METHODS, S_NORMS, T_NORMS
 from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.model.contracts import Format, Loss, Written, refusal
 from fuzzytree.model.naming import NameMap
@@ -283,7 +283,7 @@ def _activation(activation: Activation) -> str:
 
 _T_WORDS = MappingProxyType({None: "none", **{v: k for k, v in T_NORMS.items()}})
 _S_WORDS = MappingProxyType({None: "none", **{v: k for k, v in S_NORMS.items()}})
-_METHOD_WORDS = MappingProxyType({v: k for k, v in METHODS.items()})
+_METHOD_WORDS = MappingProxyType({v: k for k, v in FLL_METHODS.items()})
 _ACTIVATION_WORDS = MappingProxyType({v: k for k, v in ACTIVATIONS.items()})
 
 
@@ -339,8 +339,8 @@ FORMAT = Format(
     suffixes=(".fll",),
     carries=("rules", "system"),
     write=write,
-    read=read,
-    places=places,
+    read=read_fll,
+    places=fll_places,
     cannot=(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from msgspec.structs import astuple, replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.formats.fll.fll_rules import HEDGES
+from fuzzytree.formats.fll.fll_rules import FLL_HEDGES
 from fuzzytree.formats.formulas import fuzzylite_text_of, parse
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import LR, Band, Points
@@ -53,7 +53,7 @@ from fuzzytree.model.system import (
 from fuzzytree.semantics.inference import value_at
 
 _WORDS: Mapping[Hedge, str] = MappingProxyType(
-    {**{hedge: word for word, hedge in HEDGES.items()}, "very very": "very very"}
+    {**{hedge: word for word, hedge in FLL_HEDGES.items()}, "very very": "very very"}
 )
 
 WordsOf = Callable[[str, str | None], tuple[str, str]]

@@ -15,13 +15,13 @@ from xml.sax.saxutils import escape, quoteattr
 
 from fuzzytree.exporters.fml_rules import FmlRule, FmlRules, rules_of
 from fuzzytree.exporters.fuzzy_files import FileNames, inverse, without_heights
-from fuzzytree.formats.fml.fml_reader import places, reading
+from fuzzytree.formats.fml.fml_reader import fml_places, read_fml
 from fuzzytree.formats.fml.fml_words import (
-    FAR,
-    METHODS,
+    FML_FAR,
+    FML_METHODS,
+    FML_SNORMS,
+    FML_TNORMS,
     NAMESPACE,
-    SNORMS,
-    TNORMS,
     USUAL,
 )
 from fuzzytree.model.contracts import Format, Loss, Written, refusal
@@ -190,7 +190,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
                 f"its curve is sampled at {how.samples} values ({how.grid}), and FML "
                 f"does not say so; it is read as {USUAL.samples} ({USUAL.grid})",
             )
-        if output.aggregation not in SNORMS.values():
+        if output.aggregation not in FML_SNORMS.values():
             yield Loss(where, f"FML has no {output.aggregation}; MAX stands for it")
     for variable in system.variables:
         if variable.clips:
@@ -202,7 +202,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
             yield Loss(f"block {number} of rules", what)
         norms = (block.disjunction,)
         for norm in norms:
-            if norm is not None and norm not in SNORMS.values():
+            if norm is not None and norm not in FML_SNORMS.values():
                 yield Loss(
                     f"block {number} of rules", f"FML has no {norm}; MAX stands for it"
                 )
@@ -237,12 +237,12 @@ def _lines(
 def _norms(block: RuleBlock) -> str:
     return (
         f' andMethod="{_t(block.conjunction)}" '
-        f'orMethod="{inverse(SNORMS, block.disjunction, "MAX")}"'
+        f'orMethod="{inverse(FML_SNORMS, block.disjunction, "MAX")}"'
     )
 
 
 def _t(norm: str | None) -> str:
-    return inverse(TNORMS, norm, "MIN")
+    return inverse(FML_TNORMS, norm, "MIN")
 
 
 def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> Iterator[str]:
@@ -294,8 +294,8 @@ def _output(one: SystemOutput, names: _Ids) -> Iterator[str]:
     default = math.nan if one.default is None else one.default
     last = f' defaultValue="{_float(default)}">'
     if not one.defuzzifier.is_weighted:
-        method = inverse(METHODS, one.defuzzifier.method, "COG")
-        join = inverse(SNORMS, one.aggregation, "MAX")
+        method = inverse(FML_METHODS, one.defuzzifier.method, "COG")
+        join = inverse(FML_SNORMS, one.aggregation, "MAX")
         yield (
             f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="output"'
             f' accumulation="{join}" defuzzifier="{method}"{last}'
@@ -374,9 +374,9 @@ def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
             return "singletonShape", (value,)
         case Gaussian(mean=mean, deviation=deviation):
             return "gaussianShape", (mean, deviation)
-        case TwoGaussians(left=c, left_deviation=s, right=right) if right >= FAR:
+        case TwoGaussians(left=c, left_deviation=s, right=right) if right >= FML_FAR:
             return "rightGaussianShape", (c, s)
-        case TwoGaussians(left=left, right=c, right_deviation=s) if left <= -FAR:
+        case TwoGaussians(left=left, right=c, right_deviation=s) if left <= -FML_FAR:
             return "leftGaussianShape", (c, s)
         case SCurve(start=a, end=b) if a != b:
             return ("sShape", (a, b)) if a < b else ("zShape", (b, a))
@@ -433,8 +433,8 @@ FORMAT = Format(
     suffixes=(".fml", ".xml"),
     carries=("rules", "system"),
     write=write,
-    read=reading,
-    places=places,
+    read=read_fml,
+    places=fml_places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
         "maximum; a rule that tests an output",

@@ -13,7 +13,7 @@ import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fuzzy_files import inverse, operands, refuse
-from fuzzytree.formats.fml.fml_words import MODIFIERS, SNORMS, TNORMS
+from fuzzytree.formats.fml.fml_words import FML_SNORMS, FML_TNORMS, MODIFIERS
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.naming import unlike
 from fuzzytree.model.rulebase import Points
@@ -247,7 +247,7 @@ def _made(
             case _:
                 raise LossError(f"terms of {variable!r} are joined with hedges")
     is_or = isinstance(condition, Or)
-    norms = SNORMS if is_or else TNORMS
+    norms = FML_SNORMS if is_or else FML_TNORMS
     meant = block.disjunction if is_or else block.conjunction
     norm = inverse(norms, meant)
     if not norm:

@@ -59,7 +59,7 @@ _OF_MODELS: tuple[Output, ...] = ("label", "rule", "strengths", "status")
 _OF_SYSTEMS: tuple[Output, ...] = ("outputs", "status", "activations")
 
 
-def write(
+def write_onnx(
     model: Model | FuzzySystem,
     /,
     *,
@@ -113,7 +113,7 @@ def write(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> written = write(random_tree(1), outputs=("label", "status"))
+        >>> written = write_onnx(random_tree(1), outputs=("label", "status"))
         >>> written.losses
         ()
     """
@@ -362,7 +362,7 @@ FORMAT = Format(
     name="onnx",
     suffixes=(".onnx",),
     carries=("tree", "rules", "system"),
-    write=write,
+    write=write_onnx,
     cannot=(
         "an onnx file runs, but is not read back as a tree, rule base or system",
         "tan, asin, acos, atan, sinh, cosh, log10, log1p and the like of a system's "

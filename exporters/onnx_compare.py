@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.onnx import write
+from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import fingerprint
@@ -58,7 +58,7 @@ def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
     columns = json.loads(facts["columns"])
     needed = model.columns if isinstance(model, FuzzySystem) else model.inputs
     try:
-        fresh = write(
+        fresh = write_onnx(
             model,
             allow_loss=True,
             dtype=facts["dtype"],  # pyright: ignore[reportArgumentType]  # write checks it
@@ -225,9 +225,9 @@ def contents(content: bytes) -> Contents:
     """Count what an ONNX file consists of; nodes within functions count once.
 
     Example:
-        >>> from fuzzytree.exporters.onnx import write
+        >>> from fuzzytree.exporters.onnx import write_onnx
         >>> from fuzzytree.testing import random_tree
-        >>> written = write(random_tree(1), verify=False).content
+        >>> written = write_onnx(random_tree(1), verify=False).content
         >>> contents(written).operators["TreeEnsemble"]
         1
     """

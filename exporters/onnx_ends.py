@@ -16,7 +16,7 @@ from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import Part, RuleBase, Variable
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.narrowing import Real, RealArray, rounded
+from fuzzytree.numerics.narrowing import RealArray, RealKind, rounded
 from fuzzytree.semantics.reference import BELOW_ONE, Status
 
 
@@ -111,7 +111,7 @@ def is_known(graph: OnnxGraph, frame: InputBlock, numbers: Precision) -> str:
     return graph.node("Equal", frame.guard, zero, hint="is_row_finite")
 
 
-def scalar(graph: OnnxGraph, value: float, kind: type[Real]) -> str:
+def scalar(graph: OnnxGraph, value: float, kind: type[RealKind]) -> str:
     """Return the name of a constant number."""
     return graph.constant(np.array(value, kind), "number")
 
@@ -121,7 +121,7 @@ def column(graph: OnnxGraph, values: RealArray, hint: str) -> str:
     return graph.constant(values.reshape(-1, 1), hint)
 
 
-def _no_guard(graph: OnnxGraph, kind: type[Real], *, is_flat: bool) -> str:
+def _no_guard(graph: OnnxGraph, kind: type[RealKind], *, is_flat: bool) -> str:
     """Return 0 for each row, where no variable could be missing."""
     size = graph.take(graph.node("Shape", graph.source), [0])
     if not is_flat:
@@ -135,7 +135,7 @@ def _combinations(
     derived: Sequence[Variable],
     source: str,
     columns: Sequence[str],
-    kind: type[Real],
+    kind: type[RealKind],
 ) -> list[str]:
     """Add the chains `w1 (x1 - c1) + w2 (x2 - c2) + ...`, one position at a time.
 
@@ -164,7 +164,7 @@ def _summand(
     parts: Sequence[Part],
     source: str,
     columns: Sequence[str],
-    kind: type[Real],
+    kind: type[RealKind],
 ) -> str:
     value = graph.take(source, [columns.index(part.input) for part in parts])
     if any(part.centre for part in parts):  # x - 0.0 is x
@@ -188,8 +188,8 @@ class Precision(msgspec.Struct, frozen=True):
         below_one: The largest number below 1 of the degrees' type.
     """
 
-    axis: type[Real]
-    degree: type[Real]
+    axis: type[RealKind]
+    degree: type[RealKind]
     below_one: float
 
     @property

@@ -14,7 +14,7 @@ import onnxruntime
 from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import LR, Band, Points, RuleBase, Term
-from fuzzytree.numerics.narrowing import Real
+from fuzzytree.numerics.narrowing import RealKind
 from fuzzytree.semantics.reference import descend, evaluate
 
 _STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
@@ -103,7 +103,7 @@ def prove(
     columns: Sequence[str],
     names: Sequence[str],
     *,
-    kind: type[Real],
+    kind: type[RealKind],
     is_exact: bool,
     limit: int,
 ) -> None:

@@ -40,7 +40,7 @@ def write_system(
     facts: dict[str, str],
     verify: bool,
 ) -> Written:
-    """Write a fuzzy system; `fuzzytree.exporters.onnx.write` documents the options.
+    """Write a fuzzy system; `exporters.onnx.write_onnx` documents the options.
 
     Raises:
         LossError: If it needs a function that onnxruntime lacks in double, or if the

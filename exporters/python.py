@@ -184,7 +184,7 @@ if __name__ == "__main__":
 """
 
 
-def write(model: Model, /, *, allow_loss: bool = False) -> Written:
+def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
     """Return a model as the text of a Python file, in UTF-8.
 
     The file offers `decide(...)`, which takes each input by name and returns class
@@ -199,7 +199,7 @@ def write(model: Model, /, *, allow_loss: bool = False) -> Written:
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> space = {"__name__": "tree"}
-        >>> exec(write(random_tree(0)).content, space)
+        >>> exec(write_python(random_tree(0)).content, space)
         >>> space["decide"](x1=0.0, x2=0.0, x3=0.0, x4=0.0)[2]
         0
     """
@@ -361,6 +361,6 @@ FORMAT = Format(
     name="python",
     suffixes=(".py",),
     carries=("tree", "rules"),
-    write=write,
+    write=write_python,
     dtype="float64",
 )

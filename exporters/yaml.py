@@ -26,7 +26,7 @@ from fuzzytree.exporters.yaml_text import (
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.clauses import Vocabulary, readings, vocabulary_of
 from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_SENTENCE
-from fuzzytree.formats.yaml.yaml_reader import places, reading
+from fuzzytree.formats.yaml.yaml_reader import yaml_places, yaml_reading
 from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.model.rulebase import (
     Clause,
@@ -248,6 +248,6 @@ FORMAT = Format(
     suffixes=(".yaml", ".yml"),
     carries=("tree", "rules", "system"),
     write=write,
-    read=reading,
-    places=places,
+    read=yaml_reading,
+    places=yaml_places,
 )

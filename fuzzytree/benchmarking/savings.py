@@ -18,7 +18,7 @@ from fuzzytree.benchmarking.records import Timing
 from fuzzytree.checking.dependencies import DTYPES, Needs, needs, prove
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
-from fuzzytree.exporters.onnx import write as write_onnx
+from fuzzytree.exporters.onnx import write_onnx as write_onnx
 from fuzzytree.exporters.onnx_compare import contents
 from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.contracts import Dtype, Model

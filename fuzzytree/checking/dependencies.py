@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from fuzzytree.checking.comparing import Answers, BoolArray, Rows, compare_bits, probed
 from fuzzytree.errors import LossError, MissingExtraError
-from fuzzytree.exporters.onnx import write as write_onnx
+from fuzzytree.exporters.onnx import write_onnx as write_onnx
 from fuzzytree.exporters.onnx_compare import Contents, contents
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.contracts import Dtype, Model, ModelKind, Outcome

@@ -156,7 +156,7 @@ def command(
     )
     from fuzzytree.auditing.findings.domains import AuditDomain
     from fuzzytree.auditing.findings.records import AuditSelection
-    from fuzzytree.report.audit import audit_lines, verdict_text
+    from fuzzytree.report.audit import audit_lines, audit_verdict
 
     if target is not None and data is None:
         raise click.UsageError(
@@ -234,7 +234,7 @@ def command(
         say(f"gone     {name} {printable(accepted[name])}", quiet=quiet)
     fails = write_baseline is None and _fails(found, fail_on or known.fail_on)
     if form != "text" or output is not None:
-        say(verdict_text(found, lost), quiet=quiet and not fails)
+        say(audit_verdict(found, lost), quiet=quiet and not fails)
     return 130 if found.was_interrupted else int(fails)
 
 

@@ -111,7 +111,7 @@ def self_test(has_onnx: bool) -> list[str]:
     import numpy as np
 
     from fuzzytree.api import verbs
-    from fuzzytree.formats.yaml.yaml_reader import read
+    from fuzzytree.formats.yaml.yaml_reader import read_yaml
     from fuzzytree.runtimes.predictions import Predictions
 
     table = np.array([[k, k % 3] for k in range(12)], np.float64)
@@ -119,7 +119,7 @@ def self_test(has_onnx: bool) -> list[str]:
     try:
         tree = verbs.learn(table, target=classes)
         content = verbs.export(tree, "yaml").content
-        again = read(content, "self-test")
+        again = read_yaml(content, "self-test")
         answers = verbs.run(again, table)
         found = answers.classes if isinstance(answers, Predictions) else []
         faults = [] if again == tree else ["YAML does not give the tree back"]

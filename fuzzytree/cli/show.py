@@ -124,7 +124,7 @@ def _facts(found: Reading) -> dict[str, object]:
     if isinstance(model, FuzzySystem):
         facts["inputs"] = model.columns
         facts["outputs"] = [one.name for one in model.outputs]
-        facts["rules"] = systems.rule_facts(model)
+        facts["rules"] = systems.system_rule_facts(model)
     else:
         facts["inputs"] = model.inputs
         facts["rules"] = text.rule_facts(model)

@@ -17,7 +17,7 @@ from fuzzytree.model.contracts import Dtype, Loss, Model
 from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Variable
 from fuzzytree.model.tree import FuzzyTree
 
-Real = np.float64 | np.float32
+RealKind = np.float64 | np.float32
 RealArray = npt.NDArray[np.float64] | npt.NDArray[np.float32]
 
 LARGEST = float(np.finfo(np.float32).max)
@@ -25,7 +25,7 @@ SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
 
 
 def rounded(
-    values: Sequence[float], kind: type[Real], *, is_divisor: bool = False
+    values: Sequence[float], kind: type[RealKind], *, is_divisor: bool = False
 ) -> RealArray:
     """Return values in a type: to nearest, never infinite, a divisor never 0.
 

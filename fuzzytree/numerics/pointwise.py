@@ -106,7 +106,7 @@ def _refuse_many(points: int) -> None:
         )
 
 
-def rounded(lines: Lines) -> tuple[Points, float]:
+def rounded_lines(lines: Lines) -> tuple[Points, float]:
     """Return a point list, and the largest difference from the lines.
 
     A degree that is below 1 stays below 1.

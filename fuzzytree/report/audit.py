@@ -85,7 +85,7 @@ def audit_lines(
     """
     audit = as_in_file(audit)
     paint = _painted if is_coloured else _plain
-    yield from _wrapped(verdict_text(audit, gone), WIDTH, "  ")
+    yield from _wrapped(audit_verdict(audit, gone), WIDTH, "  ")
     findings = sorted(
         audit.open_findings, key=lambda one: [*SEVERITIES].index(one.severity)
     )
@@ -158,7 +158,7 @@ def summary_lines(audit: Audit) -> Iterator[str]:
     yield from aligned(rows)
 
 
-def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
+def audit_verdict(audit: Audit, gone: Collection[str] = ()) -> str:
     """Return what an audit found, in a sentence, and what one might do next."""
     found = audit.open_findings
     said = _by_severity(found) if found else "nothing found"

@@ -63,7 +63,7 @@ from fuzzytree.report.markup import (
     text,
 )
 from fuzzytree.report.stability import CRITERION, advice, criterion_row
-from fuzzytree.report.stability import verdict_text as stability_text
+from fuzzytree.report.stability import stability_verdict as stability_text
 from fuzzytree.report.text import (
     CERTIFIED,
     COMPARISON,
@@ -72,7 +72,7 @@ from fuzzytree.report.text import (
     counted,
     number,
 )
-from fuzzytree.report.text import verdict_text as agreement_text
+from fuzzytree.report.text import agreement_verdict as agreement_text
 
 if TYPE_CHECKING:
     from fuzzytree.checking.stability.results import Stability

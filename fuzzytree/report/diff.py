@@ -29,7 +29,7 @@ def diff_lines(found: Difference, *, is_verbose: bool = False) -> Iterator[str]:
         found: The difference.
         is_verbose: Whether to print every change, and the point of every witness.
     """
-    yield verdict_text(found)
+    yield diff_verdict(found)
     yield _model_text("old", found.old)
     yield _model_text("new", found.new)
     if found.data is not None:
@@ -60,7 +60,7 @@ def _more(count: int, noun: str) -> Iterator[str]:
         yield f"  and {counted(count, f'more {noun}')}; --verbose lists all"
 
 
-def verdict_text(found: Difference) -> str:
+def diff_verdict(found: Difference) -> str:
     """Return what a difference comes to, in a sentence.
 
     What is not proved is said not to be.

@@ -34,7 +34,7 @@ def stability_lines(found: Stability, *, is_verbose: bool = False) -> Iterator[s
     rows += f", {found.tried} of them tried" if found.tried < found.rows else ""
     runtimes = counted(len(found.runtimes), "runtime")
     probes = counted(found.probes, "probe")
-    yield f"{found.model}: {verdict_text(found)} ({probes}{rows}; {runtimes})"
+    yield f"{found.model}: {stability_verdict(found)} ({probes}{rows}; {runtimes})"
     if is_verbose:
         yield f"runtimes: {', '.join(found.runtimes) or 'none'}"
     yield from aligned([CRITERION, *map(criterion_row, found.criteria)])
@@ -55,7 +55,7 @@ def stability_lines(found: Stability, *, is_verbose: bool = False) -> Iterator[s
         yield f"{len(todo) - 5} more things to do; --verbose lists all"
 
 
-def verdict_text(found: Stability) -> str:
+def stability_verdict(found: Stability) -> str:
     """Return how many stability checks pass, and which fail."""
     total = counted(len(found.criteria), "stability check")
     failed = [one.code for one in found.criteria if one.verdict == "FAILS"]

@@ -108,7 +108,7 @@ def system_lines(system: FuzzySystem) -> Iterator[str]:
         yield from _output_lines(output, system.columns)
 
 
-def rule_facts(system: FuzzySystem) -> list[dict[str, object]]:
+def system_rule_facts(system: FuzzySystem) -> list[dict[str, object]]:
     """Return the rules for programs: number, sentence, weight."""
     return [
         {"number": k, "text": rule_text(rule), "weight": rule.weight}

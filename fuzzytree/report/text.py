@@ -303,7 +303,7 @@ def agreement_lines(
         is_verbose: Whether each comparison has a line, and not only a count.
         is_full: Whether to print the rows that differ by an allowed amount, too.
     """
-    yield f"{found.model}: {verdict_text(found)} ({_basis_text(found)})"
+    yield f"{found.model}: {agreement_verdict(found)} ({_basis_text(found)})"
     wrong = [c for c in found.comparisons if c.verdict in ("DISAGREES", "rows only")]
     if is_verbose or is_full:
         shown: Sequence[Comparison] = found.comparisons
@@ -384,7 +384,7 @@ COMPARISON = (
 )
 
 
-def verdict_text(found: Agreement) -> str:
+def agreement_verdict(found: Agreement) -> str:
     """Return how many comparisons of a check disagree, and how many bounds fail."""
     wrong = sum(one.verdict == "DISAGREES" for one in found.comparisons)
     broken = sum(one.verdict == "DISAGREES" for one in found.certificates)

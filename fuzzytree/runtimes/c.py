@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters.c import write
+from fuzzytree.exporters.c import write_c
 from fuzzytree.model.contracts import (
     Model,
     Outcome,
@@ -108,7 +108,7 @@ def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) 
         FuzzyTreeError: If the compiler fails.
     """
     try:
-        content = write(model, dtype=dtype, name="model").content
+        content = write_c(model, dtype=dtype, name="model").content
     except LossError as error:
         text = str(error).replace("cannot write", "cannot run", 1)
         raise LossError(text.partition("\n  pass allow_loss")[0]) from error
@@ -183,7 +183,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
         MissingExtraError: If no compiler is installed.
         FuzzyTreeError: If the compiler fails.
     """
-    made = write(system, name="model", activations=activations)
+    made = write_c(system, name="model", activations=activations)
     speed = "-O0" if len(made.content) > _LONG else "-O2"
     infer = compiled(made.content, _INFER_LOOP, 2, speed)
     outputs = len(system.outputs)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
-from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
+from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write_onnx
 from fuzzytree.model.contracts import (
     Dtype,
     Model,
@@ -123,7 +123,7 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> content = write(random_tree(1)).content
+        >>> content = write_onnx(random_tree(1)).content
         >>> open_onnx(content, "random.onnx").kind
         'descent'
     """
@@ -177,7 +177,7 @@ def prepare(
     outputs: tuple[Output, ...] = ("rule", "status", "strengths")
     if isinstance(model, FuzzyTree):
         outputs = outputs[:2]
-    content = write(
+    content = write_onnx(
         model,
         dtype=dtype,
         outputs=outputs,
@@ -286,7 +286,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
 
     outputs: tuple[Output, ...] = ("outputs", "status", "activations")
     outputs = outputs if activations else outputs[:2]
-    content = write(system, outputs=outputs, verify=False).content
+    content = write_onnx(system, outputs=outputs, verify=False).content
     facts = _facts(_decoded(content, system.name), system.name)
     return functools.partial(_run_system, open_session(content), facts)
 

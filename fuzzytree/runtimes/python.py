@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fuzzytree.exporters.python import write
+from fuzzytree.exporters.python import write_python
 from fuzzytree.model.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.model.rulebase import RuleBase
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def load(model: Model) -> Run:
     """Return a function that answers rows one after another by generated Python."""
-    return load_content(write(model).content, model)
+    return load_content(write_python(model).content, model)
 
 
 def load_content(content: bytes, model: Model) -> Run:
@@ -64,7 +64,7 @@ RUNTIMES = (
         ("tree", "rules"),
         load,
         is_slow=True,
-        size=lambda model: len(write(model).content),
+        size=lambda model: len(write_python(model).content),
         note="one row after another",
     ),
 )

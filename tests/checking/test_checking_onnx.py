@@ -8,7 +8,7 @@ from onnx import helper, numpy_helper
 
 from fuzzytree.checking.models import check
 from fuzzytree.errors import DisagreementError, ReadError
-from fuzzytree.exporters.onnx import Output, write
+from fuzzytree.exporters.onnx import Output, write_onnx
 from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import Kind
@@ -40,7 +40,9 @@ def test_a_file_of_rules_agrees_with_its_tree_and_with_its_rules(
     dtype: Dtype, kind: Kind
 ) -> None:
     rules = rules_from_tree(TREE, kind)
-    shipped = opened(write(rules, dtype=dtype, outputs=ALL, allow_loss=True).content)
+    shipped = opened(
+        write_onnx(rules, dtype=dtype, outputs=ALL, allow_loss=True).content
+    )
     for model in (TREE, rules):
         assert verdicts(checked(model, shipped)) == {
             "the model's metadata": "agrees",
@@ -52,12 +54,12 @@ def test_a_file_of_rules_agrees_with_its_tree_and_with_its_rules(
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_a_file_of_a_tree_agrees_with_it(dtype: Dtype) -> None:
-    shipped = opened(write(TREE, dtype=dtype, allow_loss=True).content)
+    shipped = opened(write_onnx(TREE, dtype=dtype, allow_loss=True).content)
     assert checked(TREE, shipped).ok
 
 
 def test_the_file_of_a_tree_beside_rules_is_known_by_its_rows_only() -> None:
-    shipped = opened(write(TREE).content)
+    shipped = opened(write_onnx(TREE).content)
     found = checked(rules_from_tree(TREE), shipped)
     assert verdicts(found) == {
         "a freshly written graph": "rows only",
@@ -68,7 +70,7 @@ def test_the_file_of_a_tree_beside_rules_is_known_by_its_rows_only() -> None:
 
 
 def test_the_file_of_a_tree_without_labels_proves_nothing_beside_rules() -> None:
-    shipped = opened(write(TREE, outputs=("rule",)).content)
+    shipped = opened(write_onnx(TREE, outputs=("rule",)).content)
     found = checked(rules_from_tree(TREE), shipped)
     assert verdicts(found) == {"a freshly written graph": "DISAGREES"}
 
@@ -79,7 +81,7 @@ def backdoored(**facts: str) -> bytes:
     Args:
         facts: What its metadata state in place of the truth.
     """
-    proto = onnx.load_from_string(write(TREE).content)
+    proto = onnx.load_from_string(write_onnx(TREE).content)
     graph = proto.graph
     (label,) = (n for n in graph.node if "label" in n.output)
     label.output[list(label.output).index("label")] = "honest"
@@ -156,7 +158,7 @@ def test_nothing_that_a_file_states_lets_a_backdoor_pass(lie: str) -> None:
 
 @pytest.mark.parametrize("lie", sorted(LIES.keys() - {"version", "dtype", "outputs"}))
 def test_metadata_that_are_not_the_model_s_are_found(lie: str) -> None:
-    proto = onnx.load_from_string(write(TREE).content)
+    proto = onnx.load_from_string(write_onnx(TREE).content)
     for entry in proto.metadata_props:
         if entry.key == f"fuzzytree.{lie}":
             entry.value = LIES[lie]
@@ -167,7 +169,7 @@ def test_metadata_that_are_not_the_model_s_are_found(lie: str) -> None:
 
 
 def test_metadata_stated_twice_left_out_or_added_are_found() -> None:
-    proto = onnx.load_from_string(write(TREE).content)
+    proto = onnx.load_from_string(write_onnx(TREE).content)
     proto.metadata_props.add(key="fuzzytree.kind", value="descent")
     proto.metadata_props.add(key="note", value="proved")
     found = checked(TREE, opened(proto.SerializeToString()))
@@ -179,7 +181,7 @@ def test_metadata_stated_twice_left_out_or_added_are_found() -> None:
 
 
 def test_texts_in_the_file_are_compared_as_well() -> None:
-    proto = onnx.load_from_string(write(TREE).content)
+    proto = onnx.load_from_string(write_onnx(TREE).content)
     proto.doc_string = "Certified."
     proto.graph.name = "proved"
     found = checked(TREE, opened(proto.SerializeToString()))
@@ -192,13 +194,13 @@ def test_texts_in_the_file_are_compared_as_well() -> None:
 
 def test_the_file_of_another_model_is_found_by_its_fingerprint() -> None:
     other = random_tree(4, leaves=6, inputs=3, combinations=0.0)
-    found = checked(TREE, opened(write(other).content))
+    found = checked(TREE, opened(write_onnx(other).content))
     assert verdicts(found)["the model's metadata"] == "DISAGREES"
 
 
 def test_the_file_of_other_inputs_is_not_run() -> None:
     other = random_tree(3, leaves=6, inputs=2, combinations=0.0)
-    found = checked(TREE, opened(write(other).content))
+    found = checked(TREE, opened(write_onnx(other).content))
     assert verdicts(found) == {"the model's facts": "DISAGREES"}
 
 
@@ -246,8 +248,8 @@ def is_found(content: bytes) -> bool:
     return verdict in ("DISAGREES", "rows only")
 
 
-RULES_FILE = write(rules_from_tree(TREE), outputs=ALL).content
-TREE_FILE = write(TREE, plain=True).content
+RULES_FILE = write_onnx(rules_from_tree(TREE), outputs=ALL).content
+TREE_FILE = write_onnx(TREE, plain=True).content
 
 
 @pytest.mark.one_in(4)

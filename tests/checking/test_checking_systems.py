@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from fuzzytree.checking import systems as checking_systems
 from fuzzytree.checking.systems import check_system
-from fuzzytree.exporters.onnx import write
+from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
@@ -39,7 +39,7 @@ def washer(time: float = 60.0, output: str = "time") -> FuzzySystem:
 
 
 def opened(system: FuzzySystem, **facts: object) -> OnnxModel:
-    found = open_onnx(write(system).content, "w.onnx")
+    found = open_onnx(write_onnx(system).content, "w.onnx")
     return replace(found, **facts)
 
 
@@ -156,7 +156,7 @@ def test_a_wrong_fingerprint_and_a_wrong_graph_are_found() -> None:
 
 
 def test_a_file_without_status_is_compared_by_its_numbers() -> None:
-    content = write(washer(), outputs=("outputs",)).content
+    content = write_onnx(washer(), outputs=("outputs",)).content
     assert check_system(washer(), open_onnx(content, "w.onnx"), limit=60).ok
 
 

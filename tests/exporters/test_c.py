@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.c import FORMAT, write
+from fuzzytree.exporters.c import FORMAT, write_c
 from fuzzytree.exporters.c_selftest import axis_values, digest_of, leaf, strengths
 from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import tables_of
@@ -57,7 +57,7 @@ def edge_tree(cut: float) -> FuzzyTree:
 
 
 def test_text_of_a_model_is_never_code() -> None:
-    content = write(hostile_rules()).content
+    content = write_c(hostile_rules()).content
     text = content.decode("ascii")
     assert "??" not in text
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
@@ -97,7 +97,7 @@ def test_a_prefix_is_made_of_the_model_s_name(name: str, expected: str) -> None:
 
 def test_writing_twice_gives_the_same_bytes() -> None:
     for model in (random_tree(4), rules_from_tree(random_tree(4)), random_system(4)):
-        assert write(model).content == write(model).content
+        assert write_c(model).content == write_c(model).content
 
 
 def test_numbers_are_written_with_all_their_bits() -> None:
@@ -175,14 +175,14 @@ def test_a_digest_changes_with_the_last_bit_of_any_strength(place: int) -> None:
 
 def test_what_float_cannot_hold_is_refused_with_every_loss() -> None:
     with pytest.raises(LossError) as caught:
-        write(edge_tree(1e300), dtype="float32")
+        write_c(edge_tree(1e300), dtype="float32")
     largest = float(np.finfo(np.float32).max)
     assert str(caught.value) == (
         "cannot write edge as c float32: node 1: cut 1e+300 lies beyond float32; "
         f"{largest!r} stands\n"
         "  pass allow_loss=True to write it as stated, or choose dtype 'float64'"
     )
-    written = write(edge_tree(1e300), dtype="float32", allow_loss=True)
+    written = write_c(edge_tree(1e300), dtype="float32", allow_loss=True)
     assert len(written.losses) == 1
     assert "0x1.fffffep+127f" in written.content.decode()
 
@@ -190,13 +190,13 @@ def test_what_float_cannot_hold_is_refused_with_every_loss() -> None:
 def test_wrong_options_are_named() -> None:
     tree = random_tree(0)
     with pytest.raises(ValueError, match="float64 and float32, not 'mixed'"):
-        write(tree, dtype="mixed")  # type: ignore[arg-type] # that is the test
+        write_c(tree, dtype="mixed")  # type: ignore[arg-type] # that is the test
     with pytest.raises(ValueError, match="'Grip' cannot begin the names of C; 'grip'"):
-        write(tree, name="Grip")
+        write_c(tree, name="Grip")
     with pytest.raises(ValueError, match="in float64 only"):
-        write(random_system(0), dtype="float32")
+        write_c(random_system(0), dtype="float32")
     with pytest.raises(ValueError, match="activations are those of fuzzy systems"):
-        write(tree, activations=True)
+        write_c(tree, activations=True)
 
 
 def test_the_format_carries_all_models() -> None:

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import check_list, write
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
-from fuzzytree.formats.fcl.fcl_reader import read
+from fuzzytree.formats.fcl.fcl_reader import read_fcl
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.model.system import (
     And,
@@ -103,7 +103,7 @@ def test_reading_gives_the_equal_rule_base(seed: int, dialect: Dialect) -> None:
     tree = random_tree(seed, leaves=5, combinations=0.0)
     rules = with_points(rules_from_tree(tree), seed, share=1.0)
     written = write(rules, dialect=dialect, allow_loss=True)
-    assert read(written.content, "x.fcl").model == rules
+    assert read_fcl(written.content, "x.fcl").model == rules
 
 
 @pytest.mark.one_in(3)
@@ -117,7 +117,7 @@ def test_the_scores_of_a_file_decide_as_the_rules_do(
         rules = rules_from_tree(tree, "relative" if kind == "relative" else "raw")
         content = write(rules, dialect=dialect, allow_loss=True, tolerance=1e-3).content
         plain = re.sub(rb"(//|\(\*) facts [^\n]*\n", b"", content)
-        system = read(plain, "x.fcl").model
+        system = read_fcl(plain, "x.fcl").model
         assert isinstance(system, FuzzySystem)
         chance = random.Random(seed)
         for _ in range(40):
@@ -180,7 +180,7 @@ def test_a_file_without_losses_reads_as_a_system_of_equal_answers(
         written = write(system, dialect=dialect)
     except LossError:
         return  # what it says is tested below
-    again = read(written.content, "x.fcl").model
+    again = read_fcl(written.content, "x.fcl").model
     assert isinstance(again, FuzzySystem)
     for row in random_rows(system, 1, 30):
         ours = infer(system, row).outputs
@@ -204,7 +204,7 @@ def test_random_systems_are_written_alike_or_refused_with_reasons(
         if content is None:
             continue
         exact += 1
-        again = read(content, "x.fcl").model
+        again = read_fcl(content, "x.fcl").model
         assert isinstance(again, FuzzySystem)
         for row in random_rows(system, seed, 5):
             named = dict(zip(again.columns, row.values(), strict=True))
@@ -225,7 +225,7 @@ def _content(system: FuzzySystem, dialect: Dialect) -> bytes | None:
 def test_a_system_that_the_dialect_can_hold_reads_equal() -> None:
     for name in ("Sugeno, numbers", "OR", "weights of rules", "several outputs"):
         system = _sample(name)
-        again = read(write(system, dialect="fuzzylite").content, "x.fcl").model
+        again = read_fcl(write(system, dialect="fuzzylite").content, "x.fcl").model
         assert isinstance(again, FuzzySystem)
         assert _plain(replace(again, name=system.name)) == _plain(system)
 
@@ -268,7 +268,7 @@ def test_scores_of_classes_join_rules_by_or(dialect: Dialect) -> None:
     rules = rules_from_tree(random_tree(2, leaves=6, combinations=0.0))
     rules = with_points(rules, 0, share=1.0)
     written = write(rules, dialect=dialect, scores="class", allow_loss=True)
-    assert read(written.content, "x.fcl").model == rules
+    assert read_fcl(written.content, "x.fcl").model == rules
 
 
 @pytest.mark.parametrize("dialect", ["portable", "iec", "jfuzzylogic"])
@@ -291,7 +291,7 @@ def test_a_question_for_any_has_no_place_but_in_fuzzylite() -> None:
 
 def test_rules_of_one_number_are_one_only_if_they_ask_the_same() -> None:
     text = _text(_with_default(_sample("Sugeno, numbers")))
-    again = read(text.replace("RULE 2 :", "RULE 1 :").encode(), "x.fcl").model
+    again = read_fcl(text.replace("RULE 2 :", "RULE 1 :").encode(), "x.fcl").model
     assert isinstance(again, FuzzySystem)
     assert len(again.rules) == 2
 
@@ -360,7 +360,7 @@ def test_names_avoid_the_words_of_every_dialect() -> None:
         for block in system.blocks
     )
     written = write(replace(system, inputs=renamed, blocks=blocks))
-    again = read(written.content, "x.fcl").model
+    again = read_fcl(written.content, "x.fcl").model
     assert isinstance(again, FuzzySystem)
     assert again.columns == ("sum_", "Grosse_mm")
     assert any("'sum' is sum_" in one for one in written.remarks)
@@ -372,7 +372,7 @@ def test_facts_that_belong_to_other_rules_change_nothing() -> None:
     )
     text = write(rules).content.decode()
     with_number = re.sub(r"TERM present := 1.0", "TERM present := 2.0", text, count=1)
-    reading = read(with_number.encode(), "x.fcl")
+    reading = read_fcl(with_number.encode(), "x.fcl")
     assert isinstance(reading.model, FuzzySystem)
     assert any("belong to other rules" in one for one in reading.remarks)
 
@@ -400,7 +400,7 @@ def test_the_check_list_stands_in_a_comment_on_request() -> None:
     text = write(system, checklist=True).content.decode()
     assert "// data check list (IEC 61131-7)\n// inputs: 2\n" in text
     plain = write(system).content.decode()
-    assert read(text.encode(), "x").model == read(plain.encode(), "x").model
+    assert read_fcl(text.encode(), "x").model == read_fcl(plain.encode(), "x").model
 
 
 def test_every_dialect_has_its_words() -> None:

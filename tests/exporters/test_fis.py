@@ -15,8 +15,13 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fis import write
 from fuzzytree.exporters.fis_terms import term_of
-from fuzzytree.formats.fis.fis_reader import DEFAULTS, always_concluded, reading
-from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, DIALECTS, HEDGES, Dialect
+from fuzzytree.formats.fis.fis_reader import DEFAULTS, always_concluded, read_fis
+from fuzzytree.formats.fis.fis_words import (
+    CONCLUDING_HEDGES,
+    DIALECTS,
+    FIS_HEDGES,
+    Dialect,
+)
 from fuzzytree.model.contracts import Written
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.model.system import (
@@ -139,7 +144,7 @@ def _random_rule(
         first: Sequence[tuple[Hedge, ...]] = ((), ("not",))
         return (*chance.choice(first), *chance.choice(known))
 
-    known = [*HEDGES[dialect].values()]
+    known = [*FIS_HEDGES[dialect].values()]
 
     def question(name: str) -> Is:
         found = hedges(known)
@@ -174,7 +179,7 @@ def test_any_tests_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
     assert text.partition("[Rules]\n")[2].startswith("-0.99 0 0, 1 0 (1.0) : 1\n")
     rule = "1 1 1, 1 1 (1.0) : 1\n"
     text = text.replace("-0.99", "-2.99").replace("NumRules=1", "NumRules=2") + rule
-    found = reading(text.encode(), "s.fis")
+    found = read_fis(text.encode(), "s.fis")
     assert [(loss.where, loss.what) for loss in found.losses] == [
         (
             "rule 1",
@@ -189,7 +194,7 @@ def test_a_system_is_read_back_alike(seed: int, dialect: Dialect) -> None:
     system = random_fis(seed, dialect)
     written = write(system, dialect=dialect)
     assert written.losses == ()
-    found = reading(written.content, "s.fis")
+    found = read_fis(written.content, "s.fis")
     assert found.losses == ()
     assert anonymous(found.model) == anonymous(system)
 
@@ -203,7 +208,7 @@ def test_rules_of_points_are_read_back_equal_where_no_input_is_tested_twice(
     rules, _ = pointed(rules_from_tree(tree, kind), 1e-3)  # type: ignore[arg-type]
     written = write(rules, allow_loss=True)
     if not written.losses:
-        assert reading(written.content, "r.fis").model == rules
+        assert read_fis(written.content, "r.fis").model == rules
 
 
 @pytest.mark.one_in(4)
@@ -215,7 +220,7 @@ def test_scores_read_back_are_within_the_bounds_of_the_losses(
     rules = rules_from_tree(random_tree(seed, combinations=0.0), kind)  # type: ignore[arg-type]
     written = write(rules, allow_loss=True, tolerance=1e-4)
     bounds = [loss.bound for loss in written.losses if loss.bound is not None]
-    again = reading(written.content, "r.fis").model
+    again = read_fis(written.content, "r.fis").model
     system = as_system(again) if isinstance(again, RuleBase) else again
     assert isinstance(system, FuzzySystem)
     for row in probes(rules, limit=60):
@@ -354,7 +359,7 @@ def test_an_input_that_is_tested_twice_becomes_a_term_with_a_bound() -> None:
     assert [(loss.where, loss.bound) for loss in written.losses] == [
         ("low and high of 'a'", 0.0)
     ]
-    again = reading(written.content, "s.fis").model
+    again = read_fis(written.content, "s.fis").model
     assert isinstance(again, FuzzySystem)
     assert again.inputs[0].labels[2].curve == Points((1.0, 1.5, 2.0), (0.0, 0.5, 0.0))
 
@@ -431,7 +436,7 @@ def test_what_matlab_answers_where_no_rule_fires_is_a_loss_if_the_model_differs(
     carried = replace(system, outputs=(replace(output, default=1.0),))
     written = write(carried, dialect="matlab")
     assert written.losses == ()
-    assert anonymous(reading(written.content, "s.fis").model) == anonymous(carried)
+    assert anonymous(read_fis(written.content, "s.fis").model) == anonymous(carried)
 
 
 def test_terms_of_one_number_are_a_loss_where_octave_joins_their_rules() -> None:
@@ -471,7 +476,7 @@ def test_combinations_become_inputs_and_linear_conclusions_give_them_no_weight()
         write(rules)
     flat, _ = flattened(as_system(rules))
     written = write(rules, allow_loss=True)
-    again = reading(written.content, "r.fis").model
+    again = read_fis(written.content, "r.fis").model
     if isinstance(again, FuzzySystem):
         assert len(again.columns) == len(flat.columns)
 

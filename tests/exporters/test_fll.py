@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from fuzzytree.checking.equivalence import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
-from fuzzytree.formats.fll.fll_reader import read
+from fuzzytree.formats.fll.fll_reader import read_fll
 from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
 from fuzzytree.model.system import (
     Activation,
@@ -186,7 +186,7 @@ def test_a_system_is_written_word_by_word() -> None:
 
 
 def test_a_system_that_is_read_is_written_as_the_same_bytes() -> None:
-    model = read(WRITTEN.encode(), "tank.fll").model
+    model = read_fll(WRITTEN.encode(), "tank.fll").model
     assert isinstance(model, FuzzySystem)
     again = write(model)
     assert again.content == write(TANK).content
@@ -203,7 +203,7 @@ def test_reading_written_rules_gives_the_equal_rules(
     made = rules_from_tree(tree, "raw" if kind == "raw" else "relative")
     rules, _ = pointed(replace(made, kind=None), 1e-3)
     written = write(rules, scores=scores, allow_loss=True)
-    assert read(written.content, "r.fll").model == rules
+    assert read_fll(written.content, "r.fll").model == rules
 
 
 @pytest.mark.parametrize("scores", get_args(Scores))
@@ -212,7 +212,7 @@ def test_without_its_comment_a_file_of_rules_is_their_system(scores: Scores) -> 
     written = write(rules, scores=scores)
     lines = written.content.decode().splitlines()
     bare = "\n".join(line for line in lines if FACTS not in line)
-    model = read(bare.encode(), "r.fll").model
+    model = read_fll(bare.encode(), "r.fll").model
     assert isinstance(model, FuzzySystem)
     assert anonymous(model) == anonymous(as_system(rules, scores))
 
@@ -221,8 +221,8 @@ def test_the_file_of_a_changed_comment_is_the_system_that_it_says() -> None:
     rules, _ = pointed(rules_from_tree(random_tree(3, combinations=0.0)), 1e-3)
     text = write(rules).content.decode()
     changed = text.replace("activation: Highest 1", "activation: General")
-    assert isinstance(read(text.encode(), "r.fll").model, RuleBase)
-    assert isinstance(read(changed.encode(), "r.fll").model, FuzzySystem)
+    assert isinstance(read_fll(text.encode(), "r.fll").model, RuleBase)
+    assert isinstance(read_fll(changed.encode(), "r.fll").model, FuzzySystem)
 
 
 def test_what_is_lost_is_listed_and_refused() -> None:
@@ -314,7 +314,7 @@ def test_a_not_of_several_conditions_moves_to_each_under_minimum_and_maximum() -
     when = Not(Or((And((low, big)), Not(Not(And((high, Is("is", None, ("any",)))))))))
     rule = SystemRule(when, (Conclusion("rate", "none"),))
     system = replace(TANK, blocks=(RuleBlock((rule,), implication="minimum"),))
-    model = read(write(system).content, "t.fll").model
+    model = read_fll(write(system).content, "t.fll").model
     assert isinstance(model, FuzzySystem)
     for level in (0.05, 0.4, 1.3, 2.0, 2.9):
         for x in (-2.0, 0.3, 0.9):
@@ -339,7 +339,7 @@ def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
     text = write(system).content.decode()
     points = "0.0 0.0 1.0 0.5 1.0000000000000002 1.0 2.0 1.0 2.0000000000000004 0.0"
     assert f"term: low Discrete {points}\n" in text
-    model = read(text.encode(), "s.fll").model
+    model = read_fll(text.encode(), "s.fll").model
     assert isinstance(model, FuzzySystem)
     assert model.inputs[0].labels[0].curve == STEPS
 
@@ -373,7 +373,7 @@ def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
     written = write(system)
     kind = "TakagiSugeno" if is_mixed else "Tsukamoto"
     assert f"WeightedSum {kind}\n" in written.content.decode()
-    model = read(written.content, "s.fll").model
+    model = read_fll(written.content, "s.fll").model
     assert isinstance(model, FuzzySystem)
     for value in (0.5, 1.0, 2.0, 2.5, 4.0):
         (ours,) = infer(system, {"a": value}).outputs
@@ -398,7 +398,7 @@ def test_a_random_system_without_losses_answers_alike_when_it_is_read(
     system = plain_system(seed)
     written = write(system)
     assert written.losses == ()
-    model = read(written.content, "r.fll").model
+    model = read_fll(written.content, "r.fll").model
     assert isinstance(model, FuzzySystem)
     for row in random_rows(system, seed, 5):
         given = dict(zip(model.columns, row.values(), strict=True))

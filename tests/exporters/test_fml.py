@@ -12,8 +12,8 @@ from fuzzytree.checking.equivalence import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fml import write
-from fuzzytree.formats.fml.fml_reader import reading
-from fuzzytree.formats.fml.fml_words import FAR, MODIFIERS, USUAL
+from fuzzytree.formats.fml.fml_reader import read_fml
+from fuzzytree.formats.fml.fml_words import FML_FAR, MODIFIERS, USUAL
 from fuzzytree.model.rulebase import Clause, Kind, Points, Rule
 from fuzzytree.model.system import (
     And,
@@ -55,8 +55,8 @@ def random_curve(chance: random.Random) -> Curve:
         Points((a, b, b, d), (0.0, 0.25, 1.0, 0.5)),
         Points((a, b), (0.0, 1.0)),
         Gaussian(a, d - a),
-        TwoGaussians(a, 1.5, FAR, 1.0),
-        TwoGaussians(-FAR, 1.0, c, 0.25),
+        TwoGaussians(a, 1.5, FML_FAR, 1.0),
+        TwoGaussians(-FML_FAR, 1.0, c, 0.25),
         SCurve(a, b),
         SCurve(d, c),
         Singleton(c),
@@ -133,7 +133,7 @@ def test_a_system_is_read_back_alike(seed: int) -> None:
     system = random_fml(seed)
     written = write(system)
     assert written.losses == ()
-    found = reading(written.content, "s.fml")
+    found = read_fml(written.content, "s.fml")
     assert found.losses == ()
     assert anonymous(found.model) == anonymous(system)
 
@@ -146,7 +146,7 @@ def test_rules_of_points_are_read_back_equal(seed: int, kind: Kind) -> None:
     rules, _ = pointed(rules_from_tree(tree, kind), 1e-3)
     written = write(rules)
     assert written.losses == ()
-    assert reading(written.content, "r.fml").model == rules
+    assert read_fml(written.content, "r.fml").model == rules
 
 
 def test_product_and_negated_clauses_are_read_back_equal() -> None:
@@ -158,7 +158,7 @@ def test_product_and_negated_clauses_are_read_back_equal() -> None:
         semantics=replace(rules.semantics, conjunction="product"),
         rules=(*rules.rules, Rule((clause,), rules.classes[0])),
     )
-    assert reading(write(other).content, "r.fml").model == other
+    assert read_fml(write(other).content, "r.fml").model == other
 
 
 def test_every_line_of_a_small_file() -> None:
@@ -289,7 +289,7 @@ def test_rules_with_combinations_are_read_back_equal_where_facts_are_there(
     assert any(variable.parts for variable in rules.variables)
     written = write(rules, allow_loss=True)
     assert all(loss.where.startswith("combination ") for loss in written.losses)
-    assert reading(written.content, "r.fml").model == rules
+    assert read_fml(written.content, "r.fml").model == rules
 
 
 def test_a_rule_that_mixes_and_and_or_becomes_several_under_maximum() -> None:
@@ -303,7 +303,7 @@ def test_a_rule_that_mixes_and_and_or_becomes_several_under_maximum() -> None:
     system = replace(system, blocks=(replace(system.blocks[0], rules=(rule,)),))
     with pytest.raises(LossError, match="rule 1: it is 2 rules, joined by maximum"):
         write(system)
-    again = reading(write(system, allow_loss=True).content, "s.fml").model
+    again = read_fml(write(system, allow_loss=True).content, "s.fml").model
     assert isinstance(again, FuzzySystem)
     assert [one.when for one in again.rules] == [
         And((Is("x0", "t0"), Is("x2", "t0"))),

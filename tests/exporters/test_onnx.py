@@ -18,7 +18,7 @@ import pytest
 
 from fuzzytree.errors import DisagreementError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format, onnx_ends
-from fuzzytree.exporters.onnx import FORMAT, IRS, OPSETS, Output, write
+from fuzzytree.exporters.onnx import FORMAT, IRS, OPSETS, Output, write_onnx
 from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import (
@@ -97,9 +97,9 @@ def golden_models() -> dict[str, bytes]:
     tree = grip_tree()
     rules = rules_from_tree(tree)
     return {
-        "tree": write(tree, signature="all").content,
-        "rules": write(rules, dtype="mixed", outputs=EVERY).content,
-        "readable": write(lr_rules(), readable=True, outputs=EVERY).content,
+        "tree": write_onnx(tree, signature="all").content,
+        "rules": write_onnx(rules, dtype="mixed", outputs=EVERY).content,
+        "readable": write_onnx(lr_rules(), readable=True, outputs=EVERY).content,
     }
 
 
@@ -139,12 +139,12 @@ def test_equal_models_give_equal_bytes_in_another_process() -> None:
         for seed in ("1", "2")
     }
     assert len(found) == 1
-    assert write(grip_tree()).content == write(grip_tree()).content
+    assert write_onnx(grip_tree()).content == write_onnx(grip_tree()).content
 
 
 def test_the_metadata_says_what_the_file_is() -> None:
     tree = grip_tree()
-    proto = onnx.load_from_string(write(tree, signature="all").content)
+    proto = onnx.load_from_string(write_onnx(tree, signature="all").content)
     facts = {entry.key: entry.value for entry in proto.metadata_props}
     version = facts.pop("fuzzytree.version")
     assert proto.producer_version == version
@@ -179,7 +179,7 @@ def test_class_names_of_any_script_come_back() -> None:
     side = Side(0.5, (0.2,), 1.5)
     terms = tuple(Term(f"at {k}", LR(k, side, side)) for k in range(len(names)))
     model = RuleBase("scripts", names, (Variable("x", terms),), rules)
-    made = write(model).content
+    made = write_onnx(model).content
     found = _answers(made, np.arange(len(names), dtype=float).reshape(-1, 1))
     assert found["label"].tolist() == list(names)
     facts = {e.key: e.value for e in onnx.load_from_string(made).metadata_props}
@@ -199,7 +199,7 @@ def test_outputs_stand_in_the_requested_order() -> None:
     rules = lr_rules()
     values = np.array([[10.0], [22.0], [1e3], [np.nan]])
     outputs: tuple[Output, ...] = ("strengths", "status", "rule", "label")
-    found = _answers(write(rules, outputs=outputs).content, values)
+    found = _answers(write_onnx(rules, outputs=outputs).content, values)
     assert list(found) == list(outputs)
     answers = [evaluate(rules, {"slip": row[0]}) for row in values]
     assert found["strengths"].shape == (4, 2)
@@ -214,7 +214,7 @@ def test_outputs_stand_in_the_requested_order() -> None:
 def test_other_columns_of_a_full_signature_are_ignored() -> None:
     tree = grip_tree()
     for model in (tree, rules_from_tree(tree)):
-        content = write(model, signature="all").content
+        content = write_onnx(model, signature="all").content
         values = np.array([[np.nan, 0.0, 0.0], [np.inf, 2.0, 1.0], [1.0, 2.0, np.nan]])
         assert _answers(content, values)["rule"].tolist() == [1, 3, 0]
 
@@ -222,7 +222,7 @@ def test_other_columns_of_a_full_signature_are_ignored() -> None:
 def test_a_model_without_inputs_answers_every_row() -> None:
     tree = FuzzyTree("one", ("a",), (), (), (Leaf("a"),))
     for model in (tree, rules_from_tree(tree)):
-        found = _answers(write(model).content, np.zeros((3, 0)))
+        found = _answers(write_onnx(model).content, np.zeros((3, 0)))
         assert found["label"].tolist() == ["a", "a", "a"]
 
 
@@ -234,7 +234,7 @@ def test_every_supported_opset_and_ir_runs(opset: int, ir: int) -> None:
     for model in models:
         outputs = EVERY[:3] if isinstance(model, FuzzyTree) else EVERY
         proto = onnx.load_from_string(
-            write(model, opset=opset, ir=ir, outputs=outputs).content
+            write_onnx(model, opset=opset, ir=ir, outputs=outputs).content
         )
         assert proto.ir_version == ir
         assert proto.opset_import[0].version == opset
@@ -244,8 +244,8 @@ def test_every_supported_opset_and_ir_runs(opset: int, ir: int) -> None:
 def test_a_plain_tree_and_rules_need_no_other_operators() -> None:
     tree = random_tree(3, leaves=9)
     for content in (
-        write(tree, plain=True).content,
-        write(rules_from_tree(tree)).content,
+        write_onnx(tree, plain=True).content,
+        write_onnx(rules_from_tree(tree)).content,
     ):
         proto = onnx.load_from_string(content)
         assert [entry.domain for entry in proto.opset_import] == [""]
@@ -253,7 +253,7 @@ def test_a_plain_tree_and_rules_need_no_other_operators() -> None:
 
 def test_a_tree_that_would_unfold_too_far_becomes_plain() -> None:
     tree = _ladder(24)
-    proto = onnx.load_from_string(write(tree).content)
+    proto = onnx.load_from_string(write_onnx(tree).content)
     assert [entry.domain for entry in proto.opset_import] == [""]
 
 
@@ -279,7 +279,7 @@ def _ladder(depth: int) -> FuzzyTree:
 
 def test_a_model_takes_only_the_operators_that_it_needs() -> None:
     def operators(model: Model) -> set[str]:
-        proto = onnx.load_from_string(write(model, outputs=("rule",)).content)
+        proto = onnx.load_from_string(write_onnx(model, outputs=("rule",)).content)
         return {node.op_type for node in proto.graph.node}
 
     low = Term("low", Band(high=1.0, right=Flank(1.0, 2.0)))
@@ -294,7 +294,7 @@ def test_a_model_takes_only_the_operators_that_it_needs() -> None:
 
 def refused(model: Model, **options: object) -> str:
     with pytest.raises(ValueError, match=r".") as caught:
-        write(model, **options)  # type: ignore[arg-type] # wrong on purpose
+        write_onnx(model, **options)  # type: ignore[arg-type] # wrong on purpose
     return str(caught.value)
 
 
@@ -351,7 +351,7 @@ def far_rules() -> RuleBase:
 
 def test_numbers_that_float32_cannot_hold_are_listed_and_refused() -> None:
     with pytest.raises(LossError) as caught:
-        write(far_rules(), dtype="float32")
+        write_onnx(far_rules(), dtype="float32")
     assert str(caught.value) == (
         "cannot write far as onnx float32: part 'x' of 'z': "
         "centre 1e+39 lies beyond float32; 3.4028234663852886e+38 stands\n"
@@ -375,7 +375,7 @@ def test_numbers_that_float32_cannot_hold_are_listed_and_refused() -> None:
 
 
 def test_allowed_losses_stand_beside_a_file_without_nan() -> None:
-    made = write(far_rules(), dtype="float32", allow_loss=True, outputs=EVERY)
+    made = write_onnx(far_rules(), dtype="float32", allow_loss=True, outputs=EVERY)
     assert len(made.losses) == 11
     session = onnxruntime.InferenceSession(made.content)
     values = np.array([[0.0], [1.0], [-1.0], [3e38], [1e-45]], np.float32)
@@ -397,14 +397,14 @@ def test_cuts_that_float32_merges_are_a_loss_of_a_tree() -> None:
         (Leaf("a"), Leaf("a"), Leaf("a")),
     )
     with pytest.raises(LossError) as caught:
-        write(tree, dtype="float32")
+        write_onnx(tree, dtype="float32")
     assert str(caught.value) == (
         "cannot write close as onnx float32: node 1: cuts 1.0 and 1.000000000001 "
         "become one number in float32\n"
         "  pass allow_loss=True to write it as stated, or choose dtype 'float64'"
     )
-    assert write(tree, dtype="mixed").losses == ()
-    assert len(write(tree, dtype="float32", allow_loss=True).losses) == 1
+    assert write_onnx(tree, dtype="mixed").losses == ()
+    assert len(write_onnx(tree, dtype="float32", allow_loss=True).losses) == 1
 
 
 def test_thresholds_are_rounded_to_the_nearest_float32() -> None:
@@ -423,7 +423,7 @@ def test_a_file_with_another_answer_is_not_written(
 
     monkeypatch.setattr(onnx_ends, "_winner", wrong)
     with pytest.raises(DisagreementError) as caught:
-        write(lr_rules())
+        write_onnx(lr_rules())
     assert str(caught.value) == (
         "the onnx file of slips returns another rule than the model "
         "where {'slip': 9.0}: 0, not 1"
@@ -445,11 +445,11 @@ def test_a_missing_package_is_named_with_what_installs_it(
         importlib.util, "find_spec", lambda name: None if name == absent else find(name)
     )
     with pytest.raises(MissingExtraError) as caught:
-        write(grip_tree())
+        write_onnx(grip_tree())
     hint = "onnx and onnxruntime: pip install 'onnx>=1.16' 'onnxruntime>=1.18'"
     assert str(caught.value) == f"{text} {hint}"
     if absent == "onnxruntime":
-        assert write(grip_tree(), verify=False).losses == ()
+        assert write_onnx(grip_tree(), verify=False).losses == ()
 
 
 def test_the_table_of_formats_needs_neither_onnx_nor_numpy() -> None:
@@ -473,7 +473,7 @@ def test_the_table_of_formats_needs_neither_onnx_nor_numpy() -> None:
 @pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
 def test_a_thousand_rules_stay_small_and_quick_to_write(dtype: Dtype) -> None:
     rules = rules_from_tree(random_tree(3, leaves=1000, inputs=11, combinations=0.0))
-    made = write(rules, dtype=dtype)
+    made = write_onnx(rules, dtype=dtype)
     assert len(made.content) < 250_000
     assert len(onnx.load_from_string(made.content).graph.node) < 120
 

@@ -12,7 +12,7 @@ import pytest
 from fuzzytree.checking.converting import read
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import onnx_steps
-from fuzzytree.exporters.onnx import OPSETS, Output, write
+from fuzzytree.exporters.onnx import OPSETS, Output, write_onnx
 from fuzzytree.exporters.onnx_compare import contents, differences
 from fuzzytree.exporters.onnx_steps import is_wide
 from fuzzytree.model.rulebase import fingerprint
@@ -41,11 +41,11 @@ TIPPER = read(Path(__file__).parents[2] / "examples" / "tipper.fll").model
 
 
 def test_the_same_system_gives_the_same_bytes() -> None:
-    assert write(SYSTEM).content == write(SYSTEM, verify=False).content
+    assert write_onnx(SYSTEM).content == write_onnx(SYSTEM, verify=False).content
 
 
 def test_the_file_says_what_it_is() -> None:
-    found = onnx.load_model_from_string(write(SYSTEM).content)
+    found = onnx.load_model_from_string(write_onnx(SYSTEM).content)
     facts = {one.key: one.value for one in found.metadata_props}
     assert facts["fuzzytree.carrier"] == "system"
     assert facts["fuzzytree.fingerprint"] == fingerprint(SYSTEM)
@@ -57,7 +57,7 @@ def test_the_file_says_what_it_is() -> None:
 
 
 def test_nodes_bear_the_names_of_propositions_rules_and_outputs() -> None:
-    found = onnx.load_model_from_string(write(TIPPER).content)
+    found = onnx.load_model_from_string(write_onnx(TIPPER).content)
     names = {node.name for node in found.graph.node}
     assert {"service", "service_is_poor", "food_is_rancid"} <= names
     assert {"rule_1_strength", "rule_3_strength", "tip"} <= names
@@ -76,7 +76,7 @@ def test_hostile_names_become_short_unique_identifiers() -> None:
     output = SystemOutput("status", (one,), None, None, Defuzzifier("weighted sum"))
     inputs = tuple(SystemInput(name, (half,)) for name in hostile)
     system = FuzzySystem("s", inputs, (output,), (RuleBlock(tuple(rules)),))
-    content = write(system).content
+    content = write_onnx(system).content
     graph = onnx.load_model_from_string(content).graph
     onnx.checker.check_model(content, full_check=True)
     names = [node.name for node in graph.node]
@@ -88,7 +88,7 @@ def test_hostile_names_become_short_unique_identifiers() -> None:
 
 
 def test_an_opened_file_runs() -> None:
-    content = write(SYSTEM, outputs=("activations", "outputs", "status")).content
+    content = write_onnx(SYSTEM, outputs=("activations", "outputs", "status")).content
     opened = open_onnx(content, "s.onnx")
     assert (opened.representation, opened.names) == ("system", ("y1", "y2"))
     rows = random_rows(SYSTEM, 0, 50)
@@ -111,11 +111,11 @@ def test_every_operator_set_gives_the_same_numbers(opset: int) -> None:
     # Of maxima, bisectors and centroids: reductions and pads changed between sets.
     for seed in (6, 13):
         system = random_system(seed, formulas="none", defuzzifier="of curves")
-        write(system, opset=opset, ir=8 if opset < 20 else 10)
+        write_onnx(system, opset=opset, ir=8 if opset < 20 else 10)
 
 
 def test_a_file_without_outputs_cannot_be_run() -> None:
-    content = write(SYSTEM, outputs=("status",)).content
+    content = write_onnx(SYSTEM, outputs=("status",)).content
     with pytest.raises(ReadError, match="the file has no output 'outputs'"):
         open_onnx(content, "s.onnx")
 
@@ -137,7 +137,7 @@ def test_options_of_trees_and_rules_are_refused(
     options: dict[str, object], text: str
 ) -> None:
     with pytest.raises(ValueError, match=text):
-        write(SYSTEM, **options)  # type: ignore[arg-type] # wrong on purpose
+        write_onnx(SYSTEM, **options)  # type: ignore[arg-type] # wrong on purpose
 
 
 def test_a_system_s_outputs_are_no_model_s() -> None:
@@ -146,11 +146,11 @@ def test_a_system_s_outputs_are_no_model_s() -> None:
     with pytest.raises(
         ValueError, match="there is label, rule, strengths, status, not"
     ):
-        write(random_tree(1), outputs=("outputs",))
+        write_onnx(random_tree(1), outputs=("outputs",))
 
 
 def test_a_graph_is_compared_with_a_fresh_one() -> None:
-    content = write(SYSTEM).content
+    content = write_onnx(SYSTEM).content
     assert differences(content, SYSTEM) == ((), ())
     found = differences(content, random_system(4, formulas="none"))
     assert found.graph
@@ -166,7 +166,7 @@ def test_a_wrong_graph_is_not_returned(
 ) -> None:
     monkeypatch.setattr(onnx_steps, "NODES", {**onnx_steps.NODES, operation: operator})
     with pytest.raises(DisagreementError, match=r"gives other .* than the model where"):
-        write(SYSTEM, outputs=("outputs", "activations"))
+        write_onnx(SYSTEM, outputs=("outputs", "activations"))
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_a_file_that_lies_about_itself_is_refused(
     key: str, value: str, text: str
 ) -> None:
     made = onnx.load_model_from_string(
-        write(SYSTEM, outputs=("outputs", "activations")).content
+        write_onnx(SYSTEM, outputs=("outputs", "activations")).content
     )
     for entry in made.metadata_props:
         if entry.key == f"fuzzytree.{key}":
@@ -235,7 +235,7 @@ def test_a_graph_of_many_rules_gives_the_bits_of_the_inference(
 ) -> None:
     system = grid_system(24, method=method)
     assert is_wide(from_system(system))
-    opened = open_onnx(write(system, outputs=ALL, opset=opset).content, "g.onnx")
+    opened = open_onnx(write_onnx(system, outputs=ALL, opset=opset).content, "g.onnx")
     values = np.array([[0.0, -0.0, 3.25, 23.5, np.nan, 99.0], [7.5, 1.0, 3, 22, 1, 1]])
     right = infer_rows(system, activations=True)(values)
     assert opened.run_system is not None
@@ -248,7 +248,9 @@ def test_a_graph_of_many_rules_gives_the_bits_of_the_inference(
 @pytest.mark.heavy
 def test_four_times_as_many_rules_need_no_more_nodes() -> None:
     counts = [
-        contents(write(grid_system(terms), outputs=ALL, verify=False).content).nodes
+        contents(
+            write_onnx(grid_system(terms), outputs=ALL, verify=False).content
+        ).nodes
         for terms in (30, 60)
     ]
     assert counts[1] <= counts[0]
@@ -262,4 +264,4 @@ def test_wide_nodes_give_the_answers_of_single_ones(
     system = random_system(seed, formulas="none")
     monkeypatch.setattr(onnx_steps, "MOST_SINGLE", 0)
     monkeypatch.setattr(onnx_steps, "_SHORTEST_CHAIN", 3)
-    write(system, outputs=ALL)  # it is verified
+    write_onnx(system, outputs=ALL)  # it is verified

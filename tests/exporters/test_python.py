@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fuzzytree.exporters.python import FORMAT, parameters, write
+from fuzzytree.exporters.python import FORMAT, parameters, write_python
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
@@ -67,7 +67,7 @@ def test_decide_and_strengths_have_the_bits_of_the_reference(kind: str) -> None:
     tree = random_tree(8, leaves=9)
     rules = rules_from_tree(tree, "raw" if kind == "raw" else "relative")
     model = tree if kind == "tree" else rules
-    space = executed(write(model).content)
+    space = executed(write_python(model).content)
     for row in probes(model, limit=200):
         answer = descend(tree, row) if kind == "tree" else evaluate(rules, row)
         assert space["decide"](**row) == (answer.label, answer.rule, answer.status)
@@ -78,7 +78,7 @@ def test_decide_and_strengths_have_the_bits_of_the_reference(kind: str) -> None:
 
 def test_hostile_names_stay_text() -> None:
     rules = hostile_rules()
-    content = write(rules).content
+    content = write_python(rules).content
     space = executed(content)
     row = dict.fromkeys(rules.inputs, 0.5)
     answer = evaluate(rules, row)
@@ -140,7 +140,7 @@ def test_a_tree_of_any_depth_can_be_written_and_run() -> None:
 
 def test_the_file_tests_itself_and_reports_a_changed_number(tmp_path: Path) -> None:
     file = tmp_path / "rules.py"
-    content = write(rules_from_tree(random_tree(3))).content
+    content = write_python(rules_from_tree(random_tree(3))).content
     file.write_bytes(content)
     command = [sys.executable, "-I", str(file)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -155,13 +155,13 @@ def test_the_file_tests_itself_and_reports_a_changed_number(tmp_path: Path) -> N
 
 def test_a_single_leaf_without_inputs_can_be_written() -> None:
     tree = FuzzyTree("one", ("a",), (), (), (Leaf("a"),))
-    assert executed(write(tree).content)["decide"]() == ("a", 1, 0)
+    assert executed(write_python(tree).content)["decide"]() == ("a", 1, 0)
 
 
 def test_the_same_model_gives_the_same_bytes_with_its_fingerprint() -> None:
     tree = random_tree(3)
-    content = write(tree).content
-    assert write(random_tree(3)).content == content
+    content = write_python(tree).content
+    assert write_python(random_tree(3)).content == content
     assert f"# Fingerprint: {fingerprint(tree)}\n".encode() in content
-    assert write(tree).losses == ()
+    assert write_python(tree).losses == ()
     assert FORMAT.suffixes == (".py",)

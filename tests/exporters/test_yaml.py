@@ -16,7 +16,7 @@ from fuzzytree.exporters.yaml import FORMAT, write
 from fuzzytree.formats import text_files
 from fuzzytree.formats.yaml import nodes
 from fuzzytree.formats.yaml.nodes import Scalar, compose
-from fuzzytree.formats.yaml.yaml_reader import read
+from fuzzytree.formats.yaml.yaml_reader import read_yaml
 from fuzzytree.model.contracts import Model, Reading
 from fuzzytree.model.rulebase import (
     LR,
@@ -53,7 +53,7 @@ AWKWARD = [
 
 def assert_kept(model: Model) -> bytes:
     content = write(model).content
-    back = read(content, "model.yaml")
+    back = read_yaml(content, "model.yaml")
     assert back == model
     # 0.0 and -0.0 are equal, and not the same.
     assert repr(msgspec.to_builtins(back)) == repr(msgspec.to_builtins(model))
@@ -191,7 +191,7 @@ def test_a_number_is_the_same_for_readers_of_both_versions(value: float) -> None
 
 @pytest.mark.parametrize("path", sorted(POSITIVE.glob("iris-*")), ids=lambda p: p.stem)
 def test_an_example_is_written_as_it_stands(path: Path) -> None:
-    assert write(read(path.read_bytes(), path.name)).content == path.read_bytes()
+    assert write(read_yaml(path.read_bytes(), path.name)).content == path.read_bytes()
 
 
 def test_a_symmetric_set_is_written_once() -> None:
@@ -313,7 +313,7 @@ def test_the_writer_counts_the_nodes_that_the_reader_counts(
         count = _size(root)
         monkeypatch.setattr("fuzzytree.exporters.yaml_text.MOST_NODES", count)
         monkeypatch.setattr("fuzzytree.formats.yaml.nodes.MOST_NODES", count)
-        assert read(write(model).content, "x.yaml") == model
+        assert read_yaml(write(model).content, "x.yaml") == model
         monkeypatch.setattr("fuzzytree.exporters.yaml_text.MOST_NODES", count - 1)
         with pytest.raises(LossError):
             write(model)

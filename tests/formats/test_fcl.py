@@ -8,7 +8,7 @@ import time
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fcl.fcl_reader import read
+from fuzzytree.formats.fcl.fcl_reader import read_fcl
 from fuzzytree.model.contracts import Reading
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
@@ -162,7 +162,7 @@ END_FUNCTION_BLOCK
 
 
 def _read(text: str) -> Reading:
-    return read(text.encode(), "file.fcl")
+    return read_fcl(text.encode(), "file.fcl")
 
 
 def _system(text: str) -> FuzzySystem:
@@ -406,7 +406,7 @@ def test_lines_end_as_three_systems_end_them(end: str) -> None:
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
 def test_other_encodings_are_read(encoding: str) -> None:
     text = STANDARD.replace("A file", "Un fichier français")
-    reading = read(text.encode(encoding), "file.fcl")
+    reading = read_fcl(text.encode(encoding), "file.fcl")
     assert reading.model == _system(STANDARD)
     has_remark = any("not UTF-8; read as" in one for one in reading.remarks)
     assert has_remark == (encoding in ("latin-1", "utf-16"))
@@ -532,14 +532,14 @@ def test_an_output_in_an_antecedent_is_a_loss_outside_of_fuzzylite() -> None:
 def test_a_hostile_file_ends_in_a_short_error_soon(content: bytes) -> None:
     start = time.process_time()
     with pytest.raises(ReadError) as caught:
-        read(content, "file.fcl")
+        read_fcl(content, "file.fcl")
     assert time.process_time() - start < 4.0
     assert len(str(caught.value)) < 40_000
 
 
 def _error(text: str) -> str | None:
     try:
-        read(text.encode(), "file.fcl")
+        read_fcl(text.encode(), "file.fcl")
     except ReadError as error:
         return str(error)
     return None
@@ -570,7 +570,7 @@ def test_a_damaged_file_is_read_or_refused_with_a_reason(text: str) -> None:
 def test_a_word_that_is_longer_than_any_name_is_a_mistake() -> None:
     text = f"FUNCTION_BLOCK {'n' * 1001}\nEND_FUNCTION_BLOCK\n".encode()
     with pytest.raises(ReadError, match=r"fcl:1:16: a word of more than 1000"):
-        read(text, "x.fcl")
+        read_fcl(text, "x.fcl")
 
 
 def test_a_number_that_fuzzylite_takes_for_a_degree_is_a_remark() -> None:

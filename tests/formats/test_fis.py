@@ -8,8 +8,8 @@ import time
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fis.fis_reader import reading
-from fuzzytree.formats.fis.fis_words import FAR, KINDS, Dialect, curve_of
+from fuzzytree.formats.fis.fis_reader import read_fis
+from fuzzytree.formats.fis.fis_words import FIS_FAR, KINDS, Dialect, curve_of
 from fuzzytree.model.system import (
     And,
     Bell,
@@ -80,7 +80,7 @@ MF2='fair':'linear',[1 0.5 2]
 
 
 def read(text: str, dialect: Dialect | None = None) -> FuzzySystem:
-    model = reading(text.encode(), "tip.fis", dialect=dialect).model
+    model = read_fis(text.encode(), "tip.fis", dialect=dialect).model
     assert isinstance(model, FuzzySystem)
     return model
 
@@ -107,7 +107,7 @@ def test_a_sugeno_system_is_read_whole() -> None:
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
 def test_line_ends_and_encodings_change_nothing(end: str, encoding: str) -> None:
     text = SUGENO.replace("a comment", "façade").replace("\n", end)
-    assert reading(text.encode(encoding), "tip.fis").model == read(SUGENO)
+    assert read_fis(text.encode(encoding), "tip.fis").model == read(SUGENO)
 
 
 def test_sections_and_terms_may_stand_in_any_order() -> None:
@@ -126,8 +126,8 @@ def test_sections_and_terms_may_stand_in_any_order() -> None:
     [
         ("trimf", (1, 2, 4), Trapezoid(1.0, 2.0, 2.0, 4.0)),
         ("trapmf", (1, 1, 2, 4), Trapezoid(1.0, 1.0, 2.0, 4.0)),
-        ("trapmf", (-2 * FAR, -FAR, 2, 4), Trapezoid(None, 2.0, 2.0, 4.0)),
-        ("trapmf", (1, 2, FAR, 2 * FAR), Trapezoid(1.0, 2.0, 2.0, None)),
+        ("trapmf", (-2 * FIS_FAR, -FIS_FAR, 2, 4), Trapezoid(None, 2.0, 2.0, 4.0)),
+        ("trapmf", (1, 2, FIS_FAR, 2 * FIS_FAR), Trapezoid(1.0, 2.0, 2.0, None)),
         ("trapmf", (-float("inf"), -float("inf"), 2, 4), Trapezoid(None, 2, 2, 4)),
         ("linzmf", (1, 2), Points((1.0, 2.0), (1.0, 0.0))),
         ("linsmf", (1, 2), Points((1.0, 2.0), (0.0, 1.0))),
@@ -195,7 +195,7 @@ def test_the_dialect_is_detected_and_reported(
     change: tuple[str, str], remark: str
 ) -> None:
     text = SUGENO.replace(*change, 1) if change[0] else SUGENO
-    assert reading(text.encode(), "tip.fis").remarks[0].startswith(remark)
+    assert read_fis(text.encode(), "tip.fis").remarks[0].startswith(remark)
 
 
 def test_octave_joins_the_rules_of_a_term_and_matlab_sums_them() -> None:
@@ -203,7 +203,7 @@ def test_octave_joins_the_rules_of_a_term_and_matlab_sums_them() -> None:
         "2 -1, 2 (0.5) : 2", "2 -1, 1 (0.5) : 2"
     )
     assert read(text, "octave").outputs[0].aggregation == "maximum"
-    found = reading(text.encode(), "tip.fis", dialect="matlab")
+    found = read_fis(text.encode(), "tip.fis", dialect="matlab")
     assert isinstance(found.model, FuzzySystem)
     assert found.model.outputs[0].aggregation is None
     assert "Octave would join them by maximum" in found.remarks[-1]
@@ -222,7 +222,7 @@ def test_where_no_rule_fires_matlab_answers_the_middle_of_the_range(
         text = text.replace("sugeno", "mamdani").replace("wtaver", "centroid")
         text = text.replace("'constant',[5]", "'trimf',[0 5 9]")
         text = text.replace("'linear',[1 0.5 2]", "'trimf',[5 9 30]")
-    found = reading(text.encode(), "tip.fis", dialect=dialect)
+    found = read_fis(text.encode(), "tip.fis", dialect=dialect)
     assert isinstance(found.model, FuzzySystem)
     inferred = infer(found.model, {"food": 5.0, "service": 9.0})
     assert inferred.status is Status.UNCOVERED
@@ -246,7 +246,7 @@ def test_octave_joins_the_rules_of_terms_with_one_number(
         ("2 -1, 2 (0.5) : 2", "2 0, 3 (1) : 1"),
     ):
         text = text.replace(old, new)
-    found = reading(text.encode(), "tip.fis", dialect=dialect)
+    found = read_fis(text.encode(), "tip.fis", dialect=dialect)
     assert isinstance(found.model, FuzzySystem)
     assert found.losses == ()
     (number,) = infer(found.model, {"food": 7.5, "service": 0.0}).outputs
@@ -276,7 +276,7 @@ def test_where_fuzzylite_computes_other_numbers_is_a_loss_of_its_files(
         "'linear',[1 0.5 2]", "'trimf',[5 9 30]"
     )
     found = [
-        loss.what for loss in reading(text.encode(), "tip.fis", dialect=dialect).losses
+        loss.what for loss in read_fis(text.encode(), "tip.fis", dialect=dialect).losses
     ]
     assert found == (
         [
@@ -292,7 +292,7 @@ def test_where_fuzzylite_inverts_curves_otherwise_is_a_loss_of_its_files() -> No
     text = SUGENO.replace("'constant',[5]", "'smf',[0 5]").replace(
         "'linear',[1 0.5 2]", "'smf',[5 9]"
     )
-    (loss,) = reading(text.encode(), "tip.fis", dialect="fuzzylite").losses
+    (loss,) = read_fis(text.encode(), "tip.fis", dialect="fuzzylite").losses
     assert loss.what == (
         "where a term has a degree is computed exactly; fuzzylite 6 finds other "
         "values for SShape, ZShape and Concave"
@@ -302,10 +302,10 @@ def test_where_fuzzylite_inverts_curves_otherwise_is_a_loss_of_its_files() -> No
 def test_a_rule_without_an_antecedent_is_always_true_or_reported_as_left_out() -> None:
     text = SUGENO.replace("1 1, 1 (1) : 1", "0 0, 1 (1) : 1")
     assert read(text).rules[0].when is None
-    found = reading(text.encode(), "tip.fis", dialect="fuzzylite")
+    found = read_fis(text.encode(), "tip.fis", dialect="fuzzylite")
     assert found.losses[0].where == "rule 1"
     text = SUGENO.replace("2 -1, 2 (0.5) : 2", "0 0, 2 (1) : 2")
-    found = reading(text.encode(), "tip.fis")
+    found = read_fis(text.encode(), "tip.fis")
     assert found.losses[0].what == (
         "its antecedent is empty and it never fires (an or of none); left out"
     )
@@ -313,7 +313,7 @@ def test_a_rule_without_an_antecedent_is_always_true_or_reported_as_left_out() -
 
 def test_names_that_stand_twice_are_renamed_and_reported() -> None:
     text = SUGENO.replace("'service'", "'food'").replace("'fair'", "'small'")
-    found = reading(text.encode(), "tip.fis")
+    found = read_fis(text.encode(), "tip.fis")
     assert found.model.columns == ("food", "food 2")
     assert found.remarks[1:3] == (
         "input 2 is called 'food' like another; here it is 'food 2'",
@@ -401,7 +401,7 @@ def test_all_mistakes_are_reported_at_once() -> None:
 def test_hostile_files_end_in_a_sentence_within_two_seconds(content: bytes) -> None:
     start = time.process_time()
     with pytest.raises(ReadError) as caught:
-        reading(content, "x.fis")
+        read_fis(content, "x.fis")
     assert time.process_time() - start < 2.0
     assert len(str(caught.value)) < 40_000
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fll.fll_reader import read
+from fuzzytree.formats.fll.fll_reader import read_fll
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     Activation,
@@ -92,13 +92,13 @@ def with_rule(text: str, conclusion: str) -> str:
 
 
 def system_of(text: str) -> FuzzySystem:
-    model = read(text.encode(), "tipper.fll").model
+    model = read_fll(text.encode(), "tipper.fll").model
     assert isinstance(model, FuzzySystem)
     return model
 
 
 def test_every_word_of_a_file_is_in_the_system() -> None:
-    reading = read(TIPPER.encode(), "tipper.fll")
+    reading = read_fll(TIPPER.encode(), "tipper.fll")
     system = reading.model
     assert isinstance(system, FuzzySystem)
     assert reading.losses == ()
@@ -286,7 +286,7 @@ def test_only_monotone_terms_are_inverted() -> None:
 def test_mixing_numbers_and_monotone_terms_is_a_loss() -> None:
     lines = ["InputVariable: a", "OutputVariable: b", "defuzzifier: WeightedAverage"]
     text = "\n".join([*lines, "term: t Ramp 0 1", "term: u Constant 1"])
-    reading = read(with_rule(text, "b is t").encode(), "x.fll")
+    reading = read_fll(with_rule(text, "b is t").encode(), "x.fll")
     assert [loss.where for loss in reading.losses] == ["output 'b'"]
 
 
@@ -325,7 +325,7 @@ def test_all_mistakes_are_reported_at_once_with_their_places_and_nearest_names()
     None
 ):
     with pytest.raises(ReadError) as error:
-        read(MISTAKES.encode(), "m.fll")
+        read_fll(MISTAKES.encode(), "m.fll")
     assert str(error.value).splitlines() == [
         "m.fll:1:1: no section 'Engne'; there is Engine, InputVariable, "
         "OutputVariable, RuleBlock (did you mean 'Engine'?)",
@@ -374,7 +374,7 @@ def test_all_mistakes_are_reported_at_once_with_their_places_and_nearest_names()
 
 def test_at_most_a_hundred_mistakes_are_reported() -> None:
     with pytest.raises(ReadError) as error:
-        read(
+        read_fll(
             b"InputVariable: a\n" + b" term: t Triangle a b c d e\n" * 200_000, "m.fll"
         )
     assert len(str(error.value).splitlines()) <= 101
@@ -390,7 +390,7 @@ def test_names_are_cleaned_as_the_engines_do() -> None:
         *("defuzzifier: WeightedAverage", "term: big Constant 1", "RuleBlock:"),
         *("activation: General", "rule: if forearm is _1stone then output is big"),
     ]
-    reading = read("\n".join(lines).encode(), "names.fll")
+    reading = read_fll("\n".join(lines).encode(), "names.fll")
     assert isinstance(reading.model, FuzzySystem)
     assert reading.model.columns == ("forearm",)
     assert reading.model.rules[0].when == Is("forearm", "1st.one")
@@ -428,7 +428,7 @@ RuleBlock: second
 
 
 def test_what_is_disabled_says_nothing_and_is_reported() -> None:
-    reading = read(DISABLED.encode(), "off.fll")
+    reading = read_fll(DISABLED.encode(), "off.fll")
     system = reading.model
     assert isinstance(system, FuzzySystem)
     assert (len(system.rules), len(system.outputs)) == (2, 1)
@@ -444,14 +444,14 @@ def test_what_is_disabled_says_nothing_and_is_reported() -> None:
 def test_an_answer_that_is_remembered_is_a_loss() -> None:
     lines = ["InputVariable: a", "OutputVariable: y", "defuzzifier: WeightedSum"]
     text = "\n".join([*lines, "term: t Constant 1", "lock-previous: true"])
-    found = read(with_rule(text, "y is t").encode(), "l.fll")
+    found = read_fll(with_rule(text, "y is t").encode(), "l.fll")
     assert [one.where for one in found.losses] == ["output 'y'"]
 
 
 def test_of_two_terms_with_one_name_the_second_counts_and_the_first_is_a_loss() -> None:
     lines = ["InputVariable: a", "OutputVariable: y", "defuzzifier: WeightedSum"]
     text = "\n".join([*lines, "term: t Constant 1", "term: t Constant 2"])
-    reading = read(with_rule(text, "y is t").encode(), "t.fll")
+    reading = read_fll(with_rule(text, "y is t").encode(), "t.fll")
     assert isinstance(reading.model, FuzzySystem)
     assert reading.model.outputs[0].labels == (SystemTerm("t", Singleton(2.0)),)
     assert [one.where for one in reading.losses] == ["line 4"]
@@ -459,8 +459,8 @@ def test_of_two_terms_with_one_name_the_second_counts_and_the_first_is_a_loss() 
 
 def test_a_file_of_latin_1_is_read_with_a_remark() -> None:
     text = TIPPER.replace("service", "qualité")
-    found = read(text.encode("latin-1"), "tipper.fll")
-    assert found.model == read(text.encode(), "tipper.fll").model
+    found = read_fll(text.encode("latin-1"), "tipper.fll")
+    assert found.model == read_fll(text.encode(), "tipper.fll").model
     assert found.remarks[0] == "the file is not UTF-8; read as Latin-1"
 
 
@@ -481,7 +481,7 @@ def test_what_is_no_text_file_is_reported_in_one_sentence(
     content: bytes, message: str
 ) -> None:
     with pytest.raises(ReadError) as error:
-        read(content, "x.fll")
+        read_fll(content, "x.fll")
     assert message in str(error.value)
     assert len(str(error.value).splitlines()) == 1
 
@@ -510,7 +510,7 @@ def test_hostile_lines_end_soon_in_a_message(line: str) -> None:
     text = "InputVariable: a\nterm: low Ramp 0 1\nOutputVariable: b\nterm: c Ramp 0 1\n"
     started = time.process_time()
     with pytest.raises(ReadError) as error:
-        read(f"{text}defuzzifier: Centroid\nRuleBlock:\n{line}".encode(), "x.fll")
+        read_fll(f"{text}defuzzifier: Centroid\nRuleBlock:\n{line}".encode(), "x.fll")
     assert time.process_time() - started < 5.0
     assert len(str(error.value)) < 100_000
 
@@ -530,7 +530,7 @@ def test_a_damaged_file_is_refused_or_read_and_never_crashes() -> None:
             else:
                 text[place:place] = f" {chance.choice(words)} "
         try:
-            read("".join(text).encode(), "d.fll")
+            read_fll("".join(text).encode(), "d.fll")
         except ReadError as error:
             message = str(error)
             assert all(line.startswith("d.fll:") for line in message.splitlines())
@@ -557,4 +557,4 @@ RuleBlock: rules
         "term 'much' of 'tip' has the degree 0.9 everywhere, as in fuzzylite; to "
         "answer numbers, choose a weighted defuzzifier"
     )
-    assert remark in read(text.encode(), "tip.fll").remarks
+    assert remark in read_fll(text.encode(), "tip.fll").remarks

@@ -10,8 +10,8 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters.fml import write
-from fuzzytree.formats.fml.fml_reader import reading
-from fuzzytree.formats.fml.fml_words import FAR, USUAL
+from fuzzytree.formats.fml.fml_reader import read_fml
+from fuzzytree.formats.fml.fml_words import FML_FAR, USUAL
 from fuzzytree.model.system import (
     And,
     Condition,
@@ -80,7 +80,7 @@ TIPPER = """\
 
 
 def read(text: str) -> FuzzySystem:
-    model = reading(text.encode(), "tip.xml").model
+    model = read_fml(text.encode(), "tip.xml").model
     assert isinstance(model, FuzzySystem)
     return model
 
@@ -115,8 +115,8 @@ def test_a_sugeno_system_is_read_whole() -> None:
         ("triangularShape 1 2 4", Trapezoid(1.0, 2.0, 2.0, 4.0)),
         ("trapezoidShape 1 2 4 5", Trapezoid(1.0, 2.0, 4.0, 5.0)),
         ("gaussianShape 1 2", Gaussian(1.0, 2.0)),
-        ("rightGaussianShape 1 2", TwoGaussians(1.0, 2.0, FAR, 1.0)),
-        ("leftGaussianShape 1 2", TwoGaussians(-FAR, 1.0, 1.0, 2.0)),
+        ("rightGaussianShape 1 2", TwoGaussians(1.0, 2.0, FML_FAR, 1.0)),
+        ("leftGaussianShape 1 2", TwoGaussians(-FML_FAR, 1.0, 1.0, 2.0)),
         ("singletonShape 1", Singleton(1.0)),
         ("rectangularShape 1 2", Trapezoid(1.0, 1.0, 2.0, 2.0)),
         ("zShape 1 2", SCurve(2.0, 1.0)),
@@ -140,7 +140,7 @@ def points(method: str) -> str:
 def test_points_are_joined_by_lines_and_other_ways_are_a_loss() -> None:
     curve = Points((1.0, 2.0), (0.5, 1.0))
     assert read(points("linear")).inputs[1].labels[0].curve == curve
-    found = reading(points("spline").encode(), "tip.xml")
+    found = read_fml(points("spline").encode(), "tip.xml")
     assert [loss.what for loss in found.losses] == [
         "points joined by spline are joined by lines here"
     ]
@@ -165,7 +165,7 @@ def test_modifiers_have_their_meaning(modifier: str, hedges: tuple[str, ...]) ->
 @pytest.mark.parametrize("modifier", ["above", "below", "norm", "slightly", "custom_a"])
 def test_modifiers_without_a_meaning_here_are_a_loss(modifier: str) -> None:
     text = TIPPER.replace('"very"', f'"{modifier}"')
-    (loss,) = reading(text.encode(), "tip.xml").losses
+    (loss,) = read_fml(text.encode(), "tip.xml").losses
     assert loss.what == (
         f"the modifier {modifier!r} has no meaning here and is left out"
     )
@@ -198,7 +198,7 @@ def test_a_modifier_of_a_conclusion_and_an_else_are_losses() -> None:
     text = mamdani().replace("</then>", "</then><else><clause/></else>", 1)
     clause = "<clause><variable>tip</variable>"
     text = text.replace(clause, clause.replace(">", ' modifier="very">', 1), 1)
-    losses = reading(text.encode(), "tip.xml").losses
+    losses = read_fml(text.encode(), "tip.xml").losses
     assert [loss.what for loss in losses] == [
         "its else is left out",
         "the modifier 'very' of a conclusion is left out",
@@ -317,7 +317,7 @@ def bomb(levels: int) -> str:
 def test_hostile_files_end_in_a_sentence_within_two_seconds(content: bytes) -> None:
     start = time.process_time()
     with pytest.raises(ReadError) as caught:
-        reading(content, "x.xml")
+        read_fml(content, "x.xml")
     assert time.process_time() - start < 2.0
     assert len(str(caught.value)) < 10_000
 
@@ -325,11 +325,11 @@ def test_hostile_files_end_in_a_sentence_within_two_seconds(content: bytes) -> N
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
 def test_encodings_change_nothing(encoding: str) -> None:
     text = TIPPER.replace(' encoding="UTF-8"', "")
-    assert reading(text.encode(encoding), "tip.xml").model == read(TIPPER)
+    assert read_fml(text.encode(encoding), "tip.xml").model == read(TIPPER)
 
 
 def test_a_file_without_the_namespace_is_read_with_a_remark() -> None:
     text = TIPPER.replace(' xmlns="http://www.ieee1855.org"', "")
-    found = reading(text.encode(), "tip.xml")
+    found = read_fml(text.encode(), "tip.xml")
     assert found.model == read(TIPPER)
     assert found.remarks[0].startswith("the namespace is none and not")

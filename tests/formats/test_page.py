@@ -11,7 +11,7 @@ from fuzzytree.formats import text_files
 from fuzzytree.formats.yaml import layout, nodes
 from fuzzytree.formats.yaml.binding import bind
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
-from fuzzytree.formats.yaml.yaml_reader import read
+from fuzzytree.formats.yaml.yaml_reader import read_yaml
 from fuzzytree.model.rulebase import RuleBase
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "yaml-format.md"
@@ -31,7 +31,7 @@ def items(block: str, key: str = "") -> tuple[Node, ...]:
 
 
 def test_the_first_example_is_a_whole_file() -> None:
-    rules = read(BLOCKS[0].encode(), "page")
+    rules = read_yaml(BLOCKS[0].encode(), "page")
     assert isinstance(rules, RuleBase)
     assert len(rules.rules) == 3
 

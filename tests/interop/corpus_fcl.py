@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fuzzytree.formats.fcl.fcl_reader import read
+from fuzzytree.formats.fcl.fcl_reader import read_fcl
 from tests.interop.corpus_rows import DEBIAN, Case, Corpus, Tools
 from tests.interop.fuzzylite_engine import Answers, run_program
 
@@ -24,4 +24,4 @@ def _run(cases: Sequence[Case], tools: Tools) -> Iterator[dict[str, Answers]]:
         yield {"fuzzylite 6": found}
 
 
-FCL = Corpus("fcl", files, read, _run)
+FCL = Corpus("fcl", files, read_fcl, _run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fuzzytree.formats.fis.fis_reader import reading
+from fuzzytree.formats.fis.fis_reader import read_fis
 from tests.interop.corpus_rows import DEBIAN, Case, Corpus, Tools
 from tests.interop.fuzzylite_engine import Answers, run_program
 from tests.interop.octave_engine import answers
@@ -43,4 +43,4 @@ def _run(cases: Sequence[Case], tools: Tools) -> Iterator[dict[str, Answers]]:
             yield {"fuzzylite 6": run}
 
 
-FIS = Corpus("fis", files, reading, _run)
+FIS = Corpus("fis", files, read_fis, _run)

@@ -6,7 +6,7 @@ import importlib.util
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fuzzytree.formats.fll.fll_reader import read
+from fuzzytree.formats.fll.fll_reader import read_fll
 from tests.interop.corpus_rows import DEBIAN, Case, Corpus, Tools
 from tests.interop.fuzzylite_engine import Answers, run_library, run_program
 
@@ -37,4 +37,4 @@ def _run(cases: Sequence[Case], tools: Tools) -> Iterator[dict[str, Answers]]:
         yield found
 
 
-FLL = Corpus("fll", files, read, _run)
+FLL = Corpus("fll", files, read_fll, _run)

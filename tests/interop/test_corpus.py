@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.exporters.fll import write
-from fuzzytree.formats.fll.fll_reader import read
+from fuzzytree.formats.fll.fll_reader import read_fll
 from fuzzytree.model.system import FuzzySystem
 from tests.interop import corpus
 from tests.interop.corpus_fll import FLL
@@ -90,9 +90,9 @@ def test_every_file_that_others_ship_is_read_and_run_alike_or_the_page_says_why(
 def test_every_fll_file_is_written_and_comes_back_equal(library: Need) -> None:
     library("fuzzylite")
     for name, path in FLL.files():
-        model = read(path.read_bytes(), name).model
+        model = read_fll(path.read_bytes(), name).model
         assert isinstance(model, FuzzySystem)
-        assert read(write(model).content, name).model == model, name
+        assert read_fll(write(model).content, name).model == model, name
 
 
 def test_a_number_of_the_page_that_is_not_near_is_told() -> None:

@@ -16,7 +16,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import write
 from fuzzytree.exporters.fcl_dialects import Dialect
 from fuzzytree.exporters.fll import write as write_fll
-from fuzzytree.formats.fcl.fcl_reader import read
+from fuzzytree.formats.fcl.fcl_reader import read_fcl
 from fuzzytree.model.rulebase import Kind, Points
 from fuzzytree.model.system import And, Condition, Defuzzifier, FuzzySystem, Or
 from fuzzytree.semantics.conversion import as_system, pointed, winner
@@ -271,7 +271,7 @@ def test_a_file_that_fuzzylite_wrote_of_ours_is_ours(
     files = ("-i", str(first), "-if", "fcl", "-o", str(second), "-of", "fcl")
     command = [program("fuzzylite"), *files, "-decimals", "17"]
     subprocess.run(command, check=True, capture_output=True, timeout=60)
-    again = read(second.read_bytes(), "theirs.fcl").model
+    again = read_fcl(second.read_bytes(), "theirs.fcl").model
     assert isinstance(again, FuzzySystem)
     for row in random_rows(system, 6, 30):
         ours, theirs = infer(system, row).outputs, infer(again, row).outputs

@@ -17,7 +17,7 @@ import pytest
 
 from fuzzytree import LearningSettings, learn
 from fuzzytree.exporters.fml import write
-from fuzzytree.formats.fml.fml_reader import reading
+from fuzzytree.formats.fml.fml_reader import read_fml
 from fuzzytree.formats.fml.fml_words import NAMESPACE
 from fuzzytree.model.rulebase import Kind
 from fuzzytree.semantics.conversion import pointed
@@ -109,4 +109,4 @@ def test_numbers_of_32_bits_change_each_number_by_the_share_that_the_remark_says
     for x in xs:
         (single,) = struct.unpack("f", struct.pack("f", x))
         assert abs(single - x) <= 2.0**-24 * abs(x)
-    assert reading(written.content, "r.fml").model == rules
+    assert read_fml(written.content, "r.fml").model == rules

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from fuzzytree import LearningSettings, learn
 from fuzzytree.exporters.fll import write
-from fuzzytree.formats.fll.fll_reader import read
+from fuzzytree.formats.fll.fll_reader import read_fll
 from fuzzytree.model.rulebase import (
     Clause,
     Kind,
@@ -81,7 +81,7 @@ def assert_decided_alike(
 ) -> None:
     """Compare the class of every row, and count the rules that were loaded."""
     written = write(rules, allow_loss=True, scores=scores, tolerance=1e-4)
-    model = read(written.content, "model.fll").model
+    model = read_fll(written.content, "model.fll").model
     assert isinstance(model, RuleBase)
     answers = engine(written.content, file_rows(rules, rows))
     extra = scores != "winner"
@@ -178,7 +178,7 @@ def test_scores_are_the_strengths_of_rules(engine: Engine, scores: Scores) -> No
 
 
 def test_a_system_with_both_kinds_of_outputs_answers_alike(engine: Engine) -> None:
-    system = read(TIPPER.read_bytes(), "tipper.fll").model
+    system = read_fll(TIPPER.read_bytes(), "tipper.fll").model
     assert isinstance(system, FuzzySystem)
     rows = random_rows(system, 7, 40)
     answers = engine(write(system).content, [list(row.values()) for row in rows])
@@ -247,7 +247,7 @@ def test_degrees_of_every_term_are_read_as_the_engines_have_them(
             "  rule: if a is t then b is one",
         ]
         content = "\n".join(lines).encode()
-        reading = read(content, "t.fll")
+        reading = read_fll(content, "t.fll")
         assert isinstance(reading.model, FuzzySystem)
         if engine is not run_library:
             told = " ".join(reading.remarks)
@@ -281,7 +281,7 @@ def test_weighted_numbers_of_every_term_are_read_as_the_engines_take_them(
             "  rule: if a is up then b is t",
         ]
         content = "\n".join(lines).encode()
-        reading = read(content, "t.fll")
+        reading = read_fll(content, "t.fll")
         assert isinstance(reading.model, FuzzySystem)
         ours = [infer(reading.model, {"a": value}).outputs for (value,) in rows]
         is_told = any("fuzzylite 6" in one for one in reading.remarks)

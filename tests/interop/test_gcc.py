@@ -15,7 +15,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.c import write
+from fuzzytree.exporters.c import write_c
 from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
@@ -136,7 +136,7 @@ def test_every_model_compiles_without_a_warning_and_tests_itself(
             continue
         source = tmp_path / "model.c"
         try:
-            source.write_bytes(write(model, dtype=dtype, name="m").content)
+            source.write_bytes(write_c(model, dtype=dtype, name="m").content)
         except LossError:
             continue
         strict = STRICT if compiler != "tcc" else ["-std=c99", "-Wall", "-Werror"]
@@ -158,7 +158,7 @@ def test_a_processor_of_32_bits_gives_the_same_bits(
         pytest.skip("gcc makes no programs for 32 bits here")
     for name in ("combined tree", "relative", "wide raw", "points", "system 2"):
         source = tmp_path / "model.c"
-        source.write_bytes(write(MODELS[name], name="m").content)
+        source.write_bytes(write_c(MODELS[name], name="m").content)
         command = "gcc -m32 -msse2 -mfpmath=sse -O2"
         code, said = said_by(compiled(source, command, *STRICT, "-DM_SELFTEST"))
         assert code == 0, said
@@ -171,7 +171,7 @@ def test_a_number_that_was_changed_fails_the_self_test(
     tmp_path: Path, program: Need, name: str
 ) -> None:
     program("gcc")
-    text = write(MODELS[name], name="m").content.decode()
+    text = write_c(MODELS[name], name="m").content.decode()
     tables, rest = text.split("#ifdef M_SELFTEST")
     source, failed = tmp_path / "model.c", 0
     places = [m.start(1) for m in re.finditer(r"0x1\.([0-9a-f])[0-9a-f]*p", tables)]
@@ -189,7 +189,7 @@ def test_a_number_that_was_changed_fails_the_self_test(
 def test_another_answer_fails_the_self_test(tmp_path: Path, program: Need) -> None:
     program("gcc")
     source = tmp_path / "model.c"
-    text = write(MODELS["tree"], name="m").content.decode()
+    text = write_c(MODELS["tree"], name="m").content.decode()
     wrong = text.replace(
         "value[m_tree.line[place]] > ", "value[m_tree.line[place]] >= "
     )
@@ -206,7 +206,7 @@ def test_declarations_alone_are_a_header_for_c_and_c_plus_plus(
 ) -> None:
     compiler = program("g++")
     model = rules_from_tree(random_tree(1))
-    (tmp_path / "grip.c").write_bytes(write(model, name="grip").content)
+    (tmp_path / "grip.c").write_bytes(write_c(model, name="grip").content)
     use = '#include <stdio.h>\n#define GRIP_HEADER\n#include "grip.c"\n'
     zeros = ", ".join("0" * len(model.inputs))
     use += f"int main(void) {{ grip_real x[GRIP_INPUTS] = {{{zeros}}}; "
@@ -234,7 +234,7 @@ def test_what_would_change_numbers_does_not_compile(
 ) -> None:
     program("gcc")
     source = tmp_path / "model.c"
-    source.write_bytes(write(MODELS["relative"], name="m").content)
+    source.write_bytes(write_c(MODELS["relative"], name="m").content)
     words = ["gcc", *options.split(), "-c", str(source), "-o", str(tmp_path / "m.o")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode != 0
@@ -258,7 +258,7 @@ def test_the_walk_of_seven_leaves_is_small_on_a_cortex_m0(
 ) -> None:
     compiler, size = program("arm-none-eabi-gcc"), program("arm-none-eabi-size")
     source, target = tmp_path / "model.c", tmp_path / "model.o"
-    source.write_bytes(write(seven_leaves(), dtype=dtype, name="m").content)
+    source.write_bytes(write_c(seven_leaves(), dtype=dtype, name="m").content)
     machine = ["-mcpu=cortex-m0", "-mthumb", "-Os", "-c"]
     words = [compiler, *STRICT, *machine, str(source), "-o", str(target)]
     subprocess.run(words, check=True)
@@ -289,7 +289,7 @@ def _ramp(place: int) -> Term:
 def test_ten_thousand_rules_compile_soon(tmp_path: Path, program: Need) -> None:
     program("gcc")
     source = tmp_path / "model.c"
-    source.write_bytes(write(ten_thousand_rules(), name="m").content)
+    source.write_bytes(write_c(ten_thousand_rules(), name="m").content)
     start = time.monotonic()
     target = compiled(source, "gcc -O2", "-std=c99", "-DM_SELFTEST")
     assert time.monotonic() - start < 60.0

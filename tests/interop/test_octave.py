@@ -13,7 +13,7 @@ from sklearn import datasets
 from fuzzytree import LearningSettings, learn
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis import write
-from fuzzytree.formats.fis.fis_reader import reading
+from fuzzytree.formats.fis.fis_reader import read_fis
 from fuzzytree.learning import learn_arrays
 from fuzzytree.model.rulebase import Kind, RuleBase
 from fuzzytree.model.system import FuzzySystem
@@ -42,7 +42,7 @@ Need = Callable[[str], str]
 
 def system_of(content: bytes) -> FuzzySystem:
     """Return what a file of ours says, as a system whose combinations are inputs."""
-    model = reading(content, "model.fis").model
+    model = read_fis(content, "model.fis").model
     if isinstance(model, RuleBase):
         model = flattened(as_system(model, always="term"))[0]
     assert isinstance(model, FuzzySystem)

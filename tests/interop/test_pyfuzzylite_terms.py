@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fll.fll_reader import read
+from fuzzytree.formats.fll.fll_reader import read_fll
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     FUNCTIONS,
@@ -401,8 +401,8 @@ def test_a_term_that_no_sample_meets_concludes_nothing(
     assert found == pytest.approx(expected, nan_ok=True)
     if math.isnan(expected) and term.endswith("0.333"):
         with pytest.raises(ReadError, match="has no width"):
-            read(text.encode(), "y.fll")
+            read_fll(text.encode(), "y.fll")
         return
-    model = read(text.encode(), "y.fll").model
+    model = read_fll(text.encode(), "y.fll").model
     assert isinstance(model, FuzzySystem)
     assert infer(model, {"x": 0.5}).outputs == pytest.approx((expected,), nan_ok=True)

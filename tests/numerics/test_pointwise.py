@@ -14,7 +14,7 @@ from fuzzytree.numerics.pointwise import (
     lines_of,
     negated,
     product,
-    rounded,
+    rounded_lines,
 )
 from fuzzytree.semantics.inference.membership import curve_degree
 
@@ -37,7 +37,7 @@ def test_the_least_and_the_greatest_are_within_their_bound(seed: int) -> None:
     chance = random.Random(seed)
     one, other = random_points(chance), random_points(chance)
     for join, meant in ((least, min), (greatest, max)):
-        points, bound = rounded(join(lines_of(one), lines_of(other)))
+        points, bound = rounded_lines(join(lines_of(one), lines_of(other)))
         assert bound < 1e-12  # steep lines cross at a rounded value
         for x in looked_at(chance, one, other):
             expected = meant(curve_degree(one, x, {}), curve_degree(other, x, {}))
@@ -49,7 +49,7 @@ def test_a_product_is_within_its_tolerance(seed: int) -> None:
     chance = random.Random(seed)
     one, other = random_points(chance), random_points(chance)
     lines, error = product(lines_of(one), lines_of(other), 1e-4)
-    points, bound = rounded(lines)
+    points, bound = rounded_lines(lines)
     assert error <= 1e-4
     for x in looked_at(chance, one, other):
         expected = curve_degree(one, x, {}) * curve_degree(other, x, {})
@@ -58,7 +58,7 @@ def test_a_product_is_within_its_tolerance(seed: int) -> None:
 
 def test_a_negated_step_steps_the_other_way() -> None:
     step = Points((2.0, 2.0), (1.0, 0.25))
-    points, bound = rounded(negated(lines_of(step)))
+    points, bound = rounded_lines(negated(lines_of(step)))
     assert points == Points((2.0, 2.0), (0.0, 0.75))
     assert bound == 0.0
 
@@ -66,14 +66,14 @@ def test_a_negated_step_steps_the_other_way() -> None:
 def test_a_degree_below_1_is_not_rounded_to_1() -> None:
     one = Points((0.0, 3.0), (1.0 - 2**-53, 1.0))
     other = Points((0.0, 3.0), (1.0, 1.0 - 2**-53))
-    points, _ = rounded(least(lines_of(one), lines_of(other)))
+    points, _ = rounded_lines(least(lines_of(one), lines_of(other)))
     assert max(points.degrees) < 1.0
 
 
 def test_knots_on_a_line_are_left_out() -> None:
     one = Points((0.0, 4.0), (0.0, 1.0))
     other = Points((0.0, 1.0, 4.0), (1.0, 1.0, 1.0))
-    points, bound = rounded(least(lines_of(one), lines_of(other)))
+    points, bound = rounded_lines(least(lines_of(one), lines_of(other)))
     assert points == one
     assert bound == 0.0
 
@@ -86,7 +86,7 @@ def test_a_product_with_too_many_points_is_refused() -> None:
 
 def test_points_that_would_be_too_far_apart_keep_one_between() -> None:
     far = Points((-1e308, 0.0, 1e308), (0.5, 0.5, 0.5))
-    points, error = rounded(lines_of(far))
+    points, error = rounded_lines(lines_of(far))
     assert (points.values, error) == ((-1e308, 0.0, 1e308), 0.0)
     near = Points((-1e307, 0.0, 1e307), (0.5, 0.5, 0.5))
-    assert rounded(lines_of(near))[0].values == (-1e307, 1e307)
+    assert rounded_lines(lines_of(near))[0].values == (-1e307, 1e307)

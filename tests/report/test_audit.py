@@ -13,7 +13,7 @@ from fuzzytree.report.audit import (
     MOST_FINDINGS,
     WIDTH,
     audit_lines,
-    verdict_text,
+    audit_verdict,
 )
 from tests.report.audits import LINES, every_state
 
@@ -180,26 +180,28 @@ def test_findings_beyond_the_most_are_counted() -> None:
 
 def test_the_verdict_counts_and_says_what_next() -> None:
     audit = every_state()
-    assert verdict_text(audit, ["FT101-0"]) == (
+    assert audit_verdict(audit, ["FT101-0"]) == (
         "2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is "
         "spent (--budget SECONDS); 1 accepted finding no longer found, which "
         "--write-baseline forgets; `fuzzytree explain FT101` explains the gravest"
     )
     calm = replace(audit, answers=audit.answers[3:], accepted=(), is_complete=True)
-    assert verdict_text(calm) == "nothing found; 2 questions, 1 declined"
+    assert audit_verdict(calm) == "nothing found; 2 questions, 1 declined"
     bare = replace(calm, answers=())
-    assert verdict_text(bare) == "nothing found; no question applies to this model"
+    assert audit_verdict(bare) == "nothing found; no question applies to this model"
     none = replace(calm, answers=calm.answers[:1])
-    assert verdict_text(none) == (
+    assert audit_verdict(none) == (
         "nothing found; 1 question, all declined: nothing is known; "
         "`fuzzytree explain FTD02` explains why"
     )
     bracket = replace(audit.answers[2], is_finding=False)
     unsure = replace(calm, answers=(bracket, *calm.answers))
-    assert verdict_text(unsure) == ("nothing found; 3 questions, 1 open and 1 declined")
+    assert audit_verdict(unsure) == (
+        "nothing found; 3 questions, 1 open and 1 declined"
+    )
     sure = replace(calm, answers=calm.answers[1:])
-    assert verdict_text(sure) == "nothing found; 1 question answered"
+    assert audit_verdict(sure) == "nothing found; 1 question answered"
     cut = replace(calm, unasked=("FT101 dead rule: cut short: interrupted",))
-    assert verdict_text(replace(cut, is_complete=False)) == (
+    assert audit_verdict(replace(cut, is_complete=False)) == (
         "nothing found; interrupted: what is proved is kept, the rest is not examined"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fuzzytree.model.agreement import Agreement, Certified, Comparison, Verdict
-from fuzzytree.report.text import verdict_text
+from fuzzytree.report.text import agreement_verdict
 
 
 def agreement(comparisons: list[Verdict], bounds: list[Verdict]) -> Agreement:
@@ -50,5 +50,5 @@ def test_a_check_ends_with_how_much_of_it_disagrees(
     comparisons: list[Verdict], bounds: list[Verdict], said: str
 ) -> None:
     found = agreement(comparisons, bounds)
-    assert verdict_text(found) == said
+    assert agreement_verdict(found) == said
     assert found.ok == (said.startswith("none") and "bound" not in said)

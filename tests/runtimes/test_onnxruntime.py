@@ -16,7 +16,7 @@ import pytest
 from onnx import TensorProto, helper
 
 from fuzzytree.errors import LossError, ReadError
-from fuzzytree.exporters.onnx import OLDEST, Output, write
+from fuzzytree.exporters.onnx import OLDEST, Output, write_onnx
 from fuzzytree.model.contracts import Dtype, Model, Outcome
 from fuzzytree.model.rulebase import (
     LR,
@@ -178,7 +178,7 @@ def test_relative_rules_decide_as_the_tree_in_every_type(seed: int) -> None:
 def test_optimising_a_graph_changes_no_bit(seed: int) -> None:
     for model in random_models(seed):
         other: Output = "status" if isinstance(model, FuzzyTree) else "strengths"
-        written = write(model, outputs=("rule", other))
+        written = write_onnx(model, outputs=("rule", other))
         options = onnxruntime.SessionOptions()
         level = onnxruntime.GraphOptimizationLevel
         table = np.ascontiguousarray(probe_values(model, 1500).T)
@@ -225,7 +225,7 @@ def test_whole_numbers_are_taken_as_doubles() -> None:
 
 
 def test_a_failed_run_says_nothing_on_stderr(capfd: pytest.CaptureFixture[str]) -> None:
-    model = open_onnx(write(random_tree(1, inputs=2)).content, "tree.onnx")
+    model = open_onnx(write_onnx(random_tree(1, inputs=2)).content, "tree.onnx")
     with pytest.raises(ValueError, match="one line for each"):
         model.run(np.zeros((5, 1)))
     with pytest.raises(ReadError):
@@ -234,7 +234,7 @@ def test_a_failed_run_says_nothing_on_stderr(capfd: pytest.CaptureFixture[str]) 
 
 
 def _changed(change: object, model: Model | None = None) -> bytes:
-    proto = onnx.load_from_string(write(model or random_tree(1, inputs=2)).content)
+    proto = onnx.load_from_string(write_onnx(model or random_tree(1, inputs=2)).content)
     assert callable(change)
     change(proto)
     content: bytes = proto.SerializeToString()
@@ -245,7 +245,9 @@ def test_a_shipped_file_describes_itself_and_predicts_alone() -> None:
     tree = random_tree(7, leaves=9, inputs=3, semantics=Semantics(missing="class 2"))
     values = probe_values(tree, 1500)
     for model in (tree, rules_from_tree(tree, "raw", conjunction="product")):
-        written = write(model, outputs=("status", "label", "rule"), signature="all")
+        written = write_onnx(
+            model, outputs=("status", "label", "rule"), signature="all"
+        )
         found = open_onnx(written.content, "model.onnx")
         assert isinstance(found, OnnxModel)
         assert found.fingerprint == fingerprint(model)
@@ -270,7 +272,7 @@ def test_a_file_without_status_separates_missing_from_uncovered() -> None:
     rules = RuleBase(
         "r", ("a",), (Variable("x", (low,)),), (Rule((Clause("x", ("low",)),), "a"),)
     )
-    found = open_onnx(write(rules).content, "r.onnx")
+    found = open_onnx(write_onnx(rules).content, "r.onnx")
     assert found.run(np.array([[-1.0, 1.0, np.nan]])).status.tolist() == [0, 2, 3]
 
 
@@ -321,7 +323,7 @@ def _with_fact(key: str, value: str) -> bytes:
 HOSTILE = {
     "empty": (b"", NOT_OURS),
     "yaml": (b"hello: this is yaml", NO_ONNX),
-    "truncated": (write(random_tree(1)).content[:-40], NO_ONNX),
+    "truncated": (write_onnx(random_tree(1)).content[:-40], NO_ONNX),
     "other": (_other_graph(), NOT_OURS),
     "newer": (
         _with_fact("format", "2"),
@@ -379,7 +381,7 @@ def test_a_file_that_is_not_ours_is_refused_with_one_sentence(
 
 
 def test_a_file_that_answers_in_another_shape_is_refused_at_running() -> None:
-    content = write(rules_from_tree(random_tree(1)), outputs=("rule", "strengths"))
+    content = write_onnx(rules_from_tree(random_tree(1)), outputs=("rule", "strengths"))
     proto = onnx.load_from_string(content.content)
     _set_fact(proto, "rules", "8")
     model = open_onnx(proto.SerializeToString(), "rules.onnx")
@@ -456,7 +458,7 @@ def test_the_oldest_onnxruntime_gives_equal_bits(version: str, tmp_path: Path) -
             is_tree = isinstance(model, FuzzyTree)
             for dtype in DTYPES:
                 name = f"{seed} {number} {dtype}.onnx"
-                written = write(
+                written = write_onnx(
                     model,
                     dtype=dtype,
                     plain=is_tree and is_oldest,
@@ -496,7 +498,7 @@ def test_the_oldest_onnxruntime_runs_systems(tmp_path: Path) -> None:
     for seed in range(40):
         system = random_system(seed)
         try:
-            content = write(system, outputs=("outputs",)).content
+            content = write_onnx(system, outputs=("outputs",)).content
         except LossError:  # a function that onnxruntime lacks
             continue
         rows = random_rows(system, seed, 30)

@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fuzzytree.errors import LossError, ReadError
-from fuzzytree.exporters.onnx import write as write_onnx
+from fuzzytree.exporters.onnx import write_onnx as write_onnx
 from fuzzytree.exporters.onnx_lines import MOST_CHAINED
 from fuzzytree.exporters.yaml import write
-from fuzzytree.formats.yaml.yaml_reader import read
+from fuzzytree.formats.yaml.yaml_reader import read_yaml
 from fuzzytree.model.contracts import Dtype, Runtime
 from fuzzytree.model.rulebase import (
     MOST_POINTS,
@@ -269,7 +269,7 @@ def test_every_runtime_of_doubles_answers_hostile_points_alike(
 def test_points_come_back_from_a_file(shapes: list[Points]) -> None:
     rules = rules_of(*shapes)
     content = write(rules).content
-    back = read(content, "points.yaml")
+    back = read_yaml(content, "points.yaml")
     assert back == rules
     assert repr(msgspec.to_builtins(back)) == repr(msgspec.to_builtins(rules))
     assert write(back).content == content
@@ -292,7 +292,7 @@ def test_a_point_of_three_numbers_is_refused() -> None:
     text = write(rules_of(TRAPEZOID)).content.decode()
     broken = text.replace("[2.0, 1.0]", "[2.0, 1.0, 3.0]").encode()
     with pytest.raises(ReadError) as caught:
-        read(broken, "p.yaml")
+        read_yaml(broken, "p.yaml")
     assert str(caught.value) == (
         "p.yaml:10:26: an entry of 'points' needs 2 entries, not 3"
     )

@@ -30,7 +30,7 @@ from fuzzytree.model.system import (
     sampled_values,
 )
 from fuzzytree.semantics.inference import infer
-from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.system_program import from_system
 
 SHAPES = {
@@ -146,7 +146,8 @@ def test_the_value_of_a_singleton_is_a_sample_among_those_of_the_range(
     program = from_system(system)
     for x in (0.0, 1.0, 2.0, 3.5, 4.0, 5.0):
         assert (
-            evaluate(program, {"x": x}).of("output") == infer(system, {"x": x}).outputs
+            evaluate_program(program, {"x": x}).of("output")
+            == infer(system, {"x": x}).outputs
         )
 
 

@@ -23,7 +23,7 @@ from fuzzytree.formats.fcl.fcl_syntax import (
     place,
 )
 from fuzzytree.formats.fll.fll_terms import CLASSES
-from fuzzytree.formats.fll.fll_words import METHODS, S_NORMS, T_NORMS, Method
+from fuzzytree.formats.fll.fll_words import FLL_METHODS, S_NORMS, T_NORMS, Method
 from fuzzytree.formats.text_files import ReaderNotes
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import Defuzzifier, SNorm, TNorm
@@ -94,7 +94,7 @@ METHOD_WORDS: Mapping[str, Method] = {
     "LOM": "largest of maximum",
     "MM": "mean of maximum",
     "MOM": "mean of maximum",
-    **{name.upper(): method for name, method in METHODS.items()},
+    **{name.upper(): method for name, method in FLL_METHODS.items()},
 }
 PAIRS: Mapping[TNorm, SNorm] = {
     "minimum": "maximum",

@@ -63,7 +63,7 @@ FACTS = " facts "
 _MOST_LINES = 10  # among which the facts are looked for
 
 
-def read(content: bytes, name: str) -> Reading:
+def read_fcl(content: bytes, name: str) -> Reading:
     """Return the system of an FCL file, or the rule base that was written as one.
 
     Only the first FUNCTION_BLOCK is read.
@@ -83,13 +83,13 @@ def read(content: bytes, name: str) -> Reading:
         ...   RULE 1 : IF dirt IS much THEN minutes IS long;
         ... END_RULEBLOCK
         ... END_FUNCTION_BLOCK'''
-        >>> read(text.encode(), "washer.fcl").model.outputs[0].name
+        >>> read_fcl(text.encode(), "washer.fcl").model.outputs[0].name
         'minutes'
     """
     return _read(content, name)[0]
 
 
-def places(content: bytes, name: str) -> Locate:
+def fcl_places(content: bytes, name: str) -> Locate:
     """Return where the parts of the model of an FCL file stand.
 
     A rule stands at its keyword, a term and a variable at their names.

@@ -328,7 +328,7 @@ def _question(
     result = _code(code, variable, where, notes)
     if result is None or (not result.place and dialect != "fuzzylite"):
         return None
-    hedges = _hedges(words.HEDGES[dialect], result, (variable.name, where), notes)
+    hedges = _hedges(words.FIS_HEDGES[dialect], result, (variable.name, where), notes)
     if not result.place:
         if hedges[-1:] == ("any",):
             return Is(variable.name, None, hedges)
@@ -358,7 +358,7 @@ def _conclusion(
         )
         notes.mistake((where[1].line, 1), what)
         return None
-    table = words.HEDGES[dialect]
+    table = words.FIS_HEDGES[dialect]
     if dialect == "octave":
         table = words.CONCLUDING_HEDGES
     hedges = _hedges(table, result, (output.name, where), notes)

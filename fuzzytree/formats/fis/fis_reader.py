@@ -66,7 +66,7 @@ class _Methods(msgspec.Struct, frozen=True):
     counts: Mapping[str, FisEntry]
 
 
-def reading(content: bytes, name: str, *, dialect: Dialect | None = None) -> Reading:
+def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Reading:
     r"""Return what a FIS file says.
 
     Args:
@@ -83,13 +83,13 @@ def reading(content: bytes, name: str, *, dialect: Dialect | None = None) -> Rea
         ...          "MF1='good':'linsmf',[0 10]", "[Output1]", "Name='tip %'",
         ...          "Range=[0 30]", "NumMFs=1", "MF1='much':'constant',[25]",
         ...          "[Rules]", "1, 1 (1) : 1"]
-        >>> reading("\n".join(lines).encode(), "tip.fis").model.columns
+        >>> read_fis("\n".join(lines).encode(), "tip.fis").model.columns
         ('food',)
     """
     return _read(content, name, dialect)[0]
 
 
-def places(content: bytes, name: str) -> Locate:
+def fis_places(content: bytes, name: str) -> Locate:
     """Return where the parts of the model of a FIS file stand.
 
     A rule stands where its line begins, a term and a variable behind their `=`.
@@ -251,7 +251,7 @@ def _methods(
     if not title:
         title = printable(PurePath(name).stem) or "system"
         notes.remark(f"the system has no name; {title!r} stands for it")
-    method = norm("DefuzzMethod", words.METHODS)
+    method = norm("DefuzzMethod", words.FIS_METHODS)
     is_sugeno = word("Type").lower() == "sugeno"
     if method is None:
         method = "weighted average" if is_sugeno else "centroid"
@@ -276,10 +276,10 @@ def _methods(
         )
     return _Methods(
         title,
-        norm("AndMethod", words.TNORMS),  # type: ignore[arg-type]  # its values
-        norm("OrMethod", words.SNORMS),  # type: ignore[arg-type]
-        norm("ImpMethod", words.TNORMS),  # type: ignore[arg-type]
-        norm("AggMethod", words.SNORMS),  # type: ignore[arg-type]
+        norm("AndMethod", words.FIS_TNORMS),  # type: ignore[arg-type]  # its values
+        norm("OrMethod", words.FIS_SNORMS),  # type: ignore[arg-type]
+        norm("ImpMethod", words.FIS_TNORMS),  # type: ignore[arg-type]
+        norm("AggMethod", words.FIS_SNORMS),  # type: ignore[arg-type]
         how,
         entries,
     )
@@ -315,7 +315,7 @@ def _range(
         what = f"the Range must be two rising numbers, [0 1], not {entry.value[:40]!r}"
         notes.mistake(entry.position, what)
         return None, None
-    low, high = (end if abs(end) < words.FAR else None for end in ends)
+    low, high = (end if abs(end) < words.FIS_FAR else None for end in ends)
     return low, high
 
 

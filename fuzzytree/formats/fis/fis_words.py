@@ -37,10 +37,10 @@ from fuzzytree.model.system import (
 Dialect = Literal["matlab", "octave", "fuzzylite"]
 DIALECTS: Final[tuple[Dialect, ...]] = get_args(Dialect)
 
-FAR: Final = 1e300
+FIS_FAR: Final = 1e300
 """Corners beyond it stand for none: a trapezoid has no way to say `1 up to here`."""
 
-TNORMS: Final[Mapping[str, TNorm]] = {
+FIS_TNORMS: Final[Mapping[str, TNorm]] = {
     "min": "minimum",
     "prod": "product",
     "algebraic_product": "product",
@@ -50,7 +50,7 @@ TNORMS: Final[Mapping[str, TNorm]] = {
     "hamacher_product": "hamacher product",
     "nilpotent_minimum": "nilpotent minimum",
 }
-SNORMS: Final[Mapping[str, SNorm]] = {
+FIS_SNORMS: Final[Mapping[str, SNorm]] = {
     "max": "maximum",
     "probor": "algebraic sum",
     "algebraic_sum": "algebraic sum",
@@ -62,7 +62,7 @@ SNORMS: Final[Mapping[str, SNorm]] = {
     "normalized_sum": "normalized sum",
     "sum": "sum",
 }
-METHODS: Final = {
+FIS_METHODS: Final = {
     "centroid": "centroid",
     "bisector": "bisector",
     "som": "smallest of maximum",
@@ -78,7 +78,7 @@ _BASIC_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
     20: ("very",),
     40: ("very very",),
 }
-HEDGES: Final[Mapping[Dialect, Mapping[int, tuple[Hedge, ...]]]] = {
+FIS_HEDGES: Final[Mapping[Dialect, Mapping[int, tuple[Hedge, ...]]]] = {
     "matlab": {0: ()},
     "octave": {**_BASIC_HEDGES, 10: (), 30: ("cubed",)},
     "fuzzylite": {
@@ -118,7 +118,7 @@ def trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
         >>> trapezoid(-2e300, -1e300, 3.0, 5.0).a is None
         True
     """
-    is_left, is_right = b <= -FAR, c >= FAR
+    is_left, is_right = b <= -FIS_FAR, c >= FIS_FAR
     a = b if a == math.nextafter(b, -math.inf) else a
     d = c if d == math.nextafter(c, math.inf) else d
     if is_left and is_right:

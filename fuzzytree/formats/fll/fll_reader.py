@@ -55,7 +55,7 @@ from fuzzytree.model.system import (
 from fuzzytree.semantics.conversion import as_written
 
 
-def read(content: bytes, name: str) -> Reading:
+def read_fll(content: bytes, name: str) -> Reading:
     r"""Return what an FLL file says.
 
     Raises:
@@ -66,13 +66,13 @@ def read(content: bytes, name: str) -> Reading:
         ...          "OutputVariable: tip", "  defuzzifier: WeightedAverage",
         ...          "  term: much Constant 25", "RuleBlock:",
         ...          "  rule: if food is good then tip is much"]
-        >>> read("\n".join(lines).encode(), "tip.fll").model.columns
+        >>> read_fll("\n".join(lines).encode(), "tip.fll").model.columns
         ('food',)
     """
     return _read(content, name)[0]
 
 
-def places(content: bytes, name: str) -> Locate:
+def fll_places(content: bytes, name: str) -> Locate:
     """Return where the parts of the model of an FLL file stand: their values.
 
     Raises:
@@ -505,22 +505,22 @@ def _without_disabled(
 
 
 def _without(
-    read: FllRuleBlock, off: Collection[str], never: Condition, notes: ReaderNotes
+    read_fll: FllRuleBlock, off: Collection[str], never: Condition, notes: ReaderNotes
 ) -> FllRuleBlock:
     """Return a block whose rules do not know the disabled variables."""
     rules: list[SystemRule] = []
     lines: list[FllEntry] = []
-    for rule, line in zip(read.block.rules, read.lines, strict=True):
+    for rule, line in zip(read_fll.block.rules, read_fll.lines, strict=True):
         then = tuple(one for one in rule.then if one.output not in off)
         when = None if rule.when is None else _condition_without(rule.when, off, never)
         if then:
             rules.append(replace(rule, when=when, then=then))
             lines.append(line)
-        elif read.block.activation.method not in ("general", "threshold"):
+        elif read_fll.block.activation.method not in ("general", "threshold"):
             what = "it concludes only what is disabled, and is not counted any more"
             notes.loss(f"the rule in line {line.line}", what)
-    block = replace(read.block, rules=tuple(rules))
-    return replace(read, block=block, lines=tuple(lines))
+    block = replace(read_fll.block, rules=tuple(rules))
+    return replace(read_fll, block=block, lines=tuple(lines))
 
 
 def _condition_without(

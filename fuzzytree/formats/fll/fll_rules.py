@@ -26,7 +26,7 @@ from fuzzytree.model.system import (
     SystemRule,
 )
 
-HEDGES: Mapping[str, Hedge] = {
+FLL_HEDGES: Mapping[str, Hedge] = {
     "any": "any",
     "not": "not",
     "very": "very",
@@ -36,7 +36,7 @@ HEDGES: Mapping[str, Hedge] = {
 }
 """The hedges that fuzzylite knows, by their words."""
 
-RULE_WORDS: Final = ("if", "is", "then", "and", "or", "with", *HEDGES)
+RULE_WORDS: Final = ("if", "is", "then", "and", "or", "with", *FLL_HEDGES)
 
 
 class FllVariable(msgspec.Struct, frozen=True):
@@ -175,8 +175,8 @@ def _statement(rule: _Rule, place: int, *, concludes: bool = False) -> tuple[Is,
         raise rule.error(place, "'is'")
     place += 1
     hedges: list[Hedge] = []
-    while rule.words[place].text in HEDGES:
-        hedges.append(HEDGES[rule.words[place].text])
+    while rule.words[place].text in FLL_HEDGES:
+        hedges.append(FLL_HEDGES[rule.words[place].text])
         place += 1
         if hedges[-1] == "any" and not concludes:
             return Is(variable.name, None, tuple(hedges)), place

@@ -73,7 +73,7 @@ Method = Literal[
     "weighted average",
     "weighted sum",
 ]
-METHODS: Mapping[str, Method] = {
+FLL_METHODS: Mapping[str, Method] = {
     "Centroid": "centroid",
     "Bisector": "bisector",
     "SmallestOfMaximum": "smallest of maximum",
@@ -354,9 +354,11 @@ def defuzzifier(
     if entry is None or entry.value in ("", "none"):
         return None
     name, *rest = entry.words()
-    method = METHODS.get(name.text)
+    method = FLL_METHODS.get(name.text)
     if method is None:
-        sentence = f"no defuzzifier {name.text!r}; {name_choice(name.text, METHODS)}"
+        sentence = (
+            f"no defuzzifier {name.text!r}; {name_choice(name.text, FLL_METHODS)}"
+        )
         notes.mistake(name.position, sentence)
         return Defuzzifier("centroid"), ""
     if len(rest) > 1:

@@ -41,21 +41,21 @@ _VARIABLES: Final = ("fuzzyVariable", "tskVariable", "tsukamotoVariable")
 _OUTSIDE: Final = ("anYaDataCloud", "anYaRuleBase", "aggregatedFuzzyVariable")
 
 
-def reading(content: bytes, name: str) -> Reading:
+def read_fml(content: bytes, name: str) -> Reading:
     """Return what an FML file says.
 
     Raises:
         ReadError: With every mistake of the file.
 
     Example:
-        >>> reading(b"<fuzzySystem/>", "a.xml")
+        >>> read_fml(b"<fuzzySystem/>", "a.xml")
         Traceback (most recent call last):
         fuzzytree.errors.ReadError: a.xml:1:1: <fuzzySystem> has no <knowledgeBase>
     """
     return _read(content, name)[0]
 
 
-def places(content: bytes, name: str) -> Locate:
+def fml_places(content: bytes, name: str) -> Locate:
     """Return where the parts of the model of an FML file stand: their elements.
 
     Raises:
@@ -90,9 +90,9 @@ class _Parts(NamedTuple):
         blocks: list[PositionGroup] = []
         for block in self.blocks:
             rules = [next(waiting) for _ in block.rules]
-            places = tuple(rule.position for _, rule in rules)
+            fml_places = tuple(rule.position for _, rule in rules)
             blocks.append(
-                PositionGroup(rules[0][0].position if rules else (1, 1), places)
+                PositionGroup(rules[0][0].position if rules else (1, 1), fml_places)
             )
         return Positions(
             tuple(self._group(*one) for one in self.inputs),
@@ -289,7 +289,7 @@ def _output(
     how, aggregation = Defuzzifier("weighted average"), None
     if element.name == "fuzzyVariable":
         how = _defuzzifier(element, notes)
-        aggregation = _word(element, "accumulation", words.SNORMS, "MAX", notes)
+        aggregation = _word(element, "accumulation", words.FML_SNORMS, "MAX", notes)
         if not all(isinstance(label.curve, Singleton) for label in labels):
             notes.remark(
                 f"output {name!r}: FML says nothing of samples; read with {how.samples}"
@@ -311,7 +311,7 @@ def _output(
 
 
 def _defuzzifier(element: FmlElement, notes: ReaderNotes) -> Defuzzifier:
-    method = _word(element, "defuzzifier", words.METHODS, "COG", notes)
+    method = _word(element, "defuzzifier", words.FML_METHODS, "COG", notes)
     return Defuzzifier(method or "centroid", words.USUAL.samples, words.USUAL.grid)
 
 

@@ -130,11 +130,11 @@ def _norms(base: FmlElement, rule: FmlElement, notes: ReaderNotes) -> _Norms:
             notes.mistake(element.position, _unknown(key, text, known))
         return known.get(text.upper())
 
-    conjunction = norm("andMethod", words.TNORMS, "MIN", rule)
-    disjunction = norm("orMethod", words.SNORMS, "MAX", rule)
+    conjunction = norm("andMethod", words.FML_TNORMS, "MIN", rule)
+    disjunction = norm("orMethod", words.FML_SNORMS, "MAX", rule)
     implication: TNorm | None = None
     if base.name == "mamdaniRuleBase":
-        implication = norm("activationMethod", words.TNORMS, "MIN", base)
+        implication = norm("activationMethod", words.FML_TNORMS, "MIN", base)
     return _Norms(conjunction or "minimum", disjunction or "maximum", implication)
 
 
@@ -319,13 +319,13 @@ def _inner(element: FmlElement, notes: ReaderNotes) -> _Inner:
     """Return what an <and> or an <or> joins its parts by."""
     if element.name == "and":
         word = element.attributes.get("t-norm", "MIN")
-        if word.upper() not in words.TNORMS:
-            notes.mistake(element.position, _unknown("t-norm", word, words.TNORMS))
-        return _Inner(element, t_norm=words.TNORMS.get(word.upper()))
+        if word.upper() not in words.FML_TNORMS:
+            notes.mistake(element.position, _unknown("t-norm", word, words.FML_TNORMS))
+        return _Inner(element, t_norm=words.FML_TNORMS.get(word.upper()))
     word = element.attributes.get("t-conorm", "MAX")
-    if word.upper() not in words.SNORMS:
-        notes.mistake(element.position, _unknown("t-conorm", word, words.SNORMS))
-    return _Inner(element, s_norm=words.SNORMS.get(word.upper()))
+    if word.upper() not in words.FML_SNORMS:
+        notes.mistake(element.position, _unknown("t-conorm", word, words.FML_SNORMS))
+    return _Inner(element, s_norm=words.FML_SNORMS.get(word.upper()))
 
 
 def _joined(

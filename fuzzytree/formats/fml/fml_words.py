@@ -25,10 +25,10 @@ from fuzzytree.model.system import (
 )
 
 NAMESPACE: Final = "http://www.ieee1855.org"
-FAR: Final = 1e300
+FML_FAR: Final = 1e300
 """The flat side of a right or left gaussian ends beyond all values."""
 
-TNORMS: Final[Mapping[str, TNorm]] = {
+FML_TNORMS: Final[Mapping[str, TNorm]] = {
     "MIN": "minimum",
     "PROD": "product",
     "BSUM": "bounded difference",  # so the published schema; BDIF in the text
@@ -39,7 +39,7 @@ TNORMS: Final[Mapping[str, TNorm]] = {
     "HPROD": "hamacher product",
     "NILMIN": "nilpotent minimum",
 }
-SNORMS: Final[Mapping[str, SNorm]] = {
+FML_SNORMS: Final[Mapping[str, SNorm]] = {
     "MAX": "maximum",
     "PROBOR": "algebraic sum",
     "BSUM": "bounded sum",
@@ -48,7 +48,7 @@ SNORMS: Final[Mapping[str, SNorm]] = {
     "HSUM": "hamacher sum",
     "NILMAX": "nilpotent maximum",
 }
-METHODS: Final[
+FML_METHODS: Final[
     Mapping[
         str,
         Literal[
@@ -94,8 +94,8 @@ SHAPES: Final[Mapping[str, tuple[int, _Make]]] = {
     "triangularShape": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
     "trapezoidShape": (4, lambda n: Trapezoid(n[0], n[1], n[2], n[3])),
     "gaussianShape": (2, lambda n: Gaussian(n[0], abs(n[1]))),
-    "rightGaussianShape": (2, lambda n: TwoGaussians(n[0], abs(n[1]), FAR, 1.0)),
-    "leftGaussianShape": (2, lambda n: TwoGaussians(-FAR, 1.0, n[0], abs(n[1]))),
+    "rightGaussianShape": (2, lambda n: TwoGaussians(n[0], abs(n[1]), FML_FAR, 1.0)),
+    "leftGaussianShape": (2, lambda n: TwoGaussians(-FML_FAR, 1.0, n[0], abs(n[1]))),
     "singletonShape": (1, lambda n: Singleton(n[0])),
     "rectangularShape": (2, lambda n: Trapezoid(n[0], n[0], n[1], n[1])),
     "sShape": (2, lambda n: SCurve(n[0], n[1])),

@@ -51,7 +51,7 @@ from fuzzytree.model.tree import FuzzyTree
 R = TypeVar("R")
 
 
-def read(content: bytes, name: str) -> Document:
+def read_yaml(content: bytes, name: str) -> Document:
     """Return the rule base, tree or system of a YAML file.
 
     Raises:
@@ -61,7 +61,7 @@ def read(content: bytes, name: str) -> Document:
         >>> from fuzzytree.exporters.yaml import write
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
-        >>> read(write(tree).content, "tree.yaml") == tree
+        >>> read_yaml(write(tree).content, "tree.yaml") == tree
         True
     """
     root, found = compose(content, name)
@@ -78,16 +78,16 @@ def read(content: bytes, name: str) -> Document:
     return model
 
 
-def reading(content: bytes, name: str) -> Reading:
+def yaml_reading(content: bytes, name: str) -> Reading:
     """Return what `read` makes of a file; nothing of it is lost.
 
     Raises:
         ReadError: As `read`.
     """
-    return Reading(read(content, name))
+    return Reading(read_yaml(content, name))
 
 
-def places(content: bytes, name: str) -> Locate:
+def yaml_places(content: bytes, name: str) -> Locate:
     """Return where the parts of the model of a YAML file stand, or what holds them.
 
     Raises:

@@ -32,7 +32,7 @@ class ProgramNumbers(msgspec.Struct, frozen=True):
         return tuple(value for result, value in pairs if result.kind == kind)
 
 
-def evaluate(program: Program, row: Mapping[str, float]) -> ProgramNumbers:
+def evaluate_program(program: Program, row: Mapping[str, float]) -> ProgramNumbers:
     """Run a program on one row.
 
     Raises:
@@ -48,7 +48,7 @@ def evaluate(program: Program, row: Mapping[str, float]) -> ProgramNumbers:
         ...     "grip", ("soft",), (Variable("force", (low,)),),
         ...     (Rule((Clause("force", ("low",)),), "soft"),),
         ... )
-        >>> evaluate(from_rules(rules), {"force": 2.0}).of("strength")
+        >>> evaluate_program(from_rules(rules), {"force": 2.0}).of("strength")
         (0.5,)
     """
     step_values: list[StepValue] = []

@@ -75,7 +75,7 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
         KeyError: If a formula needs an output that has no number yet.
 
     Example:
-        >>> from fuzzytree.semantics.programs.evaluate import evaluate
+        >>> from fuzzytree.semantics.programs.evaluate import evaluate_program
         >>> from fuzzytree.model.system import Conclusion, Defuzzifier, Points
         >>> dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
         >>> long = SystemTerm("long", Singleton(60.0))
@@ -86,7 +86,7 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
         ...     (RuleBlock((SystemRule(Is("dirt", "dirty"),
         ...                            (Conclusion("time", "long"),)),)),),
         ... )
-        >>> evaluate(from_system(system), {"dirt": 5.0}).of("output")
+        >>> evaluate_program(from_system(system), {"dirt": 5.0}).of("output")
         (30.0,)
     """
     make = Maker()

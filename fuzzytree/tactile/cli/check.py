@@ -56,7 +56,7 @@ def command(
     generated frames are aimed at bounds and cuts. Exit 1 if not.
     """
     from fuzzytree.files import read_bounded
-    from fuzzytree.report.text import agreement_lines, verdict_text
+    from fuzzytree.report.text import agreement_lines, agreement_verdict
     from fuzzytree.tactile.presses import read_frames
     from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
 
@@ -70,7 +70,7 @@ def command(
     )
     if as_json:
         answer_json({"check": found, "ok": found.ok})
-        say(verdict_text(found), quiet=quiet and found.ok)
+        say(agreement_verdict(found), quiet=quiet and found.ok)
     else:
         answer("\n".join(agreement_lines(found)))
     return 0 if found.ok else 1

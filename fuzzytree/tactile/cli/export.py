@@ -76,7 +76,7 @@ def command(
     All implementations from frame to class are compared first, bit by bit, and with
     exact arithmetic. If one disagrees, nothing is written: exit 1. `-` is stdout.
     """
-    from fuzzytree.report.text import verdict_text
+    from fuzzytree.report.text import agreement_verdict
     from fuzzytree.tactile.recognition.agreement import check_frames_agree
     from fuzzytree.tactile.recognition.recogniser import check_inputs
 
@@ -103,7 +103,7 @@ def command(
     else:
         answer("\n".join(lines))
     if not found.ok:
-        say(f"{verdict_text(found)}; nothing is written")
+        say(f"{agreement_verdict(found)}; nothing is written")
         return 1
     if output == "-":
         answer_bytes(written.content)

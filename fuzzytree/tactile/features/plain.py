@@ -7,7 +7,7 @@ from enum import IntEnum
 
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import RuleBase, Value
-from fuzzytree.semantics.programs.evaluate import evaluate as run
+from fuzzytree.semantics.programs.evaluate import evaluate_program as run
 from fuzzytree.semantics.reference import Status, descend, evaluate
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.sensor import Cells, pressed

@@ -27,7 +27,7 @@ from fuzzytree.auditing.findings.representations import (
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.auditing.findings.support import sample_points
 from fuzzytree.checking.comparing import Answers
-from fuzzytree.exporters.onnx import Output, write
+from fuzzytree.exporters.onnx import Output, write_onnx
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import Points, RuleBase, Term
@@ -46,7 +46,7 @@ POINTS = np.array([[0.1, 0.9], [0.4, 0.2], [0.5, 0.5]])
 
 
 def shipped(model: Model) -> OnnxModel:
-    return open_onnx(write(model).content, "m.onnx")
+    return open_onnx(write_onnx(model).content, "m.onnx")
 
 
 def findings(subject: Subject, *others: Model | OnnxModel) -> list[Answer]:
@@ -203,7 +203,7 @@ def answered(
 
 
 def graph(rules: RuleBase) -> OnnxModel:
-    return open_onnx(write(rules, outputs=ALL).content, "m.onnx")
+    return open_onnx(write_onnx(rules, outputs=ALL).content, "m.onnx")
 
 
 def with_curves(low: Points, high: Points) -> RuleBase:

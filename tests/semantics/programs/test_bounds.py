@@ -188,7 +188,7 @@ def test_a_small_change_of_a_consequent_is_seen_in_an_ordinary_row() -> None:
     moved = tank("weighted average", {**NUMBERS, "open": Singleton(5.0 * (1.0 + 1e-9))})
     row = {"level": 3.0}
     one, two = (
-        evaluate.evaluate(from_system(s), row).values[0] for s in (right, moved)
+        evaluate.evaluate_program(from_system(s), row).values[0] for s in (right, moved)
     )
     bound = error_bounds(from_system(right), np.array([[3.0]]))[0, 0]
     assert abs(one - two) > 1000 * bound > 0.0

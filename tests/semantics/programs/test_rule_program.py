@@ -16,7 +16,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.rule_program import from_rules
 from fuzzytree.semantics.reference import evaluate as refer
 from fuzzytree.testing import probes, random_tree, with_points
@@ -34,7 +34,7 @@ def bases(seed: int) -> list[RuleBase]:
 def assert_equal(rules: RuleBase, rows: list[dict[str, float]]) -> None:
     program = from_rules(rules)
     for row in rows:
-        found, right = evaluate(program, row), refer(rules, row)
+        found, right = evaluate_program(program, row), refer(rules, row)
         pairs = zip(found.of("strength"), right.strengths, strict=True)
         for one, two in pairs:
             assert one == two or (math.isnan(one) and math.isnan(two)), row
@@ -53,7 +53,7 @@ def test_strengths_rule_status_and_class_are_those_of_the_reference(seed: int) -
 
 def test_a_rule_without_a_clause_always_holds() -> None:
     rules = RuleBase("one", ("a",), (), (Rule((), "a"), Rule((), "a")))
-    found = evaluate(from_rules(rules), {})
+    found = evaluate_program(from_rules(rules), {})
     assert found.of("strength") == (1.0, 1.0)
     assert (found.of("rule"), found.of("status")) == ((1.0,), (1.0,))
 

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.operations import (
     LOGICAL,
     NUMERIC,
@@ -69,7 +69,7 @@ def test_samples_spread_over_the_steps_that_use_them() -> None:
     results = (Result("output", "a", total_), Result("output", "b", running))
     program = make.program("p", ("x",), results)
     assert [step.samples for step in program.steps] == [3, 0, 3, 0, 3, 0]
-    assert evaluate(program, {"x": 2.0}).values == (6.0, 6.0)
+    assert evaluate_program(program, {"x": 2.0}).values == (6.0, 6.0)
     assert program.size == 12
 
 

@@ -25,7 +25,7 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import SPECIAL
-from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.operations import INEXACT
 from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.testing import random_rows, random_system
@@ -40,7 +40,7 @@ def equal(one: float, two: float) -> bool:
 def assert_equal(system: FuzzySystem, rows: list[dict[str, float]]) -> None:
     program = from_system(system, activations=True)
     for row in rows:
-        right, found = infer(system, row), evaluate(program, row)
+        right, found = infer(system, row), evaluate_program(program, row)
         expected = (*right.outputs, *right.activations, float(right.status))
         numbers = found.of("output") + found.of("activation") + found.of("status")
         assert len(numbers) == len(expected)
@@ -83,8 +83,8 @@ def test_a_conclusion_that_is_not_activated_has_no_part_even_if_it_is_nan() -> N
         SystemRule(Is("x", "down"), (Conclusion("y", "one"),)),
     )
     system = FuzzySystem("test", inputs, (output,), (RuleBlock(rules),))
-    assert evaluate(from_system(system), {"x": -1.0}).of("output") == (1.0,)
-    assert math.isnan(evaluate(from_system(system), {"x": 0.5}).of("output")[0])
+    assert evaluate_program(from_system(system), {"x": -1.0}).of("output") == (1.0,)
+    assert math.isnan(evaluate_program(from_system(system), {"x": 0.5}).of("output")[0])
 
 
 def test_a_curve_that_is_the_same_everywhere_is_sampled_all_the_same() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.runtimes.programs import plan_program, run_program
-from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.operations import INEXACT
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
 from fuzzytree.tactile.features.moments import angle, signed_log
@@ -65,7 +65,7 @@ def test_an_angle_is_that_of_the_library_within_its_bound() -> None:
     ],
 )
 def test_an_angle_is_exact_on_the_axes(x: float, y: float, degrees: float) -> None:
-    found = evaluate(angle_program(), {"x": x, "y": y}).values[0]
+    found = evaluate_program(angle_program(), {"x": x, "y": y}).values[0]
     assert found == pytest.approx(degrees, abs=0 if degrees % 90 == 0 else 1e-14)
 
 
@@ -73,4 +73,4 @@ def test_the_logarithm_of_less_than_nothing_is_no_negative_zero() -> None:
     make = Maker()
     results = (Result("output", "v", signed_log(make, make.input("x"))),)
     program = make.program("log", ("x",), results)
-    assert [str(v) for v in evaluate(program, {"x": -1e-18}).values] == ["0.0"]
+    assert [str(v) for v in evaluate_program(program, {"x": -1e-18}).values] == ["0.0"]

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.steps import Maker, Result
 from fuzzytree.tactile.features.moments import Noise, Noisy
 
@@ -40,7 +40,7 @@ def test_the_true_result_lies_within_the_bound_wherever_its_arguments_do(
         a, b = draw.normal(size=2) * 2.0 ** draw.integers(-40, 40, 2)
         errors = np.abs([a, b]) * 2.0 ** draw.integers(-60, 1, 2)
         row = dict(zip(inputs, map(float, (a, errors[0], b, errors[1])), strict=True))
-        value, bound = evaluate(program, row).values
+        value, bound = evaluate_program(program, row).values
         allowed = Fraction(bound) * (1 + Fraction(2) ** -40)
         for turn in (1, -1):
             for other in (1, -1):
@@ -62,4 +62,4 @@ def test_what_is_within_its_bound_is_exactly_0_and_the_rest_is_untouched() -> No
         (1e-9, 9e-10, 1e-9),
         (-5.0, 0.0, -5.0),
     ):
-        assert evaluate(program, {"a": value, "e": error}).values == (wanted,)
+        assert evaluate_program(program, {"a": value, "e": error}).values == (wanted,)

@@ -12,7 +12,7 @@ from onnx import numpy_helper
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
 from fuzzytree.errors import ReadError
-from fuzzytree.exporters.onnx import write
+from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.tactile.exporters.onnx_frames import write_frames
@@ -75,7 +75,7 @@ def test_a_file_of_another_model_is_reported() -> None:
 
 def test_a_file_that_takes_rows_is_refused() -> None:
     with pytest.raises(ReadError) as caught:
-        frames_file(write(tree()).content, "rows.onnx")
+        frames_file(write_onnx(tree()).content, "rows.onnx")
     assert str(caught.value) == (
         "rows.onnx: the file takes rows, and not frames of a sensor; "
         "`fuzzytree check` checks it"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.tactile.features.names import FEATURES, blocks
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Sensor
@@ -31,7 +31,7 @@ def test_numpy_has_every_bit_of_the_program_in_plain_python() -> None:
             else:
                 total = max(flat) if one.of == "peak" else sum(v > 0 for v in flat)
             row[one.name] = float(total)
-        *wanted, is_pressed = evaluate(plan.made.program, row).values
+        *wanted, is_pressed = evaluate_program(plan.made.program, row).values
         assert np.array(wanted).tobytes() == found.values[:, number].copy().tobytes()
         assert bool(is_pressed) == found.is_pressed[number]
 
