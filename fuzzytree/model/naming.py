@@ -115,7 +115,7 @@ class NameMap(msgspec.Struct, frozen=True):
             ignores_case: Whether names that differ only in case count as alike.
 
         Example:
-            >>> names = Names.of(["fore arm", "fore-arm", "if"], reserved=["IF"])
+            >>> names = NameMap.of(["fore arm", "fore-arm", "if"], reserved=["IF"])
             >>> list(names.accepted.values())
             ['fore_arm', 'fore_arm_2', 'if_']
             >>> names.restored("fore_arm_2")
