@@ -12,10 +12,10 @@ from functools import partial
 import msgspec
 import numpy as np
 
-from fuzzytree.benchmarking.clock import Call, Tell, time_calls
+from fuzzytree.benchmarking.clock import Call, time_calls
 from fuzzytree.benchmarking.machine import after, machine
 from fuzzytree.benchmarking.records import Machine, Timing
-from fuzzytree.model.contracts import Model
+from fuzzytree.model.contracts import Model, Progress
 from fuzzytree.model.rulebase import RuleBase, fingerprint
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.exact import exact_features
@@ -101,7 +101,7 @@ def time_frames(
     rounds: int = 15,
     seconds: float = 120.0,
     seed: int = 0,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
 ) -> FramesStudy:
     """Measure every way from frame to class, in interleaved rounds, on one thread.
 

@@ -12,9 +12,9 @@ import numpy.typing as npt
 from trees import COLUMNS, grow, multiway_tree, tree_of
 
 from fuzzytree.benchmarking.clock import (
-    Clock,
+    CallTimings,
     Interval,
-    Timed,
+    TimeSource,
     time_calls,
     times_faster,
 )
@@ -43,7 +43,7 @@ SAMPLE_S = 0.02  # firing takes as long for every row, so few of them do
 PATIENCE_S = 20.0  # what preparing one rule base may take
 SHORT_S = 2.0  # preparing that took less says nothing of larger ones
 
-OWN_TIME = Clock(time.thread_time_ns, None)
+OWN_TIME = TimeSource(time.thread_time_ns, None)
 """The thread's time, which does not run while a neighbour has the core.
 
 Everything that is timed runs in this thread alone.
@@ -276,7 +276,11 @@ def _rules_of(representation: ModelKind, rows: Floats) -> int:
 
 
 def _price(
-    representation: ModelKind, timed: Timed, counts: dict[str, int], *, is_batch: bool
+    representation: ModelKind,
+    timed: CallTimings,
+    counts: dict[str, int],
+    *,
+    is_batch: bool,
 ) -> Price:
     timing, rows = timed.timings[representation.name], counts[representation.name]
     runs_trees = "tree" in find_runtime(representation.runtime).runs

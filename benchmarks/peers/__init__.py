@@ -15,7 +15,13 @@ from functools import partial
 import msgspec
 
 from fuzzytree.benchmarking.candidates import Bounds, questions, title
-from fuzzytree.benchmarking.records import Bound, Candidate, Loaded, Omission, Question
+from fuzzytree.benchmarking.records import (
+    Bound,
+    Candidate,
+    LoadedCandidate,
+    Omission,
+    Question,
+)
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
@@ -42,7 +48,7 @@ class TreePeer(msgspec.Struct, frozen=True):
 
     name: str
     modules: tuple[str, ...]
-    load: Callable[[FuzzyTree, int], Loaded]
+    load: Callable[[FuzzyTree, int], LoadedCandidate]
     note: str
     program: str | None = None
     is_parallel: bool = False

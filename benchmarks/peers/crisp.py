@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fuzzytree.benchmarking.records import Found
+from fuzzytree.benchmarking.records import CandidateOutput
 from fuzzytree.errors import LossError
 from fuzzytree.runtimes.rows import Axes, axis_lines, axis_row, checked
 
@@ -154,7 +154,7 @@ def guarded(
     axes: Axes,
     dtype: type[np.floating[Any]],
     ask: Callable[[FloatArray], IntArray],
-) -> Callable[[FloatArray], Found]:
+) -> Callable[[FloatArray], CandidateOutput]:
     """Return what answers rows: those with a missing value without asking the peer.
 
     Args:
@@ -165,7 +165,7 @@ def guarded(
     """
     missing_label = _number(tree, tree.semantics.missing)
 
-    def answer(values: FloatArray) -> Found:
+    def answer(values: FloatArray) -> CandidateOutput:
         array = checked(values, tree.inputs)
         with np.errstate(all="ignore"):
             lines = lines_of(axes, array).astype(dtype)
@@ -173,7 +173,7 @@ def guarded(
         labels = np.full(array.shape[1], missing_label)
         if known.any():
             labels[known] = ask(np.ascontiguousarray(array[:, known]))
-        return Found(labels)
+        return CandidateOutput(labels)
 
     return answer
 

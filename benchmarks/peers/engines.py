@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fuzzytree.benchmarking.candidates import found_of
-from fuzzytree.benchmarking.records import Found, Loaded
+from fuzzytree.benchmarking.records import CandidateOutput, LoadedCandidate
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Outcome
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape
@@ -111,7 +111,7 @@ def row_seconds(rules: RuleBase, terms: Terms) -> float:
     return sum(looks) * _LOOK_S + (1 + len(looks)) * _NAME_S
 
 
-def load_fuzzylite(rules: RuleBase, threads: int) -> Loaded:
+def load_fuzzylite(rules: RuleBase, threads: int) -> LoadedCandidate:
     """Prepare a pyfuzzylite engine; its antecedents take whole columns.
 
     Raises:
@@ -170,7 +170,7 @@ def _fll(rule: Rule, words: dict[tuple[str, str], tuple[str, str]]) -> str:
     return " and ".join(map(clause_text, rule.when))
 
 
-def load_simpful(rules: RuleBase, threads: int) -> Loaded:
+def load_simpful(rules: RuleBase, threads: int) -> LoadedCandidate:
     """Prepare a simpful system; it answers one row after another.
 
     Raises:
@@ -247,7 +247,7 @@ def _refuse(rules: RuleBase, peer: str) -> None:
             )
 
 
-def _loaded(rules: RuleBase, asked: Sequence[str], fire: Fire) -> Loaded:
+def _loaded(rules: RuleBase, asked: Sequence[str], fire: Fire) -> LoadedCandidate:
     """Return an engine that answers blocks of rows, so that strengths stay few."""
     axes = plan_axes(rules.variables)
     block = max(1, _BLOCK_NUMBERS // len(rules.rules))
@@ -256,7 +256,7 @@ def _loaded(rules: RuleBase, asked: Sequence[str], fire: Fire) -> Loaded:
         lines = lines_of(axes, values)
         return fire({name: lines[axes.line[name]] for name in asked})
 
-    def answer(values: FloatArray) -> Found:
+    def answer(values: FloatArray) -> CandidateOutput:
         array = checked(values, rules.inputs)
         is_known = np.isfinite(lines_of(axes, array))
         missing = ~np.logical_and.reduce(is_known, axis=0)
@@ -279,4 +279,4 @@ def _loaded(rules: RuleBase, asked: Sequence[str], fire: Fire) -> Loaded:
 
         return each
 
-    return Loaded(answer, call)
+    return LoadedCandidate(answer, call)

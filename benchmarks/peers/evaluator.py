@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.benchmarking.candidates import found_of
-from fuzzytree.benchmarking.records import Found, Loaded
+from fuzzytree.benchmarking.records import CandidateOutput, LoadedCandidate
 from fuzzytree.model.contracts import Model, Outcome
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.onnxruntime import prepare
@@ -21,7 +21,7 @@ _BLOCK = 1 << 16
 _BLOCK_NUMBERS = 1 << 20  # strengths that are made at once
 
 
-def load_evaluator(model: Model, threads: int) -> Loaded:
+def load_evaluator(model: Model, threads: int) -> LoadedCandidate:
     """Prepare a graph in double for the evaluator: plain for trees, readable for rules.
 
     It executes the operators in numpy, one after another. Of a `TreeEnsemble` it walks
@@ -50,7 +50,7 @@ def load_evaluator(model: Model, threads: int) -> Loaded:
                 found.append(evaluator.run(names, part))
         return found
 
-    def answer(values: FloatArray) -> Found:
+    def answer(values: FloatArray) -> CandidateOutput:
         parts = zip(*ask(prepared.table(values)), strict=True)
         rule, status, *others = [np.concatenate(part) for part in parts]
         strengths = others[0].T.astype(np.float64) if others else None
@@ -60,4 +60,4 @@ def load_evaluator(model: Model, threads: int) -> Loaded:
     def call(values: FloatArray) -> Callable[[], object]:
         return partial(ask, prepared.table(values))
 
-    return Loaded(answer, call, len(prepared.content))
+    return LoadedCandidate(answer, call, len(prepared.content))

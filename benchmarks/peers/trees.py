@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.benchmarking.records import Loaded
+from fuzzytree.benchmarking.records import LoadedCandidate
 from fuzzytree.errors import LossError
 from fuzzytree.runtimes.rows import Axes, axis_row, plan_axes
 from peers.crisp import (
@@ -35,7 +35,7 @@ _COMPILE_S = 40.0
 _ENSEMBLE_OPSET = 17
 
 
-def load_scikit_learn(tree: FuzzyTree, threads: int) -> Loaded:
+def load_scikit_learn(tree: FuzzyTree, threads: int) -> LoadedCandidate:
     """Prepare scikit-learn's `DecisionTreeClassifier.predict` with a tree's cuts."""
     axes, asked = _carried(tree)
     predict: Ask = classifier(asked, axes, len(tree.classes)).predict
@@ -43,7 +43,7 @@ def load_scikit_learn(tree: FuzzyTree, threads: int) -> Loaded:
     return _loaded(tree, axes, np.float32, predict)
 
 
-def load_scikit_learn_core(tree: FuzzyTree, threads: int) -> Loaded:
+def load_scikit_learn_core(tree: FuzzyTree, threads: int) -> LoadedCandidate:
     """Prepare `Tree.apply`, which `predict` calls behind its checks."""
     axes, asked = _carried(tree)
     apply: Ask = classifier(asked, axes, len(tree.classes)).tree_.apply
@@ -54,7 +54,7 @@ def load_scikit_learn_core(tree: FuzzyTree, threads: int) -> Loaded:
     return _loaded(tree, axes, np.float32, ask)
 
 
-def load_skl2onnx(tree: FuzzyTree, threads: int) -> Loaded:
+def load_skl2onnx(tree: FuzzyTree, threads: int) -> LoadedCandidate:
     """Prepare what skl2onnx makes of the scikit-learn tree, in onnxruntime.
 
     It writes the classifier without zipmap, and its output `label` is asked for.
@@ -82,7 +82,7 @@ def load_skl2onnx(tree: FuzzyTree, threads: int) -> Loaded:
     return _loaded(tree, axes, np.float32, ask, len(content))
 
 
-def load_treelite(tree: FuzzyTree, threads: int) -> Loaded:
+def load_treelite(tree: FuzzyTree, threads: int) -> LoadedCandidate:
     """Prepare a treelite model in double, run by its interpreter GTIL.
 
     It is put together question by question, because treelite takes no single tree of
@@ -148,7 +148,7 @@ def load_treelite(tree: FuzzyTree, threads: int) -> Loaded:
     return _loaded(tree, axes, np.float64, ask, len(model.serialize_bytes()))
 
 
-def load_m2cgen_python(tree: FuzzyTree, threads: int) -> Loaded:
+def load_m2cgen_python(tree: FuzzyTree, threads: int) -> LoadedCandidate:
     """Prepare the Python function that m2cgen writes, called for one row at a time.
 
     Raises:
@@ -185,7 +185,7 @@ def load_m2cgen_python(tree: FuzzyTree, threads: int) -> Loaded:
         return np.array(each(lines_of(axes, values).T.tolist()))
 
     answer = guarded(tree, axes, np.float64, ask)
-    return Loaded(answer, call, len(text.encode()))
+    return LoadedCandidate(answer, call, len(text.encode()))
 
 
 _LOOP = """
@@ -202,7 +202,7 @@ void answer(const double *table, long rows, long columns, long classes,
 """
 
 
-def load_m2cgen_c(tree: FuzzyTree, threads: int) -> Loaded:
+def load_m2cgen_c(tree: FuzzyTree, threads: int) -> LoadedCandidate:
     """Prepare the C function that m2cgen writes, compiled by gcc, with a loop of ours.
 
     Raises:
@@ -340,7 +340,7 @@ def _loaded(
     dtype: type[np.floating[Any]],
     ask: Ask,
     size: int | None = None,
-) -> Loaded:
+) -> LoadedCandidate:
     """Return a peer that answers a whole table, in calls and guarded."""
 
     def call(values: FloatArray) -> Callable[[], object]:
@@ -350,4 +350,4 @@ def _loaded(
     def known(values: FloatArray) -> IntArray:
         return ask(tables(axes, dtype, values)())
 
-    return Loaded(guarded(tree, axes, dtype, known), call, size)
+    return LoadedCandidate(guarded(tree, axes, dtype, known), call, size)

@@ -20,16 +20,16 @@ from fuzzytree.benchmarking.judging import MOST_ROWS
 from fuzzytree.benchmarking.records import (
     Bound,
     Candidate,
-    Found,
+    CandidateOutput,
     Kind,
-    Loaded,
+    LoadedCandidate,
     Omission,
     Question,
 )
 from fuzzytree.errors import install_hint
 from fuzzytree.model.contracts import Dtype, Model, Outcome, Prepared, Runtime
 from fuzzytree.model.rulebase import LR, Band, RuleBase
-from fuzzytree.numerics.approximation import Approximated, by_degree, by_points
+from fuzzytree.numerics.approximation import ApproximateRules, by_degree, by_points
 from fuzzytree.numerics.bounds import certify
 from fuzzytree.runtimes import all_runtimes, is_installed, needed_by
 from fuzzytree.runtimes.predictions import predictions_of
@@ -49,9 +49,9 @@ _BLOCK = 1 << 16
 
 @functools.lru_cache(maxsize=1)
 def questions(model: Model) -> Mapping[Question, Model]:
-    """Return what can be asked of a model, and the model that answers it.
+    """Return the questions that a model answers, each with its form.
 
-    The raw rules of a large tree take seconds to make: a study asks for them often.
+    The raw rules of a large tree take seconds to make: so they are kept.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -101,13 +101,13 @@ def own(
     """
     found: list[Candidate] = []
     omitted: list[Omission] = []
-    asked = questions(model)
+    forms_by_question = questions(model)
     for runtime in all_runtimes():
         if not is_installed(runtime):
             why = f"not installed ({needed_by(runtime)})"
             omitted.append(Omission(runtime.name, why))
             continue
-        for question, form in asked.items():
+        for question, form in forms_by_question.items():
             kind = "rules" if isinstance(form, RuleBase) else "tree"
             if kind in runtime.runs:
                 one = _candidate(runtime, question, form, bounds, layouts)
@@ -150,7 +150,7 @@ def _bound(runtime: Runtime, model: Model, bounds: Bounds) -> Bound | None:
 
 def load_runtime(
     runtime: Runtime, model: Model, layouts: Layouts, threads: int
-) -> Loaded:
+) -> LoadedCandidate:
     """Prepare a model in a runtime of the table.
 
     Of a graph only the session's call is timed. Others take the rows as they are;
@@ -172,7 +172,7 @@ def load_runtime(
         return partial(_each, run, parts)
 
     size = None if runtime.size is None else runtime.size(model)
-    return Loaded(partial(_found, run, model), call, size)
+    return LoadedCandidate(partial(_found, run, model), call, size)
 
 
 def _each(run: Callable[[FloatArray], object], parts: Sequence[FloatArray]) -> None:
@@ -180,23 +180,23 @@ def _each(run: Callable[[FloatArray], object], parts: Sequence[FloatArray]) -> N
         run(part)
 
 
-def session_of(prepared: Prepared, model: Model, layouts: Layouts) -> Loaded:
+def session_of(prepared: Prepared, model: Model, layouts: Layouts) -> LoadedCandidate:
     """Return a graph that was prepared from a model, as a candidate is loaded."""
 
     def call(values: FloatArray) -> Callable[[], object]:
         return partial(prepared.call, layouts.table(values, prepared))
 
     answer = partial(_found, prepared.run, model)
-    return Loaded(answer, call, len(prepared.content))
+    return LoadedCandidate(answer, call, len(prepared.content))
 
 
 def _found(
     run: Callable[[FloatArray], Outcome], model: Model, values: FloatArray
-) -> Found:
+) -> CandidateOutput:
     return found_of(run(np.ascontiguousarray(values)), model)
 
 
-def found_of(outcome: Outcome, model: Model) -> Found:
+def found_of(outcome: Outcome, model: Model) -> CandidateOutput:
     """Return a runtime's outcome as class numbers and strengths."""
     answers = predictions_of(
         outcome,
@@ -205,7 +205,7 @@ def found_of(outcome: Outcome, model: Model) -> Found:
         semantics=model.semantics,
         with_strengths=True,
     )
-    return Found(answers.codes, outcome.strengths)
+    return CandidateOutput(answers.codes, outcome.strengths)
 
 
 def _ends(model: Model) -> Iterator[str]:
@@ -244,18 +244,18 @@ def floors(question: Question) -> tuple[list[Candidate], list[Omission]]:
     return [*found, session], []
 
 
-def _nothing(values: FloatArray) -> Found:
-    return Found(np.full(values.shape[1], -1))
+def _nothing(values: FloatArray) -> CandidateOutput:
+    return CandidateOutput(np.full(values.shape[1], -1))
 
 
-def _load_reading(threads: int) -> Loaded:
+def _load_reading(threads: int) -> LoadedCandidate:
     def call(values: FloatArray) -> Callable[[], object]:
         return partial(values.sum, axis=1)
 
-    return Loaded(_nothing, call)
+    return LoadedCandidate(_nothing, call)
 
 
-def _load_session(threads: int) -> Loaded:
+def _load_session(threads: int) -> LoadedCandidate:
     from onnx import TensorProto, helper
 
     from fuzzytree.exporters.onnx_session import open_bare
@@ -275,7 +275,7 @@ def _load_session(threads: int) -> Loaded:
         table = np.ascontiguousarray(values.T)
         return partial(bare, ["same"], {"inputs": table})
 
-    return Loaded(_nothing, call, len(content))
+    return LoadedCandidate(_nothing, call, len(content))
 
 
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -283,18 +283,18 @@ TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 _MOST_TERMS = 400  # their points take seconds
 
-Make = Callable[[RuleBase], Approximated]
+Make = Callable[[RuleBase], ApproximateRules]
 
 
 class Approximations:
     """Approximated rule bases: each is made once, when it is first loaded."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[Question, str], Approximated] = {}
+        self._known: dict[tuple[Question, str], ApproximateRules] = {}
 
     def get(
         self, question: Question, what: str, make: Make, rules: RuleBase
-    ) -> Approximated:
+    ) -> ApproximateRules:
         """Return one of them.
 
         Raises:
@@ -385,11 +385,11 @@ def _largest_degree(rules: RuleBase) -> int:
 
 def _load(
     runtime: Runtime,
-    approximate: Callable[[], Approximated],
+    approximate: Callable[[], ApproximateRules],
     bounds: Bounds,
     layouts: Layouts,
     threads: int,
-) -> Loaded:
+) -> LoadedCandidate:
     found = approximate()
     loaded = load_runtime(runtime, found.model, layouts, threads)
 
@@ -510,7 +510,7 @@ def chosen(
     left = len(candidates) - len(kept)
     if not left:
         return kept, []
-    return kept, [Omission(_counted(left), "not asked for")]
+    return kept, [Omission(_counted(left), "not selected")]
 
 
 def _unknown(word: str, candidates: Sequence[Candidate]) -> str:

@@ -3,7 +3,7 @@
 All calls are timed in every round, each round in another order, so that a slow minute
 of the machine slows all of them alike. A sample is as many calls as the clock's grain
 needs. The garbage collector is off meanwhile. Wall time counts, for it is what users
-wait; the processor's time beside it tells how much a neighbour took.
+wait; the processor's time beside it shows how much other processes took.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from itertools import repeat
 import msgspec
 
 from fuzzytree.benchmarking.records import Timing
+from fuzzytree.model.contracts import Progress
 
 CONFIDENCE = 0.95
 """Of all intervals."""
@@ -28,15 +29,13 @@ SURE = 6
 """Samples from which an interval reaches that: 1 - 2 / 2**6 is 96.9 %."""
 
 Call = Callable[[], object]
-Tell = Callable[[str, float], None]
-"""Told what is done and which share of it, in [0, 1]."""
 
 _SAMPLE_NS = 2_000_000  # a sample: much longer than the clock's grain and a switch
 _MOST_CALLS = 1 << 20
-_FINE_S = 1e-4  # a processor clock coarser than this tells nothing of a sample
+_FINE_S = 1e-4  # a processor clock coarser than this measures no sample
 
 
-class Clock(msgspec.Struct, frozen=True):
+class TimeSource(msgspec.Struct, frozen=True):
     """Where the time comes from.
 
     Attributes:
@@ -65,7 +64,7 @@ class Interval(msgspec.Struct, frozen=True):
     confidence: float
 
 
-class Timed(msgspec.Struct, frozen=True):
+class CallTimings(msgspec.Struct, frozen=True):
     """What was measured, whole or up to an interruption.
 
     Attributes:
@@ -89,7 +88,7 @@ def measure(
     rounds: int = 15,
     seconds: float = math.inf,
     seed: int = 0,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
 ) -> dict[str, Timing]:
     """Return how long each call takes; the arguments are those of `time_calls`.
 
@@ -117,10 +116,10 @@ def measure(
     return found.timings
 
 
-def system_clock() -> Clock:
+def system_clock() -> TimeSource:
     """Return the clocks of this system."""
     is_fine = time.get_clock_info("process_time").resolution <= _FINE_S
-    return Clock(time.perf_counter_ns, time.process_time_ns if is_fine else None)
+    return TimeSource(time.perf_counter_ns, time.process_time_ns if is_fine else None)
 
 
 def time_calls(
@@ -131,9 +130,9 @@ def time_calls(
     rounds: int = 15,
     seconds: float = math.inf,
     seed: int = 0,
-    tell: Tell | None = None,
-    clock: Clock | None = None,
-) -> Timed:
+    tell: Progress | None = None,
+    clock: TimeSource | None = None,
+) -> CallTimings:
     """Time calls in interleaved rounds.
 
     Args:
@@ -146,7 +145,7 @@ def time_calls(
         seconds: The time for all of it, shared as `shared_rounds` says; when it is
             over, no further sample begins.
         seed: Of the order within the rounds.
-        tell: Told how far it is.
+        tell: Called with the current step and the share that is done.
         clock: Where the time comes from; the system unless given.
 
     Returns:
@@ -171,7 +170,7 @@ def time_calls(
         if samples.walls
     }
     is_complete = not interrupted and not run.is_late
-    return Timed(timings, run.failures, is_complete, interrupted)
+    return CallTimings(timings, run.failures, is_complete, interrupted)
 
 
 def _check(rows: int, threads: int, rounds: int, seconds: float) -> None:
@@ -208,7 +207,7 @@ class _Samples:
 class _Run:
     """A measurement while it runs: it must keep what it has when it is interrupted."""
 
-    def __init__(self, clock: Clock, seconds: float, tell: Tell) -> None:
+    def __init__(self, clock: TimeSource, seconds: float, tell: Progress) -> None:
         self.clock = clock
         self.begin = clock.wall()
         self.limit_ns = seconds * 1e9
@@ -306,10 +305,10 @@ def shared_rounds(
 def orders(
     shares: Mapping[str, int], rounds: int, seed: int
 ) -> Iterator[tuple[str, ...]]:
-    """Yield who is timed in each round, in which order.
+    """Yield the names that are timed in each round, in their order.
 
-    The order is drawn anew for each round, so that nobody always follows the same
-    neighbour. Whoever has fewer rounds than there are has them evenly spread.
+    The order is drawn anew for each round, so that no candidate always follows
+    the same one. A candidate with fewer rounds than there are has them evenly spread.
 
     Example:
         >>> [sorted(names) for names in orders({"a": 3, "b": 1}, 3, seed=0)]
@@ -329,7 +328,7 @@ def orders(
 def _timing(samples: _Samples, rows: int, threads: int) -> Timing:
     found = interval(samples.walls)
     busy, wall = sum(samples.cpus), sum(samples.walls)
-    is_told = all(cpu >= 0.0 for cpu in samples.cpus) and wall > 0.0
+    is_known = all(cpu >= 0.0 for cpu in samples.cpus) and wall > 0.0
     return Timing(
         rows,
         threads,
@@ -340,7 +339,7 @@ def _timing(samples: _Samples, rows: int, threads: int) -> Timing:
         found.confidence,
         samples.calls,
         tuple(samples.rounds),
-        max(0.0, 1.0 - busy / wall) if is_told else None,
+        max(0.0, 1.0 - busy / wall) if is_known else None,
     )
 
 
@@ -393,7 +392,7 @@ def times_faster(slow: Timing, fast: Timing) -> Interval | None:
     """Return how many times faster one is than another, round by round.
 
     Samples of one round were taken close together, so what slowed one of them slowed
-    the other as well; the median of their quotients is what is told.
+    the other as well; the result is the median of their quotients.
 
     Returns:
         The median quotient and its interval, or None where they share no round.

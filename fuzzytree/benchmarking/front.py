@@ -14,7 +14,7 @@ from fuzzytree.runtimes import baseline
 _LEVELS = (0.0, *(10.0**power for power in range(-16, 1)))
 
 
-class Entry(msgspec.Struct, frozen=True):
+class FrontEntry(msgspec.Struct, frozen=True):
     """A point at one number of rows and threads, with the one error that counts."""
 
     point: Point
@@ -37,8 +37,8 @@ def error_of(point: Point) -> float | None:
 
     For a tree it is the share of rows whose class differs from the exact one. For
     rules it is the certified bound of a strength where there is one, and the largest
-    error that was observed where there is none. None: a floor, or a peer that tells
-    classes alone, whose strengths nobody knows.
+    error that was observed where there is none. None: a floor, or a peer that
+    returns classes alone.
 
     Example:
         >>> from fuzzytree.benchmarking.records import Error
@@ -56,10 +56,10 @@ def error_of(point: Point) -> float | None:
 
 def entries(
     points: Sequence[Point], question: Question, rows: int, threads: int
-) -> list[Entry]:
+) -> list[FrontEntry]:
     """Return the points that can be compared, the fastest first."""
     found = [
-        Entry(point, timing, error)
+        FrontEntry(point, timing, error)
         for point in points
         if point.question == question and point.kind != "floor"
         if (error := error_of(point)) is not None
@@ -69,13 +69,13 @@ def entries(
     return sorted(found, key=lambda one: (one.timing.median_ns, one.error, one.name))
 
 
-def front(found: Sequence[Entry]) -> list[Entry]:
+def front(found: Sequence[FrontEntry]) -> list[FrontEntry]:
     """Return whom nobody beats: each is slower than the one before, and more exact.
 
     Args:
         found: As from `entries`, the fastest first.
     """
-    kept: list[Entry] = []
+    kept: list[FrontEntry] = []
     for one in found:
         if not kept or one.error < kept[-1].error:
             kept.append(one)
@@ -95,11 +95,13 @@ def fronts(points: Sequence[Point]) -> tuple[Front, ...]:
 
 def settings(points: Sequence[Point]) -> list[tuple[Question, int, int]]:
     """Return what was measured: questions in their order, then rows, then threads."""
-    asked: dict[Question, None] = {point.question: None for point in points}
+    in_order: dict[Question, None] = {point.question: None for point in points}
     sizes = sorted(
         {(one.rows, one.threads) for point in points for one in point.timings}
     )
-    return [(question, rows, threads) for question in asked for rows, threads in sizes]
+    return [
+        (question, rows, threads) for question in in_order for rows, threads in sizes
+    ]
 
 
 def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...]:
@@ -132,7 +134,7 @@ def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...
 
 
 def _sentences(
-    known: Sequence[Entry], question: Question, rows: int, most: float | None
+    known: Sequence[FrontEntry], question: Question, rows: int, most: float | None
 ) -> Iterator[str]:
     if not known:
         return
@@ -148,7 +150,7 @@ def _sentences(
                 f"with {smallest:.2g}"
             )
         return
-    before: Entry | None = None
+    before: FrontEntry | None = None
     for level in (level for level in _LEVELS if level >= smallest):
         best = _choice(known, question, level)
         if before is None or _is_surely_faster(best, before):
@@ -158,14 +160,16 @@ def _sentences(
             return
 
 
-def _is_surely_faster(one: Entry, other: Entry) -> bool:
+def _is_surely_faster(one: FrontEntry, other: FrontEntry) -> bool:
     ratio = times_faster(other.timing, one.timing)
     if one.name == other.name or ratio is None:
         return False
     return ratio.low > 1.0 and ratio.confidence >= CONFIDENCE
 
 
-def _choice(known: Sequence[Entry], question: Question, level: float) -> Entry:
+def _choice(
+    known: Sequence[FrontEntry], question: Question, level: float
+) -> FrontEntry:
     """Return the fastest within a level, or the default if nothing is surely faster."""
     within = [one for one in known if one.error <= level]
     default = _default(within, question)
@@ -174,13 +178,13 @@ def _choice(known: Sequence[Entry], question: Question, level: float) -> Entry:
     return within[0]
 
 
-def _default(known: Sequence[Entry], question: Question) -> Entry | None:
+def _default(known: Sequence[FrontEntry], question: Question) -> FrontEntry | None:
     name = title(baseline().name, question)
     return next((one for one in known if one.name == name), None)
 
 
 def _sentence(
-    known: Sequence[Entry], question: Question, rows: int, level: float
+    known: Sequence[FrontEntry], question: Question, rows: int, level: float
 ) -> str:
     """Say what to use within a level, and against what.
 
@@ -207,12 +211,12 @@ def _sentence(
     return f"{head}: nothing is surely faster ({took}, {sure})"
 
 
-def _what(best: Entry) -> str:
+def _what(best: FrontEntry) -> str:
     """Name a candidate, and what it leaves out of the answer to its question."""
     error = best.point.error
     is_mute = error is not None and error.largest is None
     if best.point.question != "tree" and is_mute:
-        return f"{best.short} (which tells no strengths)"
+        return f"{best.short} (which returns no strengths)"
     return best.short
 
 
@@ -220,7 +224,7 @@ def _where(question: Question, rows: int) -> str:
     return f"{question}, {rows:,} row{'' if rows == 1 else 's'}"
 
 
-def _level(best: Entry, level: float) -> str:
+def _level(best: FrontEntry, level: float) -> str:
     """Say what is demanded, and for a tree on how many rows it was seen."""
     error = best.point.error
     if best.point.question != "tree" or error is None:

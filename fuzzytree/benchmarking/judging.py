@@ -9,13 +9,19 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.benchmarking.clock import Clock
-from fuzzytree.benchmarking.records import Candidate, Error, Found, Loaded, Question
+from fuzzytree.benchmarking.clock import TimeSource
+from fuzzytree.benchmarking.records import (
+    Candidate,
+    CandidateOutput,
+    Error,
+    LoadedCandidate,
+    Question,
+)
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.numerics.oracle import (
-    Decided,
-    Observed,
+    Decisions,
+    ErrorMeasure,
     decide,
     error_against_exact,
     strength_errors,
@@ -36,7 +42,7 @@ _BATCH = 1 << 15  # rows in which a call's own cost no longer counts
 _MOST_STRENGTHS = 200_000  # for each candidate, in intervals: half a second or so
 
 
-class Judged(msgspec.Struct, frozen=True):
+class CandidateJudgement(msgspec.Struct, frozen=True):
     """What is known of a candidate before it is timed.
 
     Attributes:
@@ -55,21 +61,23 @@ class _Sample(msgspec.Struct, frozen=True):
 
     model: Model
     values: FloatArray
-    exact: Decided
+    exact: Decisions
 
 
-class Judge:
-    """Holds answers against the exact ones; it makes the rows for that once."""
+class CandidateJudge:
+    """Compares predictions with the exact ones, on rows that are made once."""
 
     def __init__(
-        self, asked: Mapping[Question, Model], values: FloatArray, clock: Clock
+        self, forms: Mapping[Question, Model], values: FloatArray, clock: TimeSource
     ) -> None:
-        self.asked, self.clock = asked, clock
-        most = min(map(_most_rows, asked.values()))
+        self.forms, self.clock = forms, clock
+        most = min(map(_most_rows, forms.values()))
         self.values = np.ascontiguousarray(values[:, :most])
         self.samples: dict[Question, tuple[_Sample, _Sample]] = {}
 
-    def judged(self, candidate: Candidate, loaded: Loaded) -> Judged:
+    def judged(
+        self, candidate: Candidate, loaded: LoadedCandidate
+    ) -> CandidateJudgement:
         """Return how far a candidate is from exact, and about what a row costs it.
 
         A slow one answers fewer rows, in even steps through all of them.
@@ -84,20 +92,20 @@ class Judge:
         call()
         row_ns = float(max(self.clock.wall() - start, 1))
         if candidate.kind == "floor":
-            return Judged(None, None, self._row_ns(loaded, row_ns))
+            return CandidateJudgement(None, None, self._row_ns(loaded, row_ns))
         most = max(int(_PATIENCE_NS // row_ns), 1)
         rows, edges = self._samples(candidate.question)
         certify = loaded.bound or candidate.bound
         certified = certify() if certify else None
         bound, origin = certified or (None, "nothing is certified")
-        beyond = "the bound holds on the rows, and these may lie beyond them"
-        return Judged(
+        beyond = "the bound covers the rows, and these may lie beyond them"
+        return CandidateJudgement(
             _error(loaded, _part(rows, most), bound, origin),
             _error(loaded, _part(edges, most), None, beyond),
             self._row_ns(loaded, row_ns),
         )
 
-    def _row_ns(self, loaded: Loaded, row_ns: float) -> float:
+    def _row_ns(self, loaded: LoadedCandidate, row_ns: float) -> float:
         """Return what a row takes in a batch as large as there is patience for."""
         count = max(min(int(_PATIENCE_NS // row_ns), _BATCH), 1)
         call = loaded.call(repeated(self.values, count))
@@ -108,7 +116,7 @@ class Judge:
     def _samples(self, question: Question) -> tuple[_Sample, _Sample]:
         """Return the rows of the study, and rows aimed at the model's edges."""
         if question not in self.samples:
-            model = self.asked[question]
+            model = self.forms[question]
             edges = _edges(model)
             self.samples[question] = (
                 _Sample(model, self.values, decide(model, self.values)),
@@ -121,7 +129,9 @@ def _edges(model: Model) -> FloatArray:
     return probe_values(model, min(MOST_PROBES, _most_rows(model)))
 
 
-def _error(loaded: Loaded, sample: _Sample, bound: float | None, origin: str) -> Error:
+def _error(
+    loaded: LoadedCandidate, sample: _Sample, bound: float | None, origin: str
+) -> Error:
     found = loaded.answer(sample.values)
     facts = error_against_exact(
         sample.model,
@@ -136,7 +146,9 @@ def _error(loaded: Loaded, sample: _Sample, bound: float | None, origin: str) ->
     return msgspec.structs.replace(error, largest=_largest(facts, found, sample))
 
 
-def _largest(facts: Observed, found: Found, sample: _Sample) -> float | None:
+def _largest(
+    facts: ErrorMeasure, found: CandidateOutput, sample: _Sample
+) -> float | None:
     """Return the largest error, not above the bound where only the oracle is in doubt.
 
     What was observed is an upper end. Where it is above the bound and the lower end is
@@ -160,10 +172,10 @@ def _part(sample: _Sample, most: int) -> _Sample:
     return _Sample(sample.model, values, _thinned(sample.exact, step))
 
 
-def _thinned(exact: Decided, step: int) -> Decided:
+def _thinned(exact: Decisions, step: int) -> Decisions:
     """Return the exact answers to every so many rows."""
     strengths = exact.strengths
-    return Decided(
+    return Decisions(
         exact.rule[::step],
         exact.label[::step],
         exact.status[::step],

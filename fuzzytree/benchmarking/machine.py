@@ -14,7 +14,7 @@ import msgspec
 from fuzzytree.benchmarking.records import Machine, Point, Timing
 
 PACKAGES = ("fuzzytree-toolkit", "numpy")
-"""Whose versions are always told."""
+"""Packages whose versions are always reported."""
 
 _STOLEN = 0.05  # share of the wall time from which the machine counts as noisy
 _SPREAD = 0.1  # width of an interval, as a share of its median, that is worth a word
@@ -46,9 +46,9 @@ def machine(packages: Iterable[str] = ()) -> Machine:
 
 def after(before: Machine, timings: Sequence[Timing]) -> Machine:
     """Return a machine with what is known of it once everything is measured."""
-    told = [one for one in timings if one.stolen is not None]
-    spent = [sum(one.samples_ns) * one.calls for one in told]
-    lost = [(one.stolen or 0.0) * s for one, s in zip(told, spent, strict=True)]
+    measured = [one for one in timings if one.stolen is not None]
+    spent = [sum(one.samples_ns) * one.calls for one in measured]
+    lost = [(one.stolen or 0.0) * s for one, s in zip(measured, spent, strict=True)]
     return msgspec.structs.replace(
         before,
         load_after=load_averages(),
@@ -87,7 +87,7 @@ def noise(found: Machine, points: Sequence[Point]) -> Iterator[str]:
 
 
 def load_averages() -> tuple[float, ...]:
-    """Return the load of the last 1, 5 and 15 minutes; nothing where it is not told."""
+    """Return the load of the last 1, 5 and 15 minutes; nothing if unknown."""
     return os.getloadavg() if hasattr(os, "getloadavg") else ()
 
 

@@ -21,19 +21,19 @@ Bound = tuple[float, str]
 """The certified largest error of a strength, and where it comes from."""
 
 
-class Found(msgspec.Struct, frozen=True):
+class CandidateOutput(msgspec.Struct, frozen=True):
     """What a candidate answered.
 
     Attributes:
         labels: The class number of each row, -1 for no class.
-        strengths: Shape (rules, rows), or None where the candidate tells none.
+        strengths: Shape (rules, rows), or None where the candidate returns none.
     """
 
     labels: IntArray
     strengths: FloatArray | None = None
 
 
-class Loaded(msgspec.Struct, frozen=True):
+class LoadedCandidate(msgspec.Struct, frozen=True):
     """A candidate that is ready.
 
     Attributes:
@@ -45,7 +45,7 @@ class Loaded(msgspec.Struct, frozen=True):
         bound: As of a candidate, where it is known only once that is loaded.
     """
 
-    answer: Callable[[FloatArray], Found]
+    answer: Callable[[FloatArray], CandidateOutput]
     call: Callable[[FloatArray], Callable[[], object]]
     bytes: int | None = None
     bound: Callable[[], Bound | None] | None = None
@@ -61,7 +61,7 @@ class Candidate(msgspec.Struct, frozen=True):
         load: Prepare it for a number of threads. Raises a FuzzyTreeError, or what the
             foreign library raises; the study lists it among the omissions.
         bound: Certifies the largest error of a strength against the exact one, which
-            takes its time and is asked for once the candidate has answered; it gives
+            takes its time and is called once the candidate has answered; it gives
             None, or is None, where nothing is certified.
         note: What a reader must know to compare it fairly.
         is_foreign: Whether code of others runs, which may crash or hang the process;
@@ -73,7 +73,7 @@ class Candidate(msgspec.Struct, frozen=True):
     name: str
     question: Question
     kind: Kind
-    load: Callable[[int], Loaded]
+    load: Callable[[int], LoadedCandidate]
     bound: Callable[[], Bound | None] | None = None
     note: str = ""
     is_foreign: bool = False
@@ -104,7 +104,7 @@ class Timing(msgspec.Struct, frozen=True):
         rounds: The round of each sample. Samples of two candidates that share a round
             were taken one after the other.
         stolen: Share of the time in which the process did not run; None where the
-            clocks cannot tell.
+            clocks cannot measure it.
     """
 
     rows: int
@@ -125,7 +125,7 @@ class Error(msgspec.Struct, frozen=True):
     Attributes:
         rows: Rows on which it was observed.
         largest: The largest observed difference of a strength from the exact one; None
-            where the candidate tells no strengths.
+            where the candidate returns no strengths.
         bound: The certified bound of it; None where there is none.
         origin: Where the bound comes from, or why there is none.
         flips: Rows whose class differs from the exact one.
@@ -182,10 +182,10 @@ class Machine(msgspec.Struct, frozen=True):
         system: Operating system and its version.
         python: Its version.
         versions: Of each package that took part.
-        load_before: Load averages of 1, 5 and 15 minutes, where the system tells them.
+        load_before: Load averages of 1, 5 and 15 minutes, where the system has them.
         load_after: The same at the end.
         stolen: Share of the wall time in which the process was ready and did not run,
-            as far as the clocks tell; None where they do not.
+            as far as the clocks measure it; None where they do not.
     """
 
     processor: str

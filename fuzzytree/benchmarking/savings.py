@@ -21,7 +21,7 @@ from fuzzytree.exporters import find_format
 from fuzzytree.exporters.onnx import write_onnx as write_onnx
 from fuzzytree.exporters.onnx_compare import contents
 from fuzzytree.model.agreement import Agreement
-from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.model.contracts import Dtype, Model, Progress
 from fuzzytree.model.rulebase import Variable, summary
 from fuzzytree.model.tree import Use
 from fuzzytree.runtimes import baseline
@@ -32,7 +32,7 @@ from fuzzytree.semantics.simplification import Pruned, Removed
 from fuzzytree.tables import batches, path_of
 
 if TYPE_CHECKING:
-    from fuzzytree.benchmarking.clock import Call, Tell
+    from fuzzytree.benchmarking.clock import Call
     from fuzzytree.model.contracts import FloatArray
 
 ALL_COLUMNS, AS_IT_IS, PRUNED = "all columns", "as it is", "pruned"
@@ -108,8 +108,8 @@ class Report(msgspec.Struct, frozen=True):
         rules: For each rule that is left its number before.
         sizes: Before and after.
         costs: Before and after, where they were measured.
-        proof: The pruned model held against the model.
-        omissions: What could not be told, and why.
+        proof: The comparison of the pruned model with the model.
+        omissions: What could not be measured, and why.
     """
 
     needs: Needs
@@ -145,9 +145,9 @@ def report(
     data: FloatArray | None = None,
     table: object = None,
     seconds: float = 0.0,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
 ) -> Report:
-    """Tell what a model needs, prove its pruned form, and say what that saves.
+    """Return what a model needs, prove its pruned form, and what that saves.
 
     Args:
         model: The model.
@@ -156,7 +156,7 @@ def report(
         data: Rows of one's own for the proof, in the order of the model's inputs.
         table: The path of a table; reading it is timed.
         seconds: For all timings together; 0 for none.
-        tell: Told how far the timings are.
+        tell: Called with the current step and the share of the timings that is done.
     """
     made = stages(model, found.model)
     taken, omissions = sizes(made, uses)
@@ -261,7 +261,7 @@ def costs(
     table: object = None,
     seconds: float = 20.0,
     rounds: int = 15,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
 ) -> tuple[tuple[Cost, ...], tuple[str, ...]]:
     """Time opening, answering and reading in every stage, interleaved.
 
@@ -274,7 +274,7 @@ def costs(
         table: The path of a table to read; none is read if None.
         seconds: For all of it.
         rounds: The most samples of each call.
-        tell: Told how far it is.
+        tell: Called with the current step and the share that is done.
 
     Returns:
         The costs, and what could not be timed and why.

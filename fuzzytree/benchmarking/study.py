@@ -13,26 +13,25 @@ from fuzzytree.benchmarking.candidates import chosen, gather, questions, title
 from fuzzytree.benchmarking.clock import (
     SURE,
     Call,
-    Clock,
-    Tell,
-    Timed,
+    CallTimings,
+    TimeSource,
     system_clock,
     time_calls,
 )
 from fuzzytree.benchmarking.front import advice, fronts
-from fuzzytree.benchmarking.judging import Judge, made_rows, repeated
+from fuzzytree.benchmarking.judging import CandidateJudge, made_rows, repeated
 from fuzzytree.benchmarking.machine import after, machine, noise
 from fuzzytree.benchmarking.records import (
     Candidate,
     Error,
-    Loaded,
+    LoadedCandidate,
     Machine,
     Omission,
     Point,
     Study,
     Timing,
 )
-from fuzzytree.model.contracts import Model
+from fuzzytree.model.contracts import Model, Progress
 from fuzzytree.model.interrupts import noticed
 from fuzzytree.model.naming import as_names
 from fuzzytree.model.rulebase import fingerprint
@@ -114,20 +113,20 @@ def bench(
     only: Sequence[str] = (),
     skip: Sequence[str] = (),
     plan: BenchSettings | None = None,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
 ) -> Study:
     """Measure error against run time for every way of running a model.
 
     Args:
         model: A tree or a rule base.
         values: Rows of shape (inputs, rows), in the order of `model.inputs`; repeated
-            where more are asked for. Rows are made of the declared ranges if None.
+            where a call has more. Rows are made of the declared ranges if None.
         data: What to call them.
         only: Names of candidates, or the part before the colon, or a question, or a
             kind (`runtime`, `variant`, `peer`, `floor`): the others are left out.
         skip: The same, for what is left out.
         plan: How many rows, threads, seconds.
-        tell: Told what is being done and which share of the whole is.
+        tell: Called with the current step and the share that is done.
 
     Returns:
         The study. What cannot be run is among its omissions. Ctrl-C ends it early and
@@ -190,8 +189,8 @@ def run_study(
     data: str,
     omissions: Sequence[Omission] = (),
     plan: BenchSettings | None = None,
-    tell: Tell | None = None,
-    clock: Clock | None = None,
+    tell: Progress | None = None,
+    clock: TimeSource | None = None,
 ) -> Study:
     """Try, judge and time candidates; see `bench`, which finds them.
 
@@ -202,7 +201,7 @@ def run_study(
         data: What the rows are.
         omissions: What was left out before.
         plan: How many rows, threads, seconds.
-        tell: Told what is being done and which share of the whole is.
+        tell: Called with the current step and the share that is done.
         clock: Where the time comes from; the system unless given.
     """
     with noticed() as check:
@@ -232,13 +231,13 @@ class _Draft(msgspec.Struct):
     """A point in the making."""
 
     candidate: Candidate
-    loaded: Loaded
+    loaded: LoadedCandidate
     load_ms: float
     error: Error | None
     probes: Error | None
     row_ns: float
     timings: list[Timing] = []
-    threaded: dict[int, Loaded] = {}
+    threaded: dict[int, LoadedCandidate] = {}
 
 
 class _Run:
@@ -249,8 +248,8 @@ class _Run:
         model: Model,
         values: FloatArray,
         plan: BenchSettings,
-        tell: Tell,
-        clock: Clock,
+        tell: Progress,
+        clock: TimeSource,
     ) -> None:
         self.model, self.values, self.plan = model, values, plan
         self.tell, self.clock = tell, clock
@@ -286,8 +285,8 @@ class _Run:
         self.faulty |= set(faults)
 
     def judge(self, candidates: Sequence[Candidate]) -> None:
-        """Load each candidate and hold its answers against the exact ones."""
-        judge = Judge(questions(self.model), self.values, self.clock)
+        """Load each candidate and compare its predictions with the exact ones."""
+        judge = CandidateJudge(questions(self.model), self.values, self.clock)
         todo = [c for c in candidates if c.name not in self.faulty]
         tell = _part(self.tell, 0.1, 0.3)
         # If the time is short, what others are compared with is still there.
@@ -320,8 +319,8 @@ class _Run:
             first, last = (0.3 + 0.7 * k / len(blocks) for k in (number, number + 1))
             self._block(rows, threads, left, _part(self.tell, first, last))
 
-    def _block(self, rows: int, threads: int, seconds: float, tell: Tell) -> None:
-        """Time whoever can answer so many rows with so many threads in time."""
+    def _block(self, rows: int, threads: int, seconds: float, tell: Progress) -> None:
+        """Time the candidates that answer so many rows with so many threads in time."""
         names = [*self._members(rows, threads)]
         if not names or self._is_too_large(rows, len(names)):
             return
@@ -342,7 +341,7 @@ class _Run:
         self._keep(found, rows, threads, len(calls))
 
     def _members(self, rows: int, threads: int) -> Iterator[str]:
-        """Yield who takes part; more threads are for those who can use them."""
+        """Yield the candidates to time; more threads are for parallel ones."""
         is_first = threads == min(self.plan.threads)
         if not is_first and not any(
             draft.candidate.is_parallel and draft.candidate.kind != "floor"
@@ -367,7 +366,7 @@ class _Run:
         return size > _MOST_BYTES
 
     def _fitting(self, names: Sequence[str], rows: int, seconds: float) -> list[str]:
-        """Leave out who cannot have six samples in the time that is there."""
+        """Leave out candidates that cannot have six samples in the time."""
         costs = {name: self.drafts[name].row_ns * rows for name in names}
         ranks = {name: _rank(self.drafts[name].candidate) for name in names}
         kept = fitting(costs, ranks, seconds * 1e9, min(SURE, self.plan.rounds))
@@ -389,7 +388,7 @@ class _Run:
                 why = trial.error_text(error)
                 self.omit(name, f"{_rows(values.shape[1])}: {why}")
 
-    def _threaded(self, draft: _Draft, threads: int, end: float) -> Loaded:
+    def _threaded(self, draft: _Draft, threads: int, end: float) -> LoadedCandidate:
         """Return a candidate as it is loaded for a number of threads.
 
         Raises:
@@ -404,7 +403,7 @@ class _Run:
             draft.threaded[threads] = draft.candidate.load(threads)
         return draft.threaded[threads]
 
-    def _keep(self, found: Timed, rows: int, threads: int, count: int) -> None:
+    def _keep(self, found: CallTimings, rows: int, threads: int, count: int) -> None:
         """Take what was measured, whole or not."""
         for name, error in found.failures.items():
             self.omit(name, f"{rows:,} rows: {trial.error_text(error)}")
@@ -492,8 +491,8 @@ def _is_measure(one: Candidate) -> bool:
     return one.kind == "floor" or one.name == title(baseline().name, one.question)
 
 
-def _part(tell: Tell, first: float, last: float) -> Tell:
-    """Return what tells a part of the work as a part of the whole."""
+def _part(tell: Progress, first: float, last: float) -> Progress:
+    """Return a function that reports a part of the work as a part of the whole."""
     return lambda text, share: tell(text, first + share * (last - first))
 
 

@@ -24,7 +24,7 @@ from typing import IO, TYPE_CHECKING, cast
 
 from fuzzytree.benchmarking.candidates import foreign
 from fuzzytree.benchmarking.records import Candidate
-from fuzzytree.model.contracts import Model
+from fuzzytree.model.contracts import Model, Progress
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -48,7 +48,7 @@ def tried(
     peers: str | None = None,
     seconds: float = _SECONDS,
     left: Callable[[], float] = lambda: math.inf,
-    tell: Callable[[str, float], None] | None = None,
+    tell: Progress | None = None,
 ) -> dict[str, str]:
     """Return why candidates cannot be run, by name; those that can are not in it.
 
@@ -60,7 +60,7 @@ def tried(
         seconds: How long one candidate may take to load and to answer.
         left: The seconds that are left for all of them; what is not tried by then is
             not run.
-        tell: Told which one is tried, and which share of them is done.
+        tell: Called with the current step and the share that is done.
     """
     faults: dict[str, str] = {}
     todo = list(names)
@@ -78,7 +78,7 @@ def _one_child(
     peers: str | None,
     seconds: float,
     left: Callable[[], float],
-    tell: Callable[[str, float], None] | None,
+    tell: Progress | None,
 ) -> dict[str, str]:
     """Return what one child says of each candidate until it ends; "" for well."""
     done: dict[str, str] = {}
@@ -124,7 +124,7 @@ def _send(
         stream.write(pickle.dumps(work))
         stream.close()
     except BrokenPipeError:
-        pass  # it has ended, which its exit code will tell
+        pass  # it has ended, which its exit code will show
 
 
 def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:

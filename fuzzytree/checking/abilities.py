@@ -23,7 +23,7 @@ MEANINGS: Mapping[Outcome, str] = {
     "written": "written without loss, and not read back",
     "points": "curves become points, within a stated bound that can be set",
     "lossy": "written with --allow-loss, which lists what is lost",
-    "refused": "never written; the reason is told",
+    "refused": "never written; the error has the reason",
     "no": "not a kind of model that the format carries",
 }
 

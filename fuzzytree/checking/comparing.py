@@ -1,4 +1,4 @@
-"""Hold the answers of one representation against those of another, row by row."""
+"""Compare the predictions of two representations, row by row."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fuzzytree.model.contracts import Dtype, Model, Outcome
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
-from fuzzytree.numerics.oracle import Decided, strength_errors
+from fuzzytree.numerics.oracle import Decisions, strength_errors
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.semantics.reference import Status
 
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 BoolArray = npt.NDArray[np.bool_]
 
-_TOLD = 5  # differing rows told for each comparison
+_SHOWN = 5  # differing rows listed for each comparison
 _LISTED = 20  # differences in the content of a file
 
 
-class Rows(msgspec.Struct, frozen=True):
+class RowSet(msgspec.Struct, frozen=True):
     """The rows that representations answer: probes first, then the user's data.
 
     Attributes:
@@ -42,9 +42,11 @@ class Rows(msgspec.Struct, frozen=True):
     numbers: IntArray
     probes: int
 
-    def part(self, rows: slice | IntArray) -> Rows:
+    def part(self, rows: slice | IntArray) -> RowSet:
         """Return some of the rows, which keep their numbers."""
-        return Rows(self.inputs, self.values[:, rows], self.numbers[rows], self.probes)
+        return RowSet(
+            self.inputs, self.values[:, rows], self.numbers[rows], self.probes
+        )
 
     def name(self, row: int) -> str:
         """Return what people call a row: `probe 3`, or `row 3` of the data."""
@@ -54,7 +56,7 @@ class Rows(msgspec.Struct, frozen=True):
         return f"row {number - self.probes + 1}"
 
 
-def probed(model: Model, data: FloatArray | None, limit: int) -> Rows:
+def probed(model: Model, data: FloatArray | None, limit: int) -> RowSet:
     """Return probes of a model with the user's rows behind them.
 
     Args:
@@ -71,10 +73,10 @@ def probed(model: Model, data: FloatArray | None, limit: int) -> Rows:
         if data.ndim != 2 or data.shape[0] != width:
             raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
         values = np.ascontiguousarray(np.concatenate([values, data], axis=1))
-    return Rows(model.inputs, values, np.arange(values.shape[1]), count)
+    return RowSet(model.inputs, values, np.arange(values.shape[1]), count)
 
 
-class Answers(msgspec.Struct, frozen=True):
+class ModelRun(msgspec.Struct, frozen=True):
     """What a representation answered to some rows.
 
     Attributes:
@@ -87,9 +89,9 @@ class Answers(msgspec.Struct, frozen=True):
     model: Model
     outcome: Outcome
 
-    def part(self, rows: slice | IntArray) -> Answers:
+    def part(self, rows: slice | IntArray) -> ModelRun:
         """Return some of the answers."""
-        return Answers(self.title, self.model, self.outcome.part(rows))
+        return ModelRun(self.title, self.model, self.outcome.part(rows))
 
 
 def counted(
@@ -103,7 +105,7 @@ def counted(
         rows,
         "DISAGREES" if faults else "agrees",
         differing=len(faults),
-        detail=tuple(faults[:_TOLD]),
+        detail=tuple(faults[:_SHOWN]),
     )
 
 
@@ -133,7 +135,7 @@ def judged(
     )
 
 
-def compare_bits(found: Answers, expected: Answers, rows: Rows) -> Comparison:
+def compare_bits(found: ModelRun, expected: ModelRun, rows: RowSet) -> Comparison:
     """Demand equal rules, classes, statuses, and strengths where both have them.
 
     Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value.
@@ -159,7 +161,12 @@ def same_bits(one: FloatArray, two: FloatArray) -> BoolArray:
 
 
 def compare_within(
-    found: Answers, expected: Answers, rows: Rows, *, allowed: FloatArray, origin: str
+    found: ModelRun,
+    expected: ModelRun,
+    rows: RowSet,
+    *,
+    allowed: FloatArray,
+    origin: str,
 ) -> Comparison:
     """Allow a difference of strengths, and what must follow from it, and no more.
 
@@ -169,7 +176,7 @@ def compare_within(
 
     Args:
         found: The answers of the representation examined.
-        expected: The answers of the representation it is held against.
+        expected: The answers of the other one.
         rows: The rows.
         allowed: The largest difference of a strength, for each row. The result shows
             that of the row that exceeds it most, or else of the largest difference.
@@ -192,16 +199,20 @@ def compare_within(
 
 
 def compare_answers(
-    found: Answers, expected: Answers, rows: Rows, *, by_design: bool = False
+    found: ModelRun,
+    expected: ModelRun,
+    rows: RowSet,
+    *,
+    by_design: bool = False,
 ) -> Comparison:
     """Compare classes and missing rows alone.
 
     Args:
         found: The answers of the representation examined.
-        expected: The answers of the representation it is held against.
+        expected: The answers of the other one.
         rows: The rows.
         by_design: Whether the two are different functions, so that a difference is
-            told but no fault.
+            reported and not a fault.
     """
     flips = labels(found) != labels(expected)
     gap = np.zeros(flips.shape)
@@ -212,15 +223,20 @@ def compare_answers(
 
 
 def compare_excused(
-    found: Answers, expected: Answers, rows: Rows, *, excused: BoolArray, origin: str
+    found: ModelRun,
+    expected: ModelRun,
+    rows: RowSet,
+    *,
+    excused: BoolArray,
+    origin: str,
 ) -> Comparison:
     """Demand equal answers in every row that is not excused."""
     wrong = _unequal(found, expected) & ~excused
     return _compared(found, expected, rows, wrong, np.zeros(wrong.shape), 0.0, origin)
 
 
-def without_status(answers: Answers) -> Answers:
-    """Keep of the statuses what a rule number tells."""
+def without_status(answers: ModelRun) -> ModelRun:
+    """Reduce statuses to whether a rule won."""
     outcome = answers.outcome
     status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
     kept = msgspec.structs.replace(outcome, status=status.astype(np.int64))
@@ -230,8 +246,8 @@ def without_status(answers: Answers) -> Answers:
 def compare_labels(
     title: str,
     found: Sequence[str | None],
-    base: Answers,
-    rows: Rows,
+    base: ModelRun,
+    rows: RowSet,
     excused: BoolArray,
 ) -> Comparison:
     """Compare the texts that a file answers with the classes of the model."""
@@ -248,7 +264,7 @@ def compare_labels(
 def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
     """Return the largest difference of a strength in each row; NaN equals NaN.
 
-    Zeros where one of the two tells no strengths; infinite where one has a rule more.
+    Zeros where one of the two has no strengths; infinite where one has a rule more.
     """
     one, two = found.strengths, expected.strengths
     if one is None or two is None:
@@ -262,7 +278,7 @@ def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
     return largest
 
 
-def labels(answers: Answers) -> IntArray:
+def labels(answers: ModelRun) -> IntArray:
     """Return the class number of each answer; -1 for no class."""
     model, outcome = answers.model, answers.outcome
     classes = {label: number for number, label in enumerate(model.classes)}
@@ -280,7 +296,7 @@ def labels(answers: Answers) -> IntArray:
     return found
 
 
-def margins(answers: Answers) -> FloatArray | None:
+def margins(answers: ModelRun) -> FloatArray | None:
     """Return how far the strongest class is ahead of the next, in each row."""
     model, strengths = answers.model, answers.outcome.strengths
     if strengths is None or isinstance(model, FuzzyTree):
@@ -294,7 +310,7 @@ def margins(answers: Answers) -> FloatArray | None:
     return apart
 
 
-def _unequal(found: Answers, expected: Answers) -> BoolArray:
+def _unequal(found: ModelRun, expected: ModelRun) -> BoolArray:
     one, two = found.outcome, expected.outcome
     unequal: BoolArray = (one.rule != two.rule) | (one.status != two.status)
     unequal |= labels(found) != labels(expected)
@@ -302,9 +318,9 @@ def _unequal(found: Answers, expected: Answers) -> BoolArray:
 
 
 def _compared(
-    found: Answers,
-    expected: Answers,
-    rows: Rows,
+    found: ModelRun,
+    expected: ModelRun,
+    rows: RowSet,
     wrong: BoolArray,
     gap: FloatArray,
     allowed: float = 0.0,
@@ -313,9 +329,9 @@ def _compared(
 ) -> Comparison:
     flips = labels(found) != labels(expected)
     margin = margins(expected)
-    told = np.flatnonzero(wrong)
-    told = told[np.argsort(-gap[told], kind="stable")][:_TOLD]
-    detail = [_row_text(found, expected, rows, row) for row in told.tolist()]
+    shown = np.flatnonzero(wrong)
+    shown = shown[np.argsort(-gap[shown], kind="stable")][:_SHOWN]
+    detail = [_row_text(found, expected, rows, row) for row in shown.tolist()]
     if detail and gap.any() and not flips.any():
         detail.insert(0, "only strengths differ: every row has the same class")
     return Comparison(
@@ -333,11 +349,11 @@ def _compared(
             float(margin[flips].max()) if margin is not None and flips.any() else None
         ),
         detail=tuple(detail),
-        row_numbers=tuple(rows.numbers[told].tolist()),
+        row_numbers=tuple(rows.numbers[shown].tolist()),
     )
 
 
-def _row_text(found: Answers, expected: Answers, rows: Rows, row: int) -> str:
+def _row_text(found: ModelRun, expected: ModelRun, rows: RowSet, row: int) -> str:
     values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
     shown = ", ".join(f"{name} {value!r}" for name, value in values)
     wanted, got = _answer_text(expected, row), _answer_text(found, row)
@@ -350,7 +366,7 @@ def _row_text(found: Answers, expected: Answers, rows: Rows, row: int) -> str:
     )
 
 
-def _apart(found: Answers, expected: Answers, row: int) -> str:
+def _apart(found: ModelRun, expected: ModelRun, row: int) -> str:
     """Return where the strengths of a row are furthest apart, in words."""
     one, two = found.outcome.strengths, expected.outcome.strengths
     if one is None or two is None or one.shape != two.shape:
@@ -367,7 +383,7 @@ def _apart(found: Answers, expected: Answers, row: int) -> str:
     )
 
 
-def _answer_text(answers: Answers, row: int) -> str:
+def _answer_text(answers: ModelRun, row: int) -> str:
     outcome = answers.outcome
     rule, status = int(outcome.rule[row]), Status(int(outcome.status[row]))
     number = int(labels(answers)[row])
@@ -382,9 +398,9 @@ def _answer_text(answers: Answers, row: int) -> str:
 
 
 def compare_exact(
-    found: Answers, truth: Decided, rows: Rows, *, dtype: Dtype
+    found: ModelRun, truth: Decisions, rows: RowSet, *, dtype: Dtype
 ) -> Certified:
-    """Hold answers against the exact ones, within what a number type may change.
+    """Compare predictions with the exact ones, within what a number type may change.
 
     A strength may be off by its bound in that row; a class may differ where the exact
     margin is at most twice that, or where a value lies within its rounding from a cut
@@ -440,7 +456,7 @@ class _Ends(NamedTuple):
 
 
 def _errors(
-    found: Answers, rows: Rows, dtype: Dtype
+    found: ModelRun, rows: RowSet, dtype: Dtype
 ) -> tuple[FloatArray, _Ends | None]:
     """Return what is allowed in each row (1: anything) and what was observed."""
     if isinstance(found.model, FuzzyTree):
@@ -453,7 +469,7 @@ def _errors(
     return allowed, _Ends(*strength_errors(found.model, rows.values, strengths))
 
 
-def _cover(found: Answers, truth: Decided) -> tuple[BoolArray, BoolArray]:
+def _cover(found: ModelRun, truth: Decisions) -> tuple[BoolArray, BoolArray]:
     """Return which rows lost and gained cover."""
     weighed = (found.outcome.status != Status.MISSING) & (
         truth.status != Status.MISSING
@@ -463,18 +479,18 @@ def _cover(found: Answers, truth: Decided) -> tuple[BoolArray, BoolArray]:
 
 
 def _exact_texts(
-    found: Answers,
-    truth: Decided,
-    rows: Rows,
+    found: ModelRun,
+    truth: Decisions,
+    rows: RowSet,
     wrong: BoolArray,
     allowed: FloatArray,
     ends: _Ends | None,
 ) -> Iterator[str]:
-    told = np.flatnonzero(wrong)
+    worst = np.flatnonzero(wrong)
     if ends is not None:
-        told = told[np.argsort(-ends.low[told], kind="stable")]
+        worst = worst[np.argsort(-ends.low[worst], kind="stable")]
     classes = found.model.classes
-    for row in told[:_TOLD].tolist():
+    for row in worst[:_SHOWN].tolist():
         values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
         shown = ", ".join(f"{name} {value!r}" for name, value in values)
         number = int(truth.label[row])

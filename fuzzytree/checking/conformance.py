@@ -29,7 +29,7 @@ from fuzzytree.model.contracts import (
 from fuzzytree.model.rulebase import fingerprint
 
 _PATIENCE_S = 10.0  # for one hostile input
-_LONGEST = 300  # characters of an error that are told
+_LONGEST = 300  # characters of an error that are shown
 _OFFER = "allow_loss=True"
 
 
@@ -203,7 +203,7 @@ def _read_back_failures(
     match likeness(model, written, again):
         case "other":
             what = f"{kind_of(model)} {model.name!r}"
-            yield f"read back, {what} is another model, and no loss was told"
+            yield f"read back, {what} is another model, and no loss was reported"
         case "renamed":
             yield "read back, names or notes differ, and no remark was made"
         case _:
@@ -211,7 +211,7 @@ def _read_back_failures(
 
 
 def _read(form: Format, content: bytes) -> tuple[Reading | None, Exception | None]:
-    assert form.read is not None  # asked before
+    assert form.read is not None  # the callers test it
     try:
         return form.read(content, "model"), None
     except Exception as error:  # whatever it is, it is a finding

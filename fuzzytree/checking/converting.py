@@ -62,7 +62,7 @@ class Proof(msgspec.Struct, frozen=True):
     Attributes:
         verdict: `equal`: read back, it is that model in every number and name.
             `alike`: read back, it is that model but for names and notes, of which the
-            writer told; or run, it answers like that model.
+            writer reported; or run, it answers like that model.
             `certified`: it computes, within the bound of the certificate.
             `as listed`: it differs by the losses that were allowed.
             `unproved`: the file is not read back.
@@ -200,7 +200,7 @@ def load(
 
 
 def load_content(content: bytes, name: str, *, allow_loss: bool = False) -> Document:
-    """Return the model of a file that was read already; its name tells the format.
+    """Return the model of a file that was read already; its suffix names the format.
 
     Raises:
         ReadError: As `load`.
@@ -211,7 +211,7 @@ def load_content(content: bytes, name: str, *, allow_loss: bool = False) -> Docu
 
 
 def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
-    """Return the model of whatever a public function was called with.
+    """Return the model that an argument of a public function stands for.
 
     Args:
         source: A tree, a rule base or a fuzzy system; a fitted `FuzzyTreeClassifier`
@@ -222,8 +222,8 @@ def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
     Raises:
         TypeError: If it is something else.
         NotFittedError: If it is a classifier that is not fitted.
-        ReadError: If a file cannot be read, or an object of another library holds what
-            no model can.
+        ReadError: If a file cannot be read, or an object of another library has what
+            no model can represent.
         LossError: As `load`.
     """
     if isinstance(source, FuzzyTree | RuleBase | FuzzySystem):
@@ -299,9 +299,9 @@ def formed(
     kind: Kind | None = None,
     conjunction: Conjunction | None = None,
 ) -> Document:
-    """Return a model in the form that was asked for, or that a format carries.
+    """Return a model in the wanted form, or in one that a format carries.
 
-    Unless told otherwise a model stays what it is. Where the format does not carry
+    Without options a model stays what it is. Where the format does not carry
     that, a tree becomes rules, rules become the system that decides alike, and a
     system that decides as rules do becomes those rules.
 
@@ -314,11 +314,11 @@ def formed(
 
     Raises:
         LossError: If the format does not carry it in any form.
-        ValueError: If the model cannot be had in the form that was asked for.
+        ValueError: If the model has no such form.
     """
-    asked_rules = kind is not None or conjunction is not None
+    wants_rules = kind is not None or conjunction is not None
     if isinstance(model, FuzzyTree):
-        carries = representation or ("rules" if asked_rules else _nearest("tree", form))
+        carries = representation or ("rules" if wants_rules else _nearest("tree", form))
         if carries == "tree":
             return model
         model = rules_from_tree(model, kind or "relative", conjunction=conjunction)
@@ -345,7 +345,7 @@ def _formed_system(
 
     Raises:
         LossError: If the format carries rules alone, and it is none.
-        ValueError: If it cannot be had in the form that was asked for.
+        ValueError: If it has no such form.
     """
     if representation == "tree":
         raise ValueError(
@@ -476,17 +476,17 @@ def export(
 def proved(
     model: Document, form: Format, written: Written, *, dtype: object = None
 ) -> Proof:
-    """Read a file back, or derive what it can change, and tell how it stands.
+    """Read a file back, or derive what it can change.
 
     Args:
         model: What was written.
         form: The format.
         written: The file.
-        dtype: The number type that the writer was asked for, if any.
+        dtype: The number type that the writer used, if any.
 
     Raises:
         DisagreementError: If the file is read back as another model, though the writer
-            and the reader told of nothing.
+            and the reader reported nothing.
     """
     if not isinstance(model, FuzzySystem):
         return _proved(model, form, written, dtype=dtype)
@@ -554,8 +554,8 @@ def _decided(model: Document, other: Document) -> str:
 def _certified(model: Model, form: Format, dtype: object) -> Proof:
     from fuzzytree.numerics.bounds import certify
 
-    asked = [name for name in get_args(Dtype) if name == dtype]
-    known = asked or [name for name in get_args(Dtype) if name == form.dtype]
+    wanted = [name for name in get_args(Dtype) if name == dtype]
+    known = wanted or [name for name in get_args(Dtype) if name == form.dtype]
     certificate = certify(model, known[0], None)
     return Proof("certified", certificate.sentence, certificate)
 
@@ -564,7 +564,7 @@ def _run(system: FuzzySystem, written: Written) -> Proof:
     """Run the ONNX file of a system, and compare its numbers.
 
     Raises:
-        DisagreementError: If it answers other numbers, though no loss was told.
+        DisagreementError: If it answers other numbers, though no loss was reported.
     """
     from fuzzytree.checking.systems import check_system
     from fuzzytree.runtimes.onnxruntime import open_onnx
@@ -582,7 +582,7 @@ def _run(system: FuzzySystem, written: Written) -> Proof:
 
 
 def _exact(model: Document, origin: str) -> Certificate | None:
-    """Return the certificate of a file that holds a deciding model and changes none."""
+    """Return the certificate of a file with a deciding model, unchanged."""
     if isinstance(model, FuzzySystem):
         return None
     from fuzzytree.numerics.bounds import Certificate

@@ -1,7 +1,7 @@
 """What a model needs, what the rest costs, and the proof that it may go.
 
-A graph's operators are told with what they are there for. Nothing of that is written
-down by hand: the model is written once more without the thing, a negation say, and
+A graph's operators are listed with what they are there for. No such list is written
+by hand: the model is written once more without the thing, a negation say, and
 what is missing from that graph was there because of it.
 """
 
@@ -16,7 +16,13 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.checking.comparing import Answers, BoolArray, Rows, compare_bits, probed
+from fuzzytree.checking.comparing import (
+    BoolArray,
+    ModelRun,
+    RowSet,
+    compare_bits,
+    probed,
+)
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters.onnx import write_onnx as write_onnx
 from fuzzytree.exporters.onnx_compare import Contents, contents
@@ -53,7 +59,7 @@ DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
 
 
 class Because(msgspec.Struct, frozen=True):
-    """What a graph holds on account of one thing.
+    """The part of a graph that one feature of a model causes.
 
     Attributes:
         what: The thing, as people name it.
@@ -70,7 +76,7 @@ class Because(msgspec.Struct, frozen=True):
 class Graph(msgspec.Struct, frozen=True):
     """The ONNX graph of one representation and number type, with label and rule.
 
-    What is in it for what is told for `float64`; the other types differ by a cast.
+    The causes are listed for `float64`; the other types differ by a cast.
 
     Attributes:
         representation: `tree`, `relative rules`, `raw rules` or `rules`.
@@ -78,7 +84,7 @@ class Graph(msgspec.Struct, frozen=True):
         contents: How large it is.
         because: What of it is there on account of what the model has.
         on_request: What further outputs would add, counted alike.
-        left_out: What the model does not have, of which the graph holds nothing.
+        left_out: What the model does not have, of which the graph has nothing.
     """
 
     representation: str
@@ -99,7 +105,7 @@ class Needs(msgspec.Struct, frozen=True):
         columns: How many columns the training table had; None if unknown.
         inputs: The inputs that an answer depends on.
         idle_inputs: The inputs that matter only where their value is missing.
-        combinations: The combinations that are asked.
+        combinations: The combinations that the model uses.
         terms: How many terms there are.
         sets: How many fitted sets there are; 0 in a rule base.
         rules: How many rules or leaves there are.
@@ -124,7 +130,7 @@ class Needs(msgspec.Struct, frozen=True):
 
 
 def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Needs:
-    """Tell what a model needs, and all that could be left out of it.
+    """Return what a model needs, and all that could be left out of it.
 
     Args:
         model: A tree or a rule base.
@@ -133,7 +139,7 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
     Raises:
         ValueError: As `pruned`.
     """
-    asked = pruned(model, uses=uses, inputs=True).model
+    used = pruned(model, uses=uses, inputs=True).model
     left = pruned(model, uses=uses, inputs=True, rules=True)
     graphs, omissions = _graphs(model)
     is_tree = isinstance(model, FuzzyTree)
@@ -143,9 +149,9 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
         fingerprint=fingerprint(model),
         representation="tree" if is_tree else "rules",
         columns=len(model.columns) or None,
-        inputs=asked.inputs,
-        idle_inputs=tuple(n for n in model.inputs if n not in asked.inputs),
-        combinations=tuple(v.name for v in asked.variables if v.parts),
+        inputs=used.inputs,
+        idle_inputs=tuple(n for n in model.inputs if n not in used.inputs),
+        combinations=tuple(v.name for v in used.variables if v.parts),
         terms=sum(len(v.terms) for v in model.variables),
         sets=sum(len(group.terms) for group in groups),
         rules=len(model.leaves if isinstance(model, FuzzyTree) else model.rules),
@@ -300,7 +306,7 @@ def prove(
     runtimes: Sequence[str] = ("native",),
     limit: int = 5_000,
 ) -> Agreement:
-    """Hold a pruned model against the model: by proof, and by running both.
+    """Compare a pruned model with the model: by proof, and by running both.
 
     Strengths are compared bit for bit, those of rules that are gone with 0. Rows in
     which a value is missing that only the whole model looks at are answered by the
@@ -352,7 +358,7 @@ def _proof(model: Model, faults: Sequence[str]) -> Comparison:
     )
 
 
-def _is_seen(model: Model, left: Model, rows: Rows, dtype: Dtype) -> BoolArray:
+def _is_seen(model: Model, left: Model, rows: RowSet, dtype: Dtype) -> BoolArray:
     """Return the rows in which nothing is missing that only the whole model sees."""
     seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
     gone = unguarded(model, left)
@@ -373,7 +379,7 @@ def _compared(
     model: Model,
     left: Model,
     found: Pruned,
-    rows: Rows,
+    rows: RowSet,
     is_seen: BoolArray,
 ) -> Iterator[Comparison]:
     runtime = find_runtime(name)
@@ -384,8 +390,8 @@ def _compared(
     outcome = runtime.load(left)(np.ascontiguousarray(rows.values[order]))
     numbered = _in_old_numbers(outcome, model, found.rules)
     pair = [
-        Answers(f"pruned {title} in {name}", model, numbered),
-        Answers(title, model, runtime.load(model)(rows.values)),
+        ModelRun(f"pruned {title} in {name}", model, numbered),
+        ModelRun(title, model, runtime.load(model)(rows.values)),
     ]
     parts = [(is_seen, False), (~is_seen, True)]
     for chosen, is_by_design in parts:

@@ -101,7 +101,7 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
     """Return a system whose rules ask nothing where the answer is always 1.
 
     Formats without rules that always hold ask a term of degree 1 everywhere; it goes
-    too, unless another rule asks it. A missing value answers NaN either way.
+    too, unless another rule tests it. A missing value answers NaN either way.
     """
     everywhere = {
         (one.name, label.name)
@@ -110,7 +110,7 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
         if label.height == 1.0 and _is_everywhere(label.curve)
     }
 
-    def asks(when: Condition | None) -> Condition | None:
+    def reduced(when: Condition | None) -> Condition | None:
         match when:
             case Is(variable=name, label=label, hedges=()) if (
                 label is not None and (name, label) in everywhere
@@ -124,19 +124,19 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
     blocks = tuple(
         replace(
             block,
-            rules=tuple(replace(rule, when=asks(rule.when)) for rule in block.rules),
+            rules=tuple(replace(rule, when=reduced(rule.when)) for rule in block.rules),
         )
         for block in system.blocks
     )
     if blocks == system.blocks:
         return system
-    asked = {
+    used = {
         (one.variable, one.label)
         for block in blocks
         for rule in block.rules
         for one in questions(rule.when)
     }
-    idle = everywhere - asked
+    idle = everywhere - used
     inputs = tuple(
         replace(
             one, labels=tuple(x for x in one.labels if (one.name, x.name) not in idle)
@@ -288,9 +288,9 @@ def _tree(tree: FuzzyTree) -> FuzzyTree:
     classes = _numbered("c", tree.classes)
 
     def branch(one: Branch, variable: str) -> Branch:
-        asked = tuple(terms[variable][name] for name in one.terms)
+        names_of_terms = tuple(terms[variable][name] for name in one.terms)
         fitted = tuple(sets[variable][name] for name in one.sets) if sets else ()
-        return replace(one, terms=asked, sets=fitted)
+        return replace(one, terms=names_of_terms, sets=fitted)
 
     return FuzzyTree(
         name="m",

@@ -1,7 +1,6 @@
 """Do all representations of a model give its answers?
 
-Nothing here believes a representation: each is loaded and run. Kinds of evidence are
-kept
+No representation is trusted: each is loaded and run. Kinds of evidence are kept
 apart: *file* (two contents are equal), *proof* and *all cells* (statements about every
 input), *rows* (probes aimed at every clause, and the user's data: a sample, however
 well aimed) and *calls* (ways of calling that break programs).
@@ -16,9 +15,9 @@ import msgspec
 import numpy as np
 
 from fuzzytree.checking.comparing import (
-    Answers,
     BoolArray,
-    Rows,
+    ModelRun,
+    RowSet,
     compare_answers,
     compare_bits,
     compare_exact,
@@ -54,7 +53,7 @@ GRID_LIMIT = 1 << 21
 """The most points at which all cells are tried one by one; the proof needs no limit."""
 
 _FLOAT32_TREE = "equal answers but within float32 rounding of a cut"
-_SLOW_STEPS = 3_000_000  # degrees that a slow runtime is asked for in one comparison
+_SLOW_STEPS = 3_000_000  # degrees that a slow runtime computes in one comparison
 _SERVICES: Mapping[Use, str] = {
     "tree": "path",
     "relative": "relative rules",
@@ -82,7 +81,7 @@ def check(
     rows_only: bool = False,
     progress: Progress | None = None,
 ) -> Agreement:
-    """Hold every representation of a model against the model itself.
+    """Compare every representation of a model with the model itself.
 
     Args:
         model: A tree or a rule base.
@@ -132,17 +131,17 @@ def check(
     )
 
 
-def _native(title: str, model: Model, rows: Rows) -> Answers:
-    return Answers(title, model, baseline().load(model)(rows.values))
+def _native(title: str, model: Model, rows: RowSet) -> ModelRun:
+    return ModelRun(title, model, baseline().load(model)(rows.values))
 
 
-def _representations(model: Model, rows: Rows) -> tuple[Answers, ...]:
+def _representations(model: Model, rows: RowSet) -> tuple[ModelRun, ...]:
     """Return what can be made of a model, each with the native runtime's answers."""
     return tuple(_native(title, form, rows) for title, form in forms(model).items())
 
 
 def _equivalence(
-    tree: FuzzyTree, representations: Sequence[Answers], rows: Rows
+    tree: FuzzyTree, representations: Sequence[ModelRun], rows: RowSet
 ) -> Iterator[Finding]:
     """Show that the relative rules are the tree, and how far the raw rules are not."""
     path, relative, *raw = representations
@@ -155,7 +154,7 @@ def _equivalence(
     else:
         yield f"all cells one by one ({size:.3g} points): the proof covers them"
     yield compare_bits(relative, path, rows)
-    # Probes lie where the two part; how often they do so in use, only data tells.
+    # Probes lie where the two part; how often they do so in use, only data shows.
     own = slice(rows.probes if len(rows.numbers) > rows.probes else 0, None)
     for other in raw:
         found, expected = other.part(own), path.part(own)
@@ -179,11 +178,11 @@ def _all_cells(
 
 
 def _runtimes(
-    representation: Answers, runtimes: Sequence[Runtime], rows: Rows
+    representation: ModelRun, runtimes: Sequence[Runtime], rows: RowSet
 ) -> Iterator[Finding]:
     """Run one representation in every runtime that can, against the native one."""
     kind = "rules" if isinstance(representation.model, RuleBase) else "tree"
-    bases: dict[Dtype, Answers] = {"float64": representation}
+    bases: dict[Dtype, ModelRun] = {"float64": representation}
     for runtime in runtimes:
         if kind not in runtime.runs:
             continue
@@ -201,18 +200,18 @@ def _runtimes(
         share = slice(None, None, step)
         some = rows.part(share)
         checkpoint()
-        found = Answers(title, representation.model, run(some.values))
+        found = ModelRun(title, representation.model, run(some.values))
         checkpoint()
         if not (runtime.is_baseline and runtime.dtype == "float64"):
             base = _base(runtime, representation, bases, rows)
-            yield _held(runtime, found, base.part(share), some)
+            yield _contract(runtime, found, base.part(share), some)
         yield _calls(title, run, some)
 
 
 def _certificates(
-    representation: Answers, runtimes: Sequence[Runtime], rows: Rows
+    representation: ModelRun, runtimes: Sequence[Runtime], rows: RowSet
 ) -> Iterator[Certified]:
-    """Hold each number type that was run against exact arithmetic.
+    """Compare each number type that was run with exact arithmetic.
 
     The native runtime of a type stands for all of it, for the others equal its bits.
     """
@@ -224,17 +223,20 @@ def _certificates(
             continue
         try:
             run = baseline(dtype).load(representation.model)
-        except LossError:  # told among what was not examined
+        except LossError:  # listed among what was not examined
             continue
         title = f"{representation.title} in {dtype}"
-        found = Answers(title, representation.model, run(rows.values))
+        found = ModelRun(title, representation.model, run(rows.values))
         yield compare_exact(found, truth, rows, dtype=dtype)
 
 
 def _base(
-    runtime: Runtime, representation: Answers, bases: dict[Dtype, Answers], rows: Rows
-) -> Answers:
-    """Return what a runtime is held against: the native one of its number type."""
+    runtime: Runtime,
+    representation: ModelRun,
+    bases: dict[Dtype, ModelRun],
+    rows: RowSet,
+) -> ModelRun:
+    """Return what a runtime is compared with: the native one of its number type."""
     is_rules = isinstance(representation.model, RuleBase)
     if runtime.bound is not None or runtime.is_baseline or not is_rules:
         return representation
@@ -242,12 +244,14 @@ def _base(
         base = baseline(runtime.dtype)
         run = base.load(representation.model)
         title = f"{base.name}: {representation.title}"
-        bases[runtime.dtype] = Answers(title, representation.model, run(rows.values))
+        bases[runtime.dtype] = ModelRun(title, representation.model, run(rows.values))
     return bases[runtime.dtype]
 
 
-def _held(runtime: Runtime, found: Answers, base: Answers, rows: Rows) -> Comparison:
-    """Hold a runtime's answers against its base by the contract that fits."""
+def _contract(
+    runtime: Runtime, found: ModelRun, base: ModelRun, rows: RowSet
+) -> Comparison:
+    """Compare a runtime with its base by the contract that fits."""
     model = found.model
     if runtime.bound is not None:
         bound, origin = runtime.bound(model)
@@ -266,7 +270,7 @@ def _held(runtime: Runtime, found: Answers, base: Answers, rows: Rows) -> Compar
     return compare_bits(found, base, rows)
 
 
-def _stride(model: Model, rows: Rows) -> int:
+def _stride(model: Model, rows: RowSet) -> int:
     """Return which n-th rows a slow runtime gets, so that it ends in seconds."""
     if isinstance(model, RuleBase):
         cost = sum(len(c.terms) + 1 for rule in model.rules for c in rule.when)
@@ -276,7 +280,7 @@ def _stride(model: Model, rows: Rows) -> int:
     return -(-len(rows.numbers) // max(_SLOW_STEPS // cost, 50))
 
 
-def _calls(title: str, run: Run, rows: Rows) -> Comparison:
+def _calls(title: str, run: Run, rows: RowSet) -> Comparison:
     """Call a runtime in the ways that break: no row, one, other order, wrong width."""
     width, total = rows.values.shape
     sample = np.ascontiguousarray(rows.values[:, :: max(total // 24, 1)])
@@ -313,7 +317,7 @@ def _is_same(one: Outcome, whole: Outcome, row: int) -> bool:
 
 
 def _shipped(
-    title: str, other: Model | OnnxModel | ProgramFile, model: Model, rows: Rows
+    title: str, other: Model | OnnxModel | ProgramFile, model: Model, rows: RowSet
 ) -> Iterator[Finding]:
     """Compare a file that was shipped beside a model: its content, then its answers."""
     if isinstance(other, ProgramFile):
@@ -325,7 +329,7 @@ def _shipped(
 
 
 def _shipped_model(
-    title: str, other: Model, model: Model, rows: Rows
+    title: str, other: Model, model: Model, rows: RowSet
 ) -> Iterator[Finding]:
     if isinstance(other, FuzzyTree) and isinstance(model, RuleBase):
         other = _as_rules(other, model) or other
@@ -371,7 +375,7 @@ def _content(
 ) -> Comparison:
     """Compare the content of a file with what it should be: whole, or pruned.
 
-    What `fuzzytree needs` writes is made once more, then held against the model by
+    What `fuzzytree needs` writes is made once more, then compared with the model by
     proof; what is left of a tree need not serve all that the tree does.
     """
     fault = first_difference(expected, other)
@@ -388,7 +392,7 @@ def _content(
 
 
 def _shipped_onnx(
-    title: str, other: OnnxModel, model: Model, rows: Rows
+    title: str, other: OnnxModel, model: Model, rows: RowSet
 ) -> Iterator[Finding]:
     """Compare an ONNX file: what it says of itself, its graph, and its answers."""
     if other.run_system is not None:
@@ -429,19 +433,23 @@ def _onnx_counterpart(other: OnnxModel, model: Model) -> Model | None:
 
 
 def _onnx_rows(
-    title: str, other: OnnxModel, expected: Model | None, model: Model, rows: Rows
+    title: str,
+    other: OnnxModel,
+    expected: Model | None,
+    model: Model,
+    rows: RowSet,
 ) -> Iterator[Comparison]:
     """Compare a file's answers with the native ones, then its labels."""
-    held = expected or model
-    is_rules = isinstance(held, RuleBase)
+    compared = expected or model
+    is_rules = isinstance(compared, RuleBase)
     native = baseline(other.dtype if is_rules else "float64")
-    base = Answers("the model", held, native.load(held)(rows.values))
+    base = ModelRun("the model", compared, native.load(compared)(rows.values))
     excused: BoolArray = np.full(rows.numbers.shape, fill_value=False)
-    is_rounded = isinstance(held, FuzzyTree) and other.dtype == "float32"
-    if isinstance(held, FuzzyTree) and is_rounded:
-        excused = open_paths(held, "float32", rows.values)
+    is_rounded = isinstance(compared, FuzzyTree) and other.dtype == "float32"
+    if isinstance(compared, FuzzyTree) and is_rounded:
+        excused = open_paths(compared, "float32", rows.values)
     if expected is not None:
-        found, right = Answers(title, held, other.run(rows.values)), base
+        found, right = ModelRun(title, compared, other.run(rows.values)), base
         if "status" not in other.outputs:
             found, right = without_status(found), without_status(base)
         yield (
@@ -450,12 +458,12 @@ def _onnx_rows(
             else compare_bits(found, right, rows)
         )
     if other.labels is not None:
-        told = other.labels(rows.values)
-        yield compare_labels(title, told, base, rows, excused)
+        texts = other.labels(rows.values)
+        yield compare_labels(title, texts, base, rows, excused)
 
 
 def _counterpart(other: Model, model: Model) -> Model | None:
-    """Return what a shipped file should hold, made from the model; None: no telling."""
+    """Return what a shipped file should hold, made from the model; None if unknown."""
     if isinstance(other, FuzzyTree):
         return model if isinstance(model, FuzzyTree) else None
     if isinstance(model, RuleBase):
@@ -500,7 +508,7 @@ def _differ(path: tuple[str, ...], expected: object, found: object) -> str | Non
     return f"{where}: {found!r} where {expected!r} is right"
 
 
-def _count(representation: Answers) -> Count:
+def _count(representation: ModelRun) -> Count:
     status = representation.outcome.status
     return Count(
         representation.title,

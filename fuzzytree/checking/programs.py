@@ -14,8 +14,8 @@ import msgspec
 import numpy as np
 
 from fuzzytree.checking.comparing import (
-    Answers,
-    Rows,
+    ModelRun,
+    RowSet,
     compare_bits,
     compare_excused,
     compare_labels,
@@ -81,7 +81,7 @@ class _Text(NamedTuple):
 
 
 def check_program(
-    title: str, program: ProgramFile, model: Document, rows: Rows
+    title: str, program: ProgramFile, model: Document, rows: RowSet
 ) -> Iterator[Comparison | str]:
     """Compare a program with what is written now; run it if they are equal.
 
@@ -176,14 +176,14 @@ def _why_not(text: _Text, form: Format) -> str | None:
 
 
 def _run(
-    title: str, program: ProgramFile, text: _Text, rows: Rows
+    title: str, program: ProgramFile, text: _Text, rows: RowSet
 ) -> Iterator[Comparison]:
     """Run a program, and compare its answers with those of the form it was made of."""
     model = cast("Model", text.form)  # no system: see `_why_not`
     some = rows.part(slice(None, None, -(-len(rows.numbers) // _MOST_ROWS)))
     is_single = text.options == _FLOAT32 and isinstance(model, RuleBase)
     native = baseline("float32" if is_single else "float64")
-    base = Answers("the model", model, native.load(model)(some.values))
+    base = ModelRun("the model", model, native.load(model)(some.values))
     try:
         result = ENGINES[program.format](
             program.content, model, text.options, some.values
@@ -194,7 +194,7 @@ def _run(
         faults = ("; ".join(str(error).splitlines()),)
         yield counted("rows", title, "the model", len(some.numbers), faults)
         return
-    found = Answers(title, model, result.outcome)
+    found = ModelRun(title, model, result.outcome)
     right = base
     if not result.has_status:
         found, right = without_status(found), without_status(base)

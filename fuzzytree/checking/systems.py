@@ -1,7 +1,7 @@
 """Do all representations of a fuzzy system give its numbers?
 
-The inference is the meaning; the native runtime is held against it, every other runtime
-against the native one, and shipped files against both. Bits are compared first. Where
+The inference is the meaning; the native runtime is compared with it, every other
+runtime with the native one, and shipped files with both. Bits are compared first. Where
 they differ, two runners may be as far apart as the functions of their libraries make
 them (`fuzzytree.semantics.programs.bounds`), and no further.
 """
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.comparing import Rows, counted, judged, same_bits
+from fuzzytree.checking.comparing import RowSet, counted, judged, same_bits
 from fuzzytree.checking.equivalence import is_alike
 from fuzzytree.checking.models import first_difference
 from fuzzytree.checking.programs import ProgramFile, check_program
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     from fuzzytree.runtimes.onnxruntime import OnnxModel
     from fuzzytree.semantics.programs.steps import Program
 
-_SLOW_STEPS = 2_000_000  # operations that a slow runtime is asked for
+_SLOW_STEPS = 2_000_000  # operations that a slow runtime computes
 _EDGE = 1e-6  # share of a range; a wider bound says little
 _FEW = 200  # probes of a coverage alone
 _AT_ONCE = 256  # rules that probes are aimed at, before it is seen which others fire
 _DRAWN = 1_000  # rows drawn from the ranges
-_TOLD = 5  # differing rows told for each comparison
+_SHOWN = 5  # differing rows listed for each comparison
 
 Finding = Comparison | str
 """A comparison, or a sentence about what was skipped."""
@@ -86,7 +86,7 @@ class _Subject(msgspec.Struct, frozen=True):
 
     system: FuzzySystem
     program: Program
-    rows: Rows
+    rows: RowSet
     native: SystemOutcome
     bounds: _Bounds
 
@@ -101,7 +101,7 @@ def check_system(
     rows_only: bool = False,
     progress: Progress | None = None,
 ) -> Agreement:
-    """Hold every representation of a fuzzy system against the system itself.
+    """Compare every representation of a fuzzy system with the system itself.
 
     Args:
         system: The system.
@@ -210,7 +210,7 @@ def _values(system: FuzzySystem, rows: Sequence[Row]) -> FloatArray:
     return table.reshape(len(names), len(rows))
 
 
-def _rows(system: FuzzySystem, probes: FloatArray, data: FloatArray | None) -> Rows:
+def _rows(system: FuzzySystem, probes: FloatArray, data: FloatArray | None) -> RowSet:
     names, values = system.columns, probes
     if data is not None:
         if data.ndim != 2 or data.shape[0] != len(names):
@@ -219,11 +219,11 @@ def _rows(system: FuzzySystem, probes: FloatArray, data: FloatArray | None) -> R
             )
         values = np.concatenate([values, data], axis=1)
     values = np.ascontiguousarray(values)
-    return Rows(names, values, np.arange(values.shape[1]), probes.shape[1])
+    return RowSet(names, values, np.arange(values.shape[1]), probes.shape[1])
 
 
 def _inference(subject: _Subject) -> Iterator[Finding]:
-    """Hold the native runtime against the meaning, on a share of the rows."""
+    """Compare the native runtime with the inference, on a share of the rows."""
     share = _share(subject)
     some = subject.rows.part(share)
     right = infer_rows(subject.system, activations=True)(some.values)
@@ -276,7 +276,7 @@ class _Gaps(msgspec.Struct, frozen=True):
         return sorted(found, key=lambda place: -float(self.gap[:, place].max()))
 
 
-def _gaps(one: FloatArray, two: FloatArray, subject: _Subject, rows: Rows) -> _Gaps:
+def _gaps(one: FloatArray, two: FloatArray, subject: _Subject, rows: RowSet) -> _Gaps:
     is_same = same_bits(one, two)
     apart = np.flatnonzero(~is_same.all(axis=0))
     allowed = subject.bounds.of(rows.numbers[apart])
@@ -289,7 +289,7 @@ def _gaps(one: FloatArray, two: FloatArray, subject: _Subject, rows: Rows) -> _G
 
 
 def _faults(
-    one: FloatArray, two: FloatArray, subject: _Subject, rows: Rows
+    one: FloatArray, two: FloatArray, subject: _Subject, rows: RowSet
 ) -> Iterator[str]:
     """Yield what is wrong in each row, worst first."""
     gaps = _gaps(one, two, subject, rows)
@@ -306,16 +306,16 @@ def _compared(
     found: SystemOutcome,
     right: SystemOutcome,
     subject: _Subject,
-    rows: Rows,
+    rows: RowSet,
 ) -> Iterator[Finding]:
     """Compare bits, then what the bounds of the rows that differ allow.
 
-    Rows whose bound says little are told apart: the table shows the others.
+    Rows whose bound says little are counted apart: the table shows the others.
     """
     one, two = _table(found, right), _table(right, found)
     gaps = _gaps(one, two, subject, rows)
     is_edge = _is_edge(gaps, subject)
-    faults = list(itertools.islice(_faults(one, two, subject, rows), _TOLD))
+    faults = list(itertools.islice(_faults(one, two, subject, rows), _SHOWN))
     total = len(rows.numbers)
     yield Comparison(
         representation,
@@ -385,7 +385,7 @@ def _fault(
     two: FloatArray,
     allowed: FloatArray,
     row: int,
-    rows: Rows,
+    rows: RowSet,
 ) -> str:
     """Say which number of a row is wrong first, and the values that lead to it."""
     names = _names(subject.system)
@@ -401,7 +401,7 @@ def _fault(
     return f"{rows.name(row)}: {where}: {names[first]} {numbers}{more}"
 
 
-def _calls(title: str, run: SystemRun, rows: Rows, subject: _Subject) -> Comparison:
+def _calls(title: str, run: SystemRun, rows: RowSet, subject: _Subject) -> Comparison:
     """Call a runtime in the ways that break: no row, one, other order, wrong width.
 
     A library may compute a function of one number otherwise than of many, so that the
@@ -483,7 +483,7 @@ def _content(
 
 
 def _without_status(outcome: SystemOutcome) -> SystemOutcome:
-    """Return an outcome that tells missing rows alone."""
+    """Return an outcome whose status marks missing rows alone."""
     is_missing = outcome.status == Status.MISSING
     return msgspec.structs.replace(
         outcome, status=np.where(is_missing, Status.MISSING, Status.DECIDED)

@@ -17,10 +17,10 @@ from fuzzytree.learning.shapes import (
     fitted_flanks,
     fitted_sets,
 )
-from fuzzytree.learning.sketch import Axis, Sketch, Split
+from fuzzytree.learning.sketch import Sketch, SplitAxis, TreeSplit
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.sums import Totals, totals_of
-from fuzzytree.learning.units import FloatArray, IntArray, Units
+from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
 from fuzzytree.learning.windows import window_counts
 from fuzzytree.model.rulebase import LR, Band, Flank, Part, Side, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets, interval_names
@@ -35,7 +35,7 @@ _FALLING = np.linspace(1.0, 0.0, SAMPLES)
 
 
 @dataclass(frozen=True)
-class Names:
+class TermNames:
     """How people call the parts of the table.
 
     Attributes:
@@ -52,7 +52,7 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Assembled:
+class AssembledTree:
     """A tree and what fitting its sets repaired."""
 
     tree: FuzzyTree
@@ -70,7 +70,7 @@ class _Unit:
     exponent: int = 0
 
     @staticmethod
-    def of(axis: Axis, units: Units) -> _Unit:
+    def of(axis: SplitAxis, units: ColumnUnits) -> _Unit:
         """Return the unit of an axis; a combination has the table's."""
         if axis.is_combined:
             return _Unit()
@@ -92,12 +92,12 @@ class _Unit:
 
 @dataclass(frozen=True)
 class _AxisSets:
-    """The sets of the patterns that are asked on one axis, fitted in its unit.
+    """The sets of the patterns that one axis divides, fitted in its unit.
 
     `means` are those of the table; `place` finds a pattern.
     """
 
-    axis: Axis
+    axis: SplitAxis
     unit: _Unit
     patterns: IntArray
     place: dict[int, int]
@@ -110,11 +110,11 @@ def assembled(
     sketch: Sketch,
     patterns: Patterns,
     statistics: Statistics,
-    names: Names,
+    names: TermNames,
     *,
     points: int,
     separate_sides: bool,
-) -> Assembled:
+) -> AssembledTree:
     """Return the frozen tree of a sketch.
 
     Args:
@@ -150,7 +150,7 @@ def assembled(
         sets=tuple(_frozen_sets(called[k], a, pattern_names) for k, a in axes.items()),
         columns=tuple(names.columns),
     )
-    return Assembled(
+    return AssembledTree(
         tree,
         sum(len(a.patterns) for a in axes.values()),
         sum(a.zero_spreads for a in axes.values()),
@@ -162,8 +162,8 @@ def assembled(
 _Key = tuple[int, int]
 
 
-def _key(axis: Axis, node: int) -> _Key:
-    """Return what tells axes apart: the feature, or the node of a combination."""
+def _key(axis: SplitAxis, node: int) -> _Key:
+    """Return the key of an axis: the feature, or the node of a combination."""
     return (-1, node) if axis.is_combined else (int(axis.features[0]), -1)
 
 
@@ -184,11 +184,11 @@ def _axis_sets(
     points: int,
     separate_sides: bool,
 ) -> dict[_Key, _AxisSets]:
-    """Fit the sets of every pattern on every axis that is asked about it."""
-    asked: dict[_Key, list[IntArray]] = {}
-    axis_of: dict[_Key, Axis] = {}
+    """Fit the sets of every pattern on every axis that divides it."""
+    groups_of: dict[_Key, list[IntArray]] = {}
+    axis_of: dict[_Key, SplitAxis] = {}
     for key, split in zip(keys, sketch.splits, strict=True):
-        asked.setdefault(key, []).extend(split.groups)
+        groups_of.setdefault(key, []).extend(split.groups)
         axis_of[key] = split.axis
     return {
         key: _sets_on(
@@ -199,12 +199,12 @@ def _axis_sets(
             points,
             separate_sides,
         )
-        for key, groups in asked.items()
+        for key, groups in groups_of.items()
     }
 
 
 def _sets_on(
-    axis: Axis,
+    axis: SplitAxis,
     chosen: IntArray,
     patterns: Patterns,
     statistics: Statistics,
@@ -312,7 +312,7 @@ def _values_beyond(
 
 
 def _sampled_ratios(
-    split: Split, sets: _AxisSets, field: _Field, cut: int, sign: int
+    split: TreeSplit, sets: _AxisSets, field: _Field, cut: int, sign: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return where a flank may end, and for each end its ratio at 33 points.
 
@@ -368,7 +368,7 @@ class _Field:
     after: IntArray
 
     @staticmethod
-    def of(split: Split, sets: _AxisSets) -> _Field:
+    def of(split: TreeSplit, sets: _AxisSets) -> _Field:
         """Return the field of a node."""
         everything = np.concatenate(split.groups)
         sizes = [len(group) for group in split.groups]
@@ -409,7 +409,7 @@ def _owned_neighbours(owners: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _flank_reach(
-    split: Split,
+    split: TreeSplit,
     sets: _AxisSets,
     field: _Field,
     mine: IntArray,
@@ -429,7 +429,7 @@ def _flank_reach(
     return max(reach, 16 * float(sets.unit.ulp(split.cuts[cut : cut + 1])[0]))
 
 
-def _axis_names(axes: dict[_Key, _AxisSets], names: Names) -> dict[_Key, str]:
+def _axis_names(axes: dict[_Key, _AxisSets], names: TermNames) -> dict[_Key, str]:
     """Return the column's name, or `combination 1`, ... for combinations."""
     called: dict[_Key, str] = {}
     taken = set(names.columns)
@@ -447,7 +447,7 @@ def _axis_names(axes: dict[_Key, _AxisSets], names: Names) -> dict[_Key, str]:
     return called
 
 
-def _pattern_names(patterns: Patterns, names: Names) -> list[str]:
+def _pattern_names(patterns: Patterns, names: TermNames) -> list[str]:
     """Return `class`, or `class #1`, `class #2`, ... where it has several patterns."""
     several = np.bincount(patterns.labels, minlength=len(names.classes)) > 1
     taken = set(names.classes)
@@ -505,7 +505,7 @@ def _place_term(made: dict[str, Term], name: str, band: Band) -> str:
     return unique
 
 
-def _bands(split: Split, flanks: _Flanked) -> list[Band]:
+def _bands(split: TreeSplit, flanks: _Flanked) -> list[Band]:
     cuts = split.cuts.tolist()
     last = len(cuts)
     return [
@@ -547,7 +547,7 @@ def _node(
 
 
 def _input(
-    feature: int, statistics: Statistics, names: Names, terms: tuple[Term, ...]
+    feature: int, statistics: Statistics, names: TermNames, terms: tuple[Term, ...]
 ) -> Variable:
     name = names.columns[feature]
     low, high = statistics.extent(feature)
@@ -556,9 +556,9 @@ def _input(
 
 def _combination(
     name: str,
-    axis: Axis,
+    axis: SplitAxis,
     statistics: Statistics,
-    names: Names,
+    names: TermNames,
     terms: tuple[Term, ...],
 ) -> Variable:
     """Return a combination, whose range is that of all rows in its columns' ranges.
@@ -589,7 +589,7 @@ def _combination(
 def _leaves(
     sketch: Sketch,
     patterns: Patterns,
-    names: Names,
+    names: TermNames,
     pattern_names: Sequence[str],
 ) -> tuple[Leaf, ...]:
     reached = sketch.descend(patterns.rows)
@@ -599,10 +599,10 @@ def _leaves(
     return tuple(
         Leaf(
             names.classes[label],
-            " or ".join(pattern_names[int(p)] for p in held),
+            " or ".join(pattern_names[int(p)] for p in owned),
             round(float(support[leaf])),
         )
-        for leaf, (held, label) in enumerate(
+        for leaf, (owned, label) in enumerate(
             zip(sketch.leaves, sketch.leaf_classes, strict=True)
         )
     )

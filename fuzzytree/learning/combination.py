@@ -15,7 +15,7 @@ import numpy as np
 
 from fuzzytree.learning.cuts import rounded_to, tail
 from fuzzytree.learning.patterns import Patterns
-from fuzzytree.learning.sketch import Axis, single
+from fuzzytree.learning.sketch import SplitAxis, single
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _ROUNDS = 10
@@ -228,7 +228,7 @@ def selected_features(
 
 def combined_axis(
     patterns: Patterns, view: NodeView, is_right: BoolArray, selected: IntArray
-) -> Axis:
+) -> SplitAxis:
     """Return Fisher's direction over the selected features, in the table's units."""
     if len(selected) == 1:
         return single(int(patterns.combinable[selected[0]]))
@@ -242,7 +242,7 @@ def axis_of(
     selected: IntArray,
     direction: FloatArray,
     within: FloatArray,
-) -> Axis:
+) -> SplitAxis:
     """Return an axis in the table's units from a direction in standard units.
 
     Its unit is the spread within patterns. A weight is rounded so finely that a spread
@@ -270,4 +270,4 @@ def axis_of(
     chosen = features[keep]
     units = patterns.units
     raw = np.ldexp(weights[keep], -units.exponents[chosen])
-    return Axis(chosen, raw, units.origins[chosen], True)
+    return SplitAxis(chosen, raw, units.origins[chosen], True)

@@ -24,7 +24,7 @@ _GRID = 256
 
 
 @dataclass(frozen=True)
-class Cuts:
+class SplitCuts:
     """Cuts on an axis and the owner of each interval.
 
     Attributes:
@@ -44,7 +44,7 @@ def crossing_cuts(
     groups: IntArray,
     *,
     keep_reversals: bool,
-) -> Cuts:
+) -> SplitCuts:
     """Return where the largest gaussian density passes from group to group.
 
     Args:
@@ -64,17 +64,17 @@ def crossing_cuts(
         groups[order],
         keep_reversals=keep_reversals,
     )
-    return Cuts(first + unit * found.cuts, found.owners, found.reversals)
+    return SplitCuts(first + unit * found.cuts, found.owners, found.reversals)
 
 
 def _standard_cuts(
     means: FloatArray, widths: FloatArray, groups: IntArray, *, keep_reversals: bool
-) -> Cuts:
+) -> SplitCuts:
     """Return the cuts for patterns ordered by mean, in units of the widest."""
     if len(means) > _ENVELOPE:
         points = _neighbour_crossings(means, widths, groups)
         borders = np.flatnonzero(np.diff(groups))
-        return Cuts(points, groups[np.concatenate([[0], borders + 1])])
+        return SplitCuts(points, groups[np.concatenate([[0], borders + 1])])
     points = _all_crossings(means, widths, groups)
     inner = (points[1:] + points[:-1]) / 2
     ends = points if len(points) else means
@@ -88,8 +88,8 @@ def _standard_cuts(
 
 
 def _with_everybody(
-    cuts: Cuts, means: FloatArray, widths: FloatArray, groups: IntArray
-) -> Cuts:
+    cuts: SplitCuts, means: FloatArray, widths: FloatArray, groups: IntArray
+) -> SplitCuts:
     """Fall back to neighbours in mean order where a group owns no interval."""
     if len(np.unique(cuts.owners)) == len(np.unique(groups)):
         return cuts
@@ -101,7 +101,7 @@ def _with_everybody(
     tiny = 4 * np.spacing(np.abs(middle).max()) * np.arange(1, len(middle))
     points = (middle[:-1] * wide[1:] + middle[1:] * wide[:-1]) / (wide[1:] + wide[:-1])
     points = np.maximum.accumulate(points) + tiny
-    return Cuts(points, np.unique(groups)[order])
+    return SplitCuts(points, np.unique(groups)[order])
 
 
 def _neighbour_crossings(
@@ -130,15 +130,15 @@ def _all_crossings(
     return np.unique(found[np.isfinite(found)])
 
 
-def _merged(points: FloatArray, owners: IntArray, reversals: int) -> Cuts:
+def _merged(points: FloatArray, owners: IntArray, reversals: int) -> SplitCuts:
     """Drop cuts within one owner, and cuts that do not increase."""
     keep = np.flatnonzero(np.diff(owners))
-    return Cuts(points[keep], owners[np.concatenate([[0], keep + 1])], reversals)
+    return SplitCuts(points[keep], owners[np.concatenate([[0], keep + 1])], reversals)
 
 
 def _without_reversals(
-    cuts: Cuts, means: FloatArray, widths: FloatArray, groups: IntArray
-) -> Cuts:
+    cuts: SplitCuts, means: FloatArray, widths: FloatArray, groups: IntArray
+) -> SplitCuts:
     """Give an outer interval of next to no mass to its inner neighbour."""
     points, owners, reversals = cuts.cuts, cuts.owners, cuts.reversals
     for end in (0, -1):
@@ -151,7 +151,7 @@ def _without_reversals(
             points = np.delete(points, end)
             owners = np.delete(owners, end)
             reversals += 1
-    return Cuts(points, owners, reversals)
+    return SplitCuts(points, owners, reversals)
 
 
 def tail(u: FloatArray) -> FloatArray:
@@ -163,7 +163,7 @@ def tail(u: FloatArray) -> FloatArray:
 
 def smoothed_cuts(
     values: FloatArray, is_right: BoolArray, weights: FloatArray, *, two: bool
-) -> Cuts:
+) -> SplitCuts:
     """Return the cuts that separate two groups of rows with the least error.
 
     The weights of both groups are counted on a grid and smoothed by a gaussian, so
@@ -181,7 +181,7 @@ def smoothed_cuts(
     step = (high - low) / _GRID
     if not step > 0:
         middle = float(np.median(values))
-        return Cuts(np.array([middle]), np.array([0, 1]))
+        return SplitCuts(np.array([middle]), np.array([0, 1]))
     with np.errstate(over="ignore"):  # so far away lies in the last place anyway
         place = np.clip((values - low) / step, 0, _GRID - 1).astype(np.int64)
     signed = np.where(is_right, weights, -weights)
@@ -196,7 +196,7 @@ def smoothed_cuts(
         best, position, owners = ahead, rising, [0, 1]
     else:
         best, position, owners = behind, falling, [1, 0]
-    single = Cuts(edges[position : position + 1], np.array(owners))
+    single = SplitCuts(edges[position : position + 1], np.array(owners))
     if not two:
         return single
     smaller = min(weights[is_right].sum(), weights[~is_right].sum())
@@ -213,9 +213,9 @@ def _best_place(score: FloatArray) -> int:
     return int(longest[len(longest) // 2]) + 1
 
 
-def _two_cuts(gain: FloatArray, edges: FloatArray, at_least: float) -> Cuts | None:
+def _two_cuts(gain: FloatArray, edges: FloatArray, at_least: float) -> SplitCuts | None:
     """Return the best inner interval for one group, if it is good enough."""
-    best: Cuts | None = None
+    best: SplitCuts | None = None
     for sign, owners in ((1.0, [0, 1, 0]), (-1.0, [1, 0, 1])):
         lows = np.minimum.accumulate(sign * gain)
         rise = sign * gain - lows
@@ -225,7 +225,7 @@ def _two_cuts(gain: FloatArray, edges: FloatArray, at_least: float) -> Cuts | No
         saved = rise[stop] + outside
         if saved > at_least and 0 < start < stop < len(gain) - 1:
             at_least = saved
-            best = Cuts(edges[[start, stop]], np.array(owners))
+            best = SplitCuts(edges[[start, stop]], np.array(owners))
     return best
 
 
@@ -332,12 +332,12 @@ def settled_cuts(
     return np.array(result)
 
 
-def without_empty(cuts: Cuts) -> Cuts:
+def without_empty(cuts: SplitCuts) -> SplitCuts:
     """Drop intervals between equal cuts, unless one is all that its owner has.
 
     Example:
         >>> found = without_empty(
-        ...     Cuts(np.array([2.0, 2.0, 5.0]), np.array([0, 2, 1, 2]))
+        ...     SplitCuts(np.array([2.0, 2.0, 5.0]), np.array([0, 2, 1, 2]))
         ... )
         >>> found.cuts.tolist(), found.owners.tolist()
         ([2.0, 5.0], [0, 1, 2])
@@ -353,7 +353,7 @@ def without_empty(cuts: Cuts) -> Cuts:
         points = np.delete(points, [k - 1, k] if is_same else [k])
         owners = np.delete(owners, [k, k + 1] if is_same else [k])
         k = max(k - 1, 1)
-    return Cuts(points, owners, cuts.reversals)
+    return SplitCuts(points, owners, cuts.reversals)
 
 
 def _tidy(cut: Fraction, low: float, high: float) -> float:

@@ -78,8 +78,8 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def repairs(self) -> tuple[str, ...]:
         """What had to be repaired in the fitted sets, with counts; empty if nothing."""
-        told = (_told(self, name, text) for name, text in _REPAIRS.items())
-        return tuple(line for line in told if line)
+        lines = (_counted(self, name, text) for name, text in _REPAIRS.items())
+        return tuple(line for line in lines if line)
 
     def __str__(self) -> str:
         """Show the facts that are not zero, one a line."""
@@ -88,14 +88,14 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
         lines.append(f"{self.leaves} leaves; features per node: {nodes}")
         if self.features_ignored:
             lines.append(f"columns ignored: {', '.join(self.features_ignored)}")
-        lines += [_told(self, name, text) for name, text in _TABLE.items()]
+        lines += [_counted(self, name, text) for name, text in _TABLE.items()]
         lines += self.repairs
         lines = [line for line in lines if line]
         lines.extend(f"chosen {name}: {value}" for name, value in self.chosen.items())
         return "\n".join(lines)
 
 
-def _told(report: LearningReport, name: str, text: str) -> str:
+def _counted(report: LearningReport, name: str, text: str) -> str:
     count: int = getattr(report, name)
     return f"{text}: {count}" if count else ""
 
@@ -104,10 +104,10 @@ _TABLE = {
     "rows_dropped": "rows dropped, a value is missing or not finite",
     "patterns_refused": "patterns refused, too few rows",
     "single_rows": "patterns of one row",
-    "inseparable": "patterns of different classes that nothing tells apart",
+    "inseparable": "patterns of different classes that nothing separates",
     "levels_raised": "levels passed over until the threshold split a node",
 }
-"""What was left out of the table, or could not be told apart."""
+"""What was left out of the table, or could not be separated."""
 
 _REPAIRS = {
     "zero_spreads": "sets whose values are all equal",

@@ -14,10 +14,10 @@ from fuzzytree.learning.combination import (
     node_view,
     selected_features,
 )
-from fuzzytree.learning.cuts import Cuts, crossing_cuts, smoothed_cuts
+from fuzzytree.learning.cuts import SplitCuts, crossing_cuts, smoothed_cuts
 from fuzzytree.learning.induction import Grouping, most_powerful, threshold
 from fuzzytree.learning.patterns import Patterns
-from fuzzytree.learning.sketch import Axis, Sketch, Split, single
+from fuzzytree.learning.sketch import Sketch, SplitAxis, TreeSplit, single
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _CLEAN = 0.005
@@ -52,7 +52,7 @@ class GrowthRules:
 
 
 @dataclass
-class Grown:
+class GrownTree:
     """A grown tree and what happened on the way.
 
     Attributes:
@@ -72,9 +72,9 @@ def grow(
     patterns: Patterns,
     rules: GrowthRules,
     progress: Callable[[float], None] | None = None,
-) -> Grown:
+) -> GrownTree:
     """Return a tree with at most one leaf per pattern (steps 3 to 7)."""
-    grown = Grown(Sketch())
+    grown = GrownTree(Sketch())
     sketch = grown.sketch
     everything = np.flatnonzero(patterns.weights > 0).astype(np.int64)
     todo: list[tuple[IntArray, int, int, int]] = [(everything, 0, -1, 0)]
@@ -101,7 +101,7 @@ def grow(
     return grown
 
 
-def _leaf_class(patterns: Patterns, chosen: IntArray, grown: Grown) -> int:
+def _leaf_class(patterns: Patterns, chosen: IntArray, grown: GrownTree) -> int:
     labels = patterns.labels[chosen]
     if len(np.unique(labels)) > 1:
         grown.inseparable += len(chosen)
@@ -110,8 +110,12 @@ def _leaf_class(patterns: Patterns, chosen: IntArray, grown: Grown) -> int:
 
 
 def _divided(
-    patterns: Patterns, chosen: IntArray, level: int, rules: GrowthRules, grown: Grown
-) -> tuple[Split, int] | None:
+    patterns: Patterns,
+    chosen: IntArray,
+    level: int,
+    rules: GrowthRules,
+    grown: GrownTree,
+) -> tuple[TreeSplit, int] | None:
     """Return the split of a node and the level at which it was found, or None."""
     if len(chosen) < 2:
         return None
@@ -128,8 +132,12 @@ def _divided(
 
 
 def _literal_split(
-    patterns: Patterns, chosen: IntArray, level: int, rules: GrowthRules, grown: Grown
-) -> tuple[Split, int] | None:
+    patterns: Patterns,
+    chosen: IntArray,
+    level: int,
+    rules: GrowthRules,
+    grown: GrownTree,
+) -> tuple[TreeSplit, int] | None:
     """Split by one feature; while none splits, the level rises and T falls to 0."""
     means, spreads, costs = _single_features(patterns, chosen, rules)
     while True:
@@ -146,8 +154,12 @@ def _literal_split(
 
 
 def _clean_split(
-    patterns: Patterns, chosen: IntArray, level: int, rules: GrowthRules, grown: Grown
-) -> Split | None:
+    patterns: Patterns,
+    chosen: IntArray,
+    level: int,
+    rules: GrowthRules,
+    grown: GrownTree,
+) -> TreeSplit | None:
     """Split by one feature whose groups are so far apart that next to no row strays."""
     if len(chosen) < 3:
         return None
@@ -181,8 +193,8 @@ def _grouped_split(
     chosen: IntArray,
     found: Grouping,
     rules: GrowthRules,
-    grown: Grown,
-) -> Split:
+    grown: GrownTree,
+) -> TreeSplit:
     feature = int(patterns.usable[found.feature])
     group_of = np.zeros(len(chosen), np.int64)
     for number, group in enumerate(found.groups):
@@ -199,8 +211,8 @@ def _grouped_split(
 
 
 def finished_split(
-    patterns: Patterns, axis: Axis, cuts: Cuts, groups: tuple[IntArray, ...]
-) -> Split:
+    patterns: Patterns, axis: SplitAxis, cuts: SplitCuts, groups: tuple[IntArray, ...]
+) -> TreeSplit:
     """Return a split whose cuts lie between the rows.
 
     Args:
@@ -212,7 +224,7 @@ def finished_split(
     members = _members(patterns, np.concatenate(groups))
     rows, moved = patterns.rows[members], patterns.moved[members]
     placed = axis.settled(cuts, rows, moved, patterns.units)
-    return Split(axis, placed.cuts, placed.owners, groups)
+    return TreeSplit(axis, placed.cuts, placed.owners, groups)
 
 
 def _members(patterns: Patterns, chosen: IntArray) -> IntArray:
@@ -223,7 +235,7 @@ def _members(patterns: Patterns, chosen: IntArray) -> IntArray:
 
 def _combined_split(
     patterns: Patterns, chosen: IntArray, rules: GrowthRules
-) -> Split | None:
+) -> TreeSplit | None:
     """Split in two by a combination; where it errs much, look further.
 
     Then the scatter is shrunk next to nothing, for features that are equal up to a
@@ -265,7 +277,7 @@ def _fisher_axis(
     is_right: BoolArray,
     rows: int,
     rules: GrowthRules,
-) -> Axis:
+) -> SplitAxis:
     selected = selected_features(
         view,
         is_right,
@@ -292,7 +304,7 @@ class _Task:
         return min(right, float(self.weights.sum()) - right)
 
 
-def _placed(axis: Axis, task: _Task) -> tuple[Cuts, float]:
+def _placed(axis: SplitAxis, task: _Task) -> tuple[SplitCuts, float]:
     values = axis.places(task.rows, task.moved)
     cuts = smoothed_cuts(values, task.is_right, task.weights, two=True)
     taken = cuts.owners[np.searchsorted(cuts.cuts, values, side="left")]

@@ -55,7 +55,7 @@ def most_powerful(
 ) -> Grouping | None:
     """Return the feature that makes the most groups (step 4), or None.
 
-    Ties go to the cheaper feature, then (if asked) to the wider margin between
+    Ties go to the cheaper feature, then (if wanted) to the wider margin between
     groups in units of M_SD, then to the first.
 
     Args:

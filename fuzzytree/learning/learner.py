@@ -10,15 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import LearningError
-from fuzzytree.learning.assembly import Assembled, Names, assembled
+from fuzzytree.learning.assembly import AssembledTree, TermNames, assembled
 from fuzzytree.learning.findings import LearningReport
-from fuzzytree.learning.growing import Grown
+from fuzzytree.learning.growing import GrownTree
 from fuzzytree.learning.patterns import usable_features
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.units import FloatArray, IntArray
-from fuzzytree.learning.validation import Choice, chosen_tree
+from fuzzytree.learning.validation import ChosenTree, chosen_tree
 from fuzzytree.model.rulebase import text_fault
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tables import numbers_only, unmasked
@@ -175,7 +175,7 @@ class Learner:
         choice = chosen_tree(
             moments, sample, self.settings, self.classes, costs, progress
         )
-        names = Names(self.name, self.columns, self.classes, self.units)
+        names = TermNames(self.name, self.columns, self.classes, self.units)
         if progress is not None:
             progress("fitting sets", 0.0)
         made = assembled(
@@ -191,7 +191,7 @@ class Learner:
         return Learnt(made.tree, self._report(moments, sample, choice, made))
 
     def _report(
-        self, moments: Moments, sample: Sample, choice: Choice, made: Assembled
+        self, moments: Moments, sample: Sample, choice: ChosenTree, made: AssembledTree
     ) -> LearningReport:
         patterns, grown = choice.patterns, choice.grown
         usable = set(usable_features(moments).tolist())
@@ -231,7 +231,7 @@ class Learner:
         )
 
 
-def _features_per_node(grown: Grown) -> tuple[int, ...]:
+def _features_per_node(grown: GrownTree) -> tuple[int, ...]:
     return tuple(len(split.axis.features) for split in grown.sketch.splits)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.statistics import Moments, grouped_moments
-from fuzzytree.learning.units import FloatArray, IntArray, Units
+from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
 
 SCATTER_NUMBERS = 1 << 23
 """Scatter matrices are kept per pattern up to this many numbers (64 MiB)."""
@@ -59,7 +59,7 @@ class Patterns:
     owners: IntArray
     row_weights: FloatArray
     starts: IntArray
-    units: Units
+    units: ColumnUnits
     centre: FloatArray
     scale: FloatArray
     scatter: FloatArray

@@ -16,7 +16,7 @@ import numpy as np
 from fuzzytree.learning.combination import axis_of
 from fuzzytree.learning.cuts import smoothed_cuts
 from fuzzytree.learning.patterns import Patterns
-from fuzzytree.learning.sketch import Axis, Sketch, Split
+from fuzzytree.learning.sketch import Sketch, SplitAxis, TreeSplit
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _MOST_ROWS = 20_000
@@ -77,7 +77,7 @@ class _Task:
             self.rows[chosen], self.moved[chosen], labels, self.weights[chosen]
         )
 
-    def lost(self, split: Split) -> float:
+    def lost(self, split: TreeSplit) -> float:
         """Return the weight of the rows that a split sends to the wrong branch."""
         return float(self.weights[split.branches(self.rows) != self.labels].sum())
 
@@ -121,15 +121,15 @@ def _reaching(sketch: Sketch, rows: FloatArray) -> list[IntArray]:
 
 
 def _better_split(
-    split: Split, patterns: Patterns, task: _Task, ridge: float
-) -> Split | None:
+    split: TreeSplit, patterns: Patterns, task: _Task, ridge: float
+) -> TreeSplit | None:
     """Return a split with less error on the rows that care, or None."""
     lowest = task.lost(split)
     is_right = task.labels > 0
     if lowest == 0.0 or is_right.all() or not is_right.any():
         return None
     bar = lowest - _LEAST * float(np.sqrt(lowest * task.weights.mean()))
-    best: Split | None = None
+    best: TreeSplit | None = None
     turned = _logistic_axis(split, patterns, task, ridge)
     for axis in (split.axis, turned):
         if axis is None:
@@ -141,19 +141,21 @@ def _better_split(
     return best
 
 
-def _cut_again(axis: Axis, split: Split, patterns: Patterns, task: _Task) -> Split:
+def _cut_again(
+    axis: SplitAxis, split: TreeSplit, patterns: Patterns, task: _Task
+) -> TreeSplit:
     """Return the split with new cuts on an axis."""
     places = axis.places(task.rows, task.moved)
     cuts = smoothed_cuts(
         places, task.labels > 0, task.weights, two=len(split.cuts) == 2
     )
     placed = axis.settled(cuts, task.rows, task.moved, patterns.units)
-    return Split(axis, placed.cuts, placed.owners, split.groups)
+    return TreeSplit(axis, placed.cuts, placed.owners, split.groups)
 
 
 def _logistic_axis(
-    split: Split, patterns: Patterns, task: _Task, ridge: float
-) -> Axis | None:
+    split: TreeSplit, patterns: Patterns, task: _Task, ridge: float
+) -> SplitAxis | None:
     """Return the logistic direction over the features of a combination."""
     if not split.axis.is_combined:
         return None

@@ -10,7 +10,7 @@ Rows that agree in all digits (1, 2 and 4, say) are kept together or not at all,
 class may have a few rows less than it may have. Only where they alone are more than
 half of what may be kept, a hash of the whole numbers decides between them; there a
 column multiplied by a power of two may keep others. So it may for numbers below
-2^-1022, which have fewer digits. With no more distinct rows than asked for all are
+2^-1022, which have fewer digits. With no more distinct rows than wanted all are
 kept.
 """
 
@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.learning.sums import runs
-from fuzzytree.learning.units import FloatArray, IntArray, Units, units_of
+from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray, units_of
 
 Hashes = npt.NDArray[np.uint64]
 
@@ -46,7 +46,7 @@ class Sample:
     rows: FloatArray
     moved: FloatArray
     codes: IntArray
-    units: Units
+    units: ColumnUnits
 
     def at(self, chosen: IntArray) -> Sample:
         """Return some of the rows, ordered by class."""

@@ -19,7 +19,7 @@ class LearningSettings(
             first feature. `default` adds combinations of features (step 7), several
             patterns a class, and refines the cuts.
         alpha: Weight of the difference of means in the distance; beta is 1 - alpha.
-        l_max: The paper's L_MAX. Large asks for a wide margin before one feature is
+        l_max: The paper's L_MAX. Large demands a wide margin before one feature is
             trusted. None is 4 in paper mode and 10 in default mode.
         points: n of the paper's 2n + 1 points on a fuzzy set, 1 to 8.
         separate_sides: Whether a set's left and right sides are fitted apart.

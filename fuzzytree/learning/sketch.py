@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fuzzytree.learning.cuts import Cuts, settled_cuts, without_empty
-from fuzzytree.learning.units import FloatArray, IntArray, Units
+from fuzzytree.learning.cuts import SplitCuts, settled_cuts, without_empty
+from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
-class Axis:
+class SplitAxis:
     """A feature, or a combination of features as a fixed chain.
 
     Attributes:
@@ -53,8 +53,8 @@ class Axis:
         return moved[:, self.features[0]]
 
     def settled(
-        self, cuts: Cuts, rows: FloatArray, moved: FloatArray, units: Units
-    ) -> Cuts:
+        self, cuts: SplitCuts, rows: FloatArray, moved: FloatArray, units: ColumnUnits
+    ) -> SplitCuts:
         """Return cuts in the table's unit, increasing strictly, between the rows.
 
         Cuts without a row between them become one where that leaves every branch an
@@ -74,7 +74,7 @@ class Axis:
         points = settled_cuts(
             cuts.cuts, values, places, origin=origin, exponent=exponent
         )
-        found = without_empty(Cuts(points, cuts.owners, cuts.reversals))
+        found = without_empty(SplitCuts(points, cuts.owners, cuts.reversals))
         points = found.cuts
         for k in range(1, len(points)):
             if points[k] <= points[k - 1]:
@@ -82,13 +82,13 @@ class Axis:
         return found
 
 
-def single(feature: int) -> Axis:
+def single(feature: int) -> SplitAxis:
     """Return the axis of one feature."""
-    return Axis(np.array([feature]), np.ones(1), np.zeros(1), False)
+    return SplitAxis(np.array([feature]), np.ones(1), np.zeros(1), False)
 
 
 @dataclass(frozen=True)
-class Split:
+class TreeSplit:
     """A question and its answers.
 
     Attributes:
@@ -98,7 +98,7 @@ class Split:
         groups: The patterns of each branch.
     """
 
-    axis: Axis
+    axis: SplitAxis
     cuts: FloatArray
     owners: IntArray
     groups: tuple[IntArray, ...]
@@ -120,7 +120,7 @@ class Sketch:
         leaf_classes: The class of each leaf.
     """
 
-    splits: list[Split] = field(default_factory=list[Split])
+    splits: list[TreeSplit] = field(default_factory=list[TreeSplit])
     children: list[list[int]] = field(default_factory=list[list[int]])
     leaves: list[IntArray] = field(default_factory=list[IntArray])
     leaf_classes: list[int] = field(default_factory=list[int])

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fuzzytree.learning.sampling import DistinctRows, Sample
 from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, runs
-from fuzzytree.learning.units import BoolArray, FloatArray, IntArray, Units
+from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
 
 BLOCK_VALUES = 1 << 18
 """A block holds about this many numbers (2 MiB), and never more than 2^13 rows."""
@@ -144,7 +144,7 @@ class Statistics:
         joined._rows = self._rows.merge(other._rows)
         return joined
 
-    def moments(self, units: Units | None = None) -> Moments:
+    def moments(self, units: ColumnUnits | None = None) -> Moments:
         """Return the moments of all rows taken so far, each number rounded once.
 
         Args:

@@ -134,7 +134,7 @@ def rounded_ratio(top: int, bottom: int, exponent: int) -> float:
 def rounded_root(top: int, bottom: int, exponent: int) -> float:
     """Return `sqrt(top / bottom) * 2**exponent`, rounded once.
 
-    The root is taken of a whole number of 110 bits or more; one more bit tells whether
+    The root is taken of a whole number of 110 bits or more; one more bit shows whether
     something was cut off, so that the last rounding cannot mistake it for a tie.
 
     Example:

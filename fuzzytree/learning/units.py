@@ -18,7 +18,7 @@ _WIDEST = 900
 
 
 @dataclass(frozen=True)
-class Units:
+class ColumnUnits:
     """The origin and the unit of each column.
 
     Attributes:
@@ -45,7 +45,7 @@ class Units:
         return moved
 
 
-def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> Units:
+def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> ColumnUnits:
     """Return the units of a table.
 
     Args:
@@ -68,7 +68,7 @@ def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> Units:
         ranges = highs - lows
     is_sound = (lows < highs) & np.isfinite(ranges)
     exponents = np.frexp(np.where(is_sound, ranges, 1.0))[1].astype(np.int64)
-    return Units(origins, np.where(is_sound, exponents, 0), is_sound)
+    return ColumnUnits(origins, np.where(is_sound, exponents, 0), is_sound)
 
 
 FloatArray = npt.NDArray[np.float64]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fuzzytree.learning.growing import Grown, GrowthRules, grow
+from fuzzytree.learning.growing import GrownTree, GrowthRules, grow
 from fuzzytree.learning.patterns import (
     Patterns,
     clusters_of,
@@ -49,7 +49,7 @@ Numbers = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChosenTree:
     """The tree that was chosen.
 
     Attributes:
@@ -61,7 +61,7 @@ class Choice:
     """
 
     patterns: Patterns
-    grown: Grown
+    grown: GrownTree
     refused: int
     chosen: dict[str, float | str]
     accuracy: float | None
@@ -74,16 +74,16 @@ def chosen_tree(
     classes: Sequence[str],
     costs: FloatArray,
     progress: Progress | None,
-) -> Choice:
-    """Return the tree for the settings, chosen by inner validation where asked."""
+) -> ChosenTree:
+    """Return the tree for the settings, chosen by inner validation if they say so."""
     tell = progress or _silent
     rules = _rules(settings, costs)
-    numbers = _asked(settings, classes)
+    numbers = _wanted_numbers(settings, classes)
     is_open = _is_open(settings, moments)
     accuracy: float | None = None
     chosen: dict[str, float | str] = {}
-    is_asked = is_open or bool(settings.choices)
-    folds = _folds(moments, sample, settings.seed) if is_asked else []
+    has_choice = is_open or bool(settings.choices)
+    folds = _folds(moments, sample, settings.seed) if has_choice else []
     if folds:
         is_large = moments.counts.sum() * sample.rows.shape[1] > _LARGE
         budget = _BUDGET_LARGE if is_large else _BUDGET
@@ -100,11 +100,11 @@ def chosen_tree(
     tell("growing", 0.0)
     patterns, refused = patterns_of(moments, sample, numbers)
     grown = grown_tree(patterns, rules, lambda share: tell("growing", share))
-    return Choice(patterns, grown, refused, chosen, accuracy)
+    return ChosenTree(patterns, grown, refused, chosen, accuracy)
 
 
 def _silent(_: str, __: float) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def _rules(settings: LearningSettings, costs: FloatArray) -> GrowthRules:
@@ -119,8 +119,8 @@ def _rules(settings: LearningSettings, costs: FloatArray) -> GrowthRules:
     )
 
 
-def _asked(settings: LearningSettings, classes: Sequence[str]) -> Numbers:
-    """Return how many patterns each class is asked to have; 1 where that is open."""
+def _wanted_numbers(settings: LearningSettings, classes: Sequence[str]) -> Numbers:
+    """Return how many patterns each class is to have; 1 where that is open."""
     wanted = settings.patterns_per_class
     if isinstance(wanted, int):
         return (wanted,) * len(classes)
@@ -178,7 +178,7 @@ def grown_tree(
     patterns: Patterns,
     rules: GrowthRules,
     progress: Callable[[float], None] | None = None,
-) -> Grown:
+) -> GrownTree:
     """Return a grown tree, refined unless the paper is taken to the letter."""
     grown = grow(patterns, rules, progress)
     if not rules.is_literal:
@@ -207,10 +207,10 @@ def _folds(moments: Moments, sample: Sample, seed: int) -> list[_Fold]:
     turn = (np.arange(len(codes)) - starts + codes) % _FOLDS
     folds: list[_Fold] = []
     for fold in range(_FOLDS):
-        learnt, asked = sample.at(kept[turn != fold]), kept[turn == fold]
+        learnt, left_out = sample.at(kept[turn != fold]), kept[turn == fold]
         found = grouped_moments(learnt.moved, learnt.codes, len(moments.counts))
-        if len(usable_features(found)) and len(asked):
-            rows, answers = sample.rows[asked], sample.codes[asked]
+        if len(usable_features(found)) and len(left_out):
+            rows, answers = sample.rows[left_out], sample.codes[left_out]
             folds.append(_Fold(found, learnt, rows, answers, {}))
     return folds
 
@@ -241,7 +241,7 @@ class _Trials:
 
     Attributes:
         folds: Rows to learn from and to answer.
-        tell: Hears of the progress.
+        tell: Called with the progress.
         budget: How much work may be done: patterns of the trees grown, more for
             larger folds; a millisecond or a few each.
         spent: How much was done.
@@ -279,7 +279,7 @@ class _Trials:
     ) -> bool:
         """Return whether the rows on which two trees differ favour the first one.
 
-        Half of the folds are asked first; a tree that is no better there is dropped.
+        Half of the folds are tried first; a tree that is no better there is dropped.
         """
         for folds, least in ((_FOLDS // 2, 0.0), (_FOLDS, _SURE)):
             new, old = self.right(*richer, folds), self.right(*simpler, folds)

@@ -9,7 +9,7 @@ squares Q
 
     s^2 = n^2 (x N - S)^2 (N - 1) / (N (N Q - S^2)),
 
-whose whole root is found in integers wherever floating point cannot tell.
+whose whole root is found in integers wherever floating point cannot decide.
 """
 
 from __future__ import annotations

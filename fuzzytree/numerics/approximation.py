@@ -11,9 +11,9 @@ at which the degree is 1. `by_degree` keeps the plateau itself. `by_points` ends
 two points at one value, which are a
 step: `(low, p), (low, 1)` and `(high, 1), (high, r)` with p and r below 1. So at `low`
 itself the degree is p, on the line from `(low, 1)` to `(high, 1)` it is 1, and beyond
-`high` it is r or less than 1: all other points are below 1, and a line is held between
-its ends, in every number type. Every clause is then exactly 1 where it was and less
-where it was less, so the same rule wins, alone.
+`high` it is r or less than 1: all other points are below 1, and a line is clamped
+between its ends, in every number type. Every clause is then exactly 1 where it was
+and less where it was less, so the same rule wins, alone.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _exchange(powers: FloatArray, goal: FloatArray) -> FloatArray:
         try:
             solved: FloatArray = np.linalg.solve(system, goal[reference]).astype(float)
         except np.linalg.LinAlgError:
-            break  # so close to 0 that doubles cannot tell powers apart
+            break  # so close to 0 that doubles cannot distinguish powers
         if not np.isfinite(solved).all():
             break
         found, level = solved[:-1], float(solved[-1])
@@ -222,7 +222,7 @@ class TermError(msgspec.Struct, frozen=True):
     degree: int | None = None
 
 
-class Approximated(msgspec.Struct, frozen=True):
+class ApproximateRules(msgspec.Struct, frozen=True):
     """A model in the place of another.
 
     Attributes:
@@ -241,7 +241,7 @@ class Approximated(msgspec.Struct, frozen=True):
 Change = Callable[[Shape], tuple[Shape, float] | None]
 
 
-def by_points(model: RuleBase, tolerance: float) -> Approximated:
+def by_points(model: RuleBase, tolerance: float) -> ApproximateRules:
     """Return a rule base whose curves are points joined by lines.
 
     Points lie closer where a curve bends more: all lines are nearly as far from it as
@@ -275,7 +275,7 @@ def by_points(model: RuleBase, tolerance: float) -> Approximated:
     return _approximated(model, change, f"lines within {tolerance!r} of the curves")
 
 
-def by_degree(model: RuleBase, degree: int) -> Approximated:
+def by_degree(model: RuleBase, degree: int) -> ApproximateRules:
     """Return a rule base whose curves are polynomials of at most a degree.
 
     Each flank, and each body of an LR set, is fitted again so that its largest error
@@ -346,7 +346,7 @@ def _lower_side(side: Side, degree: int) -> tuple[Side, float]:
     return Side(side.spread, curve, side.reach), bound
 
 
-def _approximated(model: RuleBase, change: Change, what: str) -> Approximated:
+def _approximated(model: RuleBase, change: Change, what: str) -> ApproximateRules:
     """Return a rule base with changed terms, and the bound of its strengths."""
     errors: list[TermError] = []
     reasons: list[str] = []
@@ -374,7 +374,7 @@ def _approximated(model: RuleBase, change: Change, what: str) -> Approximated:
     is_product = model.semantics.conjunction == "product"
     how = "summed" if is_product else "largest"
     origin = f"{how} certified error of a degree: {what}"
-    return Approximated(
+    return ApproximateRules(
         replace(model, variables=variables), tuple(errors), bound, origin
     )
 

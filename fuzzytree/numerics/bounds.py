@@ -10,7 +10,7 @@ of a strength, and with it the statement for which all this is made:
 differ.** For each of the two strengths has moved by at most delta, so their order is
 the same as in exact arithmetic.
 
-A tree weighs nothing. It takes the exact path wherever each value that it asks is
+A tree weighs nothing. It takes the exact path wherever each value that it tests is
 farther from the cuts than its own rounding and that of the cuts.
 """
 
@@ -118,8 +118,8 @@ def _term_errors(
     """Return the largest error of each term's degree in each row."""
     named = dict(zip(rules.inputs, values, strict=True))
     ranges = {name: (line, line) for name, line in named.items()}
-    asked = {variable for variable, _ in bounds}
-    variables = {v.name: v for v in rules.variables if v.name in asked}
+    used = {variable for variable, _ in bounds}
+    variables = {v.name: v for v in rules.variables if v.name in used}
     axes = {
         name: (axis_value(v, named).x, value_error(v, dtype, ranges))
         for name, v in variables.items()
@@ -409,7 +409,7 @@ def _term_texts(
 
 
 def _value_bounds(model: Model, dtype: Dtype, ranges: Ranges) -> tuple[ValueBound, ...]:
-    """Return the errors of the asked variables whose range is known."""
+    """Return the errors of the used variables whose range is known."""
     found: list[ValueBound] = []
     for variable in model.variables:
         needed = [part.input for part in variable.parts] or [variable.name]
@@ -426,7 +426,7 @@ def _value_bounds(model: Model, dtype: Dtype, ranges: Ranges) -> tuple[ValueBoun
 def _certify_tree(
     tree: FuzzyTree, dtype: Dtype, values: FloatArray | None
 ) -> Certificate:
-    asked = {node.variable for node in tree.nodes}
+    used = {node.variable for node in tree.nodes}
     if values is None:
         ranges, where, rows = _declared(tree), "for values in the declared ranges", None
     else:
@@ -438,18 +438,18 @@ def _certify_tree(
             abs(cut) for n in tree.nodes if n.variable == v.name for cut in n.cuts
         )
         for v in tree.variables
-        if v.name in asked
+        if v.name in used
     }
     stored = TYPES[dtype].stored
     found = tuple(
         ValueBound(value.variable, value.error + stored * largest[value.variable])
         for value in _value_bounds(tree, dtype, ranges)
-        if value.variable in asked
+        if value.variable in used
     )
     lost = [
         f"input {name!r} has no declared range"
         for v in tree.variables
-        if v.name in asked and (v.parts or stored)
+        if v.name in used and (v.parts or stored)
         for name in ([part.input for part in v.parts] or [v.name])
         if name not in ranges and rows != 0
     ]

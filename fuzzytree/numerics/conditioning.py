@@ -28,7 +28,7 @@ _SLIVER = Fraction(1, 2**20)  # of position: where signs are no longer sought
 _FLOOR = Fraction(1, 2**10)  # degrees below are compared with this one
 
 
-class Bracket(NamedTuple):
+class NumberBounds(NamedTuple):
     """A number that lies in [low, high], by proof."""
 
     low: float
@@ -65,10 +65,10 @@ class Conduct(NamedTuple):
     """
 
     side: str
-    size: Bracket
-    condition: Bracket
-    above: Bracket
-    below: Bracket
+    size: NumberBounds
+    condition: NumberBounds
+    above: NumberBounds
+    below: NumberBounds
     rises: tuple[Rise, ...]
 
 
@@ -329,8 +329,8 @@ def _clipped(value: Fraction) -> Fraction:
     return min(max(value, Fraction(0)), Fraction(1))
 
 
-def _rounded(low: Fraction, high: Fraction) -> Bracket:
-    return Bracket(-_up(-low), _up(high))
+def _rounded(low: Fraction, high: Fraction) -> NumberBounds:
+    return NumberBounds(-_up(-low), _up(high))
 
 
 def _up(value: Fraction) -> float:

@@ -128,7 +128,7 @@ def root(square: Fraction) -> Between:
 
 
 def powered(base: Fraction, power: Fraction) -> Between:
-    """Return bounds of `base**power`, held at 1, for a base from 0 on.
+    """Return bounds of `base**power`, clamped to 1, for a base from 0 on.
 
     Args:
         base: At least 0.
@@ -159,7 +159,7 @@ def _decimal(value: Fraction) -> Decimal:
 
 
 def _exp(q: Fraction) -> Between:
-    """Return bounds of `exp(q)`, held at 1."""
+    """Return bounds of `exp(q)`, clamped to 1."""
     if q >= 0:
         return _exactly(_ONE)
     if q < -_FAR:

@@ -44,7 +44,7 @@ _TINY = 2.0**-1000  # more than what underflow can make
 _REACH = 1.125  # R: how large z may be
 
 
-class Stretch(NamedTuple):
+class DegreePiece(NamedTuple):
     """A part of a shape: `clip(p(z), 0, top)` with `z = (x - origin) / unit`.
 
     Attributes:
@@ -64,7 +64,7 @@ class Stretch(NamedTuple):
     last: Fraction
 
 
-def flank_stretch(flank: Flank, edge: float) -> Stretch:
+def flank_stretch(flank: Flank, edge: float) -> DegreePiece:
     """Return a flank from its end, where z = q = 0, to its start or the edge.
 
     The edge is the plateau's end; beyond `start`, up to it, the degree is constant.
@@ -72,10 +72,12 @@ def flank_stretch(flank: Flank, edge: float) -> Stretch:
     origin, unit = Fraction(flank.end), Fraction(flank.start) - Fraction(flank.end)
     last = min(max((Fraction(edge) - origin) / unit, Fraction(0)), Fraction(1))
     curve = (0.0, *flank.curve)
-    return Stretch(curve, BELOW_ONE, origin, unit, Fraction(0), last)
+    return DegreePiece(curve, BELOW_ONE, origin, unit, Fraction(0), last)
 
 
-def side_stretches(side: Side, mean: float, sign: int) -> tuple[Stretch, Stretch]:
+def side_stretches(
+    side: Side, mean: float, sign: int
+) -> tuple[DegreePiece, DegreePiece]:
     """Return the tail of one side of an LR set and its body, from outside to the mean.
 
     Args:
@@ -88,10 +90,10 @@ def side_stretches(side: Side, mean: float, sign: int) -> tuple[Stretch, Stretch
     level = float(min(max(sum(curve), Fraction(0)), one))
     length = Fraction(side.reach) - 1
     end = Fraction(mean) + spread * Fraction(side.reach)
-    tail = Stretch(
+    tail = DegreePiece(
         (0.0, 0.0, 0.0, 0.0, level), 1.0, end, -spread * length, Fraction(0), one
     )
-    body = Stretch(
+    body = DegreePiece(
         tuple(map(float, curve)), 1.0, Fraction(mean), spread, one, Fraction(0)
     )
     return tail, body

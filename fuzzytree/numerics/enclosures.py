@@ -65,7 +65,7 @@ _CAP = 1.0 - U
 _LARGEST = float(np.finfo(np.float64).max)
 
 
-class Value(NamedTuple):
+class EnclosedValue(NamedTuple):
     """The value of a variable in many rows.
 
     Attributes:
@@ -91,7 +91,7 @@ class Enclosure(NamedTuple):
     high: FloatArray
 
 
-def axis_value(variable: Variable, values: Mapping[str, FloatArray]) -> Value:
+def axis_value(variable: Variable, values: Mapping[str, FloatArray]) -> EnclosedValue:
     """Return the value of a variable by its chain of doubles, and how far it is off.
 
     Args:
@@ -99,7 +99,7 @@ def axis_value(variable: Variable, values: Mapping[str, FloatArray]) -> Value:
         values: The rows' values of each input.
     """
     if not variable.parts:
-        return Value(values[variable.name], None)
+        return EnclosedValue(values[variable.name], None)
     with np.errstate(all="ignore"):
         first, *others = (
             part.weight * (values[part.input] - part.centre) for part in variable.parts
@@ -108,15 +108,16 @@ def axis_value(variable: Variable, values: Mapping[str, FloatArray]) -> Value:
         for term in others:
             total, size = total + term, size + np.abs(term)
         slack = size * ((len(variable.parts) + 3) * U * _MORE) + LEAST
-        return Value(total, np.minimum(slack, _LARGEST))
+        return EnclosedValue(total, np.minimum(slack, _LARGEST))
 
 
-def degree_enclosure(shape: Shape, value: Value) -> Enclosure:
+def degree_enclosure(shape: Shape, value: EnclosedValue) -> Enclosure:
     """Return intervals that hold the exact degrees of finite values.
 
     Example:
         >>> third = Band(0.0, 1.0, right=Flank(1.0, 4.0))
-        >>> low, high = degree_enclosure(third, Value(np.array([1.0, 3.0]), None))
+        >>> value = EnclosedValue(np.array([1.0, 3.0]), None)
+        >>> low, high = degree_enclosure(third, value)
         >>> float(low[0]), float(high[0]), bool(low[1] < 1 / 3 < high[1])
         (1.0, 1.0, True)
     """
@@ -134,7 +135,7 @@ def degree_enclosure(shape: Shape, value: Value) -> Enclosure:
         assert_never(shape)
 
 
-def _band(band: Band, value: Value) -> Enclosure:
+def _band(band: Band, value: EnclosedValue) -> Enclosure:
     x, slack = value
     low, high = np.ones(x.shape), np.ones(x.shape)
     for bound, flank, sign in ((band.low, band.left, -1), (band.high, band.right, 1)):
@@ -154,7 +155,7 @@ def _nothing(x: FloatArray) -> Enclosure:
     return Enclosure(np.zeros(x.shape), np.zeros(x.shape))
 
 
-def _flank(flank: Flank, value: Value) -> Enclosure:
+def _flank(flank: Flank, value: EnclosedValue) -> Enclosure:
     x, slack = value
     curve, span = flank.curve, flank.start - flank.end
     slope = sum(power * abs(c) for power, c in enumerate(curve, 1))
@@ -221,7 +222,7 @@ def _tail(reach: float, u: FloatArray, error: FloatArray) -> Enclosure:
     return Enclosure(low, np.clip(high, LEAST, 1.0))
 
 
-def _points(points: Points, value: Value) -> Enclosure:
+def _points(points: Points, value: EnclosedValue) -> Enclosure:
     x, slack = value
     values, degrees = np.array(points.values), np.array(points.degrees)
     after = np.searchsorted(values, x, side="left")

@@ -220,8 +220,8 @@ def _fired(rules: RuleBase, row: Mapping[str, float]) -> Exact:
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
     clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
     variables = {v.name: v for v in rules.variables}
-    asked = dict.fromkeys(clause.variable for clause in clauses)
-    axes = {name: exact_axis(variables[name], row) for name in asked}
+    names = dict.fromkeys(clause.variable for clause in clauses)
+    axes = {name: exact_axis(variables[name], row) for name in names}
     degrees = {c: _clause_degree(c, shapes, axes[c.variable]) for c in clauses}
     is_product = rules.semantics.conjunction == "product"
     strengths = tuple(
@@ -251,10 +251,10 @@ def _descended(tree: FuzzyTree, row: Mapping[str, float]) -> Exact:
     variables = {v.name: v for v in tree.variables}
     node, leaf = (1, None) if tree.nodes else (None, 1)
     while node is not None:
-        asked = tree.nodes[node - 1]
-        value = exact_axis(variables[asked.variable], row)
-        interval = sum(1 for cut in asked.cuts if value > cut)
-        branch = asked.branches[asked.owners[interval]]
+        node_tested = tree.nodes[node - 1]
+        value = exact_axis(variables[node_tested.variable], row)
+        interval = sum(1 for cut in node_tested.cuts if value > cut)
+        branch = node_tested.branches[node_tested.owners[interval]]
         node, leaf = branch.node, branch.leaf
     number = leaf or 0
     return Exact(number, tree.leaves[number - 1].label, DECIDED, (), _ONE)

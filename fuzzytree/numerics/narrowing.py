@@ -99,7 +99,7 @@ def _shape_losses(where: str, shape: Shape) -> Iterator[Loss]:
 def _peak_losses(where: str, points: Points) -> Iterator[Loss]:
     """Yield where points become one and a degree beyond those at their ends is gone.
 
-    Other points that become one are a step, as steep as float32 can tell.
+    Other points that become one are a step, as steep as float32 can represent.
     """
     single = rounded(points.values, np.float32).tolist()
     pairs = zip(single, points.values, points.degrees, strict=True)

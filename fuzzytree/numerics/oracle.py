@@ -10,8 +10,8 @@ to fractions what the intervals leave open:
 - Under the minimum, rules of a tree often tie because they share their weakest clause.
   Where all the strongest have the same term as their weakest, for sure, they are equal
   in exact arithmetic too, whatever its degree above 0 is.
-- A tree takes the same path exactly as in doubles wherever no value that a node asks is
-  as close to one of its cuts as its slack.
+- A tree takes the same path exactly as in doubles wherever no value that a node tests
+  is as close to one of its cuts as its slack.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import Clause, RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.enclosures import (
+    EnclosedValue,
     Enclosure,
     U,
-    Value,
     axis_value,
     clause_enclosure,
     degree_enclosure,
@@ -62,9 +62,9 @@ __all__ = [
     "SHARPENED",
     "TIE",
     "UNCOVERED",
-    "Decided",
+    "Decisions",
+    "ErrorMeasure",
     "Exact",
-    "Observed",
     "decide",
     "error_against_exact",
     "exact_answer",
@@ -78,7 +78,7 @@ _NUMBERS = 1 << 21  # of a chunk's intervals: 32 MB for both ends
 _FEWEST, _MOST = 64, 1 << 13  # rows of a chunk
 
 
-class Decided(msgspec.Struct, frozen=True):
+class Decisions(msgspec.Struct, frozen=True):
     """The exact answers to many rows.
 
     Attributes:
@@ -86,7 +86,7 @@ class Decided(msgspec.Struct, frozen=True):
         label: The number of its class; -1 for no class.
         status: `DECIDED`, `TIE`, `UNCOVERED` or `MISSING`.
         strengths: Shape (rules, rows): doubles near the exact strengths; NaN in rows
-            with missing values. None for a tree, or if not asked for.
+            with missing values. None for a tree, or if not computed.
         doubt: At most so far is any strength of a row from the exact one.
         margin: At least so far the strongest class is ahead of the next (see `Exact`).
         margin_high: At most so far.
@@ -103,7 +103,9 @@ class Decided(msgspec.Struct, frozen=True):
     by_fractions: int
 
 
-def decide(model: Model, values: FloatArray, *, with_strengths: bool = True) -> Decided:
+def decide(
+    model: Model, values: FloatArray, *, with_strengths: bool = True
+) -> Decisions:
     """Return the exact answer to each row: what is left open is settled by fractions.
 
     Args:
@@ -124,7 +126,7 @@ def decide(model: Model, values: FloatArray, *, with_strengths: bool = True) -> 
     width = len(model.inputs)
     if values.ndim != 2 or values.shape[0] != width:
         raise ValueError(f"values must have shape ({width}, rows), not {values.shape}")
-    parts: list[Decided] = []
+    parts: list[Decisions] = []
     for part in _chunks(model, values.shape[1]):
         if isinstance(model, RuleBase):
             found = _decide_rules(model, values[:, part])
@@ -147,9 +149,9 @@ def _chunks(model: Model, rows: int) -> Iterator[slice]:
         yield slice(start, start + step)
 
 
-def _concatenated(parts: Sequence[Decided]) -> Decided:
+def _concatenated(parts: Sequence[Decisions]) -> Decisions:
     strengths = [part.strengths for part in parts if part.strengths is not None]
-    return Decided(
+    return Decisions(
         np.concatenate([part.rule for part in parts]),
         np.concatenate([part.label for part in parts]),
         np.concatenate([part.status for part in parts]),
@@ -173,7 +175,7 @@ class _Enclosed(msgspec.Struct, frozen=True):
     rules: Enclosure
 
 
-def _decide_rules(rules: RuleBase, values: FloatArray) -> Decided:
+def _decide_rules(rules: RuleBase, values: FloatArray) -> Decisions:
     with np.errstate(all="ignore"):
         enclosed = _enclosed(rules, values)
         low, high = enclosed.rules
@@ -203,12 +205,14 @@ def _decide_rules(rules: RuleBase, values: FloatArray) -> Decided:
         doubt[row] = U
         margin[row], margin_high[row] = outwards(answer.margin)
     label = _labels(rules, [r.then for r in rules.rules], rule, status)
-    return Decided(
+    return Decisions(
         rule, label, status, strengths, doubt, margin, margin_high, len(rows)
     )
 
 
-def _axes(model: Model, values: FloatArray) -> tuple[dict[str, Value], BoolArray]:
+def _axes(
+    model: Model, values: FloatArray
+) -> tuple[dict[str, EnclosedValue], BoolArray]:
     """Return the value of each variable, and which rows miss one."""
     named = dict(zip(model.inputs, values, strict=True))
     axes = {v.name: axis_value(v, named) for v in model.variables}
@@ -362,7 +366,7 @@ def _labels(
 # --- trees
 
 
-def _decide_tree(tree: FuzzyTree, values: FloatArray) -> Decided:
+def _decide_tree(tree: FuzzyTree, values: FloatArray) -> Decisions:
     with np.errstate(all="ignore"):
         axes, missing = _axes(tree, values)
         rule, is_open = _followed(tree, axes, missing)
@@ -373,11 +377,11 @@ def _decide_tree(tree: FuzzyTree, values: FloatArray) -> Decided:
     status = np.where(missing, MISSING, DECIDED)
     label = _labels(tree, [leaf.label for leaf in tree.leaves], rule, status)
     sure = np.ones(len(rule))
-    return Decided(rule, label, status, None, 0.0 * sure, sure, sure, len(rows))
+    return Decisions(rule, label, status, None, 0.0 * sure, sure, sure, len(rows))
 
 
 def _followed(
-    tree: FuzzyTree, axes: Mapping[str, Value], missing: BoolArray
+    tree: FuzzyTree, axes: Mapping[str, EnclosedValue], missing: BoolArray
 ) -> tuple[IntArray, BoolArray]:
     """Return each row's leaf by doubles, and where they may err on the way."""
     leaf = np.zeros(missing.shape, np.int64)
@@ -482,14 +486,14 @@ def _errors(
     return least, most
 
 
-class Observed(NamedTuple):
+class ErrorMeasure(NamedTuple):
     """How far answers are from the exact ones.
 
     Attributes:
         rows: Rows on which it was observed.
         largest: The largest difference of a strength from the exact one that is
             certain: the largest lower end of `strength_errors`. None where no strengths
-            are told.
+            are known.
         bound: The certified bound of it; None where there is none.
         origin: Where the bound comes from, or why there is none.
         flips: Rows whose class differs from the exact one.
@@ -520,15 +524,15 @@ def error_against_exact(
     *,
     bound: float | None = None,
     origin: str = "",
-    exact: Decided | None = None,
-) -> Observed:
+    exact: Decisions | None = None,
+) -> ErrorMeasure:
     """Return how far answers to some rows are from the exact ones.
 
     Args:
         model: What was to be computed.
         values: Shape (inputs, rows).
         labels: The class number of each answer; -1 for no class.
-        strengths: Shape (rules, rows), if they are told.
+        strengths: Shape (rules, rows), if they are known.
         bound: The certified largest error of a strength, if there is one.
         origin: Where the bound comes from.
         exact: The exact answers to the same rows, if they are known already.
@@ -553,7 +557,7 @@ def error_against_exact(
     if bound is not None and is_rules:
         band = float((truth.margin <= 2.0 * bound).mean()) if flips.size else 0.0
     lost, gained = _cover(model, labels, strengths, truth)
-    return Observed(
+    return ErrorMeasure(
         int(flips.size),
         largest,
         bound,
@@ -567,9 +571,9 @@ def error_against_exact(
 
 
 def _cover(
-    model: Model, labels: IntArray, strengths: FloatArray | None, truth: Decided
+    model: Model, labels: IntArray, strengths: FloatArray | None, truth: Decisions
 ) -> tuple[int, int]:
-    """Return how many rows lost and gained cover, as far as the answers tell it."""
+    """Return how many rows lost and gained cover, as far as the predictions show it."""
     weighed = truth.status != MISSING
     if strengths is not None:
         weighed = weighed & ~np.isnan(strengths).any(axis=0)

@@ -22,7 +22,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import LR, MOST_POINTS, Band, Flank, Points
 from fuzzytree.numerics.curves import (
     BELOW_ONE,
-    Stretch,
+    DegreePiece,
     derivative,
     distance,
     flank_stretch,
@@ -120,14 +120,14 @@ def _double(value: Fraction) -> float:
         raise LossError("it reaches beyond the largest double") from None
 
 
-def _steepness(stretch: Stretch) -> Fraction:
+def _steepness(stretch: DegreePiece) -> Fraction:
     """Return what the slope of a stretch is at most, per unit of the variable."""
     slope = sum(k * abs(c) * 1.125**k for k, c in enumerate(stretch.coefficients))
     return Fraction(slope * _ROUNDING) / abs(stretch.unit)
 
 
 def _joined(
-    stretch: Stretch, ends: tuple[float, float], tolerance: float
+    stretch: DegreePiece, ends: tuple[float, float], tolerance: float
 ) -> tuple[list[tuple[float, float]], float]:
     """Return points along a stretch, its ends included, and the error of the lines.
 
@@ -153,7 +153,7 @@ def _joined(
     raise LossError(_TOO_COARSE.format(ends[1]))
 
 
-def _knots(stretch: Stretch) -> list[float]:
+def _knots(stretch: DegreePiece) -> list[float]:
     """Return the places of a stretch where points must lie, in its direction.
 
     They are its ends, where its polynomial leaves [0, top], and where it bends from
@@ -213,7 +213,7 @@ def _room(needed: float) -> float:
 
 
 def _rounded(
-    stretch: Stretch,
+    stretch: DegreePiece,
     ends: tuple[float, float],
     z: FloatArray,
     degrees: FloatArray,
@@ -240,7 +240,7 @@ def _line_error(
     """Return how far lines between points can be from a curve, clipped."""
     degrees = np.array([degree for _, degree in points])
     width = np.diff(z)
-    is_wide = width != 0  # places that doubles cannot tell apart are one
+    is_wide = width != 0  # places that doubles cannot distinguish are one
     slope = np.diff(degrees)[is_wide] / width[is_wide]
     first, last = z[:-1][is_wide], z[1:][is_wide]
     lines = np.stack([degrees[:-1][is_wide] - slope * first, slope])

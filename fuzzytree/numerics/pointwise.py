@@ -1,6 +1,6 @@
 """Point lists joined value by value: the least, the greatest, the product, 1 minus.
 
-For formats in which a rule asks a variable only once: `x is low and x is not far` is
+For formats in which a rule tests a variable only once: `x is low and x is not far` is
 one term there. Everything is computed with rational numbers and rounded once at the
 end; the bound covers that rounding, at every real value.
 """

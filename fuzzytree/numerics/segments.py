@@ -2,7 +2,7 @@
 
 Runtimes and exporters that promise equal bits take their constants from here. On each
 line, with `position = (x - anchor) / width`, the degree is
-`near + position * (far - near)`, held between `near` and `far`.
+`near + position * (far - near)`, clamped between `near` and `far`.
 """
 
 from __future__ import annotations

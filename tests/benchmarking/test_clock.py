@@ -10,7 +10,7 @@ from itertools import combinations
 import pytest
 
 from fuzzytree.benchmarking.clock import (
-    Clock,
+    TimeSource,
     interval,
     measure,
     median_ranks,
@@ -32,8 +32,8 @@ class FakeTime:
     def __init__(self) -> None:
         self.wall = self.cpu = 0
 
-    def clock(self) -> Clock:
-        return Clock(lambda: self.wall, lambda: self.cpu)
+    def clock(self) -> TimeSource:
+        return TimeSource(lambda: self.wall, lambda: self.cpu)
 
     def call(self, ms: float, *, stolen_ms: float = 0.0) -> Callable[[], object]:
         def call() -> None:
@@ -108,7 +108,7 @@ def test_time_that_a_neighbour_took_is_told() -> None:
 
 def test_a_coarse_processor_clock_tells_nothing_of_stolen_time() -> None:
     time = FakeTime()
-    clock = Clock(lambda: time.wall, None)
+    clock = TimeSource(lambda: time.wall, None)
     found = time_calls({"a": time.call(5.0)}, rows=1, rounds=6, clock=clock)
     assert found.timings["a"].stolen is None
 

@@ -133,7 +133,7 @@ def test_few_rounds_are_never_sure() -> None:
 def test_what_tells_no_strengths_is_said() -> None:
     best_first = point("best-first", 100.0, error(None, 1e-15))
     (sentence,) = advice([NATIVE, best_first])
-    assert "use best-first (which tells no strengths): 10.0 times faster" in sentence
+    assert "use best-first (which returns no strengths): 10.0 times faster" in sentence
 
 
 def test_a_tree_is_judged_by_its_classes_and_its_edges() -> None:

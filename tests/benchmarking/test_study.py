@@ -18,9 +18,15 @@ import numpy as np
 import pytest
 
 from fuzzytree.benchmarking.candidates import chosen, found_of, gather
-from fuzzytree.benchmarking.clock import Clock, Tell
+from fuzzytree.benchmarking.clock import TimeSource
 from fuzzytree.benchmarking.judging import made_rows, repeated
-from fuzzytree.benchmarking.records import Candidate, Found, Loaded, Omission, Study
+from fuzzytree.benchmarking.records import (
+    Candidate,
+    CandidateOutput,
+    LoadedCandidate,
+    Omission,
+    Study,
+)
 from fuzzytree.benchmarking.study import (
     BenchSettings,
     bench,
@@ -34,7 +40,7 @@ from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray, Progress
 
 pytestmark = pytest.mark.usefixtures("few_objects")
 
@@ -50,8 +56,8 @@ class FakeTime:
     def __init__(self) -> None:
         self.now = 0
 
-    def clock(self) -> Clock:
-        return Clock(lambda: self.now, lambda: self.now)
+    def clock(self) -> TimeSource:
+        return TimeSource(lambda: self.now, lambda: self.now)
 
 
 def candidate(
@@ -70,11 +76,11 @@ def candidate(
     """Return a candidate that answers as the native runtime, with a planted error."""
     run = load(rules)
 
-    def answer(values: FloatArray) -> Found:
+    def answer(values: FloatArray) -> CandidateOutput:
         outcome = run(values)
         found = found_of(outcome, rules)
         assert found.strengths is not None
-        return Found(found.labels, found.strengths - error)
+        return CandidateOutput(found.labels, found.strengths - error)
 
     def call(values: FloatArray) -> Callable[[], object]:
         def timed() -> None:
@@ -84,10 +90,10 @@ def candidate(
 
         return timed
 
-    def prepare(threads: int) -> Loaded:
+    def prepare(threads: int) -> LoadedCandidate:
         if loads is not None:
             loads.append(threads)
-        return Loaded(answer, call)
+        return LoadedCandidate(answer, call)
 
     made = Candidate(
         f"{name}: rules",
@@ -103,7 +109,7 @@ def studied(
     *candidates: Candidate,
     plan: BenchSettings = SMALL,
     time: FakeTime | None = None,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
 ) -> Study:
     values, data = made_rows(RULES, 40)
     return run_study(
@@ -171,7 +177,7 @@ def test_what_fails_is_an_omission_and_the_others_are_measured(calls: int) -> No
 
 
 def test_what_cannot_be_loaded_is_an_omission() -> None:
-    def refuse(threads: int) -> Loaded:
+    def refuse(threads: int) -> LoadedCandidate:
         raise OSError("no such library")
 
     broken = msgspec.structs.replace(candidate("broken"), load=refuse)
@@ -303,7 +309,7 @@ def test_what_takes_longer_to_load_again_than_there_is_time_is_an_omission() -> 
     time = FakeTime()
     made = candidate("heavy", time=time, is_parallel=True)
 
-    def slowly(threads: int) -> Loaded:
+    def slowly(threads: int) -> LoadedCandidate:
         time.now += 3000 * MS
         return made.load(threads)
 
@@ -417,7 +423,7 @@ def test_names_questions_and_kinds_choose_candidates(
 
 def test_candidates_that_were_not_asked_for_are_counted() -> None:
     made = [candidate("a"), candidate("b"), candidate("c")]
-    assert chosen(made, ["a"], ())[1] == [Omission("2 candidates", "not asked for")]
+    assert chosen(made, ["a"], ())[1] == [Omission("2 candidates", "not selected")]
     assert chosen(made, (), ())[1] == []
 
 

@@ -14,11 +14,13 @@ from fuzzytree.testing import random_tree
 
 PEERS = """
 import ctypes, os, signal, sys, time
-from fuzzytree.benchmarking.records import Candidate, Found, Loaded
+from fuzzytree.benchmarking.records import Candidate, CandidateOutput, LoadedCandidate
 
 def well(threads):
     print("a library that prints")
-    return Loaded(lambda values: Found(values[0]), lambda values: lambda: None)
+    def answer(values):
+        return CandidateOutput(values[0])
+    return LoadedCandidate(answer, lambda values: lambda: None)
 
 def crash(threads):
     os.kill(os.getpid(), signal.SIGSEGV)
@@ -37,7 +39,7 @@ def fail(threads):
 def late(threads):
     def call(values):
         return lambda: os.kill(os.getpid(), signal.SIGKILL)
-    return Loaded(lambda values: Found(values[0]), call)
+    return LoadedCandidate(lambda values: CandidateOutput(values[0]), call)
 
 def peers(model, bounds):
     loads = (well, crash, leave, hang, fail, late)

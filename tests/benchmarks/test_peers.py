@@ -20,7 +20,7 @@ from peers import TREE_PEERS, engines, peers
 from peers.crisp import questions as asked_questions
 
 from fuzzytree.benchmarking.candidates import found_of, questions
-from fuzzytree.benchmarking.records import Candidate, Found, Loaded
+from fuzzytree.benchmarking.records import Candidate, CandidateOutput, LoadedCandidate
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import (
@@ -71,11 +71,11 @@ def _with_all_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: object())
 
 
-def answer(model: Model, name: str, values: FloatArray) -> Found:
+def answer(model: Model, name: str, values: FloatArray) -> CandidateOutput:
     return candidate(model, name).load(1).answer(values)
 
 
-def native(model: Model, values: FloatArray) -> Found:
+def native(model: Model, values: FloatArray) -> CandidateOutput:
     return found_of(load_native(model)(values), model)
 
 
@@ -288,7 +288,7 @@ def chain(count: int) -> FuzzyTree:
     return FuzzyTree("chain", ("a", "b"), (x,), tuple(nodes), leaves)
 
 
-def loaded_deep(peer: str, tree: FuzzyTree) -> Loaded:
+def loaded_deep(peer: str, tree: FuzzyTree) -> LoadedCandidate:
     """Load a tree in a peer, without preparing its rules for others."""
     candidate(random_tree(1), f"{peer}: tree")  # or skip
     (load,) = [one.load for one in TREE_PEERS if one.name == peer]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fuzzytree.checking.comparing import (
-    Answers,
-    Rows,
+    ModelRun,
+    RowSet,
     compare_answers,
     compare_bits,
     compare_exact,
@@ -38,14 +38,14 @@ RULES = RuleBase(
     (Rule((CLAUSE,), "a"), Rule((CLAUSE,), "b"), Rule((CLAUSE,), "a")),
     Semantics(uncovered="b"),
 )
-ROWS = Rows(("x",), np.array([[1.0, 2.0, 3.0]]), np.arange(3), 1)
+ROWS = RowSet(("x",), np.array([[1.0, 2.0, 3.0]]), np.arange(3), 1)
 
 
 def answers(
     title: str, rule: list[int], status: list[int], strengths: list[list[float]]
-) -> Answers:
+) -> ModelRun:
     outcome = Outcome(np.array(rule), np.array(status), np.array(strengths))
-    return Answers(title, RULES, outcome)
+    return ModelRun(title, RULES, outcome)
 
 
 BASE = answers(
@@ -198,10 +198,10 @@ NARROW = RuleBase(
 def held(values: list[float], strengths: list[list[float]], dtype: Dtype) -> Certified:
     """Hold strengths against the exact ones of `a: low, b: above 2`; one probe."""
     fired = np.array(strengths)
-    rows = Rows(("x",), np.array([values]), np.arange(len(values)), 1)
+    rows = RowSet(("x",), np.array([values]), np.arange(len(values)), 1)
     rule = np.where(fired.max(axis=0) > 0, fired.argmax(axis=0) + 1, 0)
     status = np.where(rule > 0, 0, 2)
-    found = Answers("mine", NARROW, Outcome(rule, status, fired))
+    found = ModelRun("mine", NARROW, Outcome(rule, status, fired))
     return compare_exact(found, decide(NARROW, rows.values), rows, dtype=dtype)
 
 
@@ -246,9 +246,9 @@ def test_a_flip_beside_a_step_that_float32_cannot_tell_is_allowed() -> None:
 def test_cover_that_is_lost_and_gained_is_counted() -> None:
     near = math.nextafter(3.0, 0.0)
     low = RuleBase("r", ("a",), (Variable("x", (LOW,)),), (Rule((CLAUSE,), "a"),))
-    rows = Rows(("x",), np.array([[near, 3.0]]), np.arange(2), 0)
+    rows = RowSet(("x",), np.array([[near, 3.0]]), np.arange(2), 0)
     fired = np.array([[0.0, 1e-17]])
-    found = Answers("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))
+    found = ModelRun("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))
     told = compare_exact(found, decide(low, rows.values), rows, dtype="float64")
     assert (told.cover_lost, told.cover_gained, told.verdict) == (1, 1, "agrees")
 
@@ -257,13 +257,13 @@ def test_a_path_that_leaves_the_tree_far_from_its_cuts_disagrees() -> None:
     tree = random_tree(1, leaves=2, inputs=1, combinations=0)
     (cut,) = tree.nodes[0].cuts[:1]
     values = np.array([[cut, math.nextafter(cut, math.inf), cut + abs(cut)]])
-    rows = Rows(tree.inputs, values, np.arange(3), 0)
+    rows = RowSet(tree.inputs, values, np.arange(3), 0)
     truth = decide(tree, values)
     wrong = Outcome(3 - truth.rule, truth.status)
-    found = Answers("mine", tree, wrong)
+    found = ModelRun("mine", tree, wrong)
     assert labels(found).tolist() != truth.label.tolist()
     assert compare_exact(found, truth, rows, dtype="float64").verdict == "DISAGREES"
-    near = Rows(tree.inputs, values[:, :2], np.arange(2), 0)
+    near = RowSet(tree.inputs, values[:, :2], np.arange(2), 0)
     part = found.part(slice(0, 2))
     told = compare_exact(part, decide(tree, near.values), near, dtype="float32")
     assert (told.verdict, told.flips, told.in_band) == ("agrees", 2, 2)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fuzzytree.learning.cuts import (
-    Cuts,
+    SplitCuts,
     crossing_cuts,
     settled_cuts,
     smoothed_cuts,
@@ -182,5 +182,5 @@ def test_a_cut_is_a_round_number(
 def test_an_interval_without_a_row_goes_to_its_neighbours(
     points: list[float], owners: list[int], left: list[float], of: list[int]
 ) -> None:
-    found = without_empty(Cuts(np.array(points), np.array(owners)))
+    found = without_empty(SplitCuts(np.array(points), np.array(owners)))
     assert (found.cuts.tolist(), found.owners.tolist()) == (left, of)

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzytree.learning.units import FloatArray, Units, units_of
+from fuzzytree.learning.units import ColumnUnits, FloatArray, units_of
 
 STEPS = st.lists(st.integers(-1000, 1000), min_size=2, max_size=20, unique=True)
 
 
-def own_units(rows: FloatArray) -> Units:
+def own_units(rows: FloatArray) -> ColumnUnits:
     return units_of(rows, rows.min(axis=0), rows.max(axis=0))
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from fuzzytree.model.rulebase import LR, Band, Flank, Shape, Side
 from fuzzytree.numerics.curves import (
-    Stretch,
+    DegreePiece,
     body_coefficients,
     distance,
     flank_stretch,
@@ -112,7 +112,7 @@ def test_stretches_are_the_shapes_that_they_come_from() -> None:
         Fraction(4, 5),
     )  # of 2.5 to the edge
     uneven = LR(3.0, Side(0.5, (0.5, 0.25), 4.0), Side(2.0, (1.0,), 1.5))
-    cases: list[tuple[Stretch, Shape]] = [(stretch, band)]
+    cases: list[tuple[DegreePiece, Shape]] = [(stretch, band)]
     for side, sign in ((uneven.left, -1), (uneven.right, 1)):
         cases += [(one, uneven) for one in side_stretches(side, uneven.mean, sign)]
     for one, shape in cases:

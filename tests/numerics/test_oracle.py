@@ -29,14 +29,14 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.numerics import enclosures
-from fuzzytree.numerics.enclosures import LEAST, Value, degree_enclosure
+from fuzzytree.numerics.enclosures import LEAST, EnclosedValue, degree_enclosure
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.numerics.oracle import (
     DECIDED,
     MISSING,
     TIE,
     UNCOVERED,
-    Decided,
+    Decisions,
     decide,
     error_against_exact,
     exact_answer,
@@ -64,7 +64,7 @@ def made(seed: int, kind: Kind, conjunction: Conjunction) -> RuleBase:
     return with_points(rules, seed) if seed % 3 == 0 else rules
 
 
-def faults(model: Model, values: FloatArray, found: Decided) -> list[str]:
+def faults(model: Model, values: FloatArray, found: Decisions) -> list[str]:
     """Return where answers to many rows are not those to one row at a time."""
     wrong: list[str] = []
     for row, column in enumerate(values.T.tolist()):
@@ -253,7 +253,7 @@ def holes(shape: Shape, *, slack: float = 0.0) -> int:
     marks += [0.0, 1e308, -1e308, 5e-324, 0.3, *np.linspace(-3.0, 3.0, 13).tolist()]
     x = np.array(marks)
     off = np.maximum(np.abs(x) * slack, LEAST) if slack else None
-    low, high = degree_enclosure(shape, Value(x, off))
+    low, high = degree_enclosure(shape, EnclosedValue(x, off))
     count = 0
     for moved in (-1.0, 0.7, 1.0) if off is not None else (0.0,):
         for row, value in enumerate(marks):
@@ -278,7 +278,7 @@ def test_an_interval_holds_the_degree_of_every_value_within_the_slack(
 
 def test_intervals_are_narrow_and_exact_where_doubles_are() -> None:
     x = np.array([0.5, 1.0, 2.0, 4.0, 5.0])
-    low, high = degree_enclosure(LOW.shape, Value(x, None))
+    low, high = degree_enclosure(LOW.shape, EnclosedValue(x, None))
     assert (high - low).tolist()[0::3] == [0.0, 0.0]
     assert 0 < (high - low)[2] < 16 * 2.0**-53
 
@@ -295,8 +295,8 @@ def test_a_filter_that_forgets_the_slack_of_combinations_is_found(
 ) -> None:
     right = enclosures.axis_value
 
-    def forgetful(variable: Variable, values: dict[str, FloatArray]) -> Value:
-        return Value(right(variable, values).x, None)
+    def forgetful(variable: Variable, values: dict[str, FloatArray]) -> EnclosedValue:
+        return EnclosedValue(right(variable, values).x, None)
 
     monkeypatch.setattr("fuzzytree.numerics.oracle.axis_value", forgetful)
     found = 0
@@ -312,7 +312,7 @@ def test_a_filter_that_takes_an_edge_for_the_plateau_is_found(
 ) -> None:
     right = enclosures._band
 
-    def careless(band: Band, value: Value) -> enclosures.Enclosure:
+    def careless(band: Band, value: EnclosedValue) -> enclosures.Enclosure:
         low = None if band.low is None else math.nextafter(band.low, -math.inf)
         return right(Band(low, band.high, band.left, band.right), value)
 

@@ -45,7 +45,7 @@ from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Rule, RuleBase, Variable
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.oracle import MISSING, TIE, UNCOVERED, Decided, decide
+from fuzzytree.numerics.oracle import MISSING, TIE, UNCOVERED, Decisions, decide
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.semantics.simplification import proof_faults, unguarded
 
@@ -78,7 +78,7 @@ class RulePair(msgspec.Struct, frozen=True, eq=False):
     domain: Domain
     trees: tuple[FuzzyTree, FuzzyTree] | None = None
 
-    def decided(self, values: FloatArray) -> tuple[Decided, Decided]:
+    def decided(self, values: FloatArray) -> tuple[Decisions, Decisions]:
         """Return the exact answers of both to rows of shape (inputs, rows)."""
         one, other = (
             decide(
@@ -95,7 +95,7 @@ class RulePair(msgspec.Struct, frozen=True, eq=False):
         inputs = values[[self.inputs.index(name) for name in self.old.inputs]]
         return decide(self.old, inputs, with_strengths=False).label
 
-    def labels(self, found: tuple[Decided, Decided]) -> tuple[IntArray, IntArray]:
+    def labels(self, found: tuple[Decisions, Decisions]) -> tuple[IntArray, IntArray]:
         """Return the classes of both answers, numbered alike; -1 is no class."""
         known = list(dict.fromkeys((*self.old.classes, *self.new.classes)))
         one, other = (

@@ -34,8 +34,8 @@ from fuzzytree.auditing.engine.polynomials import (
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Clause, Shape
 from fuzzytree.numerics.enclosures import (
+    EnclosedValue,
     Enclosure,
-    Value,
     clause_enclosure,
     degree_enclosure,
 )
@@ -239,7 +239,7 @@ def _order(values: Sequence[Fraction]) -> list[int]:
 
 def _enclosed(element: RuleCurve, x: FloatArray, slack: FloatArray | None) -> Enclosure:
     checkpoint()
-    result = degree_enclosure(element.shape, Value(x, slack))
+    result = degree_enclosure(element.shape, EnclosedValue(x, slack))
     return clause_enclosure(Clause("", ("",), element.is_complement), [result])
 
 
@@ -347,7 +347,7 @@ def crossings(elements: Sequence[RuleCurve]) -> int:
     x = np.quantile(sorted(ends), np.linspace(0.0, 1.0, _STEPS))
     degrees = np.empty((len(elements), len(x)))
     for row, element in enumerate(elements):
-        result = degree_enclosure(element.shape, Value(x, None)).low
+        result = degree_enclosure(element.shape, EnclosedValue(x, None)).low
         degrees[row] = 1.0 - result if element.is_complement else result
     count = 0
     for row in range(1, len(elements)):

@@ -18,8 +18,8 @@ from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
 from fuzzytree.auditing.engine.polynomials import composed, derivative, roots
 from fuzzytree.model.rulebase import Clause, Shape
 from fuzzytree.numerics.enclosures import (
+    EnclosedValue,
     Enclosure,
-    Value,
     clause_enclosure,
     degree_enclosure,
 )
@@ -130,7 +130,7 @@ def shape_ranges(shape: Shape, edges: FloatArray) -> tuple[Enclosure, Enclosure]
         >>> cells.low.round(9).tolist(), cells.high.round(9).tolist()
         ([0.5, 0.0], [1.0, 0.5])
     """
-    at = degree_enclosure(shape, Value(edges, None))
+    at = degree_enclosure(shape, EnclosedValue(edges, None))
     a, b = edges[..., :-1], edges[..., 1:]
     low, high = at.low[..., :-1], at.high[..., :-1]
     turning = bends(shape)

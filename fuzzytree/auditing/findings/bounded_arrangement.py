@@ -47,8 +47,8 @@ from fuzzytree.model.rulebase import (
     shapes_of,
 )
 from fuzzytree.numerics.enclosures import (
+    EnclosedValue,
     Enclosure,
-    Value,
     clause_enclosure,
     degree_enclosure,
     strength_enclosure,
@@ -300,7 +300,7 @@ def _places(variable: Variable, domain: Domain) -> FloatArray:
 
 def _degrees(rules: RuleBase, name: str, at: FloatArray) -> tuple[FloatArray, ...]:
     """Return bounds of each rule's degree at some values of a variable."""
-    shapes, value = shapes_of(rules.variables), Value(at, None)
+    shapes, value = shapes_of(rules.variables), EnclosedValue(at, None)
     known: dict[Clause, Enclosure] = {}
     low, high = (np.ones((len(rules.rules), len(at))) for _ in range(2))
     is_product = rules.semantics.conjunction == "product"

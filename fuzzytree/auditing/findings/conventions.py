@@ -25,7 +25,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import rows_outside, sample_points
-from fuzzytree.checking.comparing import Answers, labels
+from fuzzytree.checking.comparing import ModelRun, labels
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Model, SystemOutcome
 from fuzzytree.model.rulebase import RuleBase
@@ -84,7 +84,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     for question in questions(subject):
         subject.clock.check()
         found = [
-            Answers(title, form, run(question.values)) for title, form, run in runs
+            ModelRun(title, form, run(question.values)) for title, form, run in runs
         ]
         yield from convention_answers(subject, question, found)
 
@@ -187,7 +187,7 @@ def _outside(subject: Subject) -> Iterator[tuple[str, float]]:
 
 
 def convention_answers(
-    subject: Subject, question: Convention, found: Sequence[Answers]
+    subject: Subject, question: Convention, found: Sequence[ModelRun]
 ) -> Iterator[Answer]:
     """Yield each representation that differs in a question, or that none does.
 
@@ -199,7 +199,7 @@ def convention_answers(
             model of their own.
     """
     count = question.values.shape[1]
-    first: dict[str, Answers] = {}
+    first: dict[str, ModelRun] = {}
     is_alike = True
     for one in found:
         form = one.title.rpartition(": ")[2]
@@ -222,7 +222,7 @@ def convention_answers(
         yield Answer("FT602", question.name, text, Proved(how), is_finding=False)
 
 
-def _differ(one: Answers, base: Answers) -> BoolArray:
+def _differ(one: ModelRun, base: ModelRun) -> BoolArray:
     """Return where two representations differ in class or in a missing value.
 
     A tree does not know ties: between a tree and rules these are no difference.
@@ -238,7 +238,11 @@ def _differ(one: Answers, base: Answers) -> BoolArray:
 
 
 def _broken(
-    subject: Subject, question: Convention, one: Answers, base: Answers, rows: IntArray
+    subject: Subject,
+    question: Convention,
+    one: ModelRun,
+    base: ModelRun,
+    rows: IntArray,
 ) -> Answer:
     values = question.values[:, rows]
     probe = _probe(subject, values[:, 0])
@@ -260,7 +264,7 @@ def _broken(
     )
 
 
-def _said(answers: Answers, row: int) -> str:
+def _said(answers: ModelRun, row: int) -> str:
     number = int(labels(answers)[row])
     label = "no class" if number < 0 else repr(answers.model.classes[number])
     rule, status = int(answers.outcome.rule[row]), int(answers.outcome.status[row])

@@ -29,7 +29,7 @@ from fuzzytree.numerics.enclosures import (
 from fuzzytree.numerics.oracle import (
     MISSING,
     UNCOVERED,
-    Decided,
+    Decisions,
     decide,
     exact_answer,
     exact_axis,
@@ -230,7 +230,7 @@ def count_rows(
 
 
 def _settled(
-    subject: Subject, values: FloatArray, found: Decided
+    subject: Subject, values: FloatArray, found: Decisions
 ) -> tuple[BoolArray, BoolArray, FloatArray]:
     """Settle by fractions what the doubts of some answers leave open.
 

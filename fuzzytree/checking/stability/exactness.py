@@ -9,18 +9,18 @@ import numpy as np
 
 from fuzzytree.checking.stability.results import Criterion, OffsetCost, judged
 from fuzzytree.checking.stability.runs import (
-    Observed,
+    ExactCheck,
+    exact_check,
     first_line,
-    made_ready,
-    observed,
-    ready,
+    loaded_form,
+    loaded_forms,
     unequal,
 )
-from fuzzytree.checking.stability.sensitivity import Scale, input_scales
+from fuzzytree.checking.stability.sensitivity import InputScale, input_scales
 from fuzzytree.checking.stability.transforms import moved
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
-from fuzzytree.numerics.oracle import Decided, decide
+from fuzzytree.numerics.oracle import Decisions, decide
 from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.probing import probe_values
 
@@ -39,7 +39,7 @@ def exactness(
     """Hold every runtime against the exact answers, within its bound (N8).
 
     Runtimes of one number type that claim no bound of their own promise the same
-    operations: they are held against each other as well, bit for bit.
+    operations: they are compared with each other as well, bit for bit.
 
     Args:
         model: A tree or a rule base.
@@ -49,16 +49,16 @@ def exactness(
     """
     faults: list[str] = []
     skipped: list[str] = []
-    exact: dict[tuple[str, int], Decided] = {}
-    seen: dict[str, list[Observed]] = {}
+    exact: dict[tuple[str, int], Decisions] = {}
+    seen: dict[str, list[ExactCheck]] = {}
     first: dict[tuple[str, Dtype, bool], tuple[str, Outcome]] = {}
     cases = 0
-    for one in ready(model, runtimes, skipped):
+    for one in loaded_forms(model, runtimes, skipped):
         rows = one.some(values)
         key = (one.representation, rows.shape[1])
         if key not in exact:
             exact[key] = decide(one.model, rows)
-        found = observed(one, rows, exact[key])
+        found = exact_check(one, rows, exact[key])
         cases += found.rows
         faults += found.faults
         if one.runtime.bound is None:
@@ -82,7 +82,7 @@ def exactness(
     )
 
 
-def _fact(name: str, found: Sequence[Observed]) -> str:
+def _fact(name: str, found: Sequence[ExactCheck]) -> str:
     worst = max(found, key=lambda one: one.worst)
     flips = max(one.flips for one in found)
     text = f"{name}: strengths off by at most {worst.worst:.2g}"
@@ -98,7 +98,7 @@ RATIOS = tuple(10.0**-k for k in range(1, 13))
 
 _PROBES = 150
 _DATA = 300
-_TOLD: tuple[float, ...] = tuple(10.0**-k for k in (1, 3, 5, 7, 9, 11))
+_REPORTED: tuple[float, ...] = tuple(10.0**-k for k in (1, 3, 5, 7, 9, 11))
 _ADVICE_OFFSETS = (
     "take differences before anything is divided or raised to a power: polynomials in "
     "the raw value lose every digit far from zero"
@@ -110,9 +110,8 @@ def offsets(
 ) -> tuple[Criterion, tuple[OffsetCost, ...]]:
     """Move every input until its narrowest term is 1e-1 to 1e-12 of its distance (N2).
 
-    The moved model is a model of its own, whose numbers are rounded once; a runtime
-    is held against the exact answers of that model, on probes of its edges and on the
-    rows of data, moved as well.
+    The moved model is a model of its own, whose numbers are rounded once. A runtime is
+    compared with its exact predictions, on probes of its edges and on moved data.
 
     Args:
         model: A tree or a rule base.
@@ -143,7 +142,7 @@ def offsets(
             worst = max([worst, *(one.worst for one, _ in found)])
             for one, _ in found:
                 faults += [f"spread over distance {ratio:.0e}: {f}" for f in one.faults]
-            if ratio in _TOLD and representation != "tree":
+            if ratio in _REPORTED and representation != "tree":
                 costs.append(_cost(representation, ratio, found, values.shape[1]))
     criterion = judged(
         "N2", cases, faults, worst=worst, advice=_ADVICE_OFFSETS, skipped=skipped
@@ -151,7 +150,7 @@ def offsets(
     return criterion, tuple(costs)
 
 
-def _step(scale: Scale, ratio: float) -> float:
+def _step(scale: InputScale, ratio: float) -> float:
     """Return what takes the middle of an input to its spread over a ratio."""
     if not np.isfinite(scale.spread):
         return 0.0
@@ -165,22 +164,22 @@ def _observed(
     values: FloatArray,
     skipped: list[str],
     ratio: float,
-) -> list[tuple[Observed, Dtype]]:
+) -> list[tuple[ExactCheck, Dtype]]:
     lost: list[str] = []
     exact = decide(form, values)
-    found: list[tuple[Observed, Dtype]] = []
+    found: list[tuple[ExactCheck, Dtype]] = []
     for runtime in runtimes:
         if runtime.bound is not None:
             continue  # its bound covers points and lines, not its arithmetic at 1e12
-        one = made_ready(representation, form, runtime, lost)
+        one = loaded_form(representation, form, runtime, lost)
         if one is not None:
             some = one.some(values)
             same = exact if some.shape == values.shape else None
-            found.append((observed(one, some, same), runtime.dtype))
-    told = {text.partition(": spread")[0] for text in skipped}
+            found.append((exact_check(one, some, same), runtime.dtype))
+    named = {text.partition(": spread")[0] for text in skipped}
     for text in lost:  # the first distance at which a type gives up is enough
         name = ": ".join(text.split(": ")[:2])
-        if name not in told:
+        if name not in named:
             skipped.append(f"{name}: spread over distance {ratio:.0e}: {text}")
     return found
 
@@ -188,7 +187,7 @@ def _observed(
 def _cost(
     representation: str,
     ratio: float,
-    found: Sequence[tuple[Observed, Dtype]],
+    found: Sequence[tuple[ExactCheck, Dtype]],
     rows: int,
 ) -> OffsetCost:
     def largest(dtype: Dtype) -> float | None:

@@ -11,7 +11,7 @@ from fuzzytree.model.agreement import version
 
 Verdict = Literal["holds", "FAILS", "not applicable"]
 
-_TOLD = 5  # faults told of each criterion; the others are counted
+_SHOWN = 5  # faults listed for each check; the others are counted
 
 
 class Criterion(msgspec.Struct, frozen=True):
@@ -21,7 +21,7 @@ class Criterion(msgspec.Struct, frozen=True):
         code: N1 to N10.
         title: What is demanded, in a few words.
         verdict: The result; `not applicable` where nothing could be tried.
-        cases: How many answers were held against what they must be.
+        cases: How many predictions were compared with what they must be.
         worst: The largest difference found, of a degree or strength; None where the
             criterion measures none.
         detail: What failed, worst first; or what was measured, in sentences.
@@ -66,7 +66,7 @@ class OffsetCost(msgspec.Struct, frozen=True):
         mixed: The same in mixed numbers.
         float64: The same in double.
         flips: Rows whose class differs from the exact one in float32, of `rows`.
-        rows: How many rows were asked.
+        rows: How many rows were run.
     """
 
     representation: str
@@ -210,17 +210,17 @@ def judged(
         cases: How many answers were examined; none makes it `not applicable`.
         faults: What failed, worst first.
         worst: The largest difference found.
-        facts: What was measured; told where nothing failed, and after the faults.
-        advice: What to do about faults; told only if there are any.
+        facts: What was measured; listed after the faults.
+        advice: What to do about faults; empty if there are none.
         skipped: What was not tried; each sentence is kept once.
 
     Example:
         >>> judged("N3", 12, ()).verdict
         'holds'
     """
-    told = [*faults[:_TOLD]]
-    if len(faults) > _TOLD:
-        told.append(f"and {len(faults) - _TOLD} more")
+    shown = [*faults[:_SHOWN]]
+    if len(faults) > _SHOWN:
+        shown.append(f"and {len(faults) - _SHOWN} more")
     verdict: Verdict = "holds" if cases else "not applicable"
     if faults:
         verdict = "FAILS"
@@ -230,7 +230,7 @@ def judged(
         verdict,
         cases,
         worst,
-        (*told, *facts),
+        (*shown, *facts),
         advice if faults else "",
         tuple(dict.fromkeys(skipped)),
     )

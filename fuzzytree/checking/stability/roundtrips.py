@@ -38,7 +38,7 @@ def roundtrips(
     Args:
         model: A tree or a rule base.
         formats: The formats.
-        values: Shape (inputs, rows): what files that run are asked.
+        values: Shape (inputs, rows): what files that run compute.
     """
     faults: list[str] = []
     skipped: list[str] = []
@@ -84,8 +84,8 @@ def _tried(
         if "dtype" in _options(one):
             options["dtype"] = dtype
         if "outputs" in _options(one):
-            told = ("label", "rule", "status", "strengths")
-            options["outputs"] = told if isinstance(form, RuleBase) else told[:3]
+            columns = ("label", "rule", "status", "strengths")
+            options["outputs"] = columns if isinstance(form, RuleBase) else columns[:3]
         try:
             run = opener(write(form, **options).content, form)
             base = baseline(dtype).load(form)
@@ -116,7 +116,7 @@ def _read_again(
         if back.inputs != form.inputs or type(back) is not type(form):
             return 1, 1.0, f"{title}: another model comes back"
         count, gap, fault = _compared(title, native(back)(values), native(form)(values))
-        said = fault or f"{title}: numbers differ, though no row tells"
+        said = fault or f"{title}: numbers differ, though all rows agree"
         return count, gap, f"{said}; the model that comes back is not equal"
     if one.write(back).content != content:
         return 1, 0.0, f"{title}: written again it has other bytes"

@@ -12,12 +12,12 @@ import numpy as np
 
 from fuzzytree.checking.stability.results import Criterion, Usable, judged
 from fuzzytree.checking.stability.runs import (
-    Ready,
-    answered,
-    made_ready,
+    LoadedForm,
+    loaded_form,
+    loaded_forms,
     missing_rows,
-    ready,
     row_text,
+    run_with_warning,
     unequal,
 )
 from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
@@ -50,7 +50,7 @@ def order(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Crit
     faults: list[str] = []
     skipped: list[str] = []
     cases = 0
-    for one in ready(model, runtimes, skipped):
+    for one in loaded_forms(model, runtimes, skipped):
         rows = one.some(values)
         whole = one.run(rows)
         for said, wrong in (*_tries(one, rows, whole), *_renumbered(one, rows, whole)):
@@ -64,7 +64,7 @@ def order(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Crit
 
 
 def _tries(
-    one: Ready, rows: FloatArray, whole: Outcome
+    one: LoadedForm, rows: FloatArray, whole: Outcome
 ) -> Iterator[tuple[str, BoolArray]]:
     """Yield what was done to the rows, and which were then answered differently."""
     count = rows.shape[1]
@@ -88,7 +88,7 @@ def _tries(
 
 
 def _renumbered(
-    one: Ready, rows: FloatArray, whole: Outcome
+    one: LoadedForm, rows: FloatArray, whole: Outcome
 ) -> Iterator[tuple[str, BoolArray]]:
     """Yield the same for a model whose inputs stand in the opposite order."""
     inputs = [v for v in one.model.variables if not v.parts]
@@ -96,7 +96,7 @@ def _renumbered(
         return
     others = [v for v in one.model.variables if v.parts]
     turned = msgspec.structs.replace(one.model, variables=(*reversed(inputs), *others))
-    after = made_ready(one.representation, turned, one.runtime, [])
+    after = loaded_form(one.representation, turned, one.runtime, [])
     if after is not None:
         found = after.run(np.ascontiguousarray(rows[::-1]))
         yield "when the inputs stand in another order", unequal(found, whole)
@@ -134,7 +134,7 @@ def scaling(
     skipped: list[str] = []
     usable: dict[tuple[str, Dtype], Usable] = {}
     cases = 0
-    for one in ready(model, runtimes, skipped):
+    for one in loaded_forms(model, runtimes, skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
         if low > high:
             skipped.append(f"{one.title}: its numbers span more than the type does")
@@ -175,7 +175,7 @@ def decades(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Cr
         return judged("N2b", 0, (), skipped=skipped)
     places = np.linspace(0, _BINARY_DECADES, len(model.inputs))
     order = random.Random(0).sample(range(len(places)), len(places))
-    for one in ready(model, runtimes, skipped):
+    for one in loaded_forms(model, runtimes, skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
         start = min(max(-_BINARY_DECADES // 2, low), high - _BINARY_DECADES)
         if start < low:
@@ -204,7 +204,7 @@ def _apart(inputs: Sequence[str], low: int, high: int, seed: int) -> dict[str, i
 
 
 def _tried(
-    one: Ready, plan: Mapping[str, int], values: FloatArray, skipped: list[str]
+    one: LoadedForm, plan: Mapping[str, int], values: FloatArray, skipped: list[str]
 ) -> tuple[int, str | None]:
     """Return how many rows were compared, and what was wrong."""
     ks = [plan[name] for name in one.model.inputs]
@@ -216,7 +216,7 @@ def _tried(
     except (LossError, InvalidModelError) as error:
         return 1, f"{one.title}, inputs times {said}: {error}"
     lost: list[str] = []
-    after = made_ready(one.representation, other, one.runtime, lost)
+    after = loaded_form(one.representation, other, one.runtime, lost)
     if after is None:
         return 1, f"inputs times {said}: {lost[0]}"
     some = one.some(values)
@@ -274,7 +274,7 @@ float32 and beyond, and the largest double."""
 
 _BASES = 4  # rows in which a value is replaced
 _ADVICE_SPECIALS = (
-    "ask for missing values before anything is compared: NaN answers every comparison "
+    "test for missing values before anything is compared: NaN answers every comparison "
     "with no, and each minimum in its own way"
 )
 
@@ -301,22 +301,22 @@ def specials(
     skipped: list[str] = []
     cases = 0
     first: dict[tuple[str, Dtype, bool], tuple[str, Outcome]] = {}
-    for one in ready(model, runtimes, skipped):
-        asked = one.some(rows)
-        found, warning = answered(one, asked)
-        cases += asked.shape[1]
+    for one in loaded_forms(model, runtimes, skipped):
+        tried = one.some(rows)
+        found, warning = run_with_warning(one, tried)
+        cases += tried.shape[1]
         faults += [f"{one.title}: it warns: {warning}"] if warning else []
-        faults += _broken_policy(one, asked, found)
-        is_zero = asked == 0.0
+        faults += _broken_policy(one, tried, found)
+        is_zero = tried == 0.0
         if is_zero.any():
-            turned = np.where(is_zero, -asked, asked)
+            turned = np.where(is_zero, -tried, tried)
             wrong = unequal(one.run(turned), found)
             if wrong.any():
                 faults.append(f"{one.title}: 0.0 and -0.0 are not answered alike")
         if one.runtime.bound is None:
             key = (one.representation, one.runtime.dtype, one.runtime.is_slow)
             title, other = first.setdefault(key, (one.title, found))
-            faults += _disagreement(one, asked, found, title, other)
+            faults += _disagreement(one, tried, found, title, other)
     return judged("N6", cases, faults, advice=_ADVICE_SPECIALS, skipped=skipped)
 
 
@@ -336,7 +336,7 @@ def _with_specials(values: FloatArray) -> FloatArray:
     return np.concatenate(made, axis=1)
 
 
-def _broken_policy(one: Ready, rows: FloatArray, found: Outcome) -> Iterator[str]:
+def _broken_policy(one: LoadedForm, rows: FloatArray, found: Outcome) -> Iterator[str]:
     expected = missing_rows(one.model, rows, one.runtime.dtype)
     is_missing = found.status == Status.MISSING
     wrong = is_missing != expected
@@ -352,13 +352,13 @@ def _broken_policy(one: Ready, rows: FloatArray, found: Outcome) -> Iterator[str
     if found.strengths is not None:
         if not np.isnan(found.strengths[:, is_missing]).all():
             yield f"{one.title}: a strength of a row with a missing value is a number"
-        told = found.strengths[:, ~is_missing]
-        if not ((told >= 0.0) & (told <= 1.0)).all():
+        known = found.strengths[:, ~is_missing]
+        if not ((known >= 0.0) & (known <= 1.0)).all():
             yield f"{one.title}: a strength is not between 0 and 1"
 
 
 def _disagreement(
-    one: Ready, rows: FloatArray, found: Outcome, title: str, other: Outcome
+    one: LoadedForm, rows: FloatArray, found: Outcome, title: str, other: Outcome
 ) -> Iterator[str]:
     wrong = unequal(found, other)
     if wrong.any():

@@ -16,13 +16,13 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.checking.comparing import Answers, labels, same_bits
+from fuzzytree.checking.comparing import ModelRun, labels, same_bits
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Dtype, Model, Outcome, Run, Runtime
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
-from fuzzytree.numerics.oracle import Decided, decide, strength_errors
+from fuzzytree.numerics.oracle import Decisions, decide, strength_errors
 from fuzzytree.runtimes import is_installed, needed_by
 from fuzzytree.semantics.lowering import forms
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _SLOW_ROWS = 60  # rows that a slow runtime is given, whatever the others get
 
 
-class Ready(msgspec.Struct, frozen=True):
+class LoadedForm(msgspec.Struct, frozen=True):
     """A form of a model in a runtime, ready to answer.
 
     Attributes:
@@ -42,7 +42,7 @@ class Ready(msgspec.Struct, frozen=True):
         representation: What to call the form.
         runtime: The runtime.
         model: The form.
-        loud: Its answers, with whatever warnings it lets out.
+        loud: Its answers, with the warnings that it lets out.
     """
 
     title: str
@@ -52,20 +52,20 @@ class Ready(msgspec.Struct, frozen=True):
     loud: Run
 
     def run(self, values: FloatArray) -> Outcome:
-        """Answer rows, and keep warnings in; criterion N4 asks for them."""
-        return answered(self, values)[0]
+        """Answer rows, and keep warnings in; check N4 examines them."""
+        return run_with_warning(self, values)[0]
 
     def some(self, values: FloatArray) -> FloatArray:
-        """Return the rows to ask: a share of them if the runtime is slow."""
+        """Return the rows to run: a share of them if the runtime is slow."""
         rows = values.shape[1]
         if not self.runtime.is_slow or rows <= _SLOW_ROWS:
             return values
         return values[:, :: -(-rows // _SLOW_ROWS)]
 
 
-def ready(
+def loaded_forms(
     model: Model, runtimes: Sequence[Runtime], skipped: list[str]
-) -> Iterator[Ready]:
+) -> Iterator[LoadedForm]:
     """Yield each form of a model in each runtime that can run it.
 
     Args:
@@ -75,14 +75,14 @@ def ready(
     """
     for representation, form in forms(model).items():
         for runtime in runtimes:
-            found = made_ready(representation, form, runtime, skipped)
+            found = loaded_form(representation, form, runtime, skipped)
             if found is not None:
                 yield found
 
 
-def made_ready(
+def loaded_form(
     representation: str, form: Model, runtime: Runtime, skipped: list[str]
-) -> Ready | None:
+) -> LoadedForm | None:
     """Return one form in one runtime; None if that cannot be, with a reason kept."""
     kind = "tree" if isinstance(form, FuzzyTree) else "rules"
     if kind not in runtime.runs:
@@ -96,10 +96,10 @@ def made_ready(
     except LossError as error:
         skipped.append(f"{title}: {first_line(error)}")
         return None
-    return Ready(title, representation, runtime, form, run)
+    return LoadedForm(title, representation, runtime, form, run)
 
 
-def answered(one: Ready, values: FloatArray) -> tuple[Outcome, str | None]:
+def run_with_warning(one: LoadedForm, values: FloatArray) -> tuple[Outcome, str | None]:
     """Return a runtime's answers, and the first warning that it let out, if any."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -131,11 +131,11 @@ def row_text(inputs: Sequence[str], values: FloatArray, row: int) -> str:
     return ", ".join(shown) + (", ..." if len(inputs) > 8 else "")
 
 
-class Observed(NamedTuple):
+class ExactCheck(NamedTuple):
     """How far a runtime was from the exact answers.
 
     Attributes:
-        rows: Rows that were asked.
+        rows: Rows that were run.
         worst: The largest error of a strength that is certain, in rows with a bound; 0
             for a tree.
         allowed: The bound in the row of that error.
@@ -156,8 +156,10 @@ class Observed(NamedTuple):
     outcome: Outcome
 
 
-def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Observed:
-    """Run rows and hold the answers against the exact ones.
+def exact_check(
+    one: LoadedForm, values: FloatArray, exact: Decisions | None = None
+) -> ExactCheck:
+    """Run rows and compare the predictions with the exact ones.
 
     Rows that are missing in the number type and not in double (beyond float32) are
     left to criterion N6.
@@ -172,7 +174,7 @@ def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Ob
     dtype = one.runtime.dtype
     known = ~missing_rows(one.model, values, dtype)
     allowed = allowed_errors(one, values)
-    flips = (labels(Answers(one.title, one.model, found)) != truth.label) & known
+    flips = (labels(ModelRun(one.title, one.model, found)) != truth.label) & known
     if isinstance(one.model, RuleBase):
         excused = truth.margin <= 2.0 * allowed
     else:
@@ -186,7 +188,7 @@ def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Ob
     bounded = np.where(allowed < 1.0, low, 0.0)
     faults = [_fault(one, values, found, wrong, low, allowed)] if wrong.any() else []
     worst = int(np.argmax(bounded)) if low.size else 0
-    return Observed(
+    return ExactCheck(
         values.shape[1],
         float(bounded[worst]) if low.size else 0.0,
         float(allowed[worst]) if low.size else 0.0,
@@ -198,7 +200,7 @@ def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Ob
     )
 
 
-def allowed_errors(one: Ready, values: FloatArray) -> FloatArray:
+def allowed_errors(one: LoadedForm, values: FloatArray) -> FloatArray:
     """Return by how much a strength may differ from the exact one, for each row."""
     if not isinstance(one.model, RuleBase):
         return np.zeros(values.shape[1])
@@ -211,7 +213,7 @@ def allowed_errors(one: Ready, values: FloatArray) -> FloatArray:
 
 
 def _fault(
-    one: Ready,
+    one: LoadedForm,
     values: FloatArray,
     found: Outcome,
     wrong: BoolArray,

@@ -20,7 +20,7 @@ from fuzzytree.model.rulebase import LR, Band, Points, RuleBase, Shape, Term, Va
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.bounds import UNIT, degree_bound
 from fuzzytree.numerics.conditioning import Conduct, conduct
-from fuzzytree.numerics.oracle import Decided, decide
+from fuzzytree.numerics.oracle import Decisions, decide
 from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.probing import landmarks
 
@@ -35,7 +35,7 @@ _OFFSET_HELPS = 16.0  # times the range of the values, at least, are they from z
 _ROWS = 4_000  # rows tried for each input
 
 
-class Scale(NamedTuple):
+class InputScale(NamedTuple):
     """The scale of an input.
 
     Attributes:
@@ -107,7 +107,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
     return tuple(sorted(found, key=lambda one: (-one.predicted, -one.observed)))
 
 
-def input_scales(model: Model, values: FloatArray) -> dict[str, Scale]:
+def input_scales(model: Model, values: FloatArray) -> dict[str, InputScale]:
     """Return the scale of each input, over all forms of a model.
 
     A combination passes its terms' widths on to its inputs, divided by their weights.
@@ -133,7 +133,7 @@ def input_scales(model: Model, values: FloatArray) -> dict[str, Scale]:
                 places[part.input].append(part.centre)
     lines = dict(zip(model.inputs, values, strict=True))
     return {
-        name: Scale(
+        name: InputScale(
             min(widths[name], default=math.inf),
             max(slopes[name], default=0.0),
             *_range(model, name, places[name], lines[name]),
@@ -157,7 +157,7 @@ def _places(variable: Variable, shapes: Sequence[Shape]) -> list[float]:
 def _range(
     model: Model, name: str, places: Sequence[float], line: FloatArray
 ) -> tuple[float, float]:
-    """Return the declared range of an input, or one that holds what is known of it."""
+    """Return the declared range of an input, or one around what is known of it."""
     declared = next(v for v in model.variables if v.name == name)
     if declared.low is not None and declared.high is not None:
         return declared.low, declared.high
@@ -170,7 +170,7 @@ def _range(
 
 
 def _slope(shape: Shape) -> float:
-    """Return a bound of the slope of a degree; steps are told by flips alone."""
+    """Return a bound of the slope of a degree; steps show in flips alone."""
     return degree_bound(shape, "float32").per_unit
 
 
@@ -192,7 +192,9 @@ def _width(shape: Shape) -> float:
             return 1.0 / slope if slope else math.inf
 
 
-def _near(model: Model, values: FloatArray, scales: dict[str, Scale]) -> FloatArray:
+def _near(
+    model: Model, values: FloatArray, scales: dict[str, InputScale]
+) -> FloatArray:
     """Return the rows that lie within twice the range of every input."""
     inside = np.isfinite(values).all(axis=0)
     for line, name in enumerate(model.inputs):
@@ -204,7 +206,7 @@ def _near(model: Model, values: FloatArray, scales: dict[str, Scale]) -> FloatAr
     return values[:, inside]
 
 
-def _gap(before: Decided, after: Decided) -> float:
+def _gap(before: Decisions, after: Decisions) -> float:
     """Return by how much an exact strength changed at most, as far as it is known."""
     if before.strengths is None or after.strengths is None:
         return 0.0
@@ -213,7 +215,7 @@ def _gap(before: Decided, after: Decided) -> float:
     return max(float(known.max(initial=0.0)), 0.0)
 
 
-def _offset(scale: Scale) -> float | None:
+def _offset(scale: InputScale) -> float | None:
     """Return a short value within the range whose subtraction keeps more digits."""
     span = scale.high - scale.low
     if not 0.0 < span < math.inf or scale.location < _OFFSET_HELPS * span:
@@ -223,7 +225,7 @@ def _offset(scale: Scale) -> float | None:
 
 
 def _advice(
-    scale: Scale, predicted: float, offset: float | None, *, is_safe: bool
+    scale: InputScale, predicted: float, offset: float | None, *, is_safe: bool
 ) -> str:
     if is_safe:
         return "float32 is safe"
@@ -251,14 +253,14 @@ LARGEST_OVERSHOOT = 0.05
 LARGEST_RISE = 0.05
 """By how much a clipped degree may rise on its way out."""
 
-_TOLD = 1e-9  # overshoot and rises below are nobody's concern
+_NEGLIGIBLE = 1e-9  # overshoot and rises below are not reported
 
 
 def curves(model: Model) -> tuple[Criterion, tuple[CurveFault, ...]]:
     """Judge the curve of every term of a model, by proof and not by samples (N7).
 
     A curve fails beyond `LARGEST_SIZE`, `LARGEST_OVERSHOOT` or `LARGEST_RISE`; below
-    them, what it does is told.
+    them, it is counted.
 
     Returns:
         The criterion, and what is to be known about curves, worst first.
@@ -273,8 +275,12 @@ def curves(model: Model) -> tuple[Criterion, tuple[CurveFault, ...]]:
                 found.append(fault)
     found.sort(key=lambda f: (not f.fails, -max(f.overshoot, f.rise), -f.condition))
     faults = [_sentence(one) for one in found if one.fails]
-    told = len(found) - len(faults)
-    facts = [f"{told} of {cases} sides bulge or rise within the limits"] if told else []
+    harmless = len(found) - len(faults)
+    facts = (
+        [f"{harmless} of {cases} sides bulge or rise within the limits"]
+        if harmless
+        else []
+    )
     criterion = judged(
         "N7",
         cases,
@@ -309,7 +315,7 @@ def _fault(form: str, variable: str, term: Term, side: Conduct) -> CurveFault | 
     overshoot = max(side.above.high, side.below.high)
     rise = side.rises[0].height if side.rises else 0.0
     size = side.size.high
-    if size <= LARGEST_SIZE and max(overshoot, rise) <= _TOLD:
+    if size <= LARGEST_SIZE and max(overshoot, rise) <= _NEGLIGIBLE:
         return None
     limits = (
         # A rise of the lower end of a bracket above the limit is a proof.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,7 @@ from fuzzytree.checking.stability.roundtrips import roundtrips
 from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
 from fuzzytree.checking.stability.sensitivity import curves, stiffness
 from fuzzytree.checking.stability.term_checks import degenerate, edges
-from fuzzytree.model.contracts import Format, Model, Runtime
+from fuzzytree.model.contracts import Format, Model, Progress, Runtime
 from fuzzytree.model.naming import as_names
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.runtimes import is_installed
@@ -29,8 +29,6 @@ from fuzzytree.semantics.probing import probe_values
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
-
-Tell = Callable[[str, float], None]
 
 _PROBES = 2_000  # for the comparison with the exact answers
 _SOME = 250  # probes for criteria that load a model anew many times
@@ -45,7 +43,7 @@ def examine(
     formats: Sequence[Format],
     data: FloatArray | None = None,
     only: Sequence[str] = (),
-    tell: Tell = lambda _text, _share: None,
+    tell: Progress = lambda _text, _share: None,
 ) -> Stability:
     """Apply the criteria N1 to N10 to a model.
 
@@ -55,7 +53,7 @@ def examine(
         formats: What to write and take back.
         data: Rows of one's own, shape (inputs, rows); at most 20,000, evenly drawn.
         only: The codes of criteria to apply; all if empty. `N2` includes `N2b`.
-        tell: Told what is being done, and how far it is in [0, 1].
+        tell: Called with the current check and the share that is done, in [0, 1].
 
     Returns:
         The result of each criterion, and what is known of inputs and curves.
@@ -129,14 +127,14 @@ def examine(
 
 def _wanted(only: Sequence[str]) -> tuple[str, ...]:
     only = as_names(only)
-    asked = [code.upper().replace("B", "b") for code in only]
+    codes = [code.upper().replace("B", "b") for code in only]
     known = ", ".join(TITLES)
-    for given, code in zip(only, asked, strict=True):
+    for given, code in zip(only, codes, strict=True):
         if code not in TITLES:
             raise ValueError(f"no criterion {given!r}; there is {known}")
-    if "N2" in asked:
-        asked.append("N2b")
-    return tuple(code for code in TITLES if not asked or code in asked)
+    if "N2" in codes:
+        codes.append("N2b")
+    return tuple(code for code in TITLES if not codes or code in codes)
 
 
 def _checked(data: FloatArray | None, inputs: int) -> FloatArray:

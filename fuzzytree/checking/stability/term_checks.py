@@ -1,7 +1,7 @@
 """The terms of a model one by one, and what must hold for each without any tolerance.
 
 A rule base with one rule for each term, whose inputs are the variables themselves,
-makes every runtime tell the degree of each term: it is the strength of its rule.
+makes every runtime return the degree of each term: it is the strength of its rule.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 
 from fuzzytree.checking.stability.results import Criterion, judged
 from fuzzytree.checking.stability.runs import (
-    Ready,
+    LoadedForm,
     allowed_errors,
-    answered,
-    made_ready,
-    ready,
+    loaded_form,
+    loaded_forms,
+    run_with_warning,
     unequal,
 )
 from fuzzytree.errors import FuzzyTreeError
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 Demand = Literal["one", "below one", "zero"]
 
 MOST_TERMS = 240
-"""Terms that are asked one by one; of more, evenly drawn ones."""
+"""Terms that are tested one by one; of more, evenly drawn ones."""
 
 _END_SLACK: dict[Dtype, float] = {
     "float64": 2.0**-50,
@@ -60,15 +60,15 @@ _END_SLACK: dict[Dtype, float] = {
 """Relative to the end of an LR set: within it the tail is 0 up to the fourth power."""
 
 
-class Asked(msgspec.Struct, frozen=True):
-    """A rule base that tells degrees, and values to ask it.
+class TermProbes(msgspec.Struct, frozen=True):
+    """A rule base whose strengths are degrees, and the rows to run.
 
     Attributes:
         rules: One rule for each term.
         values: Shape (variables, rows).
         places: For each rule: its variable's line, its shape, and the rows that hold
             its own edges.
-        left_out: How many terms are not asked, for there are too many.
+        left_out: How many terms are not tested, for there are too many.
     """
 
     rules: RuleBase
@@ -77,12 +77,12 @@ class Asked(msgspec.Struct, frozen=True):
     left_out: int
 
 
-class Held(NamedTuple):
-    """How a runtime's degrees stood what is demanded of them.
+class TermResult(NamedTuple):
+    """How the degrees of a runtime compare with what is demanded.
 
     Attributes:
         cases: How many degrees.
-        worst: The largest difference from the exact one, where that was asked.
+        worst: The largest difference from the exact one, where it was computed.
         faults: What broke.
     """
 
@@ -91,21 +91,21 @@ class Held(NamedTuple):
     faults: list[str]
 
 
-def asked(
+def term_probes(
     rules: RuleBase,
     *,
     shape: Callable[[Shape], Shape] = lambda shape: shape,
     near: Callable[[float], Iterable[float]] = neighbours,
-) -> Asked | None:
+) -> TermProbes | None:
     """Return the terms of a rule base as rules, and their edges as rows.
 
     Args:
         rules: The rule base.
-        shape: What to ask in place of each shape.
-        near: Which values to ask around a landmark.
+        shape: What to test in place of each membership function.
+        near: Which values to run around a landmark.
 
     Returns:
-        What to ask; None if no variable has a term.
+        The rows and rules; None if no variable has a term.
     """
     total = sum(len(v.terms) for v in rules.variables)
     step = -(-total // MOST_TERMS) or 1
@@ -136,7 +136,7 @@ def asked(
     longest = max(map(len, lines))
     values = np.array([(line * longest)[:longest] for line in lines], np.float64)
     whole = RuleBase(rules.name, ("true",), tuple(variables), tuple(found))
-    return Asked(whole, values, tuple(places), total - len(found))
+    return TermProbes(whole, values, tuple(places), total - len(found))
 
 
 def _edges(shape: Shape, near: Callable[[float], Iterable[float]]) -> list[float]:
@@ -225,32 +225,32 @@ def broken(demand: Demand | None, degree: float) -> bool:
     assert_never(demand)
 
 
-def held(
-    one: Ready,
-    question: Asked,
+def term_result(
+    one: LoadedForm,
+    question: TermProbes,
     skipped: list[str],
     *,
     difference: Callable[[int, float, float], tuple[float, float]] | None = None,
-) -> Held:
-    """Hold the degrees that a runtime tells against what is demanded of them.
+) -> TermResult:
+    """Compare the degrees that a runtime returns with what is demanded of them.
 
     Args:
         one: The runtime, with the rules of the question.
-        question: What to ask.
-        skipped: Gets a sentence if the runtime tells no degrees.
+        question: The terms and rows.
+        skipped: Gets a sentence if the runtime returns no degrees.
         difference: For the number of a term, a value and its degree: the difference
             from the exact degree, and the largest that is allowed.
     """
-    found, warning = answered(one, question.values)
+    found, warning = run_with_warning(one, question.values)
     faults = [f"{one.title}: it warns: {warning}"] if warning else []
     if question.left_out:
         skipped.append(f"{question.left_out} of the terms: there are too many")
     if found.strengths is None:
-        skipped.append(f"{one.runtime.name} tells no degrees")
-        return Held(0, 0.0, faults)
+        skipped.append(f"{one.runtime.name} returns no degrees")
+        return TermResult(0, 0.0, faults)
     if one.runtime.bound is not None:  # it promises nothing at a single value
         skipped.append(f"{one.runtime.name} promises a bound, and no edge")
-        return Held(0, 0.0, faults)
+        return TermResult(0, 0.0, faults)
     cases, worst = 0, 0.0
     for number, (line, shape, rows) in enumerate(question.places):
         clause = question.rules.rules[number].when[0]
@@ -276,7 +276,7 @@ def held(
                         f"{name} at {value!r}: degree {degree!r} is {gap:.3g} from "
                         f"the exact one, and {allowed:.3g} is allowed"
                     )
-    return Held(cases, worst, faults)
+    return TermResult(cases, worst, faults)
 
 
 def _same(value: float) -> float:
@@ -284,7 +284,7 @@ def _same(value: float) -> float:
 
 
 def _single(value: float) -> float:
-    """Return a value as float32 holds it; infinite beyond its range."""
+    """Return a value rounded to float32; infinite beyond its range."""
     try:
         single: float = struct.unpack("f", struct.pack("f", value))[0]
     except OverflowError:
@@ -299,7 +299,7 @@ _ADVICE = (
 
 
 def edges(model: Model, runtimes: Sequence[Runtime]) -> Criterion:
-    """Ask each term at its mean, its edges and its ends, and beside them (N5).
+    """Test each term at its mean, its edges and its ends, and beside them (N5).
 
     Every landmark comes with the neighbouring floats, in double and in float32. On a
     plateau, at a mean and at a point the degree is exactly what is stored; off a
@@ -310,29 +310,29 @@ def edges(model: Model, runtimes: Sequence[Runtime]) -> Criterion:
     skipped: list[str] = []
     cases, worst = 0, 0.0
     for representation, form in forms(model).items():
-        question = asked(form) if isinstance(form, RuleBase) else None
+        question = term_probes(form) if isinstance(form, RuleBase) else None
         if question is None:
             continue
         exact = _Exact(question)
         for runtime in runtimes:
-            one = made_ready(
+            one = loaded_form(
                 f"terms of {representation}", question.rules, runtime, skipped
             )
             if one is None:
                 continue
             allowed = allowed_errors(one, question.values)
-            tell = exact.difference(allowed, question.values)
-            told = held(one, question, skipped, difference=tell)
-            cases += told.cases
-            worst = max(worst, told.worst)
-            faults += told.faults
+            difference_of = exact.difference(allowed, question.values)
+            result = term_result(one, question, skipped, difference=difference_of)
+            cases += result.cases
+            worst = max(worst, result.worst)
+            faults += result.faults
     return judged("N5", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped)
 
 
 class _Exact:
     """The exact degrees of a question's terms, each computed once."""
 
-    def __init__(self, question: Asked) -> None:
+    def __init__(self, question: TermProbes) -> None:
         self.degrees = [
             {
                 value: exact_degree(shape, Fraction(value))
@@ -345,17 +345,19 @@ class _Exact:
     def difference(
         self, allowed: FloatArray, values: FloatArray
     ) -> Callable[[int, float, float], tuple[float, float]]:
-        """Return what tells the error of a degree and the allowed one in its row."""
+        """Return a function of the error of a degree and the allowed one in its row."""
         limits = [
             dict(zip(reversed(line.tolist()), reversed(allowed.tolist()), strict=True))
             for line in values
         ]
 
-        def tell(number: int, value: float, degree: float) -> tuple[float, float]:
+        def difference_of(
+            number: int, value: float, degree: float
+        ) -> tuple[float, float]:
             gap = abs(Fraction(degree) - self.degrees[number][value])
             return float(gap), limits[self.lines[number]][value]
 
-        return tell
+        return difference_of
 
 
 _COPIES = 50  # rows of a table whose columns are all constant
@@ -380,18 +382,20 @@ def degenerate(
     skipped: list[str] = []
     cases = 0
     for representation, form in forms(model).items():
-        question = asked(form, shape=collapsed) if isinstance(form, RuleBase) else None
+        question = (
+            term_probes(form, shape=collapsed) if isinstance(form, RuleBase) else None
+        )
         if question is None:
             continue
         for runtime in runtimes:
-            one = made_ready(
+            one = loaded_form(
                 f"{representation}, collapsed", question.rules, runtime, skipped
             )
             if one is not None:
-                told = held(one, question, skipped)
-                cases += told.cases
-                faults += told.faults
-    for one in ready(model, runtimes, skipped):
+                result = term_result(one, question, skipped)
+                cases += result.cases
+                faults += result.faults
+    for one in loaded_forms(model, runtimes, skipped):
         for said, is_wrong in _small_tables(one, one.some(values)):
             cases += 1
             faults += [f"{one.title}: {said}"] if is_wrong else []
@@ -401,7 +405,7 @@ def degenerate(
     )
 
 
-def _small_tables(one: Ready, values: FloatArray) -> Iterator[tuple[str, bool]]:
+def _small_tables(one: LoadedForm, values: FloatArray) -> Iterator[tuple[str, bool]]:
     """Yield what was tried with small tables, and whether it went wrong."""
     width, count = values.shape
     for row in range(min(count, 3)):

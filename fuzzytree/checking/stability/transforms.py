@@ -37,7 +37,7 @@ NORMAL: Mapping[Dtype, tuple[int, int]] = {
 """Binary exponents of normal numbers, two doublings below the largest."""
 
 
-class Units(msgspec.Struct, frozen=True):
+class UnitChange(msgspec.Struct, frozen=True):
     """How the numbers of a model change with the units of its variables.
 
     Attributes:
@@ -83,7 +83,7 @@ def scaled(model: AnyModel, exponents: Mapping[str, int]) -> AnyModel:
         weight = exactly_scaled(one.weight, outer - inner, variable.name)
         return Part(one.input, weight, change(one.input, one.centre))
 
-    return in_units(model, Units(change, change, part))
+    return in_units(model, UnitChange(change, change, part))
 
 
 def exactly_scaled(value: float, exponent: int, name: str) -> float:
@@ -126,10 +126,10 @@ def moved(model: AnyModel, offsets: Mapping[str, float]) -> AnyModel:
     def part(_: Variable, one: Part) -> Part:
         return Part(one.input, one.weight, place(one.input, one.centre))
 
-    return in_units(model, Units(place, length, part))
+    return in_units(model, UnitChange(place, length, part))
 
 
-def in_units(model: AnyModel, units: Units) -> AnyModel:
+def in_units(model: AnyModel, units: UnitChange) -> AnyModel:
     """Return a model with every number in the unit of a variable changed."""
     variables = tuple(_variable(variable, units) for variable in model.variables)
     if not isinstance(model, FuzzyTree):
@@ -147,7 +147,7 @@ def in_units(model: AnyModel, units: Units) -> AnyModel:
     return msgspec.structs.replace(model, variables=variables, nodes=nodes, sets=sets)
 
 
-def _variable(variable: Variable, units: Units) -> Variable:
+def _variable(variable: Variable, units: UnitChange) -> Variable:
     name = variable.name
     return msgspec.structs.replace(
         variable,
@@ -158,11 +158,11 @@ def _variable(variable: Variable, units: Units) -> Variable:
     )
 
 
-def _terms(name: str, terms: tuple[Term, ...], units: Units) -> tuple[Term, ...]:
+def _terms(name: str, terms: tuple[Term, ...], units: UnitChange) -> tuple[Term, ...]:
     return tuple(Term(term.name, _shape(name, term.shape, units)) for term in terms)
 
 
-def _shape(name: str, shape: Shape, units: Units) -> Shape:
+def _shape(name: str, shape: Shape, units: UnitChange) -> Shape:
     def place(value: float | None) -> float | None:
         return None if value is None else units.place(name, value)
 
@@ -202,7 +202,7 @@ def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
         keep(one.input, one.centre)
         return one
 
-    in_units(model, Units(keep, keep, part))
+    in_units(model, UnitChange(keep, keep, part))
     yield from found
     groups = [(variable.name, variable.terms) for variable in model.variables]
     if isinstance(model, FuzzyTree):

@@ -26,7 +26,7 @@ from fuzzytree.auditing.findings.representations import (
 )
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.auditing.findings.support import sample_points
-from fuzzytree.checking.comparing import Answers
+from fuzzytree.checking.comparing import ModelRun
 from fuzzytree.exporters.onnx import Output, write_onnx
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.contracts import Model
@@ -195,10 +195,10 @@ def answered(
 ) -> list[Answer]:
     """Return what the native runtime and a graph answer to a question."""
     native = find_runtime("native").load(subject.rules)(question.values)
-    found = [Answers("native: rules", subject.rules, native)]
+    found = [ModelRun("native: rules", subject.rules, native)]
     if representation is not None:
         outcome = representation.run(question.values)
-        found.append(Answers("m.onnx: rules", subject.rules, outcome))
+        found.append(ModelRun("m.onnx: rules", subject.rules, outcome))
     return [*conventions.convention_answers(subject, question, found)]
 
 
@@ -257,8 +257,8 @@ def test_a_runtime_in_which_nan_is_a_number_is_found() -> None:
     native = find_runtime("native").load(RULES)
     blind = native(np.nan_to_num(question.values, nan=0.5))
     found = [
-        Answers("native: rules", RULES, native(question.values)),
-        Answers("blind: rules", RULES, blind),
+        ModelRun("native: rules", RULES, native(question.values)),
+        ModelRun("blind: rules", RULES, blind),
     ]
     (finding,) = conventions.convention_answers(subject, question, found)
     assert finding.sentence == (

@@ -236,7 +236,7 @@ def six_digits() -> Format:
         return float(f"{value:.6g}")
 
     def write(model: Model, /, *, allow_loss: bool = False) -> Written:
-        from fuzzytree.checking.stability.transforms import Units, in_units
+        from fuzzytree.checking.stability.transforms import UnitChange, in_units
 
         def part(_: Variable, one: Part) -> Part:
             return Part(one.input, short(one.weight), short(one.centre))
@@ -244,7 +244,7 @@ def six_digits() -> Format:
         def place(_: str, value: float) -> float:
             return short(value)
 
-        rounded = in_units(model, Units(place, place, part))
+        rounded = in_units(model, UnitChange(place, place, part))
         return yaml.write(rounded, allow_loss=allow_loss)
 
     return msgspec.structs.replace(yaml, write=write)
