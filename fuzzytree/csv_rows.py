@@ -60,9 +60,7 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
     def table(self, width: int, wanted: Sequence[int]) -> pa.Table:
         """Return some columns, each cell as the text that it is.
 
-        Args:
-            width: How many cells each row has; empty lines are left out.
-            wanted: The positions of the columns; if there is none, the first is read.
+        Empty lines are left out. Without wanted columns the first one is read.
 
         Raises:
             TableError: If a row has another length, or the text is no UTF-8.
@@ -189,11 +187,8 @@ def blocks(
 ) -> Iterator[CsvRows]:
     """Yield a file in blocks of whole rows; the first one holds the names.
 
-    Args:
-        head: What has been read of it already.
-        read: Reads so many bytes more; fewer at the end alone.
-        mark: The delimiter.
-        name: What messages call the file.
+    `head` has been read already; `read` reads so many bytes more, and fewer only at the
+    end.
 
     Raises:
         TableError: If a row is longer than `LONGEST`, or a quote is not closed.

@@ -98,10 +98,6 @@ def check_place(path: PathLike) -> None:
 def check_places(written: Iterable[PathLike], read: Iterable[PathLike] = ()) -> None:
     """Refuse places as `check_place`, and those that would end what is still needed.
 
-    Args:
-        written: Where files will be written.
-        read: The files that they are made of.
-
     Raises:
         WriteError: If one cannot be written, is read as well, or stands twice.
     """
@@ -117,10 +113,6 @@ def check_places(written: Iterable[PathLike], read: Iterable[PathLike] = ()) -> 
 @contextlib.contextmanager
 def open_atomically(path: PathLike, *, replace: bool = True) -> Generator[BinaryIO]:
     """Open a file that appears under its name only when the block has ended well.
-
-    Args:
-        path: The file.
-        replace: Whether a file may be there.
 
     Raises:
         WriteError: If it cannot be written; nothing is left behind.

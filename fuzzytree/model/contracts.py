@@ -284,11 +284,6 @@ def loss_text(loss: Loss) -> str:
 def refusal(model: str, to: str, losses: Sequence[Loss]) -> LossError:
     """Return the error with which a writer refuses to lose something.
 
-    Args:
-        model: The name of the model.
-        to: The name of the format.
-        losses: Everything that would be lost.
-
     Example:
         >>> print(refusal("grip", "turtle", [Loss("AND", "a product becomes min")]))
         cannot write grip as turtle without loss:
@@ -305,10 +300,7 @@ def refusal(model: str, to: str, losses: Sequence[Loss]) -> LossError:
 def narrowing_refusal(model: str, to: str, losses: Sequence[Loss]) -> LossError:
     """Return the error with which a writer refuses to narrow numbers.
 
-    Args:
-        model: The name of the model.
-        to: The name of the format and the number type.
-        losses: Everything that would be lost; the first ten are listed.
+    It lists the first ten losses.
     """
     lines = [f"{loss.where}: {loss.what}" for loss in losses[:10]]
     if len(losses) > 10:

@@ -179,9 +179,7 @@ def unlike(name: str, taken: Collection[str]) -> str:
 def numbered(name: str, taken: dict[str, int]) -> str:
     """Return a name like `unlike`, and remember it: quick for any number of names.
 
-    Args:
-        name: The name.
-        taken: The names so far, each with how often it was used.
+    `taken` has the names so far, each with how often it was used.
 
     Example:
         >>> taken = {}
@@ -200,10 +198,8 @@ def numbered(name: str, taken: dict[str, int]) -> str:
 def changes_text(changed: Mapping[str, str], inputs: Iterable[str]) -> str:
     """Return the names that are others in a file, in words; empty if there are none.
 
-    Args:
-        changed: The names in the file, by those of the model.
-        inputs: The names of the inputs; they are all shown, as the caller of the file
-            uses them; of the others, a dozen at most with the inputs.
+    All inputs are shown, as the caller of the file uses them; with the other names at
+    most a dozen.
 
     Example:
         >>> changes_text({"tip %": "tip"}, [])

@@ -96,10 +96,7 @@ def check_options(form: Format, options: Mapping[str, object]) -> None:
 def option_value(form: Format, name: str, text: str) -> Option:
     """Return what a text means as an option: a number, a truth value, a list.
 
-    Args:
-        form: The format whose option it is.
-        name: The option.
-        text: What was given; a list has commas.
+    The elements of a list are separated by commas.
 
     Raises:
         ValueError: If there is no such option, or the text is no value of it.

@@ -476,11 +476,7 @@ def part_mistakes(
 ) -> Iterator[Mistake]:
     """Yield what is wrong with a combination.
 
-    Args:
-        path: Where it stands.
-        name: What it is called.
-        parts: Its summands.
-        known: The variables before it, and whether each is a combination itself.
+    `known` has the variables before it, and whether each is a combination itself.
     """
     for index, part in enumerate(parts):
         where = (*path, "parts", index)

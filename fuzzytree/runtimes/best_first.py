@@ -154,8 +154,7 @@ class Frontier:
 def search(rules: RuleBase) -> Run:
     """Return a function that finds the winning rule of every row.
 
-    Args:
-        rules: Any rule base. The more its rules share, the more is saved.
+    The more the rules share, the more is saved.
 
     Returns:
         A function from values of shape (inputs, rows) to an outcome with the rule and

@@ -96,11 +96,7 @@ found = fired ? model_strengths(row, fired) : model_decide(row);
 def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) -> Run:
     """Return a function that answers rows by compiled C.
 
-    Args:
-        model: A tree or a rule base.
-        dtype: The type of all numbers.
-        has_strengths: Whether all rules of a rule base are fired, or the winner alone
-            is looked for.
+    Without `has_strengths` only the winner of a rule base is looked for.
 
     Raises:
         LossError: If float32 cannot represent a number of the model.
@@ -125,12 +121,7 @@ def load_content(
 ) -> Run:
     """Return the same for a file that `fuzzytree.exporters.c` wrote of a model.
 
-    Args:
-        content: The file.
-        model: The model.
-        dtype: The type of all numbers.
-        prefix: The beginning of all names in the file.
-        has_strengths: As in `load`.
+    `prefix` is the beginning of all names in the file.
 
     Raises:
         MissingExtraError: As `load`.
@@ -175,10 +166,6 @@ def load_best_first(model: Model) -> Run:
 def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
     """Return a function that answers rows of a fuzzy system by compiled C.
 
-    Args:
-        system: The system.
-        activations: Whether the degree of activation of each rule is wanted.
-
     Raises:
         MissingExtraError: If no compiler is installed.
         FuzzyTreeError: If the compiler fails.
@@ -214,13 +201,7 @@ def compiled(
 ) -> Decide:
     """Return a function of a loop behind a file.
 
-    Args:
-        content: A file.
-        loop: C behind it. The function takes a pointer, a number of rows, and more
-            pointers.
-        pointers: How many pointers follow.
-        speed: An option of the compiler.
-        function: Its name.
+    The function takes a pointer, a number of rows, and `pointers` more pointers.
 
     Raises:
         MissingExtraError: If no compiler is installed.

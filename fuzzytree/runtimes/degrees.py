@@ -138,10 +138,7 @@ def plan_blocks(
 ) -> tuple[list[Atom], tuple[AtomBlock, ...]]:
     """Return atoms in the order in which blocks compute them, and the blocks.
 
-    Args:
-        atoms: Distinct atoms.
-        numbers: The types.
-        rows: How many rows a chunk has.
+    `rows` is how many rows a chunk has.
     """
     ordered = sorted(atoms, key=_kind)
     blocks: list[AtomBlock] = []
@@ -340,10 +337,7 @@ def shape_degrees(shape: Shape, values: Reals) -> Reals:
 def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
     """Return the degree of each value on its line.
 
-    Args:
-        lines: The lines of all shapes.
-        place: The place of each value's line.
-        x: Finite values, in the lines' type.
+    `place` is that of each finite value's line.
     """
     position = _taken(lines.anchor, place)
     np.subtract(x, position, out=position)
@@ -360,11 +354,7 @@ def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
 def counted(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
     """Return the place of the line on which each value lies, by comparisons.
 
-    Args:
-        lines: The lines of all shapes.
-        shape: Numbers of shapes of less than 128 points, in a form that broadcasts to
-            that of the values.
-        x: The values.
+    `shape` has numbers of shapes of less than 128 points and broadcasts to the values.
     """
     first = lines.first.take(shape)
     last = 2 * lines.room.take(shape) - 1  # a line without a further point
@@ -382,10 +372,7 @@ def counted(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
 def halved(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
     """Return the place of the line on which each value lies, by halving.
 
-    Args:
-        lines: The lines of all shapes.
-        shape: Numbers of shapes, in a form that broadcasts to that of the values.
-        x: The values.
+    `shape` has numbers of shapes and broadcasts to the values.
     """
     place = np.empty(x.shape, np.int64)
     place[:] = lines.first.take(shape)

@@ -122,9 +122,8 @@ class Descent:
 def plan_descent(splits: Sequence[AxisSplit], kind: Real) -> Descent:
     """Return a tree as lists of tests.
 
-    Args:
-        splits: The nodes, a parent before its children; none for a single leaf.
-        kind: The type of values and cuts, to which cuts are rounded.
+    A parent stands before its children; a single leaf has no splits. Cuts are rounded
+    to `kind`.
     """
     draft = _plan_walk(splits)
     top, exits = _plan_top(draft, kind)
@@ -409,9 +408,7 @@ def descend_row(splits: Sequence[AxisSplit], row: Sequence[float]) -> int:
 def follow(tree: FuzzyTree, dtype: Dtype = "float64") -> Run:
     """Return a function that follows one path of a tree for every row.
 
-    Args:
-        tree: The tree.
-        dtype: The number type of values and cuts; `mixed` compares in double.
+    The dtype `mixed` compares in double.
 
     Returns:
         A function from values of shape (inputs, rows) to an outcome without strengths.

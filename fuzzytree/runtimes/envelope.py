@@ -159,10 +159,8 @@ def plan_envelope(
 ) -> Envelope:
     """Return the envelope of some clauses.
 
-    Args:
-        rules: Where the clauses' terms are defined.
-        clauses: Distinct clauses. A clause without terms is always true.
-        at_line: The line of each variable's values.
+    `at_line` is the line of each variable's values. A clause without terms is always
+    true.
     """
     shapes = shapes_of(rules.variables)
     always = Band(None, None)
@@ -235,10 +233,7 @@ def cell_ends(grid: AxisCells, line: int) -> tuple[FloatArray, FloatArray]:
 def exact_degrees(envelope: Envelope, entries: IntArray, x: FloatArray) -> FloatArray:
     """Return degrees of clauses, bit-equal to the reference.
 
-    Args:
-        envelope: The envelope.
-        entries: `clause * cells + cell` of each, with the cell of its value.
-        x: The value of each clause's variable; finite.
+    An entry is `clause * cells + cell`, with the cell of its value; `x` is finite.
     """
     if not len(entries):
         return np.empty(0)
@@ -485,11 +480,7 @@ def _between(
 ) -> tuple[FloatArray, FloatArray]:
     """Return bounds of a polynomial from its values at the ends of a stretch.
 
-    Args:
-        values: The values at the ends.
-        bend: What its second derivative is at most, in size.
-        width: The length of the stretch.
-        curve: Its coefficients, a line for each power.
+    `bend` bounds the size of the second derivative; `curve` has a line for each power.
     """
     margin = 64 * _EPS * (1.0 + np.abs(curve).sum(axis=0))
     slack = bend * (width * width) / 8.0 * (1.0 + 1e-9) + margin

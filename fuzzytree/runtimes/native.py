@@ -17,9 +17,7 @@ from fuzzytree.runtimes.programs import run_system
 def load(model: Model, dtype: Dtype = "float64") -> Run:
     """Return a function that answers many rows at once.
 
-    Args:
-        model: A tree is answered by descent, a rule base by firing every rule.
-        dtype: The number type.
+    A tree is descended; of a rule base every rule is fired.
 
     Raises:
         LossError: If the type cannot hold the model.

@@ -111,10 +111,6 @@ class RulePlan:
 def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
     """Return a function that fires every rule on every row.
 
-    Args:
-        rules: The rule base.
-        dtype: The number type, as in `fuzzytree.model.contracts`.
-
     Returns:
         A function from values of shape (inputs, rows) to an outcome with strengths.
 
@@ -178,12 +174,7 @@ def plan_degrees(
 ) -> Degrees:
     """Return how to compute the degrees of some clauses.
 
-    Args:
-        rules: Where the clauses' terms are defined.
-        clauses: Distinct clauses.
-        at_line: The line of each variable's values.
-        numbers: The types.
-        rows: How many rows go through together.
+    `at_line` is the line of each variable's values.
     """
     shapes = shapes_of(rules.variables)
     keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)

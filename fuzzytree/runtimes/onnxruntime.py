@@ -110,10 +110,6 @@ class OnnxModel(Facts, frozen=True, kw_only=True):
 def open_onnx(content: bytes, name: str) -> OnnxModel:
     """Open an ONNX file that `fuzzytree.exporters.onnx` wrote.
 
-    Args:
-        content: The file.
-        name: Of the file, for messages.
-
     Returns:
         What it says about itself, and how to run it.
 
@@ -156,12 +152,8 @@ def prepare(
 ) -> Prepared:
     """Write a model as ONNX, in memory, and open it.
 
-    Args:
-        model: A tree or a rule base.
-        dtype: The number type of the graph.
-        readable: Whether a rule base's graph has functions, for people.
-        plain: Whether a tree's graph does without tree operators.
-        threads: How many threads one call may use.
+    A `readable` graph of rules has functions, for people; a `plain` one of a tree has
+    no tree operators. One call uses at most `threads` threads.
 
     Raises:
         LossError: If the number type or the kind of graph cannot hold the model.
@@ -272,10 +264,6 @@ def _run_system(session: Session, facts: Facts, values: FloatArray) -> SystemOut
 
 def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
     """Write a fuzzy system as ONNX, in memory, and return what runs it.
-
-    Args:
-        system: The system.
-        activations: Whether the degree of activation of each rule is wanted.
 
     Raises:
         LossError: If the graph cannot hold the system.

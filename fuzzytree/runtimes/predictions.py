@@ -214,12 +214,8 @@ def predictions_of(
 ) -> Predictions:
     """Name the classes of an outcome.
 
-    Args:
-        outcome: What a runtime found.
-        choices: The classes.
-        ends: The class of each rule or leaf.
-        semantics: The answers where no rule wins, and the type of the labels.
-        with_strengths: Whether to keep the strengths.
+    `ends` are the classes of the rules or leaves; `semantics` has the classes where no
+    rule wins.
     """
     position = {name: k for k, name in enumerate(choices)}
     owners = tuple(position[end] for end in ends)
@@ -245,10 +241,7 @@ def predictions_of(
 def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> list[str]:
     """Return, for each row, its rule as a sentence with the degree of each clause.
 
-    Args:
-        rules: The rules that answered, or those of the tree that did.
-        values: Shape (inputs, rows), in the order of `rules.inputs`.
-        predictions: Those for these rows.
+    `values` has shape (inputs, rows), in the order of `rules.inputs`.
 
     Example:
         >>> from fuzzytree.model.rulebase import Band, Clause, Flank, Rule
@@ -341,9 +334,6 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
 
     def columns(self, *, with_activations: bool = False) -> dict[str, Sequence[object]]:
         """Return the columns that `to_csv` writes, by name.
-
-        Args:
-            with_activations: Whether each rule has a column.
 
         Raises:
             ValueError: If activations are requested that are not there.

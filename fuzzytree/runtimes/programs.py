@@ -213,9 +213,7 @@ def plan_program(program: Program) -> ProgramPlan:
 def run_program(plan: ProgramPlan, values: FloatArray) -> FloatArray:
     """Return the results for many rows, of shape (results, rows).
 
-    Args:
-        plan: The plan of a program.
-        values: Of shape (inputs, rows), in the order of the program's inputs.
+    `values` has shape (inputs, rows), in the order of the program's inputs.
 
     Example:
         >>> from fuzzytree.semantics.programs.steps import Maker, Result
@@ -309,10 +307,6 @@ def _shelf(
 
 def run_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
     """Return a function that runs a system's program in numpy.
-
-    Args:
-        system: The system.
-        activations: Whether the degree of activation of each rule is wanted.
 
     Example:
         >>> import numpy as np

@@ -49,12 +49,7 @@ def load(model: Model) -> Run:
 
 
 def infer_rows(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
-    """Return a function that infers rows one after another.
-
-    Args:
-        system: The system.
-        activations: Whether the degree of activation of each rule is wanted.
-    """
+    """Return a function that infers rows one after another."""
     names = system.columns
 
     def run(values: FloatArray) -> SystemOutcome:

@@ -52,9 +52,8 @@ def winners(
 ) -> IntArray:
     """Return rule numbers and status codes as the two lines of one array.
 
-    Args:
-        strengths: Of shape (rules, rows), without NaN.
-        missing: The rows whose values are missing: rule 0, status 3.
+    `strengths` has shape (rules, rows) and no NaN; a missing row has rule 0 and status
+    3.
 
     Example:
         >>> winners(np.array([[0.5, 0.0], [0.5, 0.0]]), np.array([False, False]))
@@ -148,10 +147,8 @@ def _step(
 def axis_lines(axes: Axes, values: FloatArray) -> Reals:
     """Return the value of every variable, of shape (variables, rows).
 
-    Args:
-        axes: The plan.
-        values: Doubles of shape (inputs, rows); returned as they are if the plan has
-            no combinations and computes in doubles.
+    `values` has shape (inputs, rows); it is returned as it is if the plan has no
+    combinations and computes in doubles.
     """
     base: Reals = values.astype(axes.dtype, copy=False)
     if not axes.steps:

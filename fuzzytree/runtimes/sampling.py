@@ -49,9 +49,7 @@ def clause_shapes(rules: RuleBase) -> dict[tuple[str, str], Shape]:
 def universe(shapes: Sequence[Shape], points: int) -> FloatArray:
     """Return increasing values at which to sample all shapes of one variable.
 
-    Args:
-        shapes: The shapes.
-        points: How many values to put on each curved piece.
+    Each curved piece gets `points` values.
     """
     found: list[FloatArray] = [np.array([0.0])]
     for shape in shapes:
@@ -78,9 +76,7 @@ def line_error(shape: Shape, values: FloatArray) -> float:
     1, the line between the clamped ends adds at most by how much p exceeds the range at
     them. Both are computed for every pair of neighbours.
 
-    Args:
-        shape: The shape.
-        values: Increasing, with every landmark and its neighbours among them.
+    `values` increase and have every landmark and its neighbours among them.
     """
     match shape:
         case Band(left=left, right=right):
@@ -103,9 +99,7 @@ def lines_bound(
 
     The minimum passes on the largest error of a clause; a product adds them up.
 
-    Args:
-        rules: The rule base.
-        errors: The `line_error` of each term that a clause names.
+    `errors` has the `line_error` of each term that a clause names.
     """
     is_product = rules.semantics.conjunction == "product"
     worst = 0.0
