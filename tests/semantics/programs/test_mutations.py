@@ -22,7 +22,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
-from fuzzytree.runtimes import systems as runtimes
+from fuzzytree.runtimes import programs as runtimes
 from fuzzytree.semantics.programs import system_program as systems
 from fuzzytree.semantics.programs.steps import Program, Step
 
