@@ -120,7 +120,7 @@ class NameMap(msgspec.Struct, frozen=True):
             ['fore_arm', 'fore_arm_2', 'if_']
             >>> names.restored("fore_arm_2")
             'fore-arm'
-            >>> list(Names.of(["Größe (µm)", "β"]).accepted.values())
+            >>> list(NameMap.of(["Größe (µm)", "β"]).accepted.values())
             ['Grosse_mum', 'beta']
         """
         allowed = _Allowed(first, rest, filler, longest or 0, ignores_case)
