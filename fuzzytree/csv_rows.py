@@ -161,13 +161,13 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
     def _quotes_one_by_one(self, places: list[int]) -> Iterator[int]:
         ends = (b"", b"\n", b"\r", self.mark)
         is_inside, known = False, frozenset(places)
-        found = iter(places)
-        for place in found:
+        result = iter(places)
+        for place in result:
             before = self.content[max(place - 1, 0) : place]
             if not is_inside and before not in ends:
                 continue  # inside a cell that is not quoted, a quote is text
             if is_inside and place + 1 in known:
-                next(found)
+                next(result)
                 continue
             after = self.content[place + 1 : place + 2]
             if is_inside and after not in ends:

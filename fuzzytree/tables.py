@@ -219,13 +219,13 @@ def read_table(
             f"the target has the shape {tuple(shape)}, and it needs one class for each "
             "row: pass the name of a column, or an array of shape (rows,)"
         )
-    found = pieces(source, columns=columns, delimiter=delimiter, name=name)
-    first = next(found)
+    result = pieces(source, columns=columns, delimiter=delimiter, name=name)
+    first = next(result)
     target = target.strip() if isinstance(target, str) else target
     chosen = _learnt_columns(first, target, [c.strip() for c in as_names(ignore)])
     numbers = _Numbers(first.name, [first.columns[k] for k in chosen])
     classes: list[Cells] = [] if isinstance(target, str) else [target]
-    for piece in itertools.chain([first], found):
+    for piece in itertools.chain([first], result):
         numbers.add(piece, chosen)
         if isinstance(target, str):
             classes.append(piece.cells[first.columns.index(target)])
@@ -547,10 +547,10 @@ def plain(cells: Cells) -> Sequence[object]:
         return cast("Sequence[object]", cells.tolist())
     if isinstance(cells, Sequence):
         return cells
-    found: list[object] = (  # a pandas or polars series is no Sequence either
+    result: list[object] = (  # a pandas or polars series is no Sequence either
         cells.to_pylist() if hasattr(cells, "to_pylist") else [*cells]
     )
-    return found
+    return result
 
 
 def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:
@@ -561,9 +561,9 @@ def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:
         parsed = _parsed([cells])
         if parsed is not None:
             return parsed, []
-    found = [_number(cell) for cell in plain(cells)]
-    bad = [row for row, value in enumerate(found) if value is None]
-    filled = [math.nan if value is None else value for value in found]
+    result = [_number(cell) for cell in plain(cells)]
+    bad = [row for row, value in enumerate(result) if value is None]
+    filled = [math.nan if value is None else value for value in result]
     return np.array(filled, np.float64), bad
 
 
@@ -585,8 +585,8 @@ def _parsed(columns: Sequence[pa.ChunkedArray]) -> FloatArray | None:
             how = pc.ReplaceSubstringOptions(_MISSING, "nan")
             cells = pc.call_function("replace_substring_regex", [cells], how)
             nan = pc.MatchSubstringOptions("^nan$")
-            found = pc.call_function("match_substring_regex", [cells], nan)
-            missing = pc.call_function("sum", [found]).as_py()
+            result = pc.call_function("match_substring_regex", [cells], nan)
+            missing = pc.call_function("sum", [result]).as_py()
         try:
             values = np.from_dlpack(pc.cast(cells, pa.float64()))
         except pa.ArrowInvalid:
@@ -613,9 +613,9 @@ def _number(cell: object) -> float | None:
 def trimmed(piece: TablePiece) -> list[tuple[str, str]]:
     """Return a remark on names that stand between blanks, if there are any."""
     pairs = zip(piece.written, piece.columns, strict=True)
-    found = [title for title, name in pairs if title != name and title.strip()]
-    text = f"blanks around its name, which are left out{_more(len(found))}"
-    return [(repr(title), text) for title in found[:1]]
+    result = [title for title, name in pairs if title != name and title.strip()]
+    text = f"blanks around its name, which are left out{_more(len(result))}"
+    return [(repr(title), text) for title in result[:1]]
 
 
 def _is_count(piece: TablePiece, column: int, values: FloatArray) -> bool:
@@ -637,8 +637,8 @@ def _is_count(piece: TablePiece, column: int, values: FloatArray) -> bool:
 
 def _some(names: Iterable[str]) -> list[str]:
     """Return the first few of many names, and three dots for the others."""
-    found = list(itertools.islice(names, _MOST_NAMES + 1))
-    return [*found[:_MOST_NAMES], "..."] if len(found) > _MOST_NAMES else found
+    result = list(itertools.islice(names, _MOST_NAMES + 1))
+    return [*result[:_MOST_NAMES], "..."] if len(result) > _MOST_NAMES else result
 
 
 def _learnt_columns(
@@ -772,9 +772,9 @@ def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[TablePiec
     import pyarrow as pa
 
     try:
-        names, found = _record_batches(stream, name, only)
+        names, result = _record_batches(stream, name, only)
         first = 0
-        for batch in found:
+        for batch in result:
             yield _frame_piece(pa.table(batch), name, first, only, names)
             first += batch.num_rows
     except pa.ArrowMemoryError:
@@ -790,22 +790,22 @@ def _record_batches(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    found: Iterator[pa.RecordBatch]
+    result: Iterator[pa.RecordBatch]
     is_arrow = stream.read(len(_ARROW)) == _ARROW
     stream.seek(-len(_ARROW), io.SEEK_CUR)
     if is_arrow:
         file = pa.ipc.open_file(stream)
         count, schema = file.num_record_batches, file.schema
-        found = map(file.get_batch, range(count))
+        result = map(file.get_batch, range(count))
     else:
         parquet = pq.ParquetFile(stream)
         count, schema = parquet.metadata.num_rows, parquet.schema_arrow
         pairs = zip(schema.names, _named(name, schema.names), strict=True)
         wanted = [written for written, c in pairs if only is None or c in only]
-        found = parquet.iter_batches(batch_size=PIECE, columns=wanted)
+        result = parquet.iter_batches(batch_size=PIECE, columns=wanted)
     if not count:
-        found = iter([pa.RecordBatch.from_pylist([], schema)])
-    return tuple(schema.names), found
+        result = iter([pa.RecordBatch.from_pylist([], schema)])
+    return tuple(schema.names), result
 
 
 def _csv_pieces(
@@ -858,14 +858,14 @@ def _rows_pieces(
 
 def _delimiter(line: str, name: str) -> str:
     bare = re.sub(r'"[^"]*"', "", line)
-    found = [mark for mark in _DELIMITERS if mark in bare]
-    if len(found) > 1:
-        shown = " and ".join(repr(mark) for mark in found)
+    result = [mark for mark in _DELIMITERS if mark in bare]
+    if len(result) > 1:
+        shown = " and ".join(repr(mark) for mark in result)
         raise TableError(
             f"{name}:1: both {shown} stand between names; say which one is the "
             "delimiter (--delimiter)"
         )
-    return found[0] if found else ","
+    return result[0] if result else ","
 
 
 # --- tables in memory

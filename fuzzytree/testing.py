@@ -99,10 +99,10 @@ def check_exporter(form: Format | str, *, seed: int = 0, rounds: int = 2) -> Non
     """
     form = find_format(form) if isinstance(form, str) else form
     models = exporter_models(seed, rounds)
-    found = failures(form, models, seed=seed, damaged=1 + rounds)
-    if found:
-        listed = "\n".join(f"  {text}" for text in found)
-        raise DisagreementError(f"{form.name} fails in {len(found)} points:\n{listed}")
+    result = failures(form, models, seed=seed, damaged=1 + rounds)
+    if result:
+        listed = "\n".join(f"  {text}" for text in result)
+        raise DisagreementError(f"{form.name} fails in {len(result)} points:\n{listed}")
 
 
 def exporter_models(seed: int = 0, rounds: int = 2) -> Iterator[tuple[str, Document]]:

@@ -136,8 +136,8 @@ def run(
         LossError: If the runtime cannot carry the model, or as `load`.
         ValueError: If there is no such runtime.
     """
-    found = opened(model, allow_loss=allow_loss)
-    ready = answering(found, runtime, with_strengths=with_strengths)
+    result = opened(model, allow_loss=allow_loss)
+    ready = answering(result, runtime, with_strengths=with_strengths)
     return ready.join([one for _, one in ready(table, columns=columns)])
 
 
@@ -179,8 +179,8 @@ class Answering(msgspec.Struct, frozen=True):
         ):
             rows = batch.values.shape[1]
             starts = range(0, max(rows, 1), _BLOCK)
-            found = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
-            yield batch, self.join(found)
+            result = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
+            yield batch, self.join(result)
 
     @staticmethod
     def join(parts: Sequence[Predictions | Outputs]) -> Predictions | Outputs:
@@ -229,10 +229,10 @@ def _answering_system(
     system: FuzzySystem, runtime: str | None, *, with_strengths: bool
 ) -> Answering:
     name = runtime or baseline().name
-    found = _runtime(name, system)
-    if found.load_system is None:
+    result = _runtime(name, system)
+    if result.load_system is None:
         raise LossError(f"cannot run {system.name} in {name}: it runs no systems")
-    execute = found.load_system(system, activations=with_strengths)
+    execute = result.load_system(system, activations=with_strengths)
     names = tuple(one.name for one in system.outputs)
 
     def answer(values: FloatArray) -> Outputs:

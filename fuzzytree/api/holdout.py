@@ -189,9 +189,9 @@ def folds_of(codes: IntArray, folds: int, seed: int) -> IntArray:
         >>> folds_of(np.array([0, 0, 1, 1]), 2, 0).tolist()
         [0, 1, 0, 1]
     """
-    found = np.empty(len(codes), np.int64)
-    found[_by_class(codes, seed)] = np.arange(len(codes)) % folds
-    return found
+    result = np.empty(len(codes), np.int64)
+    result[_by_class(codes, seed)] = np.arange(len(codes)) % folds
+    return result
 
 
 def sampled(codes: IntArray, most: int, seed: int) -> IntArray:

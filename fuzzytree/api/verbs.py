@@ -158,11 +158,11 @@ def learn(
     from fuzzytree.learning import LearningSettings
     from fuzzytree.learning.findings import remarks
 
-    found = read_table(table, target=target, ignore=ignore)
-    for column, text in remarks(found, lambda column: f"ignore=[{column!r}]"):
-        warnings.warn(f"{found.name}: {column} has {text}", stacklevel=2)
+    result = read_table(table, target=target, ignore=ignore)
+    for column, text in remarks(result, lambda column: f"ignore=[{column!r}]"):
+        warnings.warn(f"{result.name}: {column} has {text}", stacklevel=2)
     return learn_table(
-        found,
+        result,
         name=name or _name_of(table),
         units=units or {},
         settings=settings or LearningSettings(),
@@ -232,8 +232,8 @@ def rules_from_tree(
         TypeError: If it is no tree.
         InvalidModelError: If `kind` is `raw` and the tree carries no sets.
     """
-    found = _tree_of(tree, "rules_from_tree")
-    return lowering.rules_from_tree(found, kind, conjunction=conjunction)
+    result = _tree_of(tree, "rules_from_tree")
+    return lowering.rules_from_tree(result, kind, conjunction=conjunction)
 
 
 def save(
@@ -290,7 +290,7 @@ def _rows(
 ) -> tuple[FloatArray, list[Batch]]:
     """Return rows for a model, of shape (inputs, rows), and as they came."""
     is_system = isinstance(model, FuzzySystem)
-    found = [
+    result = [
         *batches(
             data,
             model.columns if isinstance(model, FuzzySystem) else model.inputs,
@@ -299,10 +299,10 @@ def _rows(
             with_others=with_others,
         )
     ]
-    values = np.hstack([batch.values for batch in found])
+    values = np.hstack([batch.values for batch in result])
     if not values.shape[1]:
-        raise TableError(f"{found[0].piece.name} has no rows")
-    return values, found
+        raise TableError(f"{result[0].piece.name} has no rows")
+    return values, result
 
 
 def check(
@@ -416,13 +416,13 @@ def _as_deciding(
     """
     if not isinstance(model, FuzzySystem):
         return model
-    found = as_rules(model, None)
-    if found is None:
+    result = as_rules(model, None)
+    if result is None:
         raise ReadError(
             f"{title}: is a fuzzy system whose outputs are numbers, and is not "
             "compared with rules or a tree"
         )
-    return found
+    return result
 
 
 def certify(
@@ -516,11 +516,11 @@ def _model_of(model: ModelSource, verb: str) -> Model:
 
 
 def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
-    found = as_model(model)
-    if not isinstance(found, FuzzyTree):
-        kind = CALLED[kind_of(found)]
-        raise TypeError(f"{verb} takes a tree, and {found.name} is a {kind}")
-    return found
+    result = as_model(model)
+    if not isinstance(result, FuzzyTree):
+        kind = CALLED[kind_of(result)]
+        raise TypeError(f"{verb} takes a tree, and {result.name} is a {kind}")
+    return result
 
 
 def _data_name(data: object) -> str:
@@ -592,7 +592,7 @@ def audit(
         limited=where.limits,
         row=where.row,
     )
-    found = auditing.audit(
+    result = auditing.audit(
         model.model,
         rows=model.rows,
         domain=limited(box, where.limits, model.model),
@@ -606,7 +606,7 @@ def audit(
         accepted=wanted.accepted,
         repeat=repeat,
     )
-    return with_results(found, model.given) if model.given else found
+    return with_results(result, model.given) if model.given else result
 
 
 def material(
@@ -727,22 +727,22 @@ def audited_rows(
 
     if data is None:
         return None
-    values, found = _rows(
+    values, result = _rows(
         data,
         model,
         name=name,
         with_others=target is not None,
     )
-    name = found[0].piece.name
+    name = result[0].piece.name
     if target is None:
         return AuditRows(name, values)
-    known = found[0].piece.columns
+    known = result[0].piece.columns
     if target not in known:
         raise TableError(
             f"{name} has no column {target!r}; {name_choice(target, known)}"
         )
     place = known.index(target)
-    labels = class_names([batch.piece.cells[place] for batch in found])
+    labels = class_names([batch.piece.cells[place] for batch in result])
     classes = () if isinstance(model, FuzzySystem) else model.classes
     numbers = {label: number for number, label in enumerate(classes)}
     codes = np.array([numbers.get(label or "", -1) for label in labels], np.int64)
@@ -820,7 +820,7 @@ def diff(
     source = _source_of(data, name)
     rows = None
     if data is not None:
-        found = [
+        result = [
             *batches(
                 data,
                 all_inputs(first, second),
@@ -828,7 +828,7 @@ def diff(
             )
         ]
         rows = AuditRows(
-            found[0].piece.name, np.hstack([batch.values for batch in found])
+            result[0].piece.name, np.hstack([batch.values for batch in result])
         )
         if not rows.values.shape[1]:
             raise TableError(f"{rows.name} has no rows")

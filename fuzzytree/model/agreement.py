@@ -138,19 +138,19 @@ class Coverage(msgspec.Struct, frozen=True):
     @property
     def sentences(self) -> tuple[str, ...]:
         """What a user should know of it; empty if all rules fire and cover enough."""
-        found: list[str] = []
+        result: list[str] = []
         if self.unfired:
             shown = ", ".join(map(str, self.unfired[:20]))
             more = len(self.unfired) - 20
             shown += f" and {more} more" if more > 0 else ""
             noun = "rule" if len(self.unfired) == 1 else "rules"
-            found.append(f"no probe fires {noun} {shown} of {self.rules}")
+            result.append(f"no probe fires {noun} {shown} of {self.rules}")
         if 2 * self.uncovered > self.rows:
-            found.append(
+            result.append(
                 f"in {self.uncovered} of {self.rows} rows drawn evenly from the ranges "
                 "of the inputs an output has no number, and its default answers"
             )
-        return tuple(found)
+        return tuple(result)
 
 
 class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):

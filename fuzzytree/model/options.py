@@ -171,9 +171,9 @@ def _meant(name: str, text: str, kind: Any) -> Option:
     for part in parts:
         origin = get_origin(part) or part
         if origin is Literal:
-            found = [one for one in get_args(part) if str(one) == text]
-            if found:
-                return typing.cast("Option", found[0])  # a Literal holds options
+            result = [one for one in get_args(part) if str(one) == text]
+            if result:
+                return typing.cast("Option", result[0])  # a Literal holds options
             wrong = _one_of(text, tuple(map(str, get_args(part))))
         elif part is bool:
             known = {**_TRUTHS, **_FALSITIES}
@@ -207,13 +207,13 @@ def _helps(doc: str) -> dict[str, str]:
     if len(section) < 2:
         return {}
     body = re.split(r"^\S", section[1], maxsplit=1, flags=re.MULTILINE)[0]
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     name = ""
     for line in body.splitlines():
         entry = re.match(r"    (\w+): (.*)", line)
         if entry:
             name = entry[1]
-            found[name] = entry[2]
+            result[name] = entry[2]
         elif name and line.strip():
-            found[name] += f" {line.strip()}"
-    return found
+            result[name] += f" {line.strip()}"
+    return result

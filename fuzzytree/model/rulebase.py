@@ -347,12 +347,12 @@ def label_type_of(labels: Iterable[object]) -> LabelType | msgspec.UnsetType:
         >>> label_type_of([0, 1.5]), label_type_of([True]), label_type_of([True, 2])
         ('number', 'boolean', UNSET)
     """
-    found = [*labels]
-    if all(isinstance(label, bool) for label in found):
+    result = [*labels]
+    if all(isinstance(label, bool) for label in result):
         return "boolean"
-    if any(isinstance(label, bool) for label in found):
+    if any(isinstance(label, bool) for label in result):
         return msgspec.UNSET
-    is_number = all(isinstance(label, int | float) for label in found)
+    is_number = all(isinstance(label, int | float) for label in result)
     return "number" if is_number else msgspec.UNSET
 
 

@@ -354,8 +354,8 @@ def _plateau_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
         for owner, interval in zip(node.owners, intervals(node), strict=True):
             owned[owner].append(interval)
         for index, branch in enumerate(node.branches):
-            found = [shapes[node.variable, name] for name in branch.terms]
-            plateaus = [(s.low, s.high) for s in found if isinstance(s, Band)]
+            result = [shapes[node.variable, name] for name in branch.terms]
+            plateaus = [(s.low, s.high) for s in result if isinstance(s, Band)]
             if plateaus != owned[index]:
                 yield (
                     ("nodes", number - 1, "branches", index, "terms"),

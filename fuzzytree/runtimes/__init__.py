@@ -90,5 +90,5 @@ def needed_by(runtime: Runtime) -> str:
 
 
 def _runtimes_of(module: str) -> tuple[Runtime, ...]:
-    found: tuple[Runtime, ...] = importlib.import_module(module).RUNTIMES
-    return found
+    result: tuple[Runtime, ...] = importlib.import_module(module).RUNTIMES
+    return result

@@ -120,16 +120,16 @@ class CellRows:
 
     def places(self, net: Net, branch: IntArray, row: IntArray) -> IntArray:
         """Return where the value of each branch's variable stands."""
-        found = net.line.take(branch)
-        found *= self.lines.shape[1]
-        found += row
-        return found
+        result = net.line.take(branch)
+        result *= self.lines.shape[1]
+        result += row
+        return result
 
     def entries(self, net: Net, branch: IntArray, row: IntArray) -> IntArray:
         """Return the entry of each branch's clause for a row."""
-        found = self.cells.take(self.places(net, branch, row))
-        found += net.entry.take(branch)
-        return found
+        result = self.cells.take(self.places(net, branch, row))
+        result += net.entry.take(branch)
+        return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,10 +190,10 @@ def search(rules: RuleBase) -> Run:
                     continue
                 status[here][missing] = 3
                 whole = np.flatnonzero(~missing)
-                found = _search(net, lines.take(whole, axis=1))
+                result = _search(net, lines.take(whole, axis=1))
                 whole += start
-                rule[whole], status[whole] = found[:2]
-                crowded.append(whole[found[2]])
+                rule[whole], status[whole] = result[:2]
+                crowded.append(whole[result[2]])
         many = np.concatenate([np.empty(0, np.int64), *crowded])
         if len(many):
             outcome = fired(array.take(many, axis=1))
@@ -253,7 +253,7 @@ def _plateaus(
 
     None if they do not follow one another from end to end of one axis.
     """
-    found: list[tuple[float, float | None, int]] = []
+    result: list[tuple[float, float | None, int]] = []
     for clause, target in zip(fork.clauses, fork.targets, strict=True):
         if clause.negated or clause.variable != fork.clauses[0].variable:
             return None
@@ -261,12 +261,12 @@ def _plateaus(
             ends = _plateau(shapes[clause.variable, term])
             if ends is None:
                 return None
-            found.append((-np.inf if ends[0] is None else ends[0], ends[1], target))
-    found.sort(key=lambda plateau: plateau[0])
-    starts = [low for low, _, _ in found]
-    if [-np.inf, *(high for _, high, _ in found)] != [*starts, None]:
+            result.append((-np.inf if ends[0] is None else ends[0], ends[1], target))
+    result.sort(key=lambda plateau: plateau[0])
+    starts = [low for low, _, _ in result]
+    if [-np.inf, *(high for _, high, _ in result)] != [*starts, None]:
         return None
-    return [(high, target) for _, high, target in found]
+    return [(high, target) for _, high, target in result]
 
 
 def _plateau(shape: Shape) -> tuple[float | None, float | None] | None:
@@ -338,15 +338,15 @@ def _net(rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int]) 
 def _paths(rule: IntArray, target: IntArray, source: IntArray) -> list[IntArray]:
     """Return the branches from the first fork to the end of each rule."""
     into = {int(fork): branch for branch, fork in enumerate(target)}
-    found: dict[int, IntArray] = {}
+    result: dict[int, IntArray] = {}
     for fork in np.flatnonzero(rule).tolist():
         path: list[int] = []
         here = fork
         while here:
             path.append(into[here])
             here = int(source[into[here]])
-        found[int(rule[fork])] = np.array(path[::-1], np.int64)
-    return [found[number] for number in sorted(found)]
+        result[int(rule[fork])] = np.array(path[::-1], np.int64)
+    return [result[number] for number in sorted(result)]
 
 
 def _search(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -429,7 +429,7 @@ def _join(net: Net, before: FloatArray, degree: FloatArray) -> FloatArray:
 def _follow(
     net: Net,
     rows: CellRows,
-    found: tuple[IntArray, IntArray, FloatArray],
+    result: tuple[IntArray, IntArray, FloatArray],
     unsure: IntArray,
 ) -> IntArray:
     """Enter rule and status of some rows; return those to be fired.
@@ -437,11 +437,11 @@ def _follow(
     Args:
         net: The forks.
         rows: All rows.
-        found: The rule and the status of each row, and a lower bound of its strength,
+        result: The rule and the status of each row, and a lower bound of its strength,
             which is raised.
         unsure: The rows to do.
     """
-    rule, status, floor = found
+    rule, status, floor = result
     ends, crowded = _reachable(net, rows, floor, unsure)
     np.maximum.at(floor, ends.row, ends.low)
     ends = ends.take(np.flatnonzero(ends.high >= floor.take(ends.row)))
@@ -512,11 +512,11 @@ def _compare(
 
 def _strengths(net: Net, rows: CellRows, row: IntArray, rule: IntArray) -> FloatArray:
     """Return the strength of a rule in each row, bit-equal to firing."""
-    found = np.empty(len(row))
+    result = np.empty(len(row))
     for start in range(0, len(row), _PAIRS):
         part = slice(start, start + _PAIRS)
-        found[part] = _part_strengths(net, rows, row[part], rule[part] - 1)
-    return found
+        result[part] = _part_strengths(net, rows, row[part], rule[part] - 1)
+    return result
 
 
 def _part_strengths(
@@ -539,15 +539,15 @@ def _part_strengths(
     if not net.is_product:
         least: FloatArray = np.minimum.reduceat(degree, begin)
         return least
-    found, length = np.ones(len(path)), net.length.take(path)
+    result, length = np.ones(len(path)), net.length.take(path)
     for position in range(int(length.max())):
         longer = np.flatnonzero(length > position)
-        found[longer] *= degree.take(begin.take(longer) + position)
-    return found
+        result[longer] *= degree.take(begin.take(longer) + position)
+    return result
 
 
 def _begins(owner: IntArray) -> npt.NDArray[np.bool_]:
     """Return where a new owner begins among sorted ones."""
-    found = np.ones(len(owner), np.bool_)
-    np.not_equal(owner[1:], owner[:-1], out=found[1:])
-    return found
+    result = np.ones(len(owner), np.bool_)
+    np.not_equal(owner[1:], owner[:-1], out=result[1:])
+    return result

@@ -137,13 +137,13 @@ def load_content(
     def run(values: FloatArray) -> Outcome:
         array = checked(values, model.inputs)
         with np.errstate(over="ignore"):  # what float32 cannot hold is missing
-            given = np.ascontiguousarray(array, real)
+            inputs = np.ascontiguousarray(array, real)
         rows = array.shape[1]
         rule, status = np.empty((2, rows), np.int64)
         fired = np.empty(count, real) if count else None
         strengths = np.empty((count, rows), np.float64) if count else None
         filled = map(_at, (rule, status, fired, strengths))
-        decide(_at(given), rows, *filled)
+        decide(_at(inputs), rows, *filled)
         return Outcome(rule, status, strengths)
 
     return run
@@ -177,12 +177,12 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
     count = outputs + activations * len(system.rules)
 
     def run(values: FloatArray) -> SystemOutcome:
-        given = np.ascontiguousarray(checked(values, system.columns))
-        rows = given.shape[1]
-        found, status = np.empty((count, rows)), np.empty(rows, np.int64)
-        infer(_at(given), rows, _at(found), _at(status))
-        degrees = found[outputs:] if activations else None
-        return SystemOutcome(found[:outputs], status, degrees)
+        inputs = np.ascontiguousarray(checked(values, system.columns))
+        rows = inputs.shape[1]
+        result, status = np.empty((count, rows)), np.empty(rows, np.int64)
+        infer(_at(inputs), rows, _at(result), _at(status))
+        degrees = result[outputs:] if activations else None
+        return SystemOutcome(result[:outputs], status, degrees)
 
     return run
 
@@ -220,13 +220,13 @@ def compiled(
             timeout=_LONGEST_WAIT,
         )
         if done.returncode:
-            said = done.stderr.decode("utf-8", "replace").strip()[:1000]
-            raise FuzzyTreeError(f"{compiler} cannot compile the model: {said}")
-        found = getattr(ctypes.CDLL(str(path)), function)
+            message = done.stderr.decode("utf-8", "replace").strip()[:1000]
+            raise FuzzyTreeError(f"{compiler} cannot compile the model: {message}")
+        result = getattr(ctypes.CDLL(str(path)), function)
     pointer = ctypes.c_void_p
-    found.argtypes = [pointer, ctypes.c_size_t, *[pointer] * pointers]
-    found.restype = None
-    many: Decide = found
+    result.argtypes = [pointer, ctypes.c_size_t, *[pointer] * pointers]
+    result.restype = None
+    many: Decide = result
     return many
 
 

@@ -125,12 +125,12 @@ def atoms_of(line: int, shape: Shape) -> tuple[Atom, ...]:
         return SetSide(line, mean, -1, left), SetSide(line, mean, 1, right)
     if isinstance(shape, Points):
         return (Polyline(line, shape),)
-    found: list[Atom] = []
+    result: list[Atom] = []
     if shape.low is not None:
-        found.append(BandEdge(line, shape.low, False, shape.left))
+        result.append(BandEdge(line, shape.low, False, shape.left))
     if shape.high is not None:
-        found.append(BandEdge(line, shape.high, True, shape.right))
-    return tuple(found)
+        result.append(BandEdge(line, shape.high, True, shape.right))
+    return tuple(result)
 
 
 def plan_blocks(
@@ -149,11 +149,11 @@ def plan_blocks(
             checkpoint()
             part = members[start : start + size]
             lines = np.array([atom.line for atom in part], np.int64)
-            blocks.append(AtomBlock(lines, _made(kind, part, numbers)))
+            blocks.append(AtomBlock(lines, _block_run(kind, part, numbers)))
     return ordered, tuple(blocks)
 
 
-def _made(
+def _block_run(
     kind: int, atoms: Sequence[Atom], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     if kind <= 1:
@@ -322,7 +322,7 @@ def shape_degrees(shape: Shape, values: Reals) -> Reals:
         >>> shape_degrees(band, np.array([0.0, 1.0, 1.25])).tolist()
         [0.0, 1.0, 0.75]
     """
-    found = np.ones(len(values))
+    result = np.ones(len(values))
     atoms = atoms_of(0, shape)
     _, blocks = plan_blocks(atoms, NUMBERS["float64"], max(len(values), 1))
     with np.errstate(all="ignore"):
@@ -330,8 +330,8 @@ def shape_degrees(shape: Shape, values: Reals) -> Reals:
             lines = np.repeat(values[np.newaxis], len(block.lines), axis=0)
             out = np.empty_like(lines)
             block.run(lines, out, np.empty_like(lines))
-            np.minimum(found, out.min(axis=0), out=found)
-    return found
+            np.minimum(result, out.min(axis=0), out=result)
+    return result
 
 
 def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
@@ -343,12 +343,12 @@ def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
     np.subtract(x, position, out=position)
     position /= _taken(lines.width, place)
     near, far = _taken(lines.near, place), _taken(lines.far, place)
-    found = position.astype(near.dtype, copy=False)
-    found *= far - near
-    found += near
-    np.maximum(found, np.minimum(near, far), out=found)
-    np.minimum(found, np.maximum(near, far, out=far), out=found)
-    return found
+    result = position.astype(near.dtype, copy=False)
+    result *= far - near
+    result += near
+    np.maximum(result, np.minimum(near, far), out=result)
+    np.minimum(result, np.maximum(near, far, out=far), out=result)
+    return result
 
 
 def counted(lines: Segments, shape: IntArray, x: Reals) -> IntArray:

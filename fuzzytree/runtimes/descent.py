@@ -462,12 +462,12 @@ def _one(splits: tuple[AxisSplit, ...], row: list[float]) -> Outcome:
 
 
 def _splits(tree: FuzzyTree, axes: Axes) -> list[AxisSplit]:
-    found: list[AxisSplit] = []
+    result: list[AxisSplit] = []
     for node in tree.nodes:
         ends = [
             -branch.leaf if branch.leaf is not None else (branch.node or 0) - 1
             for branch in node.branches
         ]
         targets = tuple(ends[owner] for owner in node.owners)
-        found.append(AxisSplit(axes.line[node.variable], node.cuts, targets))
-    return found
+        result.append(AxisSplit(axes.line[node.variable], node.cuts, targets))
+    return result

@@ -168,14 +168,14 @@ def plan_envelope(
         list(dict.fromkeys(shapes[c.variable, term] for term in c.terms)) or [always]
         for c in clauses
     ]
-    distinct = dict.fromkeys(shape for found in of_clause for shape in found)
+    distinct = dict.fromkeys(shape for result in of_clause for shape in result)
     sets = [shape for shape in distinct if isinstance(shape, LR)]
     bands = [shape for shape in distinct if isinstance(shape, Band)]
     points = [shape for shape in distinct if isinstance(shape, Points)]
     ordered: list[Shape] = [*sets, *bands, *points]
     number = {shape: position for position, shape in enumerate(ordered)}
     line = np.array([at_line[c.variable] if c.terms else 0 for c in clauses], np.int64)
-    members = [np.array([number[s] for s in found], np.int64) for found in of_clause]
+    members = [np.array([number[s] for s in result], np.int64) for result in of_clause]
     lines = segments(points, DOUBLE, DOUBLE)
     by_kind = Shapes(_slopes(sets), _edges(bands), points, lines)
     negated = np.array([clause.negated for clause in clauses])
@@ -219,8 +219,8 @@ def cell_ends(grid: AxisCells, line: int) -> tuple[FloatArray, FloatArray]:
     def ends(moved: FloatArray, sign: float) -> FloatArray:
         z = moved / (1.0 - np.abs(moved))
         rounding = 8 * _EPS * (np.abs(centre) + np.abs(unit * z))
-        found: FloatArray = centre + unit * z + sign * rounding
-        return found
+        result: FloatArray = centre + unit * z + sign * rounding
+        return result
 
     with np.errstate(all="ignore"):
         low = np.append(-np.inf, ends(share[1:-1] - _CLOSE, -1.0))
@@ -242,11 +242,11 @@ def exact_degrees(envelope: Envelope, entries: IntArray, x: FloatArray) -> Float
     owner, offset, begin = spread(count)
     shape = envelope.candidates.take(first.take(owner) + offset).astype(np.int64)
     degrees = _degrees(envelope.shapes, shape, x.take(owner))
-    found: FloatArray = np.maximum.reduceat(degrees, begin)
+    result: FloatArray = np.maximum.reduceat(degrees, begin)
     if envelope.negated.any():
         negated = envelope.negated.take(entries // envelope.grid.count)
-        np.subtract(1.0, found, out=found, where=negated)
-    return found
+        np.subtract(1.0, result, out=result, where=negated)
+    return result
 
 
 def spread(count: IntArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -266,18 +266,18 @@ def spread(count: IntArray) -> tuple[IntArray, IntArray, IntArray]:
 def _degrees(shapes: Shapes, shape: IntArray, x: FloatArray) -> FloatArray:
     if shapes.bands_from == shapes.points_from and not shapes.points:
         return _slope_degrees(shapes.slopes, shape, x)
-    found = np.empty(len(x))
+    result = np.empty(len(x))
     mine = np.flatnonzero(shape < shapes.bands_from)
-    found[mine] = _slope_degrees(shapes.slopes, shape.take(mine), x.take(mine))
+    result[mine] = _slope_degrees(shapes.slopes, shape.take(mine), x.take(mine))
     is_joined = shape >= shapes.points_from
     mine = np.flatnonzero((shape >= shapes.bands_from) & ~is_joined)
     bands = shape.take(mine) - shapes.bands_from
-    found[mine] = _edge_degrees(shapes.edges, bands, x.take(mine))
+    result[mine] = _edge_degrees(shapes.edges, bands, x.take(mine))
     mine = np.flatnonzero(is_joined)
     points = shape.take(mine) - shapes.points_from
     values = x.take(mine)
-    found[mine] = join(shapes.lines, halved(shapes.lines, points, values), values)
-    return found
+    result[mine] = join(shapes.lines, halved(shapes.lines, points, values), values)
+    return result
 
 
 def _slope_degrees(slopes: Slopes, shape: IntArray, x: FloatArray) -> FloatArray:
@@ -300,10 +300,10 @@ def _slope_degrees(slopes: Slopes, shape: IntArray, x: FloatArray) -> FloatArray
 def _body(curve: FloatArray, t: FloatArray) -> FloatArray:
     v = t * 2.0
     v -= 1.0
-    found = _horner(curve, v)
-    found *= t
-    np.subtract(1.0, found, out=found)
-    return found
+    result = _horner(curve, v)
+    result *= t
+    np.subtract(1.0, result, out=result)
+    return result
 
 
 def _tail(reach: FloatArray, u: FloatArray) -> FloatArray:
@@ -317,12 +317,12 @@ def _tail(reach: FloatArray, u: FloatArray) -> FloatArray:
 
 def _horner(curve: FloatArray, x: FloatArray) -> FloatArray:
     """Return c0 + x (c1 + ...); leading zeros change nothing."""
-    found = np.empty(np.broadcast_shapes(curve[-1].shape, x.shape))
-    found[:] = curve[-1]
+    result = np.empty(np.broadcast_shapes(curve[-1].shape, x.shape))
+    result[:] = curve[-1]
     for coefficient in curve[-2::-1]:
-        found *= x
-        found += coefficient
-    return found
+        result *= x
+        result += coefficient
+    return result
 
 
 def _edge_degrees(edges: Edges, shape: IntArray, x: FloatArray) -> FloatArray:
@@ -368,10 +368,10 @@ def _edges(bands: Sequence[Band]) -> Edges:
 def _curves(curves: Sequence[tuple[float, ...]]) -> FloatArray:
     """Return a line for each power, low ones first, and a column for each curve."""
     longest = max(map(len, curves), default=1)
-    found = np.zeros((longest, len(curves)))
+    result = np.zeros((longest, len(curves)))
     for position, curve in enumerate(curves):
-        found[: len(curve), position] = curve
-    return found
+        result[: len(curve), position] = curve
+    return result
 
 
 def _grid(
@@ -533,7 +533,7 @@ def _line_bounds(
 
 def _outwards(bounds: FloatArray, towards: float) -> Singles:
     """Return bounds in float32, not on the inner side of what they were."""
-    found = bounds.astype(np.float32)
-    is_inside = found < bounds if towards > 0 else found > bounds
-    moved = np.nextafter(found, np.float32(towards))
-    return np.where(is_inside, moved, found)
+    result = bounds.astype(np.float32)
+    is_inside = result < bounds if towards > 0 else result > bounds
+    moved = np.nextafter(result, np.float32(towards))
+    return np.where(is_inside, moved, result)

@@ -24,9 +24,9 @@ def load(model: Model, dtype: Dtype = "float64") -> Run:
     """
     lost = losses(model, dtype)
     if lost:
-        found = "; ".join(f"{loss.where}: {loss.what}" for loss in lost[:3])
+        result = "; ".join(f"{loss.where}: {loss.what}" for loss in lost[:3])
         more = f"; and {len(lost) - 3} more" if len(lost) > 3 else ""
-        raise LossError(f"cannot run {model.name} in {dtype}: {found}{more}")
+        raise LossError(f"cannot run {model.name} in {dtype}: {result}{more}")
     if isinstance(model, RuleBase):
         return fire(model, dtype)
     return follow(model, dtype)

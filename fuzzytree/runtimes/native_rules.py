@@ -127,7 +127,7 @@ def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
         array = checked(values, rules.inputs)
         count = array.shape[1]
         strengths = np.empty((len(rules.rules), count), np.float64)
-        found = np.empty((2, count), np.int64)
+        result = np.empty((2, count), np.int64)
         with np.errstate(all="ignore"):
             for start in range(0, count, plan.rows):
                 part = slice(start, start + plan.rows)
@@ -139,9 +139,9 @@ def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
                 else:
                     fired[:, missing] = 0
                 strengths[:, part] = fired
-                found[:, part] = winners(fired, missing)
+                result[:, part] = winners(fired, missing)
                 strengths[:, part][:, missing] = np.nan
-        return Outcome(found[0], found[1], strengths)
+        return Outcome(result[0], result[1], strengths)
 
     return run
 
@@ -265,19 +265,19 @@ def clause_degrees(degrees: Degrees, lines: Reals) -> Reals:
     """Return the degree of every clause, a line each (see `Degrees`)."""
     rows = lines.shape[1]
     atoms = _atom_degrees(degrees, lines)
-    found = np.empty((degrees.count, rows), degrees.numbers.degree)
+    result = np.empty((degrees.count, rows), degrees.numbers.degree)
     terms, both = len(degrees.left), len(degrees.right)
-    atoms.take(degrees.left, axis=0, out=found[:terms], mode="clip")
+    atoms.take(degrees.left, axis=0, out=result[:terms], mode="clip")
     if both:
-        np.minimum(found[:both], atoms.take(degrees.right, axis=0), out=found[:both])
+        np.minimum(result[:both], atoms.take(degrees.right, axis=0), out=result[:both])
     for choice in degrees.choices:
-        out = found[choice.first : choice.first + len(choice.terms)]
-        _join(found[:terms], choice.terms, out)
+        out = result[choice.first : choice.first + len(choice.terms)]
+        _join(result[:terms], choice.terms, out)
     if len(degrees.negated):
         start = degrees.count - len(degrees.negated)
-        plain = found[:start].take(degrees.negated, axis=0)
-        np.subtract(np.ones((), found.dtype), plain, out=found[start:])
-    return found
+        plain = result[:start].take(degrees.negated, axis=0)
+        np.subtract(np.ones((), result.dtype), plain, out=result[start:])
+    return result
 
 
 def _atom_degrees(degrees: Degrees, lines: Reals) -> Reals:

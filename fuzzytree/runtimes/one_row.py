@@ -59,14 +59,14 @@ def row_runner(program: Program) -> RunRow | None:
         known: list[Any] = [*still]
         for place, line in inputs:
             known[place] = row[line]
-        for place, function, given in calls:  # unpacked: it takes half of the time
-            if len(given) == 2:
-                one, two = given
+        for place, function, arguments in calls:  # unpacked: it takes half of the time
+            if len(arguments) == 2:
+                one, two = arguments
                 known[place] = function(known[one], known[two])
-            elif len(given) == 1:
-                known[place] = function(known[given[0]])
+            elif len(arguments) == 1:
+                known[place] = function(known[arguments[0]])
             else:
-                condition, one, two = given
+                condition, one, two = arguments
                 known[place] = function(known[condition], known[one], known[two])
         return [float(known[place]) for place in results]
 

@@ -217,13 +217,13 @@ def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:
         strengths=np.empty((facts.rules, count)) if has_strengths else None,
     )
     names = [name for name in facts.outputs if name != "label"]
-    for start, found in _chunks(session, facts, values, names):
-        part = slice(start, start + len(found["rule"]))
-        outcome.rule[part] = found["rule"]
-        if "status" in found:
-            outcome.status[part] = found["status"]
+    for start, result in _chunks(session, facts, values, names):
+        part = slice(start, start + len(result["rule"]))
+        outcome.rule[part] = result["rule"]
+        if "status" in result:
+            outcome.status[part] = result["status"]
         if outcome.strengths is not None:
-            outcome.strengths[:, part] = found["strengths"].T
+            outcome.strengths[:, part] = result["strengths"].T
     if "status" not in names:
         is_missing = ~np.isfinite(values).all(axis=0)
         none = np.where(is_missing, 3, 2)
@@ -248,13 +248,13 @@ def _run_system(session: Session, facts: Facts, values: FloatArray) -> SystemOut
         status=np.empty(count, np.int64),
         activations=np.empty((facts.rules, count)) if has_activations else None,
     )
-    for start, found in _chunks(session, facts, values, facts.outputs):
-        part = slice(start, start + len(found["outputs"]))
-        outcome.outputs[:, part] = found["outputs"].T
+    for start, result in _chunks(session, facts, values, facts.outputs):
+        part = slice(start, start + len(result["outputs"]))
+        outcome.outputs[:, part] = result["outputs"].T
         if outcome.activations is not None:
-            outcome.activations[:, part] = found["activations"].T
-        if "status" in found:
-            outcome.status[part] = found["status"]
+            outcome.activations[:, part] = result["activations"].T
+        if "status" in result:
+            outcome.status[part] = result["status"]
     if "status" not in facts.outputs:
         is_none = np.isnan(outcome.outputs).any(axis=0)
         is_missing = ~np.isfinite(values).all(axis=0)
@@ -285,8 +285,8 @@ def _labels(session: Session, facts: Facts, values: FloatArray) -> Labels:
     values = checked(values, facts.inputs)
     return tuple(
         label or None
-        for _, found in _chunks(session, facts, values, ["label"])
-        for label in found["label"].tolist()
+        for _, result in _chunks(session, facts, values, ["label"])
+        for label in result["label"].tolist()
     )
 
 
@@ -303,15 +303,15 @@ def _chunks(
     for start in range(0, max(values.shape[1], 1), rows):
         table = _table(facts, values[:, start : start + rows])
         try:
-            found = session(names, table)
+            result = session(names, table)
         except RUNTIME_ERRORS as error:
             text = f"onnxruntime cannot run {facts.name}: {first_line(error)}"
             raise LossError(text) from error
-        if not _is_answer(facts, found, len(table)):
+        if not _is_answer(facts, result, len(table)):
             raise LossError(
                 f"{facts.name}: the ONNX file gives answers without meaning"
             )
-        yield start, found
+        yield start, result
 
 
 def _rows_at_once(facts: Facts) -> int:
@@ -336,24 +336,24 @@ def _table(facts: Facts, values: FloatArray) -> npt.NDArray[np.generic]:
     return table
 
 
-def _is_answer(facts: Facts, found: Outputs, rows: int) -> bool:
+def _is_answer(facts: Facts, result: Outputs, rows: int) -> bool:
     """Say whether outputs have the shapes and numbers that answers have."""
     import numpy as np
 
     widths = {"strengths": facts.rules, "activations": facts.rules}
     widths["outputs"] = len(facts.names)
     for name, width in widths.items():
-        if name in found and found[name].shape != (rows, width):
+        if name in result and result[name].shape != (rows, width):
             return False
     for name, last in (("rule", facts.rules), ("status", 3)):
-        if name not in found:
+        if name not in result:
             continue
-        numbers = found[name].astype(np.int64)
+        numbers = result[name].astype(np.int64)
         if numbers.shape != (rows,) or rows == 0:
             return numbers.shape == (rows,)
         if numbers.min() < 0 or numbers.max() > last:
             return False
-    return "label" not in found or found["label"].shape == (rows,)
+    return "label" not in result or result["label"].shape == (rows,)
 
 
 def parsed(content: bytes, name: str) -> onnx.ModelProto:

@@ -86,11 +86,11 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
             return None
         owners = np.array(self.owners)
         nothing = self.strengths[0] * 0.0  # NaN stays NaN
-        found = [
+        result = [
             self.strengths[owners == k].max(axis=0) if k in self.owners else nothing
             for k in range(len(self.choices))
         ]
-        return np.array(found)
+        return np.array(result)
 
     def count(self, status: int) -> int:
         """Return how many rows have this `fuzzytree.semantics.reference.Status`."""
@@ -99,8 +99,8 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
     def class_counts(self) -> dict[str, int]:
         """Return how many rows have each class, and `no class` if any has none."""
         counts = np.bincount(self.codes + 1, minlength=len(self.choices) + 1).tolist()
-        found = dict(zip(self.choices, counts[1:], strict=True))
-        return found | ({"no class": counts[0]} if counts[0] else {})
+        result = dict(zip(self.choices, counts[1:], strict=True))
+        return result | ({"no class": counts[0]} if counts[0] else {})
 
     def to_csv(self, strengths: By | None = None) -> str:
         """Return them as CSV: class, rule, status and, if requested, strengths.
@@ -119,13 +119,13 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
             ValueError: If strengths are requested that are not there.
         """
         words = [status.name.lower() for status in Status]
-        found: dict[str, Sequence[object]] = {
+        result: dict[str, Sequence[object]] = {
             "class": [name or "" for name in self.names],
             "rule": self.rule.tolist(),
             "status": [words[status] for status in self.status.tolist()],
         }
         if strengths is None:
-            return found
+            return result
         values = self.class_strengths if strengths == "class" else self.strengths
         if values is None:
             raise ValueError(
@@ -135,8 +135,8 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
         names = self.choices if strengths == "class" else range(1, len(values) + 1)
         for name, row in zip(names, values.tolist(), strict=True):
             shown = ["" if math.isnan(value) else value for value in row]
-            found[f"strength of {strengths} {name}"] = shown
-        return found
+            result[f"strength of {strengths} {name}"] = shown
+        return result
 
     def to_arrow(self, strengths: By | None = None) -> pa.Table:
         """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
@@ -164,8 +164,8 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
 
     def __str__(self) -> str:
         """Show how many rows got which class, and what was out of the ordinary."""
-        found = self.class_counts().items()
-        counts = ", ".join(f"{name} {count}" for name, count in found)
+        result = self.class_counts().items()
+        counts = ", ".join(f"{name} {count}" for name, count in result)
         odd = odd_text(self)
         return f"{len(self)} rows: {counts}" + (f"; {odd}" if odd else "")
 
@@ -256,7 +256,7 @@ def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> li
         ['IF force is low (0.5) THEN soft']
     """
     shapes = shapes_of(rules.variables)
-    found = zip(
+    result = zip(
         values.T.tolist(),
         predictions.rule.tolist(),
         predictions.status.tolist(),
@@ -264,7 +264,7 @@ def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> li
     )
     return [
         _reason(rules, shapes, dict(zip(rules.inputs, row, strict=True)), rule, status)
-        for row, rule, status in found
+        for row, rule, status in result
     ]
 
 
@@ -338,21 +338,21 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         Raises:
             ValueError: If activations are requested that are not there.
         """
-        found: dict[str, Sequence[object]] = {
+        result: dict[str, Sequence[object]] = {
             name: _cells(row) for name, row in zip(self.names, self.values, strict=True)
         }
         words = [status.name.lower() for status in Status]
         title = "status"
-        while title in found:  # an output may have that name
+        while title in result:  # an output may have that name
             title += "_"
-        found[title] = [words[status] for status in self.status.tolist()]
+        result[title] = [words[status] for status in self.status.tolist()]
         if not with_activations:
-            return found
+            return result
         if self.activations is None:
             raise ValueError("there are no degrees of activation; ask for them")
         for number, row in enumerate(self.activations, 1):
-            found[f"strength of rule {number}"] = _cells(row)
-        return found
+            result[f"strength of rule {number}"] = _cells(row)
+        return result
 
     def spans(self) -> dict[str, tuple[float, float]]:
         """Return the least and the largest number of each output that has one."""
@@ -396,9 +396,9 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
 
     def __str__(self) -> str:
         """Show the range of each output, and what was out of the ordinary."""
-        found = self.spans().items()
+        result = self.spans().items()
         spans = ", ".join(
-            f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in found
+            f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in result
         )
         odd = [
             f"{count} {what}"

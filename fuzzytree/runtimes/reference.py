@@ -58,13 +58,13 @@ def infer_rows(system: FuzzySystem, /, *, activations: bool = False) -> SystemRu
         from fuzzytree.runtimes.rows import checked
 
         table = checked(values, names).T.tolist()
-        found = [infer(system, dict(zip(names, row, strict=True))) for row in table]
-        outputs = np.array([one.outputs for one in found], np.float64)
-        degrees = np.array([one.activations for one in found], np.float64)
+        result = [infer(system, dict(zip(names, row, strict=True))) for row in table]
+        outputs = np.array([one.outputs for one in result], np.float64)
+        degrees = np.array([one.activations for one in result], np.float64)
         return SystemOutcome(
-            outputs.reshape(len(found), len(system.outputs)).T,
-            np.array([one.status for one in found], np.int64),
-            degrees.reshape(len(found), len(system.rules)).T if activations else None,
+            outputs.reshape(len(result), len(system.outputs)).T,
+            np.array([one.status for one in result], np.int64),
+            degrees.reshape(len(result), len(system.rules)).T if activations else None,
         )
 
     return run

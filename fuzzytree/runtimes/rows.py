@@ -62,13 +62,13 @@ def winners(
     """
     best = strengths.max(axis=0)
     equal = strengths == best
-    found = np.empty((2, strengths.shape[1]), np.int64)
-    np.add(equal.argmax(axis=0), 1, out=found[0])
-    np.greater(np.count_nonzero(equal, axis=0), 1, out=found[1], casting="unsafe")
+    result = np.empty((2, strengths.shape[1]), np.int64)
+    np.add(equal.argmax(axis=0), 1, out=result[0])
+    np.greater(np.count_nonzero(equal, axis=0), 1, out=result[1], casting="unsafe")
     uncovered = best == 0.0
-    found[0, uncovered], found[1, uncovered] = 0, 2
-    found[0, missing], found[1, missing] = 0, 3
-    return found
+    result[0, uncovered], result[1, uncovered] = 0, 2
+    result[0, missing], result[1, missing] = 0, 3
+    return result
 
 
 def _shown(names: Sequence[str]) -> str:

@@ -51,14 +51,14 @@ def universe(shapes: Sequence[Shape], points: int) -> FloatArray:
 
     Each curved piece gets `points` values.
     """
-    found: list[FloatArray] = [np.array([0.0])]
+    result: list[FloatArray] = [np.array([0.0])]
     for shape in shapes:
         marks = np.array(_marks(shape))
-        found += [marks, np.nextafter(marks, -np.inf), np.nextafter(marks, np.inf)]
+        result += [marks, np.nextafter(marks, -np.inf), np.nextafter(marks, np.inf)]
         for start, end in _pieces(shape):
             share = np.arange(points + 1) / points
-            found.append(start * (1.0 - share) + end * share)
-    values = np.unique(np.concatenate(found))
+            result.append(start * (1.0 - share) + end * share)
+    values = np.unique(np.concatenate(result))
     return values[np.isfinite(values)]
 
 

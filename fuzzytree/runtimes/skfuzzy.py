@@ -90,9 +90,9 @@ def load(model: Model) -> Run:
             simulation.compute_rule(rule)
             line[:] = rule.aggregate_firing[simulation]
         simulation.reset()
-        found = winners(strengths, missing)
+        result = winners(strengths, missing)
         strengths[:, missing] = np.nan
-        return Outcome(found[0], found[1], strengths)
+        return Outcome(result[0], result[1], strengths)
 
     return run
 
@@ -119,10 +119,10 @@ def _clause_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
     """Return the shapes that clauses name: those of each variable, by term."""
     from fuzzytree.runtimes.sampling import clause_shapes
 
-    found: dict[str, dict[str, Shape]] = {}
+    result: dict[str, dict[str, Shape]] = {}
     for (variable, term), shape in clause_shapes(rules).items():
-        found.setdefault(variable, {})[term] = shape
-    return found
+        result.setdefault(variable, {})[term] = shape
+    return result
 
 
 def _universe(shapes: Sequence[Shape]) -> FloatArray:

@@ -123,12 +123,12 @@ def numbers_of(
         except subprocess.TimeoutExpired as error:
             text = f"{language} did not end within {_LONGEST_WAIT:.0f} seconds"
             raise FuzzyTreeError(text) from error
-        found = folder / "found.bin"
-        if done.returncode or not found.is_file():
-            said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-            why = said[-1] if said else f"exit code {done.returncode}"
+        result = folder / "found.bin"
+        if done.returncode or not result.is_file():
+            messages = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            why = messages[-1] if messages else f"exit code {done.returncode}"
             raise FuzzyTreeError(f"{language} cannot run it: {why}")
-        numbers = np.frombuffer(found.read_bytes())
+        numbers = np.frombuffer(result.read_bytes())
     if not count or numbers.size % count:
         raise FuzzyTreeError(f"{language} does not answer each row")
     return numbers.reshape(count, -1)
@@ -138,9 +138,9 @@ def _script(language: str) -> Engine:
     def run(
         content: bytes, model: Model, _: Options, values: FloatArray
     ) -> ProgramOutcome:
-        found = numbers_of(content, language, values, model.classes)
-        labels = tuple(None if k < 0 else model.classes[int(k)] for k in found[:, 0])
-        return ProgramOutcome(_outcome(model, found[:, 1:].tolist()), labels)
+        result = numbers_of(content, language, values, model.classes)
+        labels = tuple(None if k < 0 else model.classes[int(k)] for k in result[:, 0])
+        return ProgramOutcome(_outcome(model, result[:, 1:].tolist()), labels)
 
     return run
 
@@ -205,13 +205,13 @@ def _queried(
     marks = ", ".join("?" * len(quoted))
     connection.executemany(f"INSERT INTO data VALUES ({marks})", values.T.tolist())
     cursor = connection.execute(content.decode("utf-8"))
-    found = cursor.fetchall()
+    result = cursor.fetchall()
     width = len(quoted)
-    kept = np.array([row[:width] for row in found], np.float64).reshape(-1, width)
+    kept = np.array([row[:width] for row in result], np.float64).reshape(-1, width)
     if not np.array_equal(kept, values.T, equal_nan=True):
         raise FuzzyTreeError("it does not give each row with its inputs, in order")
-    outcome = _outcome(model, [row[width + 1 :] for row in found])
-    return ProgramOutcome(outcome, tuple(row[width] for row in found))
+    outcome = _outcome(model, [row[width + 1 :] for row in result])
+    return ProgramOutcome(outcome, tuple(row[width] for row in result))
 
 
 def _pmml(
@@ -225,13 +225,13 @@ def _pmml(
     engine: Any = importlib.import_module("jpmml_evaluator")
     evaluator = engine.make_evaluator(content).verify()
     table = pandas.DataFrame(dict(zip(model.inputs, values, strict=True)))
-    found = evaluator.evaluateAll(table, error_col=None)[0]
-    labels = tuple(None if one != one else one for one in found["answer"])
+    result = evaluator.evaluateAll(table, error_col=None)[0]
+    labels = tuple(None if one != one else one for one in result["answer"])
     count = len(model.rules) if isinstance(model, RuleBase) else 0
     names = [f"strength of rule {k}" for k in range(1, count + 1)]
     known = np.logical_and.reduce(np.isfinite(values), axis=0).tolist()
     rows = []
-    for place, line in enumerate(found.to_dict("records")):
+    for place, line in enumerate(result.to_dict("records")):
         is_none = line["rule"] is None or line["rule"] != line["rule"]
         rule = 0 if is_none else int(line["rule"])
         status = Status.DECIDED if rule else Status.UNCOVERED
