@@ -2,7 +2,7 @@
 
 A tree's cuts are carried over to trees of other libraries, a rule base's terms to
 fuzzy engines. Every peer answers rows with missing values, and those beyond its number
-type, without being asked; its own code sees the others.
+type, in our code; its own code sees the others.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
     for peer in TREE_PEERS:
         why = _absent(peer.modules, peer.program)
         if why or not tree.nodes:
-            omitted.append(Omission(peer.name, why or "the tree asks nothing"))
+            omitted.append(Omission(peer.name, why or "the tree has no node"))
             continue
         note = peer.note
         if any(variable.parts for variable in tree.variables):
@@ -223,7 +223,7 @@ def _lines(
     certified = bounds(rules, "float64")
     if certified is None:
         return None
-    terms = engines.asked_terms(rules, points)
+    terms = engines.sampled_terms(rules, points)
     if is_rowwise and engines.is_steep(terms):
         return None
     errors = {key: one.error for key, one in terms.items()}

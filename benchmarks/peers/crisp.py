@@ -24,11 +24,11 @@ _MOST = 200_000
 NOWHERE = -1
 
 
-class Questions(NamedTuple):
+class NodeTable(NamedTuple):
     """A binary tree in flat arrays; position 0 is its root, and parents come first.
 
     Attributes:
-        line: The line of the axis that is asked; -1 in a leaf.
+        line: The line of the axis that is tested; -1 in a leaf.
         cut: On to the left for values up to it; 0 in a leaf.
         left: The position of the way on to the left; -1 in a leaf.
         right: The same to the right.
@@ -49,7 +49,7 @@ class Questions(NamedTuple):
         return self.leaf > 0
 
 
-def questions(tree: FuzzyTree, axes: Axes) -> Questions:
+def nodes_of(tree: FuzzyTree, axes: Axes) -> NodeTable:
     """Return a tree as questions with two ways on, the same answers and cuts.
 
     A node of several cuts becomes a balanced cascade of them. A branch that owns
@@ -62,8 +62,8 @@ def questions(tree: FuzzyTree, axes: Axes) -> Questions:
         >>> from fuzzytree.runtimes.rows import plan_axes
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1, leaves=3)
-        >>> asked = questions(tree, plan_axes(tree.variables))
-        >>> asked.leaf[asked.is_leaf].tolist()
+        >>> nodes = nodes_of(tree, plan_axes(tree.variables))
+        >>> nodes.leaf[nodes.is_leaf].tolist()
         [1, 2, 3]
     """
     code = {label: number for number, label in enumerate(tree.classes)}
@@ -93,7 +93,7 @@ def questions(tree: FuzzyTree, axes: Axes) -> Questions:
     line, left, right, leaf_number, label = (
         columns[i].astype(np.int64) for i in (0, 2, 3, 4, 5)
     )
-    return Questions(line, columns[1], left, right, leaf_number, label)
+    return NodeTable(line, columns[1], left, right, leaf_number, label)
 
 
 def _entry(tree: FuzzyTree, number: int) -> tuple[int, int, int]:

@@ -76,11 +76,11 @@ Terms = Mapping[tuple[str, str], Knots]
 def names_of(rules: RuleBase) -> dict[tuple[str, str], tuple[str, str]]:
     """Return plain words for variables and terms that clauses ask: v1 and t1 ..."""
     variables = {v.name: f"v{n}" for n, v in enumerate(rules.variables, 1)}
-    asked = enumerate(clause_shapes(rules), 1)
-    return {key: (variables[key[0]], f"t{number}") for number, key in asked}
+    names = enumerate(clause_shapes(rules), 1)
+    return {key: (variables[key[0]], f"t{number}") for number, key in names}
 
 
-def asked_terms(rules: RuleBase, points: int) -> dict[tuple[str, str], Knots]:
+def sampled_terms(rules: RuleBase, points: int) -> dict[tuple[str, str], Knots]:
     """Return the points of every term that a clause names."""
     shapes = clause_shapes(rules).items()
     return {key: knots(shape, points) for key, shape in shapes}
@@ -127,7 +127,7 @@ def load_fuzzylite(rules: RuleBase, threads: int) -> LoadedCandidate:
             f"cannot run {rules.name} as pyfuzzylite: its rules name terms {names} "
             f"times, and reading more than {_MOST_NAMES} takes too long"
         )
-    terms, words = asked_terms(rules, FINE), names_of(rules)
+    terms, words = sampled_terms(rules, FINE), names_of(rules)
     variables: dict[str, Any] = {}
     for (variable, term), (short, label) in words.items():
         if variable not in variables:
@@ -177,7 +177,7 @@ def load_simpful(rules: RuleBase, threads: int) -> LoadedCandidate:
         LossError: If a rule has no clause, or one row would take more than a second.
     """
     _refuse(rules, "simpful")
-    terms, words = asked_terms(rules, COARSE), names_of(rules)
+    terms, words = sampled_terms(rules, COARSE), names_of(rules)
     seconds = row_seconds(rules, terms)
     if seconds > _LONGEST_ROW_S:
         raise LossError(
@@ -247,14 +247,14 @@ def _refuse(rules: RuleBase, peer: str) -> None:
             )
 
 
-def _loaded(rules: RuleBase, asked: Sequence[str], fire: Fire) -> LoadedCandidate:
+def _loaded(rules: RuleBase, names: Sequence[str], fire: Fire) -> LoadedCandidate:
     """Return an engine that answers blocks of rows, so that strengths stay few."""
     axes = plan_axes(rules.variables)
     block = max(1, _BLOCK_NUMBERS // len(rules.rules))
 
     def strengths_of(values: FloatArray) -> FloatArray:
         lines = lines_of(axes, values)
-        return fire({name: lines[axes.line[name]] for name in asked})
+        return fire({name: lines[axes.line[name]] for name in names})
 
     def answer(values: FloatArray) -> CandidateOutput:
         array = checked(values, rules.inputs)

@@ -8,7 +8,7 @@ from typing import Literal, cast
 import msgspec
 
 from fuzzytree.checking.converting import formed, kind_of
-from fuzzytree.checking.equivalence import likeness
+from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.model.contracts import Document, Format, Written
 from fuzzytree.model.options import options_of
@@ -113,7 +113,7 @@ def _ability(
     if form.read is None:
         return Ability(name, "written")
     again = form.read(written.content, form.name)
-    match likeness(given, written, again):
+    match equivalence(given, written, again):
         case "equal" if not again.losses:
             return Ability(name, "equal")
         case "equal" | "alike" | "renamed":

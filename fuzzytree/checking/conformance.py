@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator
 from typing import get_args
 
 from fuzzytree.checking.converting import kind_of
-from fuzzytree.checking.equivalence import likeness
+from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
 from fuzzytree.model.contracts import (
     Document,
@@ -200,7 +200,7 @@ def _read_back_failures(
         return
     if again.losses:
         yield f"reading what it writes loses {_listed(again.losses)}"
-    match likeness(model, written, again):
+    match equivalence(model, written, again):
         case "other":
             what = f"{kind_of(model)} {model.name!r}"
             yield f"read back, {what} is another model, and no loss was reported"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import msgspec
 
-from fuzzytree.checking.equivalence import likeness
+from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded
@@ -512,7 +512,7 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
             f"{model.name} as {form.name} cannot be read back, and is not written:\n"
             f"{error}"
         ) from error
-    match likeness(model, written, again):
+    match equivalence(model, written, again):
         case "equal":
             what = CALLED[kind_of(model)]
             text = f"read back from the file, the {what} is equal in every number"

@@ -57,7 +57,7 @@ from fuzzytree.semantics.reference import degree
 Likeness = Literal["equal", "alike", "renamed", "other"]
 
 
-def likeness(model: Document, written: Written, again: Reading) -> Likeness:
+def equivalence(model: Document, written: Written, again: Reading) -> Likeness:
     """Return how what was read back stands to what was written.
 
     Args:
@@ -72,12 +72,12 @@ def likeness(model: Document, written: Written, again: Reading) -> Likeness:
     """
     if fingerprint(again.model) == fingerprint(model):
         return "equal"
-    if not is_alike(model, again.model):
+    if not is_equivalent(model, again.model):
         return "other"
     return "alike" if written.remarks or again.remarks else "renamed"
 
 
-def is_alike(model: Document, other: Document) -> bool:
+def is_equivalent(model: Document, other: Document) -> bool:
     """Return whether two models answer alike by their form, whatever they are called.
 
     A rule base is like each of the systems that decide alike, and straight curves are
@@ -94,7 +94,7 @@ def is_alike(model: Document, other: Document) -> bool:
 def _mark(model: Document) -> str:
     if isinstance(model, FuzzySystem):
         model = _settled(model)
-    return fingerprint(anonymous(model))
+    return fingerprint(canonical_form(model))
 
 
 def _settled(system: FuzzySystem) -> FuzzySystem:
@@ -158,7 +158,7 @@ def _is_everywhere(curve: Curve) -> bool:
 
 def _have_the_same_lines(one: RuleBase, other: RuleBase) -> bool:
     """Return whether two rule bases differ by nothing but how lines are written."""
-    first, second = anonymous(one), anonymous(other)
+    first, second = canonical_form(one), canonical_form(other)
     assert isinstance(first, RuleBase)  # it keeps the kind of a model
     assert isinstance(second, RuleBase)
     left, right = shapes_of(first.variables), shapes_of(second.variables)
@@ -234,7 +234,7 @@ Names = Mapping[str, str]
 Labels = Mapping[str, Names]
 
 
-def anonymous(model: Document) -> Document:
+def canonical_form(model: Document) -> Document:
     """Return a model whose parts are called by their places: `v1`, `t1`, `c1`.
 
     Units, notes, supports, training columns and the origin of terms are left out, and
@@ -249,7 +249,7 @@ def anonymous(model: Document) -> Document:
         >>> from fuzzytree.model.rulebase import RuleBase, Rule, Variable
         >>> one = RuleBase("a", ("x",), (Variable("p"),), (Rule((), "x"),))
         >>> two = RuleBase("b", ("y",), (Variable("q", unit="mm"),), (Rule((), "y"),))
-        >>> anonymous(one) == anonymous(two)
+        >>> canonical_form(one) == canonical_form(two)
         True
     """
     match model:

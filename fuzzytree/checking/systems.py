@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.checking.comparing import RowSet, counted, judged, same_bits
-from fuzzytree.checking.equivalence import is_alike
+from fuzzytree.checking.equivalence import is_equivalent
 from fuzzytree.checking.models import first_difference
 from fuzzytree.checking.programs import ProgramFile, check_program
 from fuzzytree.errors import FuzzyTreeError, LossError
@@ -511,7 +511,7 @@ def _shipped_system(
     found = run_system(other, activations=has_all)(subject.rows.values)
     rows = subject.rows
     results = [*_compared(title, "native", found, subject.native, subject, rows)]
-    if is_alike(system, other):
+    if is_equivalent(system, other):
         yield counted("file", title, "the system but for names", 1, ())
     else:
         yield _content(title, "the system", (fault,), results)

@@ -162,23 +162,23 @@ def test_a_rule_base_without_curves_has_no_variants() -> None:
     assert variants(made, lambda rules, dtype: None, Layouts()) == ([], [])
 
 
-def test_nothing_is_certified_before_it_is_asked_for(
+def test_nothing_is_certified_before_the_bound_is_used(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked: list[int] = []
+    row_counts: list[int] = []
 
     def certify(
         rules: RuleBase, dtype: Dtype, values: FloatArray
     ) -> bounds.Certificate:
-        asked.append(values.shape[1])
+        row_counts.append(values.shape[1])
         return bounds.certify(rules, dtype, values)
 
     monkeypatch.setattr("fuzzytree.benchmarking.candidates.certify", certify)
     found, _ = gather(TREE, VALUES)
-    assert asked == []
+    assert row_counts == []
     bounds_of_raw = [o.bound for o in found if o.bound and o.question == "raw rules"]
     assert len([bound() for bound in bounds_of_raw]) > 10
-    assert asked == [VALUES.shape[1]] * 3  # once for each number type
+    assert row_counts == [VALUES.shape[1]] * 3  # once for each number type
 
 
 def test_every_runtime_that_runs_foreign_code_is_tried_apart() -> None:
@@ -204,7 +204,7 @@ def test_a_quiet_machine_gives_no_doubt() -> None:
     assert [*noise(found, [one])] == []
 
 
-def test_a_noisy_machine_is_told_in_three_ways() -> None:
+def test_a_noisy_machine_is_reported_in_three_ways() -> None:
     wide = msgspec.structs.replace(timing(1000.0, spread=0.5), stolen=0.25)
     one = msgspec.structs.replace(point("native", 1.0, error(0.0)), timings=(wide,))
     busy = msgspec.structs.replace(quiet(), load_before=(1.9, 1.0, 1.0))
@@ -221,8 +221,8 @@ def test_stolen_time_is_weighed_by_what_was_measured() -> None:
     short = msgspec.structs.replace(timing(100.0), stolen=1.0)
     long = msgspec.structs.replace(timing(900.0), stolen=0.0)
     assert after(quiet(), [short, long]).stolen == pytest.approx(0.1)
-    untold = msgspec.structs.replace(timing(100.0), stolen=None)
-    assert after(quiet(), [untold]).stolen is None
+    unknown = msgspec.structs.replace(timing(100.0), stolen=None)
+    assert after(quiet(), [unknown]).stolen is None
 
 
 def test_packages_that_are_not_installed_have_no_version() -> None:

@@ -97,7 +97,7 @@ def test_a_call_is_repeated_until_the_clock_can_tell() -> None:
     assert found["slow"].rounds == (0, 1, 2, 3, 4, 5)
 
 
-def test_time_that_a_neighbour_took_is_told() -> None:
+def test_time_that_other_processes_took_is_reported() -> None:
     time = FakeTime()
     calls = {"alone": time.call(5.0), "robbed": time.call(6.0, stolen_ms=2.0)}
     found = time_calls(calls, rows=1, rounds=6, clock=time.clock()).timings
@@ -233,15 +233,15 @@ def test_the_garbage_collector_is_off_while_timing_and_on_again() -> None:
 
 def test_progress_names_the_call_and_grows() -> None:
     time = FakeTime()
-    told: list[tuple[str, float]] = []
+    calls_seen: list[tuple[str, float]] = []
     time_calls(
         {"a": time.call(5.0)},
         rows=1,
         rounds=2,
         clock=time.clock(),
-        tell=lambda text, share: told.append((text, share)),
+        tell=lambda text, share: calls_seen.append((text, share)),
     )
-    assert told == [("a, round 1 of 2", 0.0), ("a, round 2 of 2", 0.5)]
+    assert calls_seen == [("a, round 1 of 2", 0.0), ("a, round 2 of 2", 0.5)]
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,7 @@ def test_few_rounds_are_never_sure() -> None:
     )
 
 
-def test_what_tells_no_strengths_is_said() -> None:
+def test_a_candidate_without_strengths_is_marked() -> None:
     best_first = point("best-first", 100.0, error(None, 1e-15))
     (sentence,) = advice([NATIVE, best_first])
     assert "use best-first (which returns no strengths): 10.0 times faster" in sentence

@@ -337,11 +337,11 @@ def test_rows_that_memory_does_not_hold_are_an_omission() -> None:
 
 
 def test_progress_grows_from_nothing_to_nearly_all() -> None:
-    told: list[float] = []
-    studied(candidate(), tell=lambda _text, share: told.append(share))
-    assert told == sorted(told)
-    assert told[0] == pytest.approx(0.1)
-    assert 0.3 < told[-1] < 1.0
+    shares: list[float] = []
+    studied(candidate(), tell=lambda _text, share: shares.append(share))
+    assert shares == sorted(shares)
+    assert shares[0] == pytest.approx(0.1)
+    assert 0.3 < shares[-1] < 1.0
 
 
 def test_json_has_every_sample_and_fits_the_schema() -> None:
@@ -421,7 +421,7 @@ def test_names_questions_and_kinds_choose_candidates(
     assert names_of(only, skip) == names
 
 
-def test_candidates_that_were_not_asked_for_are_counted() -> None:
+def test_candidates_that_are_not_selected_are_counted() -> None:
     made = [candidate("a"), candidate("b"), candidate("c")]
     assert chosen(made, ["a"], ())[1] == [Omission("2 candidates", "not selected")]
     assert chosen(made, (), ())[1] == []

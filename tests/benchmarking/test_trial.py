@@ -1,4 +1,4 @@
-"""What ends or blocks a process ends or blocks a child, and is told."""
+"""What ends or blocks a process ends or blocks a child, and is reported."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_what_works_is_not_named(planted: str) -> None:
     assert tried(model(), [], rows(), peers=planted) == {}
 
 
-def test_crashes_and_errors_are_told_and_the_others_go_on(planted: str) -> None:
+def test_crashes_and_errors_are_reported_and_the_others_go_on(planted: str) -> None:
     names = ["crash", "well", "leave", "fail", "late", "unheard of"]
     assert tried(model(), names, rows(), peers=planted) == {
         "crash": "it crashed the process (SIGSEGV)",
@@ -84,7 +84,7 @@ def test_what_hangs_is_ended(planted: str) -> None:
     assert found == {"hang": "it did not answer within 4 s"}
 
 
-def test_what_the_budget_leaves_no_time_for_is_told(planted: str) -> None:
+def test_what_the_budget_leaves_no_time_for_is_reported(planted: str) -> None:
     late = "a third of the budget was over before it was tried; a larger one helps"
     names = ["hang", "well"]
     found = tried(model(), names, rows(), peers=planted, left=lambda: 0.0)

@@ -17,7 +17,7 @@ import peers as module
 import pytest
 from msgspec.structs import replace
 from peers import TREE_PEERS, engines, peers
-from peers.crisp import questions as asked_questions
+from peers.crisp import nodes_of
 
 from fuzzytree.benchmarking.candidates import found_of, questions
 from fuzzytree.benchmarking.records import Candidate, CandidateOutput, LoadedCandidate
@@ -182,7 +182,7 @@ def test_a_value_beyond_float32_is_missing_there(name: str) -> None:
 
 
 @pytest.mark.parametrize("peer", [peer.name for peer in TREE_PEERS])
-def test_two_classes_are_told_apart(peer: str) -> None:
+def test_two_classes_are_distinguished(peer: str) -> None:
     tree = random_tree(4, leaves=6, classes=2, combinations=0.0)
     made = probe_values(tree, 400)[:, -150:-50]
     values = np.round(made * 16.0) / 16.0  # float32 holds them
@@ -253,8 +253,8 @@ def shared() -> FuzzyTree:
 
 def test_a_branch_of_two_intervals_is_written_twice() -> None:
     tree = shared()
-    asked = asked_questions(tree, plan_axes(tree.variables))
-    assert asked.leaf[asked.is_leaf].tolist() == [1, 2, 3, 1, 2]
+    nodes = nodes_of(tree, plan_axes(tree.variables))
+    assert nodes.leaf[nodes.is_leaf].tolist() == [1, 2, 3, 1, 2]
     values = np.array([[-1.0, 0.0, 0.5, 1.0, 1.5, 1.5], [0.0, 1.0, 0.0, 0.0, 0.5, 0.6]])
     for peer in TREE_PEERS:
         labels = answer(tree, f"{peer.name}: tree", values).labels
@@ -266,12 +266,12 @@ def test_a_tree_of_one_leaf_leaves_peers_nothing_to_do() -> None:
     names = {one.name for one in found}
     assert {"scikit-learn: tree", "treelite: tree"}.isdisjoint(names)
     assert {one.why for one in omitted if one.name == "scikit-learn"} == {
-        "the tree asks nothing"
+        "the tree has no node"
     }
 
 
 def chain(count: int) -> FuzzyTree:
-    """Return a tree that asks one question after another of the same input."""
+    """Return a tree that tests the same input again and again."""
     terms: list[Term] = []
     nodes: list[Node] = []
     for k in range(count):
@@ -302,7 +302,7 @@ def test_a_deep_tree_is_followed_or_refused_in_a_sentence(peer: str) -> None:
         with pytest.raises(LossError) as caught:
             loaded_deep(peer, tree)
         assert str(caught.value) == (
-            "cannot run chain as m2cgen: a path asks 1100 questions: "
+            "cannot run chain as m2cgen: a path has 1100 nodes: "
             "it is written by recursion"
         )
         return
@@ -315,7 +315,7 @@ def test_python_takes_fewer_ifs_within_each_other_than_m2cgen_writes() -> None:
     with pytest.raises(LossError) as caught:
         loaded_deep("m2cgen python", chain(150))
     assert str(caught.value) == (
-        "cannot run chain as m2cgen: a path asks 150 questions: "
+        "cannot run chain as m2cgen: a path has 150 nodes: "
         "Python does not take so many ifs within each other"
     )
 
@@ -368,7 +368,7 @@ def test_an_engine_keeps_the_certified_bound_of_its_lines(
     assert found.strengths is not None
     assert want.strengths is not None
     points = engines.FINE if engine == "pyfuzzylite" else engines.COARSE
-    terms = engines.asked_terms(rules, points)
+    terms = engines.sampled_terms(rules, points)
     bound, _ = lines_bound(rules, {key: one.error for key, one in terms.items()})
     missing = np.isnan(want.strengths[0])
     assert np.array_equal(np.isnan(found.strengths[0]), missing)

@@ -1,11 +1,11 @@
-"""Models that are equal but for names, units and notes are told from others."""
+"""Models that are equal but for names, units and notes have the same canonical form."""
 
 from __future__ import annotations
 
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import anonymous
+from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.model.system import (
@@ -31,8 +31,8 @@ def test_every_kind_of_model_can_be_made_anonymous_twice(seed: int) -> None:
     tree = random_tree(seed)
     models: list[Document] = [tree, rules_from_tree(tree), random_system(seed)]
     for model in models:
-        once = anonymous(model)
-        assert anonymous(once) == once
+        once = canonical_form(model)
+        assert canonical_form(once) == once
         assert type(once) is type(model)
 
 
@@ -67,13 +67,13 @@ def test_a_rule_base_with_other_names_is_equal_to_it() -> None:
         ),
         columns=(),
     )
-    assert anonymous(renamed) == anonymous(rules)
+    assert canonical_form(renamed) == canonical_form(rules)
 
 
 def test_rules_in_another_order_are_not_equal() -> None:
     rules = rules_from_tree(random_tree(2))
     turned = replace(rules, rules=rules.rules[::-1])
-    assert anonymous(turned) != anonymous(rules)
+    assert canonical_form(turned) != canonical_form(rules)
 
 
 def _system(**changes: object) -> FuzzySystem:
@@ -90,10 +90,10 @@ def _system(**changes: object) -> FuzzySystem:
 
 
 def test_what_no_number_depends_on_is_left_out() -> None:
-    plain = anonymous(_system())
-    assert anonymous(_system(low=-5.0, unit="V")) == plain
+    plain = canonical_form(_system())
+    assert canonical_form(_system(low=-5.0, unit="V")) == plain
     how = Defuzzifier("weighted average", samples=7, grid="ends")
-    assert anonymous(_system(defuzzifier=how)) == plain
+    assert canonical_form(_system(defuzzifier=how)) == plain
 
 
 @pytest.mark.parametrize(
@@ -109,11 +109,13 @@ def test_what_no_number_depends_on_is_left_out() -> None:
     ids=lambda changes: next(iter(changes)),
 )
 def test_what_a_number_depends_on_stays(changes: dict[str, object]) -> None:
-    assert anonymous(_system(**changes)) != anonymous(_system())
+    assert canonical_form(_system(**changes)) != canonical_form(_system())
 
 
 def test_the_range_of_an_output_that_is_clipped_stays() -> None:
-    assert anonymous(_system(clips=True, low=0.5)) != anonymous(_system(clips=True))
+    assert canonical_form(_system(clips=True, low=0.5)) != canonical_form(
+        _system(clips=True)
+    )
 
 
 def test_very_very_is_very_twice() -> None:
@@ -124,11 +126,11 @@ def test_very_very_is_very_twice() -> None:
             _system(), inputs=(SystemInput("x", (ramp,)),), blocks=(RuleBlock((rule,)),)
         )
 
-    assert anonymous(asking("very very")) == anonymous(asking("very", "very"))
-    assert anonymous(asking("very very")) != anonymous(asking("very"))
+    assert canonical_form(asking("very very")) == canonical_form(asking("very", "very"))
+    assert canonical_form(asking("very very")) != canonical_form(asking("very"))
 
 
 def test_a_rule_base_is_not_its_tree() -> None:
     tree = random_tree(1)
     assert isinstance(rules_from_tree(tree), RuleBase)
-    assert anonymous(tree) != anonymous(rules_from_tree(tree))
+    assert canonical_form(tree) != canonical_form(rules_from_tree(tree))

@@ -38,9 +38,9 @@ def test_every_installed_runtime_is_compared_in_all_it_can_run() -> None:
         if is_installed(runtime) and "tree" in runtime.runs:
             assert by(found, f"{runtime.name}: tree"), runtime.name
         if is_installed(runtime) and "rules" in runtime.runs:
-            told = by(found, f"{runtime.name}: relative rules")
+            results = by(found, f"{runtime.name}: relative rules")
             named = [s for s in found.skipped if s.startswith(runtime.name)]
-            assert told or named, runtime.name
+            assert results or named, runtime.name
 
 
 def test_the_proof_and_all_cells_stand_beside_the_rows() -> None:
@@ -49,7 +49,7 @@ def test_the_proof_and_all_cells_stand_beside_the_rows() -> None:
     assert bases == ["proof", "all cells", "rows"]
 
 
-def test_the_difference_of_raw_rules_is_told_and_no_fault() -> None:
+def test_the_difference_of_raw_rules_is_reported_and_no_fault() -> None:
     found = check(TREE, limit=300, runtimes=["native"])
     (raw,) = [c for c in found.comparisons if c.representation == "raw rules"]
     assert raw.verdict == "differs by design"
@@ -174,13 +174,13 @@ def test_a_fault_in_a_rule_file_is_found_in_content_and_in_answers(
 ) -> None:
     faulty = plant(rules_from_tree(TREE))
     found = check(TREE, faulty, names=["rules.yaml"], limit=3000, runtimes=["native"])
-    told = {
+    results = {
         c.basis: c.verdict
         for c in found.comparisons
         if c.representation == "rules.yaml"
     }
     assert not found.ok
-    assert told == {"file": "DISAGREES", "rows": "DISAGREES"}
+    assert results == {"file": "DISAGREES", "rows": "DISAGREES"}
 
 
 def test_the_rules_of_the_tree_itself_agree_as_a_file() -> None:
@@ -285,9 +285,9 @@ def test_a_disagreement_is_raised_with_its_first_row() -> None:
 
 def test_the_same_facts_are_there_for_programs() -> None:
     found = check(TREE, limit=200, runtimes=["native"])
-    told = msgspec.json.decode(found.to_json())
-    assert told["ok"] is True
-    assert len(told["comparisons"]) == len(found.comparisons)
+    results = msgspec.json.decode(found.to_json())
+    assert results["ok"] is True
+    assert len(results["comparisons"]) == len(found.comparisons)
 
 
 def test_first_difference_names_the_path_and_both_values() -> None:

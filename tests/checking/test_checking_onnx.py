@@ -164,8 +164,8 @@ def test_metadata_that_are_not_the_model_s_are_found(lie: str) -> None:
             entry.value = LIES[lie]
     found = checked(TREE, opened(proto.SerializeToString()))
     assert verdicts(found)["the model's metadata"] == "DISAGREES"
-    (told,) = (c for c in found.comparisons if c.against == "the model's metadata")
-    assert told.detail[0].startswith(f"it states {lie} ")
+    (result,) = (c for c in found.comparisons if c.against == "the model's metadata")
+    assert result.detail[0].startswith(f"it states {lie} ")
 
 
 def test_metadata_stated_twice_left_out_or_added_are_found() -> None:
@@ -173,8 +173,8 @@ def test_metadata_stated_twice_left_out_or_added_are_found() -> None:
     proto.metadata_props.add(key="fuzzytree.kind", value="descent")
     proto.metadata_props.add(key="note", value="proved")
     found = checked(TREE, opened(proto.SerializeToString()))
-    (told,) = (c for c in found.comparisons if c.against == "the model's metadata")
-    assert told.detail == (
+    (result,) = (c for c in found.comparisons if c.against == "the model's metadata")
+    assert result.detail == (
         "it states 'fuzzytree.kind' twice",
         "it states 'note', which is not written",
     )
@@ -185,8 +185,8 @@ def test_texts_in_the_file_are_compared_as_well() -> None:
     proto.doc_string = "Certified."
     proto.graph.name = "proved"
     found = checked(TREE, opened(proto.SerializeToString()))
-    (told,) = (c for c in found.comparisons if c.verdict == "rows only")
-    assert told.detail == (
+    (result,) = (c for c in found.comparisons if c.verdict == "rows only")
+    assert result.detail == (
         "its doc_string differs from the one that would be written",
         "its name differs from the one that would be written",
     )
@@ -315,9 +315,9 @@ def swaps(content: bytes) -> list[tuple[bytes, str]]:
 def test_a_changed_operator_is_found_in_graph_and_answers(
     content: bytes, op: str
 ) -> None:
-    told = verdicts(checked(TREE, opened(content)))
-    assert told["a freshly written graph"] == "DISAGREES", op
-    assert told["the model"] == "DISAGREES", op
+    result = verdicts(checked(TREE, opened(content)))
+    assert result["a freshly written graph"] == "DISAGREES", op
+    assert result["the model"] == "DISAGREES", op
 
 
 def test_both_files_have_operators_to_change() -> None:

@@ -86,12 +86,12 @@ def test_files_with_the_system_agree() -> None:
         washer(), washer(), opened(washer()), names=["a.yaml", "b.onnx"]
     )
     assert found.ok
-    told = [
+    result = [
         (c.representation, c.against)
         for c in found.comparisons
         if c.representation == "b.onnx"
     ]
-    assert told == [
+    assert result == [
         ("b.onnx", "the system's metadata"),
         ("b.onnx", "a freshly written graph"),
         ("b.onnx", "native"),
@@ -101,10 +101,10 @@ def test_files_with_the_system_agree() -> None:
 def test_a_file_with_other_names_agrees() -> None:
     found = check_system(washer(), washer(output="t"), limit=50)
     assert found.ok
-    told = [
+    result = [
         (c.against, c.basis) for c in found.comparisons if c.representation == "file 1"
     ]
-    assert told == [("the system but for names", "file"), ("native", "rows")]
+    assert result == [("the system but for names", "file"), ("native", "rows")]
 
 
 def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
@@ -133,13 +133,13 @@ def test_a_file_with_another_number_is_found_in_its_rows() -> None:
     assert "probe" in one.detail[0]
 
 
-def test_the_worst_row_is_told_first_with_its_values() -> None:
+def test_the_worst_row_comes_first_with_its_values() -> None:
     found = check_system(washer(), washer(61.0), limit=1, data=np.array([[5.0]]))
     text = "row 1: dirt 5.0: output 'time' 30.5 where 30.0 is right"
     assert text in about(found, "file 1", "rows").detail
 
 
-def test_a_file_of_another_system_is_told_by_its_facts() -> None:
+def test_a_file_of_another_system_is_reported_by_its_facts() -> None:
     other = random_system(1, formulas="none")
     found = check_system(washer(), other, opened(other), limit=20)
     assert [c.detail for c in found.comparisons if c.verdict == "DISAGREES"] == [
@@ -190,7 +190,7 @@ def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> No
     assert one.allowed < 1e-11 < one.largest_difference
 
 
-def test_rows_on_an_edge_are_told_apart_from_the_table() -> None:
+def test_rows_on_an_edge_are_counted_beside_the_table() -> None:
     # The rule passes from the very degree of dirt 1 on.
     system = washer()
     (soaked,) = system.inputs
@@ -204,8 +204,8 @@ def test_rows_on_an_edge_are_told_apart_from_the_table() -> None:
     found = check_system(
         system, other, limit=1, data=np.array([[1.0, 0.5]]), runtimes=["native"]
     )
-    (told,) = (text for text in found.skipped if text.startswith("file 1"))
-    assert "in 1 of 3 rows last bits decide" in told
+    (result,) = (text for text in found.skipped if text.startswith("file 1"))
+    assert "in 1 of 3 rows last bits decide" in result
     rows = [
         c
         for c in found.comparisons

@@ -56,7 +56,7 @@ BASE = answers(
 )
 
 
-def test_equal_answers_of_other_strengths_are_told_with_the_rule_that_differs() -> None:
+def test_equal_answers_of_other_strengths_name_the_rule_that_differs() -> None:
     assert BASE.outcome.strengths is not None
     strengths = BASE.outcome.strengths.tolist()
     strengths[2][1] = 0.125
@@ -149,10 +149,10 @@ def test_the_allowed_difference_is_that_of_the_row_with_the_largest_one() -> Non
     assert (found.unbounded, found.largest_unbounded) == (1, 0.5)
 
 
-def test_a_difference_by_design_is_told_and_no_fault() -> None:
+def test_a_difference_by_design_is_reported_and_no_fault() -> None:
     other = answers("other", [2, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
-    told = compare_answers(other, BASE, ROWS, by_design=True)
-    assert (told.verdict, told.flips) == ("differs by design", 1)
+    result = compare_answers(other, BASE, ROWS, by_design=True)
+    assert (result.verdict, result.flips) == ("differs by design", 1)
     assert compare_answers(other, BASE, ROWS).verdict == "DISAGREES"
 
 
@@ -195,7 +195,9 @@ NARROW = RuleBase(
 )
 
 
-def held(values: list[float], strengths: list[list[float]], dtype: Dtype) -> Certified:
+def certified(
+    values: list[float], strengths: list[list[float]], dtype: Dtype
+) -> Certified:
     """Hold strengths against the exact ones of `a: low, b: above 2`; one probe."""
     fired = np.array(strengths)
     rows = RowSet(("x",), np.array([values]), np.arange(len(values)), 1)
@@ -206,7 +208,7 @@ def held(values: list[float], strengths: list[list[float]], dtype: Dtype) -> Cer
 
 
 def test_exact_strengths_agree_and_the_data_are_counted() -> None:
-    found = held([9.0, 1.0, 2.0], [[0.0, 1.0, 0.5], [1.0, 0.0, 0.0]], "float64")
+    found = certified([9.0, 1.0, 2.0], [[0.0, 1.0, 0.5], [1.0, 0.0, 0.0]], "float64")
     assert (found.verdict, found.on, found.rows) == ("agrees", "data", 2)
     assert (found.largest, found.flips, found.in_band) == (0.0, 0, 0)
     assert found.sentence == (
@@ -215,12 +217,12 @@ def test_exact_strengths_agree_and_the_data_are_counted() -> None:
 
 
 def test_without_data_the_probes_are_counted() -> None:
-    found = held([1.0], [[1.0], [0.0]], "mixed")
+    found = certified([1.0], [[1.0], [0.0]], "mixed")
     assert (found.on, found.rows) == ("probes", 1)
 
 
-def test_a_strength_beyond_its_bound_disagrees_and_is_told() -> None:
-    found = held([1.0, 2.0], [[1.0, 0.51], [0.0, 0.0]], "mixed")
+def test_a_strength_beyond_its_bound_disagrees_and_is_reported() -> None:
+    found = certified([1.0, 2.0], [[1.0, 0.51], [0.0, 0.0]], "mixed")
     assert (found.verdict, found.flips) == ("DISAGREES", 0)
     assert found.detail == (
         "row 1: x 2.0: exactly a (rule 1), mine a (rule 1) with 0.51; a strength is "
@@ -229,7 +231,7 @@ def test_a_strength_beyond_its_bound_disagrees_and_is_told() -> None:
 
 
 def test_a_flip_where_the_margin_is_wide_disagrees() -> None:
-    found = held([1.0, 2.0], [[1.0, 0.0], [0.0, 0.5]], "float64")
+    found = certified([1.0, 2.0], [[1.0, 0.0], [0.0, 0.5]], "float64")
     assert (found.verdict, found.flips) == ("DISAGREES", 1)
     assert found.largest_flip_margin == pytest.approx(0.5)
 
@@ -237,8 +239,8 @@ def test_a_flip_where_the_margin_is_wide_disagrees() -> None:
 def test_a_flip_beside_a_step_that_float32_cannot_tell_is_allowed() -> None:
     above = math.nextafter(2.0, 3.0)
     values, strengths = [1.0, above], [[1.0, 0.5], [0.0, 0.0]]
-    assert held(values, strengths, "float64").verdict == "DISAGREES"
-    found = held(values, strengths, "float32")
+    assert certified(values, strengths, "float64").verdict == "DISAGREES"
+    found = certified(values, strengths, "float32")
     assert (found.verdict, found.flips, found.in_band) == ("agrees", 1, 1)
     assert found.unbounded == 1
 
@@ -249,8 +251,8 @@ def test_cover_that_is_lost_and_gained_is_counted() -> None:
     rows = RowSet(("x",), np.array([[near, 3.0]]), np.arange(2), 0)
     fired = np.array([[0.0, 1e-17]])
     found = ModelRun("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))
-    told = compare_exact(found, decide(low, rows.values), rows, dtype="float64")
-    assert (told.cover_lost, told.cover_gained, told.verdict) == (1, 1, "agrees")
+    result = compare_exact(found, decide(low, rows.values), rows, dtype="float64")
+    assert (result.cover_lost, result.cover_gained, result.verdict) == (1, 1, "agrees")
 
 
 def test_a_path_that_leaves_the_tree_far_from_its_cuts_disagrees() -> None:
@@ -265,5 +267,5 @@ def test_a_path_that_leaves_the_tree_far_from_its_cuts_disagrees() -> None:
     assert compare_exact(found, truth, rows, dtype="float64").verdict == "DISAGREES"
     near = RowSet(tree.inputs, values[:, :2], np.arange(2), 0)
     part = found.part(slice(0, 2))
-    told = compare_exact(part, decide(tree, near.values), near, dtype="float32")
-    assert (told.verdict, told.flips, told.in_band) == ("agrees", 2, 2)
+    result = compare_exact(part, decide(tree, near.values), near, dtype="float32")
+    assert (result.verdict, result.flips, result.in_band) == ("agrees", 2, 2)

@@ -186,7 +186,7 @@ def _with_unnamed_option() -> Format:
         (
             _losing_in_silence(),
             "relative rules: read back, rules 'grip' is another model, "
-            "and no loss was told",
+            "and no loss was reported",
         ),
         (
             _renaming_in_silence(),

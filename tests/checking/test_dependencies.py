@@ -1,4 +1,4 @@
-"""What a model needs is told, and a pruned model is held against the model."""
+"""The needs of a model are reported, and a pruned model is compared with it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def because(found: Graph) -> dict[str, dict[str, int]]:
 # --- needs
 
 
-def test_an_input_that_nothing_asks_is_told_apart_from_those_that_are_needed() -> None:
+def test_an_input_that_no_rule_tests_is_listed_as_idle() -> None:
     mix = Variable("mix", (HARD,), parts=(Part("slip", 1.0), Part("speed", 2.0)))
     known = (FORCE, Variable("slip"), Variable("speed"), Variable("heat"), mix)
     rules = base((force("soft"),), (Clause("mix", ("hard",)),), variables=known)
@@ -76,7 +76,7 @@ def test_a_graph_holds_nothing_for_what_the_rules_do_not_have() -> None:
     assert not {"Max", "Concat_2", "Slice"} & found.contents.operators.keys()
 
 
-def test_the_operators_of_an_or_a_negation_and_a_missing_answer_are_told() -> None:
+def test_the_operators_of_an_or_a_negation_and_a_missing_answer_are_listed() -> None:
     rules = base(
         (force("soft", "hard"),),
         (force("firm", negated=True),),
@@ -89,7 +89,7 @@ def test_the_operators_of_an_or_a_negation_and_a_missing_answer_are_told() -> No
     assert "product as AND" not in found
 
 
-def test_the_operators_of_a_product_and_of_combinations_are_told() -> None:
+def test_the_operators_of_a_product_and_of_combinations_are_listed() -> None:
     mix = Variable("mix", (SOFT,), parts=(Part("force", 1.0), Part("slip", 2.0)))
     rules = base(
         (force("soft"), Clause("mix", ("soft",))),
@@ -144,9 +144,9 @@ def test_a_pruned_model_answers_with_the_same_bits(seed: int) -> None:
     for kind in ("relative", "raw"):
         rules = rules_from_tree(tree, kind)
         left = pruned(rules, inputs=True, rules=True)
-        held = prove(rules, left, runtimes=OUTCOMES, limit=300)
-        assert held.ok, held
-        assert held.comparisons[0].basis == "proof"
+        proof = prove(rules, left, runtimes=OUTCOMES, limit=300)
+        assert proof.ok, proof
+        assert proof.comparisons[0].basis == "proof"
 
 
 @pytest.mark.heavy
@@ -219,8 +219,8 @@ def test_a_model_that_needs_every_column_has_two_stages() -> None:
 
 def test_a_pruned_model_is_nowhere_larger() -> None:
     tree = random_tree(6, leaves=6)
-    told = report(tree, pruned(tree, uses=PATH), uses=PATH)
-    before, after = told.sizes[-2:]
+    footprint = report(tree, pruned(tree, uses=PATH), uses=PATH)
+    before, after = footprint.sizes[-2:]
     for one, two in zip(before.files, after.files, strict=True):
         assert (one.representation, one.format, one.dtype) == (
             two.representation,
@@ -254,11 +254,11 @@ def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
 
 def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
     tree = random_tree(1, leaves=1)
-    told = report(tree, pruned(tree), seconds=5.0)
-    assert told.proof.ok
-    assert told.needs.inputs == ()
-    assert {cost.what for cost in told.costs} == {"open", "one row", "10,000 rows"}
-    assert [size.row_bytes for size in told.sizes] == [8 * len(tree.columns), 0, 0]
+    footprint = report(tree, pruned(tree), seconds=5.0)
+    assert footprint.proof.ok
+    assert footprint.needs.inputs == ()
+    assert {cost.what for cost in footprint.costs} == {"open", "one row", "10,000 rows"}
+    assert [size.row_bytes for size in footprint.sizes] == [8 * len(tree.columns), 0, 0]
 
 
 def test_what_the_time_does_not_reach_is_an_omission() -> None:
@@ -289,20 +289,20 @@ def test_a_table_that_cannot_be_read_is_an_omission() -> None:
 def test_what_float32_cannot_hold_is_an_omission() -> None:
     huge = replace(HARD, shape=replace(HARD.shape, low=1e300, high=None))
     rules = base((force("hard"),), variables=(Variable("force", (huge,)),))
-    told = report(rules, pruned(rules))
-    assert len(told.needs.omissions) == len(told.omissions) == 1
-    assert "float32" in told.omissions[0]
+    footprint = report(rules, pruned(rules))
+    assert len(footprint.needs.omissions) == len(footprint.omissions) == 1
+    assert "float32" in footprint.omissions[0]
 
 
 def test_a_report_fits_its_schema_and_says_the_same_in_words() -> None:
     tree = random_tree(3, leaves=4)
-    told = report(tree, pruned(tree), seconds=0.2)
-    facts = json.loads(told.to_json())
+    footprint = report(tree, pruned(tree), seconds=0.2)
+    facts = json.loads(footprint.to_json())
     schema = json.loads((ROOT / "schemas" / "needs.schema.json").read_bytes())
     jsonschema.Draft202012Validator(schema).validate(facts)
-    text = "\n".join(report_lines(told, is_verbose=True))
+    text = "\n".join(report_lines(footprint, is_verbose=True))
     assert facts["needs"]["model"] in text
-    for one in told.removed:
+    for one in footprint.removed:
         assert one.where in text
 
 

@@ -1,4 +1,4 @@
-"""What comes back from a file is told apart from what only looks like it."""
+"""A model read back from a file is equal, equivalent or another one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import is_alike, likeness
+from fuzzytree.checking.equivalence import equivalence, is_equivalent
 from fuzzytree.model.contracts import Document, Reading, Written
 from fuzzytree.model.rulebase import (
     Band,
@@ -39,13 +39,13 @@ RAMP = _one(Band(high=2.0, right=Flank(2.0, 4.0)))
 
 
 def _seen(model: Document, other: Document, *remarks: str) -> str:
-    return likeness(model, Written(b"", (), remarks), Reading(other))
+    return equivalence(model, Written(b"", (), remarks), Reading(other))
 
 
 def test_a_model_is_equal_to_itself() -> None:
     for model in samples().values():
         assert _seen(model, model) == "equal"
-        assert is_alike(model, model)
+        assert is_equivalent(model, model)
 
 
 @pytest.mark.heavy
@@ -55,7 +55,7 @@ def test_no_sample_is_like_another() -> None:
         (name, other_name)
         for name, one in known
         for other_name, other in known
-        if name != other_name and is_alike(one, other)
+        if name != other_name and is_equivalent(one, other)
     ]
     assert alike == []
 
@@ -77,9 +77,9 @@ def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> N
             blocks=(replace(block, rules=rules),),
         )
 
-    assert is_alike(always, asking(label))
-    assert not is_alike(always, asking(replace(label, height=0.5)))
-    assert not is_alike(
+    assert is_equivalent(always, asking(label))
+    assert not is_equivalent(always, asking(replace(label, height=0.5)))
+    assert not is_equivalent(
         always, asking(SystemTerm("near", Trapezoid(None, 0.0, 9.0, 10.0)))
     )
 
@@ -96,25 +96,25 @@ def test_rules_are_like_the_systems_that_decide_as_they_do(scores: str) -> None:
     assert isinstance(RULES, RuleBase)
     for how in ("winner", "rule", "class"):
         if how == scores:
-            assert is_alike(RULES, as_system(RULES, how))
+            assert is_equivalent(RULES, as_system(RULES, how))
     other = samples()["AND as product"]
     assert isinstance(other, RuleBase)
-    assert not is_alike(other, as_system(RULES, "winner"))
+    assert not is_equivalent(other, as_system(RULES, "winner"))
 
 
 def test_straight_flanks_are_like_their_points() -> None:
     points = straightened(RAMP)
     assert points is not None
     assert _seen(RAMP, points, "lines became points") == "alike"
-    assert is_alike(points, RAMP)
+    assert is_equivalent(points, RAMP)
 
 
 def test_a_step_is_like_a_line_to_the_next_double() -> None:
     step = _one(Points((1.0, 1.0), (0.0, 1.0)))
     ramp = _one(Points((1.0, math.nextafter(1.0, 2.0)), (0.0, 1.0)))
-    assert is_alike(step, ramp)
+    assert is_equivalent(step, ramp)
     other = _one(Points((math.nextafter(1.0, 0.0), 1.0), (0.0, 1.0)))
-    assert not is_alike(step, other)  # at 1 itself they differ
+    assert not is_equivalent(step, other)  # at 1 itself they differ
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_a_step_is_like_a_line_to_the_next_double() -> None:
     ],
 )
 def test_another_curve_is_another_model(shape: Shape) -> None:
-    assert not is_alike(RAMP, _one(shape))
+    assert not is_equivalent(RAMP, _one(shape))
     assert _seen(RAMP, _one(shape), "a remark") == "other"
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import anonymous
+from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read_fll
@@ -214,7 +214,7 @@ def test_without_its_comment_a_file_of_rules_is_their_system(scores: Scores) -> 
     bare = "\n".join(line for line in lines if FACTS not in line)
     model = read_fll(bare.encode(), "r.fll").model
     assert isinstance(model, FuzzySystem)
-    assert anonymous(model) == anonymous(as_system(rules, scores))
+    assert canonical_form(model) == canonical_form(as_system(rules, scores))
 
 
 def test_the_file_of_a_changed_comment_is_the_system_that_it_says() -> None:

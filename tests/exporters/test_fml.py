@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.equivalence import anonymous
+from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fml import write
@@ -135,7 +135,7 @@ def test_a_system_is_read_back_alike(seed: int) -> None:
     assert written.losses == ()
     found = read_fml(written.content, "s.fml")
     assert found.losses == ()
-    assert anonymous(found.model) == anonymous(system)
+    assert canonical_form(found.model) == canonical_form(system)
 
 
 @pytest.mark.one_in(4)

@@ -42,7 +42,7 @@ def test_a_far_reversal_is_counted_and_left_out() -> None:
     assert 3.0 < cuts[0] < 4.0
 
 
-def test_a_far_reversal_stays_if_asked_for() -> None:
+def test_a_far_reversal_stays_on_request() -> None:
     cuts, owners, reversals = crossings([0.0, 10.0], [1.0, 2.0], keep=True)
     assert (len(cuts), owners, reversals) == (2, [1, 0, 1], 0)
 

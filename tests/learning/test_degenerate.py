@@ -48,7 +48,7 @@ def labels_of(tree: FuzzyTree, values: FloatArray) -> list[str | None]:
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("place", PLACES)
-def test_two_rows_of_two_classes_are_told_apart_and_have_degree_1(
+def test_two_rows_of_two_classes_are_separated_and_have_degree_1(
     place: float, mode: Mode
 ) -> None:
     other = place + max(abs(place), 1e-310)
@@ -62,7 +62,7 @@ def test_two_rows_of_two_classes_are_told_apart_and_have_degree_1(
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_neighbouring_floats_are_told_apart(mode: Mode) -> None:
+def test_neighbouring_floats_are_separated(mode: Mode) -> None:
     for place in (0.1, 1e12, -7e200, 0.0):
         values = np.array([[place], [np.nextafter(place, np.inf)]])
         found = learn(values, [0, 1], mode)

@@ -250,7 +250,7 @@ def test_patterns_can_be_given_by_class() -> None:
     assert names == ["c0", "c1 #1", "c1 #2", "c1 #3"]
 
 
-def test_progress_is_told_and_ends_with_the_sets() -> None:
+def test_progress_is_reported_and_ends_with_the_sets() -> None:
     values, labels = blobs()
     heard: list[tuple[str, float]] = []
     learn(values, labels, progress=lambda what, share: heard.append((what, share)))

@@ -130,7 +130,7 @@ def test_a_set_goes_through_its_points() -> None:
     assert np.allclose(degrees, [[1.0, 0.75, 0.75, 0.25, 0.0]], atol=1e-15)
 
 
-def test_the_two_sides_are_averaged_unless_asked_for_apart() -> None:
+def test_the_two_sides_are_averaged_unless_they_are_separate() -> None:
     counts = np.array([[2, 8, 6]])
     means, spreads = np.array([0.0]), np.array([1.0])
     ends = np.array([-1.0, 1.0])

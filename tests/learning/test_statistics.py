@@ -59,13 +59,13 @@ def test_the_bits_do_not_depend_on_the_chunks(sizes: list[int]) -> None:
 
 def test_asking_in_between_changes_nothing() -> None:
     values, codes = table(500)
-    asked, silent = Statistics(4, 3), Statistics(4, 3)
+    read, silent = Statistics(4, 3), Statistics(4, 3)
     for k in range(0, 500, 100):
-        asked.update(values[k : k + 100], codes[k : k + 100])
-        asked.moments()
-        asked.sample()
+        read.update(values[k : k + 100], codes[k : k + 100])
+        read.moments()
+        read.sample()
     silent.update(values, codes)
-    assert bits(asked) == bits(silent)
+    assert bits(read) == bits(silent)
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e6, 1e12])
@@ -109,7 +109,7 @@ def test_merged_statistics_have_the_bits_of_one_pass() -> None:
     assert bits(parts[2].merge(parts[0].merge(parts[1]))) == bits(whole)
 
 
-def test_the_sample_holds_whole_rows_and_no_more_than_asked() -> None:
+def test_the_sample_holds_whole_rows_and_no_more_than_wanted() -> None:
     values, codes = table(5000)
     statistics = Statistics(4, 3, rows_per_class=100)
     statistics.update(values, codes)

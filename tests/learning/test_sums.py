@@ -69,7 +69,7 @@ def test_many_groups_are_added_up_as_few_are() -> None:
     assert_exact(totals_of(values, groups, 1500), values, groups)
 
 
-def test_columns_that_grow_keep_what_they_held() -> None:
+def test_columns_that_grow_keep_their_sums() -> None:
     sums = Sums(1, 2)
     columns = np.array([[2.0**-40, 3.0], [0.0, 0.1]])
     everything = np.array([0]), np.array([0]), np.array([2])

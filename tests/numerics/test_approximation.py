@@ -97,7 +97,7 @@ def largest_error(found: Shape, shape: Shape, at: list[Fraction]) -> Fraction:
 
 
 def model_of(*shapes: Shape, conjunction: Conjunction = "min") -> RuleBase:
-    """Return a rule that asks a variable for each shape."""
+    """Return a rule that tests a variable for each shape."""
     variables = tuple(
         Variable(f"x{number}", (Term("t", shape),))
         for number, shape in enumerate(shapes)

@@ -54,13 +54,13 @@ def ruled(
     """Return one rule that all shapes hold, of one variable each or of a sum."""
     names = [f"x{k}" for k in range(max(len(shapes), len(parts)))]
     terms = [(Term("t", shape),) for shape in shapes]
-    asked = [Variable(n, t) for n, t in zip(names, terms, strict=False)]
+    tested = [Variable(n, t) for n, t in zip(names, terms, strict=False)]
     if parts:
         mix = Variable("mix", terms[0], parts=parts)
-        asked = [*(Variable(part.input) for part in parts), mix]
-    clauses = tuple(Clause(v.name, ("t",)) for v in asked if v.terms)
+        tested = [*(Variable(part.input) for part in parts), mix]
+    clauses = tuple(Clause(v.name, ("t",)) for v in tested if v.terms)
     return RuleBase(
-        "one", ("a",), tuple(asked), (Rule(clauses, "a"),), Semantics(conjunction)
+        "one", ("a",), tuple(tested), (Rule(clauses, "a"),), Semantics(conjunction)
     )
 
 

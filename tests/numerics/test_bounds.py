@@ -37,7 +37,7 @@ STEP = Term("low", Band(high=1.0))
 
 
 def grip(*terms: Term, conjunction: Conjunction = "min") -> RuleBase:
-    """Return one rule that asks the first term of as many inputs as there are terms."""
+    """Return one rule that tests the first term of each of its inputs."""
     names = [f"x{k}" for k in range(1, len(terms) + 1)]
     return RuleBase(
         "grip",

@@ -60,7 +60,7 @@ ABOVE_ONE = math.nextafter(1.0, 2.0)
         (CUBE, 3.0, 1 - Fraction(8, 27)),  # q = 1/3
         (Band(low=1.0), 1.0, Fraction(0)),  # its lower end is open
         (Band(low=1.0), ABOVE_ONE, Fraction(1)),
-        (Band(high=1.0, right=Flank(1.0, 4.0, (2.0,))), 2.0, CAP),  # 4/3, held
+        (Band(high=1.0, right=Flank(1.0, 4.0, (2.0,))), 2.0, CAP),  # 4/3, clamped
         (Band(high=1.0, right=Flank(1.0, 4.0, (-1.0,))), 2.0, Fraction(0)),
         (Band(high=0.0, right=Flank(0.0, 4 * TINY)), TINY, Fraction(3, 4)),
         (
@@ -79,7 +79,7 @@ ABOVE_ONE = math.nextafter(1.0, 2.0)
             Fraction(1, 2**209),
         ),
         (LR(0.0, BENT, BENT), 0.5, Fraction(29, 32)),  # 1 - 1/4 (1/2 - 1/2 * 1/4)
-        (LR(0.0, Side(1.0, (2.0,)), HALF), -0.75, Fraction(0)),  # 1 - 3/2, held
+        (LR(0.0, Side(1.0, (2.0,)), HALF), -0.75, Fraction(0)),  # 1 - 3/2, clamped
         (Points((0.0, 3.0), (1.0, 0.0)), 1.0, Fraction(2, 3)),
         (Points((0.0, 3.0), (0.25, 0.75)), -7.0, Fraction(1, 4)),
         (Points((0.0, 3.0), (0.25, 0.75)), 7.0, Fraction(3, 4)),
@@ -236,9 +236,9 @@ def _decimal(shape: Shape, x: Decimal) -> Decimal:
         for flank, is_off in sides:
             if flank is not None and is_off:
                 start, end = Decimal(flank.start), Decimal(flank.end)
-                q = _held((x - end) / (start - end))
+                q = _clamped((x - end) / (start - end))
                 powers = (Decimal(c) * q**k for k, c in enumerate(flank.curve, 1))
-                return min(_held(sum(powers, Decimal(0))), 1 - Decimal(2) ** -53)
+                return min(_clamped(sum(powers, Decimal(0))), 1 - Decimal(2) ** -53)
         return Decimal(1)
     assert isinstance(shape, LR)
     is_left = x <= Decimal(shape.mean)
@@ -250,8 +250,8 @@ def _decimal(shape: Shape, x: Decimal) -> Decimal:
         for k, c in enumerate(side.curve)
     )
     reach = Decimal(side.reach)
-    return _held(1 - t * curve) * _held((reach - u) / (reach - 1)) ** 4
+    return _clamped(1 - t * curve) * _clamped((reach - u) / (reach - 1)) ** 4
 
 
-def _held(value: Decimal) -> Decimal:
+def _clamped(value: Decimal) -> Decimal:
     return min(max(value, Decimal(0)), Decimal(1))

@@ -1,4 +1,4 @@
-"""Every runtime, held against exact arithmetic within what is certified for it."""
+"""Every runtime, compared with exact arithmetic within what is certified for it."""
 
 import numpy as np
 import pytest

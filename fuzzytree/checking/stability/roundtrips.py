@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, cast, get_args
 
 from fuzzytree.checking.comparing import strength_gap
-from fuzzytree.checking.equivalence import is_alike
+from fuzzytree.checking.equivalence import is_equivalent
 from fuzzytree.checking.stability.results import Criterion, judged
 from fuzzytree.checking.stability.runs import first_line, unequal
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
@@ -107,9 +107,9 @@ def _read_again(
     except ReadError as error:
         return 1, 1.0, f"{title}: it cannot be read again: {first_line(error)}"
     if isinstance(back, FuzzySystem):
-        is_same = isinstance(form, RuleBase) and is_alike(form, back)
+        is_same = isinstance(form, RuleBase) and is_equivalent(form, back)
         return 1, 0.0, None if is_same else f"{title}: another model comes back"
-    if back != form and isinstance(form, RuleBase) and is_alike(form, back):
+    if back != form and isinstance(form, RuleBase) and is_equivalent(form, back):
         return _straight(title, back, form, values)
     if back != form:
         native = baseline().load

@@ -149,10 +149,10 @@ def test_n8_finds_a_tree_that_turns_at_another_value() -> None:
 def test_n7_finds_a_curve_that_is_no_membership_function(
     shape: LR | Band, said: str
 ) -> None:
-    found, told = curves(defects.one_rule(Term("odd", shape)))
+    found, facts = curves(defects.one_rule(Term("odd", shape)))
     assert found.verdict == "FAILS"
     assert said in found.detail[0]
-    assert told[0].fails
+    assert facts[0].fails
     assert curves(RULES)[0].verdict == "holds"
 
 

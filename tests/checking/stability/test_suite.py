@@ -145,7 +145,7 @@ def test_numbers_at_the_ends_of_double_can_be_examined(name: str) -> None:
     jsonschema.validate(json.loads(found.to_json()), SCHEMA)
 
 
-def test_only_what_was_asked_for_is_applied() -> None:
+def test_only_selected_checks_are_applied() -> None:
     found = examine(small_rules(), runtimes=FAST, formats=(), only=["n3", "N2"])
     assert [one.code for one in found.criteria] == ["N2", "N2b", "N3"]
     assert set(TITLES) >= {one.code for one in found.criteria}
@@ -190,7 +190,7 @@ def test_an_input_near_zero_is_safe_in_float32() -> None:
     assert found.ratio == pytest.approx(1.0 / 3.0)
 
 
-def test_an_input_far_from_zero_is_told_what_to_subtract() -> None:
+def test_an_input_far_from_zero_gets_a_value_to_subtract() -> None:
     values = 1e9 + np.linspace(-1.0, 2.0, 50)[np.newaxis]
     (found,) = stiffness(far_away(1e9), values, is_data=True)
     assert found.advice == "use mixed, or subtract 1e+09 first"
@@ -217,7 +217,7 @@ def test_an_input_whose_terms_only_step_has_no_spread() -> None:
     jsonschema.validate(json.loads(study.to_json()), SCHEMA)
 
 
-def test_a_distance_at_which_doubles_are_too_coarse_is_told() -> None:
+def test_a_distance_at_which_doubles_are_too_coarse_is_reported() -> None:
     values = 1e14 + np.arange(4.0)[np.newaxis]
     (found,) = stiffness(far_away(1e14), values, is_data=True)
     assert found.advice == "use mixed, and subtract 1e+14 where the values are made"
