@@ -34,14 +34,14 @@ _SPELT = {
 }
 
 
-def as_names(given: str | Iterable[str]) -> tuple[str, ...]:
+def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
     """Return names as a tuple; a text is one name, and no sequence of letters.
 
     Example:
         >>> as_names("slip"), as_names(["force", "slip"])
         (('slip',), ('force', 'slip'))
     """
-    return (given,) if isinstance(given, str) else tuple(given)
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def printable(text: str) -> str:
@@ -126,20 +126,22 @@ class NameMap(msgspec.Struct, frozen=True):
         allowed = _Allowed(first, rest, filler, longest or 0, ignores_case)
         words = {word.casefold() for word in reserved}
         used = {allowed.key(name) for name in taken}
-        given = list(dict.fromkeys(names))
-        found: dict[str, str] = {}
-        for name in given:
+        originals = list(dict.fromkeys(names))
+        result: dict[str, str] = {}
+        for name in originals:
             if allowed.takes(name) and name.casefold() not in words:
                 key = allowed.key(name)
                 if key not in used:
                     used.add(key)
-                    found[name] = name
+                    result[name] = name
         counts: dict[str, int] = {}
-        for name in given:
-            if name not in found:
-                found[name] = _unlike(allowed, allowed.made(name), words, used, counts)
-                used.add(allowed.key(found[name]))
-        return NameMap({name: found[name] for name in given})
+        for name in originals:
+            if name not in result:
+                result[name] = _unlike(
+                    allowed, allowed.adapted(name), words, used, counts
+                )
+                used.add(allowed.key(result[name]))
+        return NameMap({name: result[name] for name in originals})
 
     def __getitem__(self, name: str) -> str:
         """Return the target's name for one of the model's."""
@@ -169,11 +171,11 @@ def unlike(name: str, taken: Collection[str]) -> str:
         >>> unlike("class", ["class", "class 2"])
         'class 3'
     """
-    found, count = name, 1
-    while found in taken:
+    result, count = name, 1
+    while result in taken:
         count += 1
-        found = f"{name} {count}"
-    return found
+        result = f"{name} {count}"
+    return result
 
 
 def numbered(name: str, taken: dict[str, int]) -> str:
@@ -186,13 +188,13 @@ def numbered(name: str, taken: dict[str, int]) -> str:
         >>> [numbered("low", taken) for _ in range(3)]
         ['low', 'low 2', 'low 3']
     """
-    found, count = name, taken.get(name, 0)
-    while found in taken:
+    result, count = name, taken.get(name, 0)
+    while result in taken:
         count += 1
-        found = f"{name} {count}"
+        result = f"{name} {count}"
     taken[name] = max(count, 1)
-    taken.setdefault(found, 1)
-    return found
+    taken.setdefault(result, 1)
+    return result
 
 
 def changes_text(changed: Mapping[str, str], inputs: Iterable[str]) -> str:
@@ -240,7 +242,7 @@ class _Allowed(msgspec.Struct, frozen=True):
     def is_too_long(self, name: str) -> bool:
         return bool(self.longest) and len(name) > self.longest
 
-    def made(self, name: str) -> str:
+    def adapted(self, name: str) -> str:
         """Return an accepted name that reads like another."""
         text = "".join(self._kept(name))
         if self.filler:
@@ -268,13 +270,13 @@ def _plain(character: str) -> str:
     if lower in _SPELT:
         spelt = _SPELT[lower]
         return spelt if character == lower else spelt.capitalize()
-    found: list[str] = []
+    result: list[str] = []
     for one in unicodedata.normalize("NFKD", character):
         if one.isascii():
-            found.append(one)
+            result.append(one)
         elif not unicodedata.combining(one):
-            found.append(_letter_name(one))
-    return "".join(found) or f"u{ord(character):04x}"
+            result.append(_letter_name(one))
+    return "".join(result) or f"u{ord(character):04x}"
 
 
 def _letter_name(character: str) -> str:
@@ -295,12 +297,12 @@ def _unlike(
     """Return a name, with the first number that makes it unlike all others."""
     if plain.casefold() in words and not allowed.is_too_long(plain + allowed.filler):
         plain += allowed.filler
-    found = plain
+    result = plain
     count = counts.get(plain, 1)
-    while allowed.key(found) in used or found.casefold() in words:
+    while allowed.key(result) in used or result.casefold() in words:
         count += 1
         end = f"{allowed.filler}{count}"
         room = allowed.longest - len(end) if allowed.longest else len(plain)
-        found = plain[:room] + end
+        result = plain[:room] + end
     counts[plain] = count
-    return found
+    return result
