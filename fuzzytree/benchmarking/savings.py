@@ -321,7 +321,8 @@ def _calls(
     stage: str, title: str, model: Model, rows: FloatArray, omissions: list[str]
 ) -> Iterator[tuple[int, _Key, Call]]:
     """Yield the calls of one representation, each with its number of rows."""
-    runs = {"native": baseline().load(model)}
+    base = baseline()
+    runs = {base.name: base.load(model)}
     try:
         content = write_onnx(model, verify=False).content
         runs["onnxruntime"] = open_onnx(content, title).run

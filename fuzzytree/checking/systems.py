@@ -24,7 +24,7 @@ from fuzzytree.model.agreement import Agreement, Comparison, Count, Coverage
 from fuzzytree.model.contracts import Progress, Runtime, SystemOutcome, SystemRun
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.system import FuzzySystem
-from fuzzytree.runtimes import chosen_runtimes, is_installed, needed_by
+from fuzzytree.runtimes import baseline, chosen_runtimes, is_installed, needed_by
 from fuzzytree.runtimes.programs import run_system
 from fuzzytree.runtimes.reference import infer_rows
 from fuzzytree.semantics.probing import Aim, Row, range_rows, system_probes
@@ -228,7 +228,7 @@ def _inference(subject: _Subject) -> Iterator[Finding]:
     some = subject.rows.part(share)
     right = infer_rows(subject.system, activations=True)(some.values)
     found = subject.native.part(share)
-    yield from _compared("native", "the inference", found, right, subject, some)
+    yield from _compared(baseline().name, "the inference", found, right, subject, some)
 
 
 def _share(subject: _Subject) -> slice:
@@ -252,7 +252,7 @@ def _runtime(subject: _Subject, runtime: Runtime) -> Iterator[Finding]:
     some = subject.rows.part(share)
     if not (runtime.is_baseline or runtime.is_definition):
         found, right = run(some.values), subject.native.part(share)
-        yield from _compared(runtime.name, "native", found, right, subject, some)
+        yield from _compared(runtime.name, baseline().name, found, right, subject, some)
     yield _calls(runtime.name, run, some, subject)
 
 
@@ -463,14 +463,14 @@ def _shipped(
         found = other.run_system(rows.values)
     except LossError as error:  # the file loads, but onnxruntime cannot run it
         faults = (str(error),)
-        answers = [counted("rows", title, "native", len(rows.numbers), faults)]
+        answers = [counted("rows", title, baseline().name, len(rows.numbers), faults)]
         yield judged(title, "a freshly written graph", apart.graph, answers)
         yield from answers
         return
     right = subject.native
     if "status" not in other.outputs:
         found, right = (_without_status(one) for one in (found, right))
-    results = [*_compared(title, "native", found, right, subject, rows)]
+    results = [*_compared(title, baseline().name, found, right, subject, rows)]
     yield _content(title, "a freshly written graph", apart.graph, results)
     yield from results
 
@@ -510,7 +510,7 @@ def _shipped_system(
     has_all = len(other.rules) == len(system.rules)
     found = run_system(other, activations=has_all)(subject.rows.values)
     rows = subject.rows
-    results = [*_compared(title, "native", found, subject.native, subject, rows)]
+    results = [*_compared(title, baseline().name, found, subject.native, subject, rows)]
     if is_equivalent(system, other):
         yield counted("file", title, "the system but for names", 1, ())
     else:
