@@ -317,22 +317,6 @@ def _size(low: Reals, high: Reals) -> Reals:
     return np.maximum(np.abs(low), np.abs(high))
 
 
-def axis_errors(
-    variable: Variable, inputs: tuple[str, ...], values: FloatArray
-) -> FloatArray:
-    """Return how far each value of a variable in float32 can be from the exact one.
-
-    Args:
-        variable: An input or a combination.
-        inputs: The names of the rows of `values`.
-        values: Shape (inputs, rows).
-    """
-    named = dict(zip(inputs, zip(values, values, strict=True), strict=True))
-    with np.errstate(all="ignore"):
-        found = value_error(variable, "float32", named)
-    return np.zeros(values.shape[1]) if found is None else found
-
-
 def degree_errors(
     bound: DegreeBound, x: Reals, off: Reals | None, *, is_input: bool
 ) -> Reals:
