@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fuzzytree.learning.cuts import Sketch, SplitAxis, TreeSplit
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.shapes import (
     REACH,
@@ -17,7 +18,6 @@ from fuzzytree.learning.shapes import (
     fitted_flanks,
     fitted_sets,
 )
-from fuzzytree.learning.sketch import Sketch, SplitAxis, TreeSplit
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.sums import Totals, totals_of
 from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.learning.cuts import rounded_to, tail
+from fuzzytree.learning.cuts import SplitAxis, rounded_to, single, tail
 from fuzzytree.learning.patterns import Patterns
-from fuzzytree.learning.sketch import SplitAxis, single
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _ROUNDS = 10

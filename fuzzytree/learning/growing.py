@@ -14,10 +14,17 @@ from fuzzytree.learning.combination import (
     node_view,
     selected_features,
 )
-from fuzzytree.learning.cuts import SplitCuts, crossing_cuts, smoothed_cuts
+from fuzzytree.learning.cuts import (
+    Sketch,
+    SplitAxis,
+    SplitCuts,
+    TreeSplit,
+    crossing_cuts,
+    single,
+    smoothed_cuts,
+)
 from fuzzytree.learning.induction import Grouping, most_powerful, threshold
 from fuzzytree.learning.patterns import Patterns
-from fuzzytree.learning.sketch import Sketch, SplitAxis, TreeSplit, single
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _CLEAN = 0.005

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fuzzytree.learning.combination import axis_of
-from fuzzytree.learning.cuts import smoothed_cuts
+from fuzzytree.learning.cuts import Sketch, SplitAxis, TreeSplit, smoothed_cuts
 from fuzzytree.learning.patterns import Patterns
-from fuzzytree.learning.sketch import Sketch, SplitAxis, TreeSplit
 from fuzzytree.learning.units import BoolArray, FloatArray, IntArray
 
 _MOST_ROWS = 20_000
