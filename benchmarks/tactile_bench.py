@@ -95,7 +95,7 @@ def command(
     sensor = sensor_of_options(board, size, full, threshold)
     asked = frames_model(model)
     frames = frames_of_file(data, sensor, quiet=quiet)
-    with wrong_options(), progress_bar(quiet=quiet) as tell:
+    with wrong_options(), progress_bar(quiet=quiet) as progress:
         found = time_frames(
             asked,
             sensor,
@@ -106,7 +106,7 @@ def command(
             rounds=rounds,
             seconds=budget,
             seed=seed,
-            tell=tell,
+            progress=progress,
         )
     if as_json:
         answer_json(found)

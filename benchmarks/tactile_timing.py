@@ -101,7 +101,7 @@ def time_frames(
     rounds: int = 15,
     seconds: float = 120.0,
     seed: int = 0,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> FramesStudy:
     """Measure every way from frame to class, in interleaved rounds, on one thread.
 
@@ -115,7 +115,7 @@ def time_frames(
         rounds: The most samples of each call.
         seconds: For all of it, about.
         seed: Of the order of the rounds, and of made frames.
-        tell: Told how far it is.
+        progress: Told how far it is.
 
     Raises:
         TableError: If the model asks for other features, or frames do not fit.
@@ -146,7 +146,7 @@ def time_frames(
             rounds=rounds,
             seconds=max(share, 1e-3),
             seed=seed,
-            tell=tell,
+            progress=progress,
         )
         for error in found.failures.values():
             raise error

@@ -507,7 +507,7 @@ def bench(
         only=only,
         skip=skip,
         plan=settings,
-        tell=progress,
+        progress=progress,
     )
 
 
@@ -883,7 +883,7 @@ def needs(
         data=rows_of(data, first),
         table=data if path_of(data) else None,
         seconds=seconds,
-        tell=progress,
+        progress=progress,
     )
 
 
@@ -989,7 +989,7 @@ def stability(
         formats=all_formats(),
         data=rows_of(data, first),
         only=only,
-        tell=progress or (lambda _text, _share: None),
+        progress=progress or (lambda _text, _share: None),
     )
 
 

@@ -88,7 +88,7 @@ def measure(
     rounds: int = 15,
     seconds: float = math.inf,
     seed: int = 0,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Timing]:
     """Return how long each call takes; the arguments are those of `time_calls`.
 
@@ -109,7 +109,7 @@ def measure(
         rounds=rounds,
         seconds=seconds,
         seed=seed,
-        tell=tell,
+        progress=progress,
     )
     for error in found.failures.values():
         raise error
@@ -130,7 +130,7 @@ def time_calls(
     rounds: int = 15,
     seconds: float = math.inf,
     seed: int = 0,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
     clock: TimeSource | None = None,
 ) -> CallTimings:
     """Time calls in interleaved rounds.
@@ -145,7 +145,7 @@ def time_calls(
         seconds: The time for all of it, shared as `shared_rounds` says; when it is
             over, no further sample begins.
         seed: Of the order within the rounds.
-        tell: Called with the current step and the share that is done.
+        progress: Called with the current step and the share that is done.
         clock: Where the time comes from; the system unless given.
 
     Returns:
@@ -155,7 +155,9 @@ def time_calls(
         ValueError: If there is nothing to do: no round, no row, no time.
     """
     _check(rows, threads, rounds, seconds)
-    run = _Run(clock or system_clock(), seconds, tell or (lambda _text, _share: None))
+    run = _Run(
+        clock or system_clock(), seconds, progress or (lambda _text, _share: None)
+    )
     interrupted = False
     with _no_garbage():
         try:
@@ -207,11 +209,11 @@ class _Samples:
 class _Run:
     """A measurement while it runs: it must keep what it has when it is interrupted."""
 
-    def __init__(self, clock: TimeSource, seconds: float, tell: Progress) -> None:
+    def __init__(self, clock: TimeSource, seconds: float, progress: Progress) -> None:
         self.clock = clock
         self.begin = clock.wall()
         self.limit_ns = seconds * 1e9
-        self.tell = tell
+        self.progress = progress
         self.samples: dict[str, _Samples] = {}
         self.failures: dict[str, Exception] = {}
         self.is_late = False
@@ -247,7 +249,7 @@ class _Run:
                 if self.left_ns() <= 0:
                     self.is_late = True
                     return
-                self.tell(f"{name}, round {number + 1} of {rounds}", done / whole)
+                self.progress(f"{name}, round {number + 1} of {rounds}", done / whole)
                 done += 1
                 if name not in self.failures:
                     self._sample(name, calls[name], number)

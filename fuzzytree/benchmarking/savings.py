@@ -145,7 +145,7 @@ def report(
     data: FloatArray | None = None,
     table: object = None,
     seconds: float = 0.0,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> Report:
     """Return what a model needs, prove its pruned form, and what that saves.
 
@@ -156,14 +156,14 @@ def report(
         data: Rows of one's own for the proof, in the order of the model's inputs.
         table: The path of a table; reading it is timed.
         seconds: For all timings together; 0 for none.
-        tell: Called with the current step and the share of the timings that is done.
+        progress: Called with the current step and the share that is done.
     """
     made = stages(model, found.model)
     taken, omissions = sizes(made, uses)
     timed, untimed = (
         ((), ())
         if seconds <= 0
-        else costs(made, uses, table=table, seconds=seconds, tell=tell)
+        else costs(made, uses, table=table, seconds=seconds, progress=progress)
     )
     return Report(
         needs(model, uses=uses),
@@ -261,7 +261,7 @@ def costs(
     table: object = None,
     seconds: float = 20.0,
     rounds: int = 15,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> tuple[tuple[Cost, ...], tuple[str, ...]]:
     """Time opening, answering and reading in every stage, interleaved.
 
@@ -274,7 +274,7 @@ def costs(
         table: The path of a table to read; none is read if None.
         seconds: For all of it.
         rounds: The most samples of each call.
-        tell: Called with the current step and the share that is done.
+        progress: Called with the current step and the share that is done.
 
     Returns:
         The costs, and what could not be timed and why.
@@ -304,7 +304,7 @@ def costs(
             rows=size,
             rounds=rounds,
             seconds=seconds / len(groups),
-            tell=tell,
+            progress=progress,
         )
         for failure in timed.failures.values():
             raise failure

@@ -113,7 +113,7 @@ def bench(
     only: Sequence[str] = (),
     skip: Sequence[str] = (),
     plan: BenchSettings | None = None,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> Study:
     """Measure error against run time for every way of running a model.
 
@@ -126,7 +126,7 @@ def bench(
             kind (`runtime`, `variant`, `peer`, `floor`): the others are left out.
         skip: The same, for what is left out.
         plan: How many rows, threads, seconds.
-        tell: Called with the current step and the share that is done.
+        progress: Called with the current step and the share that is done.
 
     Returns:
         The study. What cannot be run is among its omissions. Ctrl-C ends it early and
@@ -160,7 +160,7 @@ def bench(
         data=text,
         omissions=[*omitted, *left],
         plan=plan,
-        tell=tell,
+        progress=progress,
     )
 
 
@@ -189,7 +189,7 @@ def run_study(
     data: str,
     omissions: Sequence[Omission] = (),
     plan: BenchSettings | None = None,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
     clock: TimeSource | None = None,
 ) -> Study:
     """Try, judge and time candidates; see `bench`, which finds them.
@@ -201,15 +201,15 @@ def run_study(
         data: What the rows are.
         omissions: What was left out before.
         plan: How many rows, threads, seconds.
-        tell: Called with the current step and the share that is done.
+        progress: Called with the current step and the share that is done.
         clock: Where the time comes from; the system unless given.
     """
     with noticed() as check:
 
         def step(text: str, share: float) -> None:
             check()
-            if tell:
-                tell(text, share)
+            if progress:
+                progress(text, share)
 
         run = _Run(
             model, values, plan or BenchSettings(), step, clock or system_clock()
@@ -248,11 +248,11 @@ class _Run:
         model: Model,
         values: FloatArray,
         plan: BenchSettings,
-        tell: Progress,
+        progress: Progress,
         clock: TimeSource,
     ) -> None:
         self.model, self.values, self.plan = model, values, plan
-        self.tell, self.clock = tell, clock
+        self.progress, self.clock = progress, clock
         self.begin = clock.wall()
         self.drafts: dict[str, _Draft] = {}
         self.omissions: list[Omission] = []
@@ -278,7 +278,7 @@ class _Run:
             self.values[:, :_TRIED],
             peers=self.plan.peers,
             left=lambda: self.plan.budget_s / 3 - self.spent_s(),
-            tell=_part(self.tell, 0.0, 0.1),
+            progress=_part(self.progress, 0.0, 0.1),
         )
         for name, why in faults.items():
             self.omit(name, why)
@@ -288,10 +288,10 @@ class _Run:
         """Load each candidate and compare its predictions with the exact ones."""
         judge = CandidateJudge(questions(self.model), self.values, self.clock)
         todo = [c for c in candidates if c.name not in self.faulty]
-        tell = _part(self.tell, 0.1, 0.3)
+        progress = _part(self.progress, 0.1, 0.3)
         # If the time is short, what others are compared with is still there.
         for position, one in enumerate(sorted(todo, key=_rank)):
-            tell(f"judging {one.name}", position / len(todo))
+            progress(f"judging {one.name}", position / len(todo))
             if self.spent_s() > self.plan.budget_s / 2 and _rank(one):
                 why = "half of the budget was over before it was judged"
                 self.omit(one.name, f"{why}; a larger one helps")
@@ -317,9 +317,11 @@ class _Run:
         for number, (rows, threads) in enumerate(blocks):
             left = max(end - self.spent_s(), 1e-3) / (len(blocks) - number)
             first, last = (0.3 + 0.7 * k / len(blocks) for k in (number, number + 1))
-            self._block(rows, threads, left, _part(self.tell, first, last))
+            self._block(rows, threads, left, _part(self.progress, first, last))
 
-    def _block(self, rows: int, threads: int, seconds: float, tell: Progress) -> None:
+    def _block(
+        self, rows: int, threads: int, seconds: float, progress: Progress
+    ) -> None:
         """Time the candidates that answer so many rows with so many threads in time."""
         names = [*self._members(rows, threads)]
         if not names or self._is_too_large(rows, len(names)):
@@ -335,7 +337,7 @@ class _Run:
             rounds=self.plan.rounds,
             seconds=max(end - self.spent_s(), 1e-3),
             seed=self.plan.seed,
-            tell=tell,
+            progress=progress,
             clock=self.clock,
         )
         self._keep(found, rows, threads, len(calls))
@@ -491,9 +493,9 @@ def _is_measure(one: Candidate) -> bool:
     return one.kind == "floor" or one.name == title(baseline().name, one.question)
 
 
-def _part(tell: Progress, first: float, last: float) -> Progress:
+def _part(progress: Progress, first: float, last: float) -> Progress:
     """Return a function that reports a part of the work as a part of the whole."""
-    return lambda text, share: tell(text, first + share * (last - first))
+    return lambda text, share: progress(text, first + share * (last - first))
 
 
 def _point(draft: _Draft) -> Point:

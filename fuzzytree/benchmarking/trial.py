@@ -48,7 +48,7 @@ def tried(
     peers: str | None = None,
     seconds: float = _SECONDS,
     left: Callable[[], float] = lambda: math.inf,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, str]:
     """Return why candidates cannot be run, by name; those that can are not in it.
 
@@ -60,12 +60,12 @@ def tried(
         seconds: How long one candidate may take to load and to answer.
         left: The seconds that are left for all of them; what is not tried by then is
             not run.
-        tell: Called with the current step and the share that is done.
+        progress: Called with the current step and the share that is done.
     """
     faults: dict[str, str] = {}
     todo = list(names)
     while todo and left() > 0.0:
-        done = _one_child(model, todo, values, peers, seconds, left, tell)
+        done = _one_child(model, todo, values, peers, seconds, left, progress)
         faults |= {name: why for name, why in done.items() if why}
         todo = [name for name in todo if name not in done]
     return faults | dict.fromkeys(todo, _LATE)
@@ -78,7 +78,7 @@ def _one_child(
     peers: str | None,
     seconds: float,
     left: Callable[[], float],
-    tell: Progress | None,
+    progress: Progress | None,
 ) -> dict[str, str]:
     """Return what one child says of each candidate until it ends; "" for well."""
     done: dict[str, str] = {}
@@ -99,8 +99,8 @@ def _one_child(
         try:
             _send(target, (peers, model, names, values))
             for position, name in enumerate(names):
-                if tell:
-                    tell(f"trying {name}", position / len(names))
+                if progress:
+                    progress(f"trying {name}", position / len(names))
                 patience = min(seconds, max(left(), 0.0))
                 line = lines.get(timeout=patience)
                 if line is None:

@@ -105,7 +105,7 @@ def command(
             data=rows,
             table=None if data == "-" else table_source(data, delimiter),
             seconds=seconds or 0.0,
-            tell=show,
+            progress=show,
         )
     if as_json:
         answer_json(report.to_json())

@@ -76,7 +76,7 @@ def chosen_tree(
     progress: Progress | None,
 ) -> ChosenTree:
     """Return the tree for the settings, chosen by inner validation if they say so."""
-    tell = progress or _silent
+    progress = progress or _silent
     rules = _rules(settings, costs)
     numbers = _wanted_numbers(settings, classes)
     is_open = _is_open(settings, moments)
@@ -87,7 +87,7 @@ def chosen_tree(
     if folds:
         is_large = moments.counts.sum() * sample.rows.shape[1] > _LARGE
         budget = _BUDGET_LARGE if is_large else _BUDGET
-        trials = _Trials(folds, tell, budget)
+        trials = _Trials(folds, progress, budget)
         if is_open:
             numbers = _best_numbers(trials, rules, moments)
             shown = zip(classes, numbers, strict=True)
@@ -97,9 +97,9 @@ def chosen_tree(
             rules, value = _best_rule(trials, rules, numbers, name)
             chosen[name] = value
         accuracy = float(trials.right(numbers, rules).mean())
-    tell("growing", 0.0)
+    progress("growing", 0.0)
     patterns, refused = patterns_of(moments, sample, numbers)
-    grown = grown_tree(patterns, rules, lambda share: tell("growing", share))
+    grown = grown_tree(patterns, rules, lambda share: progress("growing", share))
     return ChosenTree(patterns, grown, refused, chosen, accuracy)
 
 
@@ -241,14 +241,14 @@ class _Trials:
 
     Attributes:
         folds: Rows to learn from and to answer.
-        tell: Called with the progress.
+        progress: Called with the progress.
         budget: How much work may be done: patterns of the trees grown, more for
             larger folds; a millisecond or a few each.
         spent: How much was done.
     """
 
     folds: list[_Fold]
-    tell: Progress
+    progress: Progress
     budget: float
     spent: float = 0.0
     known: dict[tuple[_Key, int], BoolArray] = field(
@@ -265,7 +265,7 @@ class _Trials:
             if (key, place) not in self.known:
                 self.known[key, place] = _answered(fold, numbers, rules)
                 self.spent += _work(fold, numbers)
-                self.tell("choosing", min(1.0, self.spent / self.budget))
+                self.progress("choosing", min(1.0, self.spent / self.budget))
             parts.append(self.known[key, place])
         return np.concatenate(parts)
 

@@ -239,7 +239,7 @@ def test_progress_names_the_call_and_grows() -> None:
         rows=1,
         rounds=2,
         clock=time.clock(),
-        tell=lambda text, share: calls_seen.append((text, share)),
+        progress=lambda text, share: calls_seen.append((text, share)),
     )
     assert calls_seen == [("a, round 1 of 2", 0.0), ("a, round 2 of 2", 0.5)]
 

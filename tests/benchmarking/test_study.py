@@ -109,7 +109,7 @@ def studied(
     *candidates: Candidate,
     plan: BenchSettings = SMALL,
     time: FakeTime | None = None,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> Study:
     values, data = made_rows(RULES, 40)
     return run_study(
@@ -119,7 +119,7 @@ def studied(
         data=data,
         plan=plan,
         clock=time.clock() if time else None,
-        tell=tell,
+        progress=progress,
     )
 
 
@@ -338,7 +338,7 @@ def test_rows_that_memory_does_not_hold_are_an_omission() -> None:
 
 def test_progress_grows_from_nothing_to_nearly_all() -> None:
     shares: list[float] = []
-    studied(candidate(), tell=lambda _text, share: shares.append(share))
+    studied(candidate(), progress=lambda _text, share: shares.append(share))
     assert shares == sorted(shares)
     assert shares[0] == pytest.approx(0.1)
     assert 0.3 < shares[-1] < 1.0

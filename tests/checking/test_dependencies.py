@@ -275,7 +275,7 @@ def test_an_interruption_ends_the_measuring_and_is_passed_on() -> None:
 
     rules = base((force("soft"),))
     with pytest.raises(KeyboardInterrupt):
-        savings.costs({"as it is": rules}, (), seconds=60.0, tell=interrupt)
+        savings.costs({"as it is": rules}, (), seconds=60.0, progress=interrupt)
 
 
 def test_a_table_that_cannot_be_read_is_an_omission() -> None:

@@ -43,7 +43,7 @@ def examine(
     formats: Sequence[Format],
     data: FloatArray | None = None,
     only: Sequence[str] = (),
-    tell: Progress = lambda _text, _share: None,
+    progress: Progress = lambda _text, _share: None,
 ) -> Stability:
     """Apply the criteria N1 to N10 to a model.
 
@@ -53,7 +53,7 @@ def examine(
         formats: What to write and take back.
         data: Rows of one's own, shape (inputs, rows); at most 20,000, evenly drawn.
         only: The codes of criteria to apply; all if empty. `N2` includes `N2b`.
-        tell: Called with the current check and the share that is done, in [0, 1].
+        progress: Called with the current check and the share that is done, in [0, 1].
 
     Returns:
         The result of each criterion, and what is known of inputs and curves.
@@ -83,7 +83,7 @@ def examine(
     costs: tuple[OffsetCost, ...] = ()
     faults: tuple[CurveFault, ...] = ()
     for number, code in enumerate(wanted):
-        tell(f"{code} {TITLES[code]}", number / (len(wanted) + 1))
+        progress(f"{code} {TITLES[code]}", number / (len(wanted) + 1))
         match code:
             case "N1":
                 one, usable = scaling(model, runtimes, some)
@@ -109,7 +109,7 @@ def examine(
                 one = _work_precision()
         found.append(one)
     has_data = rows.shape[1] > 0
-    tell("stiffness of the inputs", len(wanted) / (len(wanted) + 1))
+    progress("stiffness of the inputs", len(wanted) / (len(wanted) + 1))
     return Stability(
         model.name,
         fingerprint(model),
