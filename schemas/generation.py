@@ -29,7 +29,7 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "check.schema.json": "fuzzytree.model.agreement:Agreement",
         "diff.schema.json": "fuzzytree.auditing.diff.difference_records:Difference",
         "learn.schema.json": "fuzzytree.api.holdout:Summary",
-        "needs.schema.json": "fuzzytree.benchmarking.savings:Report",
+        "needs.schema.json": "fuzzytree.benchmarking.savings:Footprint",
         "rulebase.schema.json": "fuzzytree.formats.yaml.layout:RuleBaseFile",
         "stability.schema.json": "fuzzytree.checking.stability.results:Stability",
         "system.schema.json": "fuzzytree.formats.yaml.layout:SystemFile",

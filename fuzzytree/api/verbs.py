@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from fuzzytree.auditing.findings.subject import AuditRows, Material
     from fuzzytree.auditing.recheck import Report as RecheckReport
     from fuzzytree.benchmarking.records import Study
-    from fuzzytree.benchmarking.savings import Report
+    from fuzzytree.benchmarking.savings import Footprint
     from fuzzytree.benchmarking.study import BenchSettings
     from fuzzytree.checking.programs import ProgramFile
     from fuzzytree.checking.stability.results import Stability
@@ -852,7 +852,7 @@ def needs(
     drop: Collection[Literal["inputs", "rules"]] = (),
     seconds: float = 0.0,
     progress: Progress | None = None,
-) -> Report:
+) -> Footprint:
     """Return what a model needs, and what leaving out the rest saves.
 
     Args:

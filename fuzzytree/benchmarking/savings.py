@@ -99,7 +99,7 @@ class Cost(msgspec.Struct, frozen=True):
     timing: Timing
 
 
-class Report(msgspec.Struct, frozen=True):
+class Footprint(msgspec.Struct, frozen=True):
     """What a model needs, what was left out, what that saves, and the proof.
 
     Attributes:
@@ -123,7 +123,7 @@ class Report(msgspec.Struct, frozen=True):
     def __repr__(self) -> str:
         """Show how many inputs are needed, and how many things were left out."""
         return summary(
-            "Report", inputs=len(self.needs.inputs), removed=len(self.removed)
+            "Footprint", inputs=len(self.needs.inputs), removed=len(self.removed)
         )
 
     @property
@@ -146,7 +146,7 @@ def report(
     table: object = None,
     seconds: float = 0.0,
     progress: Progress | None = None,
-) -> Report:
+) -> Footprint:
     """Return what a model needs, prove its pruned form, and what that saves.
 
     Args:
@@ -165,7 +165,7 @@ def report(
         if seconds <= 0
         else costs(made, uses, table=table, seconds=seconds, progress=progress)
     )
-    return Report(
+    return Footprint(
         needs(model, uses=uses),
         found.removed,
         found.rules,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.benchmarking.clock import times_faster
-from fuzzytree.benchmarking.savings import Cost, File, Report, Size
+from fuzzytree.benchmarking.savings import Cost, File, Footprint, Size
 from fuzzytree.checking.dependencies import Because, Graph, Needs
 from fuzzytree.report.text import agreement_lines, aligned, counted, duration
 from fuzzytree.semantics.simplification import Removed
@@ -13,7 +13,7 @@ from fuzzytree.semantics.simplification import Removed
 _MOST = 6  # parts printed one by one, unless all are
 
 
-def report_lines(found: Report, *, is_verbose: bool = False) -> Iterator[str]:
+def report_lines(found: Footprint, *, is_verbose: bool = False) -> Iterator[str]:
     """Yield which inputs a model needs, what can be left out, the proof, the sizes.
 
     Args:
@@ -48,7 +48,7 @@ def report_lines(found: Report, *, is_verbose: bool = False) -> Iterator[str]:
 _SIZES = 5  # rows of the table of sizes: head, columns, bytes, terms, the first file
 
 
-def _verdict(found: Report) -> str:
+def _verdict(found: Footprint) -> str:
     """Return how many inputs are needed, and what can be left out."""
     needs = found.needs
     of = f" of {needs.columns} columns" if needs.columns else ""

@@ -219,7 +219,7 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
         f"Agreement({len(found.comparisons)} comparisons, agrees)",
         "Audit(1 answer, 0 findings)",
         f"Written({len(written.content)} bytes, 0 losses, 0 remarks)",
-        "Report(3 inputs, 16 removed)",
+        "Footprint(3 inputs, 16 removed)",
         "Difference(0 changes, decisions equal)",
     ]
 
