@@ -52,7 +52,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree

@@ -27,8 +27,8 @@ from fuzzytree.benchmarking.machine import load_averages, machine
 from fuzzytree.model.contracts import Run
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load, load_best_first
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 
 Singles = npt.NDArray[np.float32]

@@ -17,11 +17,11 @@ import griffe
 import fuzzytree
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import LIMITS
-from fuzzytree.cli import program
-from fuzzytree.exporters import all_formats
+from fuzzytree.cli.program import program
+from fuzzytree.exporters.table import all_formats
 from fuzzytree.model.contracts import Runtime
 from fuzzytree.model.options import options_of
-from fuzzytree.runtimes import all_runtimes
+from fuzzytree.runtimes.table import all_runtimes
 
 MARK = re.compile(r"<!-- generated: (\w+) -->")
 

@@ -23,7 +23,7 @@ import numpy as np
 
 import fuzzytree as ft
 from fuzzytree.report.text import tree_lines
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.tables import batches, read_table
 
 if TYPE_CHECKING:

@@ -33,17 +33,21 @@ from fuzzytree.exporters.c_text import (
 )
 from fuzzytree.exporters.c_tree import CTreeTest, cut_tests, tree_code
 from fuzzytree.exporters.reference_tables import places_of
-from fuzzytree.model.contracts import (
+from fuzzytree.model import (
     Document,
     Format,
+    FuzzySystem,
+    FuzzyTree,
     Model,
+    RuleBase,
+    Variable,
     Written,
+    fingerprint,
     narrowing_refusal,
+    outline,
+    sentence,
 )
-from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint, sentence
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree, outline
-from fuzzytree.numerics.narrowing import losses
+from fuzzytree.numerics import losses
 
 _NUMBERS = {"float64": DOUBLE, "float32": SINGLE}
 

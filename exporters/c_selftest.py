@@ -20,11 +20,8 @@ from fuzzytree.exporters.c_tables import (
 )
 from fuzzytree.exporters.c_text import CNumbers, fill
 from fuzzytree.exporters.c_tree import CTreeTest
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import Variable
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.probing import Row, few_probes
-from fuzzytree.semantics.reference import Answer, Status, descend, evaluate
+from fuzzytree.model import FuzzyTree, Model, Variable
+from fuzzytree.semantics import Answer, Row, Status, descend, evaluate, few_probes
 
 _MOST_ROWS = 160
 _FEWEST_ROWS = 8

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.model.naming import DIGITS, LETTERS, NameMap
-from fuzzytree.numerics.narrowing import rounded
+from fuzzytree.model import DIGITS, LETTERS, NameMap
+from fuzzytree.numerics import rounded
 
 _WIDTH = 88
 _LONGEST_PREFIX = 20  # C99 promises that 31 letters of a global name count

@@ -13,7 +13,7 @@ from fuzzytree.exporters.c_text import (
     real_lines,
     whole_lines,
 )
-from fuzzytree.model.tree import FuzzyTree, Node
+from fuzzytree.model import FuzzyTree, Node
 
 
 @dataclass(frozen=True, slots=True)

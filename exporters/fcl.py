@@ -30,13 +30,21 @@ from fuzzytree.exporters.fcl_terms import (
 )
 from fuzzytree.exporters.fll_text import speakable
 from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
-from fuzzytree.formats.fcl.fcl_dialects import MARK
-from fuzzytree.formats.fcl.fcl_reader import FACTS, fcl_places, read_fcl
-from fuzzytree.model.contracts import Format, Loss, Written, refusal
-from fuzzytree.model.naming import NameMap
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem, Or, SystemInput, SystemOutput
-from fuzzytree.semantics.conversion import (
+from fuzzytree.formats import FACTS, MARK, fcl_places, read_fcl
+from fuzzytree.model import (
+    Format,
+    FuzzySystem,
+    Loss,
+    NameMap,
+    Or,
+    RuleBase,
+    SystemInput,
+    SystemOutput,
+    Written,
+    refusal,
+)
+from fuzzytree.semantics import (
+    Always,
     Scores,
     as_system,
     cast_losses,
@@ -46,7 +54,6 @@ from fuzzytree.semantics.conversion import (
     pointed,
     refuse_singletons,
 )
-from fuzzytree.semantics.conversion.scores import Always
 
 __all__ = ["FORMAT", "check_list", "write"]
 

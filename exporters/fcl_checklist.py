@@ -10,17 +10,18 @@ from collections.abc import Iterator
 
 from fuzzytree.exporters.fcl_rules import uses
 from fuzzytree.exporters.fll_text import has_not
-from fuzzytree.model.rulebase import Points, RuleBase
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
     Or,
+    Points,
+    RuleBase,
     SystemTerm,
     joints,
     questions,
 )
-from fuzzytree.semantics.conversion import as_system
+from fuzzytree.semantics import as_system
 
 _MOST_BASIC, _MOST_EXTENDED = 3, 4  # points of a term
 
@@ -32,8 +33,8 @@ def check_list(document: RuleBase | FuzzySystem) -> str:
     for it.
 
     Example:
-        >>> from fuzzytree.semantics.samples import samples
-        >>> system = samples()["Sugeno, numbers"]
+        >>> from fuzzytree.semantics.samples import all_samples
+        >>> system = all_samples()["Sugeno, numbers"]
         >>> print(check_list(system).splitlines()[0])
         data check list (IEC 61131-7)
     """

@@ -9,8 +9,8 @@ from typing import Final, Literal
 import msgspec
 
 from fuzzytree.exporters.fll_text import KNOWN
-from fuzzytree.formats.fcl.fcl_dialects import METHOD_WORDS, S_WORDS, T_WORDS
-from fuzzytree.model.system import (
+from fuzzytree.formats import METHOD_WORDS, S_WORDS, T_WORDS
+from fuzzytree.model import (
     FUNCTIONS,
     Arc,
     Bell,

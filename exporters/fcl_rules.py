@@ -9,16 +9,19 @@ from msgspec.structs import replace
 
 from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import WordsOf, hedge_losses, rule_text
-from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, PAIRS
-from fuzzytree.formats.fcl.fcl_rules import ALWAYS
-from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.naming import unlike
-from fuzzytree.model.system import (
+from fuzzytree.formats import (
+    ALWAYS,
+    DEFUZZIFIERS,
+    JFUZZYLOGIC_PAIRS,
+    PAIRS,
+    fuzzylite_losses,
+)
+from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
     Is,
+    Loss,
     Not,
     Or,
     RuleBlock,
@@ -27,8 +30,9 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
     questions,
+    unlike,
 )
-from fuzzytree.semantics.conversion import number_losses
+from fuzzytree.semantics import number_losses
 
 
 def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:

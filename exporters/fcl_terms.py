@@ -10,9 +10,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
 from fuzzytree.exporters.fuzzy_files import refuse, with_labels
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Bell,
     Call,
     Cosine,
@@ -22,8 +20,10 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Linear,
+    Loss,
     Name,
     Number,
+    Points,
     Sigmoid,
     SigmoidDifference,
     Singleton,
@@ -33,7 +33,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
-from fuzzytree.semantics.conversion.points import EXACT, points_for
+from fuzzytree.semantics import EXACT, points_for
 
 Names = Mapping[str, str]
 

@@ -21,15 +21,9 @@ from fuzzytree.exporters.fuzzy_files import (
     refuse,
     without_heights,
 )
-from fuzzytree.formats.fis.fis_reader import (
+from fuzzytree.formats import (
     DEFAULTS,
     DIALECT,
-    always_concluded,
-    fis_places,
-    middle,
-    read_fis,
-)
-from fuzzytree.formats.fis.fis_words import (
     DIALECTS,
     FIS_FAR,
     FIS_METHODS,
@@ -37,20 +31,27 @@ from fuzzytree.formats.fis.fis_words import (
     FIS_TNORMS,
     PRIVATE,
     Dialect,
+    always_concluded,
+    fis_places,
+    fuzzylite_losses,
+    middle,
+    read_fis,
 )
-from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
-from fuzzytree.model.contracts import Format, Loss, Written, refusal
-from fuzzytree.model.naming import NameMap
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
+    Format,
     FuzzySystem,
+    Loss,
+    NameMap,
+    RuleBase,
     SNorm,
     SystemInput,
     SystemOutput,
     SystemTerm,
+    Written,
+    refusal,
 )
-from fuzzytree.semantics.conversion import (
+from fuzzytree.semantics import (
     FACTS,
     as_system,
     cast_losses,

@@ -12,30 +12,29 @@ from typing import Final
 
 import msgspec
 
+from fuzzytree import numerics
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fuzzy_files import operands
-from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, FIS_HEDGES, Dialect
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.naming import unlike
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.formats import CONCLUDING_HEDGES, FIS_HEDGES, Dialect
+from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
     Hedge,
     Is,
+    Loss,
     Not,
     Or,
+    Points,
     RuleBlock,
     SystemOutput,
     SystemRule,
     SystemTerm,
     questions,
+    unlike,
 )
-from fuzzytree.numerics import pointwise
-from fuzzytree.numerics.pointwise import Lines
-from fuzzytree.semantics.conversion.points import shape_of
-from fuzzytree.semantics.conversion.rule_forms import split
+from fuzzytree.numerics import Lines
+from fuzzytree.semantics import shape_of, split
 
 EVERYWHERE: Final = Points((0.0,), (1.0,))
 
@@ -108,7 +107,7 @@ class FisTerms:
         variable = next(questions(whole)).variable
         try:
             lines, bound = self._lines(whole)
-            points, rounding = pointwise.rounded_lines(lines)
+            points, rounding = numerics.rounded_lines(lines)
         except LossError as error:
             raise LossError(
                 f"{variable!r} has several conditions, and {error}"
@@ -129,7 +128,7 @@ class FisTerms:
                 return self._lines_of(condition), 0.0
             case Not(part=part):
                 lines, bound = self._lines(part)
-                return pointwise.negated(lines), bound
+                return numerics.negated(lines), bound
             case And(parts=parts) | Or(parts=parts):
                 result = [self._lines(part) for part in parts]
                 total, bound = result[0]
@@ -143,7 +142,7 @@ class FisTerms:
     def _lines_of(self, proposition: Is) -> Lines:
         hedges = _merged(proposition.hedges)
         if hedges == ("any",):
-            return pointwise.lines_of(EVERYWHERE)
+            return numerics.lines_of(EVERYWHERE)
         if proposition.label is None or hedges not in ((), ("not",)):
             raise LossError(
                 f"{proposition.variable!r} has several conditions with hedges"
@@ -155,19 +154,19 @@ class FisTerms:
         if not isinstance(shape, Points):
             text = f"the term {proposition.label!r} of {proposition.variable!r}"
             raise LossError(f"{text} has several conditions and is no list of points")
-        lines = pointwise.scaled(pointwise.lines_of(shape), label.height)
-        return pointwise.negated(lines) if hedges else lines
+        lines = numerics.scaled(numerics.lines_of(shape), label.height)
+        return numerics.negated(lines) if hedges else lines
 
     def _join(self, *, is_or: bool) -> Callable[[Lines, Lines], tuple[Lines, float]]:
         block = self.system.blocks[0]
         norm = block.disjunction if is_or else block.conjunction
         match norm:
             case "minimum":
-                return lambda one, other: (pointwise.least(one, other), 0.0)
+                return lambda one, other: (numerics.least(one, other), 0.0)
             case "maximum":
-                return lambda one, other: (pointwise.greatest(one, other), 0.0)
+                return lambda one, other: (numerics.greatest(one, other), 0.0)
             case "product":
-                return lambda one, other: pointwise.product(one, other, self.tolerance)
+                return lambda one, other: numerics.product(one, other, self.tolerance)
             case _:
                 raise LossError(f"one input has several conditions, joined by {norm}")
 

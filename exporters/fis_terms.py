@@ -7,11 +7,8 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from fuzzytree.formats.fis.fis_words import FIS_FAR, Dialect, curve_of
-from fuzzytree.formats.formulas import fuzzylite_text_of
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.formats import FIS_FAR, Dialect, curve_of, fuzzylite_text_of
+from fuzzytree.model import (
     Bell,
     Binary,
     Concave,
@@ -21,7 +18,9 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Linear,
+    Loss,
     PiCurve,
+    Points,
     SCurve,
     Sigmoid,
     SigmoidDifference,
@@ -31,8 +30,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
-from fuzzytree.semantics.conversion import pointed
-from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.semantics import pointed, shape_of
 
 Term = tuple[str, str]
 """A kind such as `trimf`, and its numbers as text."""

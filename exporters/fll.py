@@ -25,20 +25,30 @@ from fuzzytree.exporters.fll_text import (
     weighted_type,
 )
 from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
-from fuzzytree.formats.fll.fll_differences import differences
-from fuzzytree.formats.fll.fll_reader import fll_places, read_fll
-from fuzzytree.formats.fll.fll_rules import RULE_WORDS
-from fuzzytree.formats.fll.fll_words import ACTIVATIONS, FLL_METHODS, S_NORMS, T_NORMS
-from fuzzytree.formats.text_files import LONGEST_NAME
-from fuzzytree.model.contracts import Format, Loss, Written, refusal
-from fuzzytree.model.naming import NameMap
-from fuzzytree.model.rulebase import LR, Band, Points, RuleBase
-from fuzzytree.model.system import (
+from fuzzytree.formats import (
+    ACTIVATIONS,
+    FLL_METHODS,
+    LONGEST_NAME,
+    RULE_WORDS,
+    S_NORMS,
+    T_NORMS,
+    differences,
+    fll_places,
+    read_fll,
+)
+from fuzzytree.model import (
     FUNCTIONS,
+    LR,
     Activation,
+    Band,
     Conclusion,
     Defuzzifier,
+    Format,
     FuzzySystem,
+    Loss,
+    NameMap,
+    Points,
+    RuleBase,
     RuleBlock,
     Singleton,
     SystemInput,
@@ -46,8 +56,10 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
     Trapezoid,
+    Written,
+    refusal,
 )
-from fuzzytree.semantics.conversion import (
+from fuzzytree.semantics import (
     FACTS,
     Scores,
     as_system,

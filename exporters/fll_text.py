@@ -9,13 +9,12 @@ from types import MappingProxyType
 from msgspec.structs import astuple, replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.formats.fll.fll_rules import FLL_HEDGES
-from fuzzytree.formats.formulas import fuzzylite_text_of, parse
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import LR, Band, Points
-from fuzzytree.model.system import (
+from fuzzytree.formats import FLL_HEDGES, fuzzylite_text_of, parse
+from fuzzytree.model import (
+    LR,
     And,
     Arc,
+    Band,
     Bell,
     Binary,
     Call,
@@ -29,11 +28,13 @@ from fuzzytree.model.system import (
     Hedge,
     Is,
     Linear,
+    Loss,
     Name,
     Not,
     Number,
     Or,
     PiCurve,
+    Points,
     RuleBlock,
     SCurve,
     SemiEllipse,
@@ -50,7 +51,7 @@ from fuzzytree.model.system import (
     joints,
     questions,
 )
-from fuzzytree.semantics.inference import value_at
+from fuzzytree.semantics import value_at
 
 _WORDS: Mapping[Hedge, str] = MappingProxyType(
     {**{hedge: word for word, hedge in FLL_HEDGES.items()}, "very very": "very very"}

@@ -15,24 +15,29 @@ from xml.sax.saxutils import escape, quoteattr
 
 from fuzzytree.exporters.fml_rules import FmlRule, FmlRules, rules_of
 from fuzzytree.exporters.fuzzy_files import FileNames, inverse, without_heights
-from fuzzytree.formats.fml.fml_reader import fml_places, read_fml
-from fuzzytree.formats.fml.fml_words import (
+from fuzzytree.formats import (
     FML_FAR,
     FML_METHODS,
     FML_SNORMS,
     FML_TNORMS,
     NAMESPACE,
     USUAL,
+    fml_places,
+    read_fml,
 )
-from fuzzytree.model.contracts import Format, Loss, Written, refusal
-from fuzzytree.model.naming import DIGITS, LETTERS, NameMap
-from fuzzytree.model.rulebase import Points, RuleBase
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    DIGITS,
+    LETTERS,
     Activation,
     Curve,
+    Format,
     FuzzySystem,
     Gaussian,
     Linear,
+    Loss,
+    NameMap,
+    Points,
+    RuleBase,
     RuleBlock,
     SCurve,
     Singleton,
@@ -41,8 +46,10 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
     TwoGaussians,
+    Written,
+    refusal,
 )
-from fuzzytree.semantics.conversion import (
+from fuzzytree.semantics import (
     FACTS,
     as_system,
     cast_losses,
@@ -52,8 +59,8 @@ from fuzzytree.semantics.conversion import (
     joined_outputs,
     pointed,
     refuse_singletons,
+    shape_of,
 )
-from fuzzytree.semantics.conversion.points import shape_of
 
 _ALLOWED: Final = (Trapezoid, Gaussian, SCurve, Singleton)
 _FLOAT32: Final = (

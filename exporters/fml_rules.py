@@ -13,27 +13,27 @@ import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fuzzy_files import inverse, operands, refuse
-from fuzzytree.formats.fml.fml_words import FML_SNORMS, FML_TNORMS, MODIFIERS
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.naming import unlike
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.formats import FML_SNORMS, FML_TNORMS, MODIFIERS
+from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
     Hedge,
     Is,
     Linear,
+    Loss,
     Not,
     Or,
+    Points,
     RuleBlock,
     SCurve,
     Singleton,
     SystemOutput,
     SystemRule,
     questions,
+    unlike,
 )
-from fuzzytree.semantics.conversion.rule_forms import split
+from fuzzytree.semantics import split
 
 Clause = tuple[str, str, str]
 """A variable, a term, and a modifier, which may be empty."""

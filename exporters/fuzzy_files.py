@@ -8,20 +8,21 @@ import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.naming import NameMap, changes_text
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
     Linear,
+    Loss,
+    NameMap,
     Or,
+    Points,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemTerm,
+    changes_text,
 )
 
 TITLE = "Written by fuzzytree."

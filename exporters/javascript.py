@@ -38,17 +38,19 @@ from fuzzytree.exporters.reference_tables import (
     node_rows,
     places_of,
 )
-from fuzzytree.model.contracts import Document, Format, Model, Written
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    Document,
+    Format,
+    FuzzySystem,
+    FuzzyTree,
+    Model,
     RuleBase,
     Variable,
+    Written,
     fingerprint,
     sentence,
 )
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.probing import few_probes
-from fuzzytree.semantics.reference import descend, evaluate
+from fuzzytree.semantics import descend, evaluate, few_probes
 
 _MOST_EXAMPLES = 64
 _FEWEST_EXAMPLES = 8

@@ -7,14 +7,18 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from fuzzytree.exporters.js_text import literal, number_text, table, text_of
-from fuzzytree.model.system import FuzzySystem, SystemInput, SystemOutput
-from fuzzytree.semantics.inference import infer
-from fuzzytree.semantics.probing import Row, system_probes
-from fuzzytree.semantics.programs.bounds import error_bounds
-from fuzzytree.semantics.programs.evaluate import still_results
-from fuzzytree.semantics.programs.operations import OVER_SAMPLES
-from fuzzytree.semantics.programs.steps import Program, Step
-from fuzzytree.semantics.programs.system_program import from_system
+from fuzzytree.model import FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.semantics import (
+    OVER_SAMPLES,
+    Program,
+    Row,
+    Step,
+    error_bounds,
+    from_system,
+    infer,
+    still_results,
+    system_probes,
+)
 
 _EXAMPLES = 64
 

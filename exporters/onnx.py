@@ -16,10 +16,16 @@ from typing import TYPE_CHECKING, Literal, get_args
 import msgspec
 
 from fuzzytree.errors import MissingExtraError, install_hint
-from fuzzytree.model.contracts import Dtype, Format, Model, Written, narrowing_refusal
-from fuzzytree.model.rulebase import fingerprint
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import (
+    Dtype,
+    Format,
+    FuzzySystem,
+    FuzzyTree,
+    Model,
+    Written,
+    fingerprint,
+    narrowing_refusal,
+)
 
 if TYPE_CHECKING:
     import onnx
@@ -131,7 +137,7 @@ def write_onnx(
             model, opset=opset, ir=ir, outputs=outputs, facts=facts, verify=verify
         )
     from fuzzytree.exporters.onnx_ends import NUMBERS
-    from fuzzytree.numerics.narrowing import losses
+    from fuzzytree.numerics import losses
 
     lost = losses(model, dtype)
     if lost and not allow_loss:

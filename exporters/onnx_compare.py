@@ -17,9 +17,7 @@ import msgspec
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import fingerprint
-from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model import FuzzySystem, Model, fingerprint
 
 if TYPE_CHECKING:
     import onnx

@@ -13,11 +13,9 @@ import numpy as np
 from onnx import numpy_helper
 
 from fuzzytree.exporters.onnx_graph import OnnxGraph
-from fuzzytree.model.contracts import Dtype, Model
-from fuzzytree.model.rulebase import Part, RuleBase, Variable
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.narrowing import RealArray, RealKind, rounded
-from fuzzytree.semantics.reference import BELOW_ONE, Status
+from fuzzytree.model import Dtype, FuzzyTree, Model, Part, RuleBase, Variable
+from fuzzytree.numerics import RealArray, RealKind, rounded
+from fuzzytree.semantics import BELOW_ONE, Status
 
 
 class InputBlock(msgspec.Struct, frozen=True):

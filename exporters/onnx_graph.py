@@ -14,7 +14,7 @@ import numpy.typing as npt
 import onnx
 from onnx import helper, numpy_helper
 
-from fuzzytree.model.naming import NameMap
+from fuzzytree.model import NameMap
 
 DOMAIN = "fuzzytree"
 """The domain of our own functions, in readable files."""

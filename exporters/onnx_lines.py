@@ -19,11 +19,11 @@ from onnx import helper
 
 from fuzzytree.exporters.onnx_ends import Precision
 from fuzzytree.exporters.onnx_graph import OnnxGraph
-from fuzzytree.model.rulebase import Points
-from fuzzytree.numerics.segments import Segments, segments
+from fuzzytree.model import Points
+from fuzzytree.numerics import Segments, segments_of
 
 if TYPE_CHECKING:
-    from fuzzytree.numerics.segments import Real, Reals
+    from fuzzytree.numerics import Real, Reals
 
 MOST_CHAINED = 8
 """Points up to which a chain is the faster way."""
@@ -48,7 +48,7 @@ def polylines(
     """Add the degrees of shapes, given their finite values, as one block."""
     axis: Real = np.dtype(numbers.axis)
     degree: Real = np.dtype(numbers.degree)
-    lines = segments(shapes, axis, degree)
+    lines = segments_of(shapes, axis, degree)
     longest = max(len(shape.values) for shape in shapes)
     if longest > MOST_CHAINED:
         return _searched(graph, values, lines, numbers)

@@ -32,17 +32,8 @@ from fuzzytree.exporters.onnx_ends import (
 )
 from fuzzytree.exporters.onnx_graph import DegreeRows, OnnxGraph
 from fuzzytree.exporters.onnx_lines import PointsPart, is_chained, polylines
-from fuzzytree.model.rulebase import (
-    LR,
-    Clause,
-    Flank,
-    Points,
-    RuleBase,
-    Shape,
-    Side,
-    shapes_of,
-)
-from fuzzytree.numerics.narrowing import RealArray, rounded
+from fuzzytree.model import LR, Clause, Flank, Points, RuleBase, Shape, Side, shapes_of
+from fuzzytree.numerics import RealArray, rounded
 
 Key = tuple[str, str]  # variable and term
 Curve = tuple[float, ...]

@@ -12,10 +12,9 @@ import numpy.typing as npt
 import onnxruntime
 
 from fuzzytree.errors import DisagreementError, LossError
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import LR, Band, Points, RuleBase, Term
-from fuzzytree.numerics.narrowing import RealKind
-from fuzzytree.semantics.reference import descend, evaluate
+from fuzzytree.model import LR, Band, Model, Points, RuleBase, Term
+from fuzzytree.numerics import RealKind
+from fuzzytree.semantics import descend, evaluate
 
 _STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
 

@@ -20,8 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.exporters.onnx_graph import OnnxGraph, identifier
-from fuzzytree.semantics.programs.evaluate import StepValue, still_results
-from fuzzytree.semantics.programs.steps import Program, Step
+from fuzzytree.semantics import Program, Step, StepValue, still_results
 
 NODES: Mapping[str, str] = {
     "add": "Add",

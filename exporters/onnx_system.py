@@ -12,10 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from fuzzytree.errors import DisagreementError, LossError
-from fuzzytree.model.contracts import Written
-from fuzzytree.model.rulebase import fingerprint
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.semantics.programs.system_program import from_system
+from fuzzytree.model import FuzzySystem, Written, fingerprint
+from fuzzytree.semantics import from_system
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.exporters.onnx import Output
     from fuzzytree.exporters.onnx_graph import OnnxGraph
-    from fuzzytree.semantics.programs.steps import Program
+    from fuzzytree.semantics import Program
 
 _MOST_ROWS_TO_VERIFY = 24
 _MOST_STEPS_TO_VERIFY = 300_000
@@ -207,7 +205,7 @@ def _prove(content: bytes, system: FuzzySystem, outputs: Sequence[Output]) -> No
     import numpy as np
 
     from fuzzytree.exporters.onnx_session import proved_run
-    from fuzzytree.semantics.probing import system_probes
+    from fuzzytree.semantics import system_probes
 
     program = from_system(system, activations=True)
     limit = max(1, min(_MOST_ROWS_TO_VERIFY, _MOST_STEPS_TO_VERIFY // program.size))
@@ -229,8 +227,7 @@ def _differences(
     """Yield numbers of a file that differ from the inference by more than allowed."""
     import numpy as np
 
-    from fuzzytree.semantics.inference import infer
-    from fuzzytree.semantics.programs.bounds import error_bounds
+    from fuzzytree.semantics import error_bounds, infer
 
     right = [infer(system, row) for row in rows]
     expected = {

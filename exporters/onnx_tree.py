@@ -22,8 +22,8 @@ from fuzzytree.exporters.onnx_ends import (
     is_known,
 )
 from fuzzytree.exporters.onnx_graph import TREES, Constant, OnnxGraph
-from fuzzytree.model.tree import FuzzyTree, Node
-from fuzzytree.numerics.narrowing import rounded
+from fuzzytree.model import FuzzyTree, Node
+from fuzzytree.numerics import rounded
 
 _MOST_QUESTIONS = 1_000_000
 _MOST_LEAVES = 2**24  # as float32 counts

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from fuzzytree.model.contracts import Format
+from fuzzytree.model import Format
 
 GROUP = "fuzzytree.formats"
 
@@ -89,7 +89,7 @@ def _loaded(entry: importlib.metadata.EntryPoint) -> Plugin:
 
 
 def _name_faults(name: str) -> Iterator[str]:
-    from fuzzytree.exporters import TABLE
+    from fuzzytree.exporters.table import TABLE
 
     if name in TABLE:
         yield f"{name!r} is the name of a format of fuzzytree"

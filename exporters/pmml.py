@@ -32,19 +32,27 @@ from fuzzytree.exporters.pmml_elements import (
     text_of,
 )
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
-from fuzzytree.model.contracts import Document, Format, Loss, Model, Written, refusal
-from fuzzytree.model.naming import unlike
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     Clause,
+    Document,
+    Format,
+    FuzzySystem,
+    FuzzyTree,
+    Loss,
+    Model,
+    Node,
     Points,
     RuleBase,
+    SystemInput,
     Variable,
+    Written,
     fingerprint,
+    intervals,
+    refusal,
     sentence,
+    unlike,
 )
-from fuzzytree.model.system import FuzzySystem, SystemInput
-from fuzzytree.model.tree import FuzzyTree, Node, intervals
-from fuzzytree.semantics.conversion import pointed
+from fuzzytree.semantics import pointed
 
 _MISSING, _UNCOVERED = -1.0, 0.0  # numbers in the place of a rule's
 

@@ -11,8 +11,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side
-from fuzzytree.semantics.reference import BELOW_ONE
+from fuzzytree.model import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.semantics import BELOW_ONE
 
 _ESCAPES = {
     "&": "&amp;",

@@ -24,16 +24,16 @@ from fuzzytree.exporters.pmml_elements import (
     element,
     ref,
 )
-from fuzzytree.model.naming import unlike
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.semantics.programs.operations import (
+from fuzzytree.model import FuzzySystem, unlike
+from fuzzytree.semantics import (
     INEXACT,
     LOGICAL,
     NUMERIC,
     OPERATIONS,
+    Program,
+    Step,
+    from_system,
 )
-from fuzzytree.semantics.programs.steps import Program, Step
-from fuzzytree.semantics.programs.system_program import from_system
 
 MOST_FIELDS = 20_000
 """The most derived fields of a file: engines look each other's values up one by one."""

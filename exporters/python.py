@@ -19,16 +19,17 @@ from fuzzytree.exporters.reference_tables import (
     node_rows,
     places_of,
 )
-from fuzzytree.model.contracts import Format, Model, Written
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    Format,
+    FuzzyTree,
+    Model,
     RuleBase,
     Variable,
+    Written,
     fingerprint,
     sentence,
 )
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.probing import probes
-from fuzzytree.semantics.reference import descend, evaluate
+from fuzzytree.semantics import descend, evaluate, probes
 
 _EXAMPLES = 6
 

@@ -7,18 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
     Flank,
+    FuzzyTree,
+    Node,
     Points,
     RuleBase,
     Shape,
     Side,
     Variable,
+    intervals,
     shapes_of,
 )
-from fuzzytree.model.tree import FuzzyTree, Node, intervals
 
 Row = tuple[object, ...]
 

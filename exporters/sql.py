@@ -12,9 +12,18 @@ from typing import Literal, get_args
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.sql_expressions import Query, SqlDegrees
-from fuzzytree.model.contracts import Format, Model, Written
-from fuzzytree.model.rulebase import Clause, RuleBase, fingerprint, sentence, shapes_of
-from fuzzytree.model.tree import FuzzyTree, Node
+from fuzzytree.model import (
+    Clause,
+    Format,
+    FuzzyTree,
+    Model,
+    Node,
+    RuleBase,
+    Written,
+    fingerprint,
+    sentence,
+    shapes_of,
+)
 
 Dialect = Literal["sqlite", "duckdb", "postgresql", "spark"]
 

@@ -8,8 +8,8 @@ import re
 from collections.abc import Sequence
 from fractions import Fraction
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side
-from fuzzytree.semantics.reference import BELOW_ONE
+from fuzzytree.model import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.semantics import BELOW_ONE
 
 _MOST_ARGUMENTS = 60  # of one function; SQLite takes 100
 

@@ -12,11 +12,8 @@ from collections.abc import Iterator, Mapping
 from msgspec.structs import replace
 
 from fuzzytree.exporters.st_text import StNumbers, remark, table
-from fuzzytree.model.rulebase import RuleBase, sentence
-from fuzzytree.semantics.programs.evaluate import still_results
-from fuzzytree.semantics.programs.membership import BELOW_ONE
-from fuzzytree.semantics.programs.rule_program import from_rules
-from fuzzytree.semantics.programs.steps import Program, Step
+from fuzzytree.model import RuleBase, sentence
+from fuzzytree.semantics import BELOW_ONE, Program, Step, from_rules, still_results
 
 _SIGNS: Mapping[str, str] = {
     "add": "+",

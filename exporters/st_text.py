@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.model.naming import NameMap
-from fuzzytree.numerics.narrowing import rounded
+from fuzzytree.model import NameMap
+from fuzzytree.numerics import rounded
 
 _WIDTH = 88
 _LONGEST_NAME = 30

@@ -26,13 +26,23 @@ from fuzzytree.exporters.st_text import (
     remark,
     table,
 )
-from fuzzytree.formats.formulas import text_of
-from fuzzytree.model.contracts import Document, Format, Model, Written
-from fuzzytree.model.naming import NameMap
-from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint
-from fuzzytree.model.system import Formula, FuzzySystem, SystemInput, SystemOutput
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.programs.system_program import from_system
+from fuzzytree.formats import text_of
+from fuzzytree.model import (
+    Document,
+    Format,
+    Formula,
+    FuzzySystem,
+    FuzzyTree,
+    Model,
+    NameMap,
+    RuleBase,
+    SystemInput,
+    SystemOutput,
+    Variable,
+    Written,
+    fingerprint,
+)
+from fuzzytree.semantics import from_system
 
 _OUTPUTS = ("class_number", "rule", "status", "strengths")
 _LOCALS = (

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from fuzzytree import formats
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.yaml_system import entries_of, losses_of
 from fuzzytree.exporters.yaml_text import (
@@ -23,21 +24,32 @@ from fuzzytree.exporters.yaml_text import (
     range_ends,
     summand,
 )
-from fuzzytree.formats.yaml import layout
-from fuzzytree.formats.yaml.clauses import Vocabulary, readings, vocabulary_of
-from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_SENTENCE
-from fuzzytree.formats.yaml.yaml_reader import yaml_places, yaml_reading
-from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
-from fuzzytree.model.rulebase import (
+from fuzzytree.formats import (
+    LARGEST_COUNT,
+    LONGEST_SENTENCE,
+    Vocabulary,
+    readings,
+    vocabulary_of,
+    yaml_places,
+    yaml_reading,
+)
+from fuzzytree.model import (
+    Branch,
     Clause,
+    Document,
+    Format,
+    FuzzySystem,
+    FuzzyTree,
+    Loss,
+    Model,
+    Node,
     RuleBase,
     Semantics,
     Term,
     Variable,
+    Written,
     clause_text,
 )
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import Branch, FuzzyTree, Node
 
 _TITLES: Final = {
     "rule base": "# A fuzzy rule base of fuzzytree: IF clauses THEN class.",
@@ -163,7 +175,7 @@ def _tree(tree: FuzzyTree) -> dict[str, Entry]:
 
 
 def _head(model: Model, kind: str) -> dict[str, Entry]:
-    return {"format": layout.FORMAT, "kind": kind, "name": model.name}
+    return {"format": formats.YAML_FORMAT, "kind": kind, "name": model.name}
 
 
 def _body(model: Model) -> dict[str, Entry]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from fuzzytree import formats
 from fuzzytree.exporters.yaml_text import (
     Entry,
     Noted,
@@ -16,21 +17,29 @@ from fuzzytree.exporters.yaml_text import (
     summand,
     text_losses,
 )
-from fuzzytree.formats.formulas import FormulaError, parse, text_of
-from fuzzytree.formats.yaml import layout
-from fuzzytree.formats.yaml.conditions import conclusions_text, condition_text
-from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_NOTE, LONGEST_SENTENCE
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import LR, Band, Points
-from fuzzytree.model.system import (
+from fuzzytree.formats import (
+    LARGEST_COUNT,
+    LONGEST_NOTE,
+    LONGEST_SENTENCE,
+    FormulaError,
+    conclusions_text,
+    condition_text,
+    parse,
+    text_of,
+)
+from fuzzytree.model import (
+    LR,
     Activation,
+    Band,
     Binary,
     Curve,
     Defuzzifier,
     Formula,
     FuzzySystem,
     Linear,
+    Loss,
     PiCurve,
+    Points,
     RuleBlock,
     SigmoidDifference,
     SigmoidProduct,
@@ -46,7 +55,7 @@ from fuzzytree.model.system import (
 def entries_of(system: FuzzySystem) -> dict[str, Entry]:
     """Return the entries of a system, in order."""
     entries: dict[str, Entry] = {
-        "format": layout.FORMAT,
+        "format": formats.YAML_FORMAT,
         "kind": "system",
         "name": system.name,
     }

@@ -13,10 +13,8 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import LossError
-from fuzzytree.formats.text_files import LONGEST_NAME
-from fuzzytree.formats.yaml.nodes import MOST_BYTES, MOST_NODES
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, Shape, Side
+from fuzzytree.formats import LONGEST_NAME, MOST_BYTES, MOST_NODES
+from fuzzytree.model import LR, Band, Flank, Loss, Part, Points, Shape, Side
 
 _WIDTH: Final = 88
 

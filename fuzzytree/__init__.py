@@ -10,7 +10,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fuzzytree.api.verbs import (
+    from fuzzytree.api import (
         audit,
         bench,
         certify,
@@ -31,20 +31,20 @@ if TYPE_CHECKING:
         save,
         stability,
     )
-    from fuzzytree.auditing.findings.domains import AuditDomain
-    from fuzzytree.auditing.findings.records import AuditSelection, AuditSettings
-    from fuzzytree.benchmarking.study import BenchSettings
+    from fuzzytree.auditing import AuditDomain, AuditSelection, AuditSettings
+    from fuzzytree.benchmarking import BenchSettings
     from fuzzytree.errors import FuzzyTreeError
     from fuzzytree.estimator import FuzzyTreeClassifier
-    from fuzzytree.formats.simpful import from_simpful
-    from fuzzytree.formats.skfuzzy import from_skfuzzy
-    from fuzzytree.formats.sklearn import from_sklearn
-    from fuzzytree.learning.settings import LearningSettings
-    from fuzzytree.model.agreement import Agreement, CheckSettings
-    from fuzzytree.model.rulebase import RuleBase
-    from fuzzytree.model.system import FuzzySystem
-    from fuzzytree.model.tree import FuzzyTree
-    from fuzzytree.runtimes.predictions import Outputs, Predictions
+    from fuzzytree.formats import from_simpful, from_skfuzzy, from_sklearn
+    from fuzzytree.learning import LearningSettings
+    from fuzzytree.model import (
+        Agreement,
+        CheckSettings,
+        FuzzySystem,
+        FuzzyTree,
+        RuleBase,
+    )
+    from fuzzytree.runtimes import Outputs, Predictions
     from fuzzytree.tables import table
 
     __version__: str

@@ -11,11 +11,9 @@ import numpy.typing as npt
 
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import Learner, LearningReport, LearningSettings
-from fuzzytree.model.rulebase import label_type_of
-from fuzzytree.model.tree import FuzzyTree, with_label_type
+from fuzzytree.model import FuzzyTree, label_type_of, with_label_type
 from fuzzytree.runtimes import baseline
-from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.reference import Status
+from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tables import numbers_only
 
 try:
@@ -28,7 +26,7 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray, ModelKind, Outcome, Run
+    from fuzzytree.model import FloatArray, IntArray, ModelKind, Outcome, Run
 
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]

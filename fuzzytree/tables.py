@@ -27,8 +27,7 @@ import numpy.typing as npt
 from fuzzytree.csv_rows import BLOCK, CsvRows, blocks
 from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
-from fuzzytree.model.naming import as_names
-from fuzzytree.model.rulebase import LabelType, is_label, label_type_of
+from fuzzytree.model import LabelType, as_names, is_label, label_type_of
 
 if TYPE_CHECKING:
     import pandas as pd

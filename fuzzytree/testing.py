@@ -17,50 +17,53 @@ from collections.abc import Iterator, Sequence
 
 from msgspec.structs import replace
 
-from fuzzytree.checking.conformance import failures
+from fuzzytree.checking import failures
 from fuzzytree.errors import DisagreementError
 from fuzzytree.exporters import find_format
-from fuzzytree.model.contracts import Document, Format
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
+    Branch,
     Clause,
+    Conclusion,
+    Defuzzifier,
+    Document,
     Flank,
+    Format,
+    FuzzySystem,
+    FuzzyTree,
+    Is,
+    Leaf,
+    Node,
     Part,
     Points,
     Rule,
     RuleBase,
+    RuleBlock,
     Semantics,
+    Sets,
     Shape,
     Side,
-    Term,
-    Variable,
-)
-from fuzzytree.model.system import (
-    Conclusion,
-    Defuzzifier,
-    FuzzySystem,
-    Is,
-    RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
     SystemTerm,
-)
-from fuzzytree.model.tree import (
-    Branch,
-    FuzzyTree,
-    Leaf,
-    Node,
-    Sets,
+    Term,
+    Variable,
     interval_names,
     intervals,
 )
-from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.probing import SPECIAL, landmarks, probe_values, probes
-from fuzzytree.semantics.random_systems import random_rows, random_system
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics import (
+    SPECIAL,
+    all_samples,
+    landmarks,
+    probe_values,
+    probes,
+    random_rows,
+    random_system,
+    rules_from_tree,
+)
 
 __all__ = [
     "SPECIAL",
@@ -112,7 +115,7 @@ def exporter_models(seed: int = 0, rounds: int = 2) -> Iterator[tuple[str, Docum
         seed: Of the random ones.
         rounds: How many random trees; there are twice as many systems.
     """
-    yield from samples().items()
+    yield from all_samples().items()
     for number in range(seed, seed + rounds):
         tree = random_tree(number, leaves=5)
         yield f"random_tree({number})", tree

@@ -19,7 +19,7 @@ from typing import Final
 import msgspec
 from msgspec import inspect
 
-from fuzzytree.formats.yaml.layout import FileRecord
+from fuzzytree.formats import FileRecord
 
 FILES: Final[Mapping[str, str]] = MappingProxyType(
     {

@@ -41,9 +41,9 @@ def test_a_format_is_added_to_this_repository(tmp_path: Path) -> None:
     for name in ("fuzzytree", "exporters", "schemas"):
         shutil.copytree(ROOT / name, copy / name, symlinks=True, ignore=ignored)
     (copy / "exporters" / "turtle.py").write_text(SHOWN["file: turtle.py"], "utf-8")
-    table = copy / "exporters" / "__init__.py"
+    table = copy / "exporters" / "table.py"
     text = table.read_text("utf-8")
-    line = SHOWN["line: exporters/__init__.py"]
+    line = SHOWN["line: exporters/table.py"]
     assert "    }\n)\n" in text
     table.write_text(text.replace("    }\n)\n", f"{line}    }}\n)\n", 1), "utf-8")
     done = _run("-c", TRY, folder=tmp_path, path=copy)

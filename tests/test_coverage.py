@@ -33,7 +33,7 @@ from fuzzytree.model.system import (
 from fuzzytree.runtimes.programs import run_system
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import Aim, range_rows
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -115,7 +115,7 @@ def test_a_system_that_mostly_answers_its_default_is_reported() -> None:
 
 
 def test_a_system_that_covers_its_ranges_has_nothing_to_report() -> None:
-    system = samples()["Mamdani, singletons"]
+    system = all_samples()["Mamdani, singletons"]
     assert isinstance(system, FuzzySystem)
     assert coverage_of(system).sentences == ()
 

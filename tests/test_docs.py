@@ -18,9 +18,9 @@ import pytest
 
 import fuzzytree
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.cli import program
-from fuzzytree.exporters import all_formats
-from fuzzytree.runtimes import all_runtimes
+from fuzzytree.cli.program import program
+from fuzzytree.exporters.table import all_formats
+from fuzzytree.runtimes.table import all_runtimes
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -194,7 +194,7 @@ def _shown(name: str) -> str:
 def _differences() -> str:
     """Return how far the runtimes' strengths lie apart on the wine tree."""
     import fuzzytree as ft
-    from fuzzytree.runtimes import all_runtimes
+    from fuzzytree.runtimes.table import all_runtimes
 
     table = ROOT / "examples" / "wine" / "wine.csv"
     tree = ft.learn(table, target="cultivar", name="wine")

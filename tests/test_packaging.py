@@ -66,7 +66,8 @@ def test_every_file_that_is_no_code_is_package_data() -> None:
             if is_code or (folder == "fuzzytree" and _is_linked(path)):
                 continue
             package = ".".join([name, *path.relative_to(ROOT / folder).parent.parts])
-            assert any(path.match(pattern) for pattern in data.get(package, [])), path
+            patterns = [*data.get(package, []), *data["*"]]
+            assert any(map(path.match, patterns)), path
 
 
 def test_the_version_of_the_package_is_that_of_the_changelog() -> None:

@@ -22,7 +22,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Run
 from fuzzytree.model.rulebase import Kind, RuleBase
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.runtimes.table import find_runtime, is_installed
 from fuzzytree.semantics.lowering import rules_from_tree
 from paper.records import Family, Price, Size, Times, What
 

@@ -10,33 +10,37 @@ from typing import TYPE_CHECKING, overload
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.converting import CALLED, as_model, kind_of
+from fuzzytree.checking import CALLED, as_model, kind_of
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.files import read_bounded
-from fuzzytree.model.contracts import (
+from fuzzytree.model import (
     Document,
     Fitted,
+    FuzzySystem,
     Model,
     ModelSource,
+    RuleBase,
     Run,
     Runtime,
     SystemOutcome,
 )
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.runtimes import baseline, find_runtime, is_installed, needed_by
-from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
-from fuzzytree.runtimes.predictions import (
+from fuzzytree.runtimes import (
+    OnnxModel,
     Outputs,
     Predictions,
+    baseline,
+    find_runtime,
+    is_installed,
     joined,
     joined_outputs,
+    needed_by,
+    open_onnx,
     predictions_of,
 )
 from fuzzytree.tables import Batch, batches
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 Carried = ModelSource | OnnxModel | bytes
 """A model, an ONNX file opened or as bytes, or the path of a file of either."""
@@ -137,7 +141,7 @@ def run(
         ValueError: If there is no such runtime.
     """
     result = opened(model, allow_loss=allow_loss)
-    ready = answering(result, runtime, with_strengths=with_strengths)
+    ready = prepare_answering(result, runtime, with_strengths=with_strengths)
     return ready.join([one for _, one in ready(table, columns=columns)])
 
 
@@ -190,7 +194,7 @@ class Answering(msgspec.Struct, frozen=True):
         return joined_outputs(numbers) if numbers else joined(classes)
 
 
-def answering(
+def prepare_answering(
     model: Document | OnnxModel,
     runtime: str | None = None,
     *,

@@ -15,14 +15,14 @@ import msgspec
 import numpy as np
 
 from fuzzytree.learning import LearningReport, LearningSettings, learn_arrays
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import FuzzyTree
 from fuzzytree.runtimes import baseline
 from fuzzytree.tables import Table
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 FOLDS = 5
 ROWS = 20_000

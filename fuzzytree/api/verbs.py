@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Literal, get_args
 import msgspec
 import numpy as np
 
-from fuzzytree.api.answering import Answering, Carried, answering, opened, run
-from fuzzytree.checking.converting import (
+from fuzzytree import semantics
+from fuzzytree.api.answering import Answering, Carried, opened, run
+from fuzzytree.checking import (
     CALLED,
     Conversion,
     as_model,
@@ -32,24 +33,28 @@ from fuzzytree.checking.converting import (
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import check_stream, read_bounded, reason, write_atomically
-from fuzzytree.model.agreement import Agreement, CheckSettings
-from fuzzytree.model.contracts import (
+from fuzzytree.model import (
+    Agreement,
+    CheckSettings,
+    Conjunction,
     Document,
     Dtype,
+    FuzzySystem,
+    FuzzyTree,
+    Kind,
     Model,
     ModelSource,
+    Option,
     Progress,
+    RuleBase,
     Written,
+    as_names,
+    name_choice,
+    printable,
+    with_label_type,
 )
-from fuzzytree.model.naming import as_names, printable
-from fuzzytree.model.options import Option
-from fuzzytree.model.rulebase import Conjunction, Kind, RuleBase, name_choice
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree, with_label_type
-from fuzzytree.runtimes import chosen_runtimes
-from fuzzytree.runtimes.onnxruntime import OnnxModel
-from fuzzytree.semantics import lowering
-from fuzzytree.semantics.conversion import as_rules, as_system
+from fuzzytree.runtimes import OnnxModel, chosen_runtimes
+from fuzzytree.semantics import as_rules, as_system
 from fuzzytree.tables import (
     Batch,
     Table,
@@ -64,32 +69,28 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from matplotlib.figure import Figure
 
-    from fuzzytree.auditing.diff.difference_records import Difference
-    from fuzzytree.auditing.findings.codes import Code
-    from fuzzytree.auditing.findings.domains import AuditDomain
-    from fuzzytree.auditing.findings.records import (
+    from fuzzytree.auditing import (
         Audit,
+        AuditDomain,
+        AuditRows,
         AuditSelection,
         AuditSettings,
+        Code,
+        Difference,
+        Material,
         SourceFile,
     )
-    from fuzzytree.auditing.findings.subject import AuditRows, Material
-    from fuzzytree.auditing.recheck import Report as RecheckReport
-    from fuzzytree.benchmarking.records import Study
-    from fuzzytree.benchmarking.savings import Footprint
-    from fuzzytree.benchmarking.study import BenchSettings
-    from fuzzytree.checking.programs import ProgramFile
-    from fuzzytree.checking.stability.results import Stability
+    from fuzzytree.auditing import Report as RecheckReport
+    from fuzzytree.benchmarking import BenchSettings, Footprint, Study
+    from fuzzytree.checking import ProgramFile, Stability
     from fuzzytree.learning import LearningSettings, Learnt
-    from fuzzytree.model.contracts import FloatArray
-    from fuzzytree.model.tree import Use
-    from fuzzytree.numerics.bounds import Certificate
+    from fuzzytree.model import FloatArray, Use
+    from fuzzytree.numerics import Certificate
 
 __all__ = [
     "Answering",
     "Carried",
     "Conversion",
-    "answering",
     "audit",
     "audited_rows",
     "bench",
@@ -106,6 +107,7 @@ __all__ = [
     "material",
     "needs",
     "opened",
+    "prepare_answering",
     "read",
     "recheck",
     "rows_of",
@@ -155,8 +157,7 @@ def learn(
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
-    from fuzzytree.learning import LearningSettings
-    from fuzzytree.learning.findings import remarks
+    from fuzzytree.learning import LearningSettings, remarks
 
     result = read_table(table, target=target, ignore=ignore)
     for column, text in remarks(result, lambda column: f"ignore=[{column!r}]"):
@@ -233,7 +234,7 @@ def rules_from_tree(
         InvalidModelError: If `kind` is `raw` and the tree carries no sets.
     """
     result = _tree_of(tree, "rules_from_tree")
-    return lowering.rules_from_tree(result, kind, conjunction=conjunction)
+    return semantics.rules_from_tree(result, kind, conjunction=conjunction)
 
 
 def save(
@@ -353,7 +354,7 @@ def check(
     ]
     values = rows_of(data, first)
     if isinstance(first, FuzzySystem):
-        from fuzzytree.checking.systems import check_system
+        from fuzzytree.checking import check_system
 
         return check_system(
             first,
@@ -365,7 +366,7 @@ def check(
             rows_only=chosen.rows_only,
             progress=progress,
         )
-    from fuzzytree.checking import models as checking
+    from fuzzytree import checking
 
     return checking.check(
         first,
@@ -386,7 +387,7 @@ def _program(source: Carried, may_run: bool) -> ProgramFile | None:
     form = format_of(source)
     if form.read is not None or form.name == "onnx":
         return None
-    from fuzzytree.checking.programs import ProgramFile
+    from fuzzytree.checking import ProgramFile
 
     return ProgramFile(form.name, read_bounded(source), may_run)
 
@@ -449,13 +450,13 @@ def certify(
         >>> certify(random_tree(1, combinations=0)).sentence
         'no path can differ: no value is rounded before it meets a cut'
     """
-    from fuzzytree.numerics import bounds
+    from fuzzytree import numerics
 
     if dtype not in get_args(Dtype):
         known = ", ".join(get_args(Dtype))
         raise ValueError(f"there is no number type {dtype!r}; there are {known}")
     first = _model_of(model, "certify")
-    return bounds.certify(first, dtype, rows_of(data, first))
+    return numerics.certify(first, dtype, rows_of(data, first))
 
 
 def bench(
@@ -497,10 +498,10 @@ def bench(
         >>> [point.question for point in study.points]
         ['tree', 'relative rules', 'raw rules']
     """
-    from fuzzytree.benchmarking import study
+    from fuzzytree import benchmarking
 
     first = _model_of(model, "bench")
-    return study.bench(
+    return benchmarking.bench(
         first,
         values=rows_of(data, first),
         data=_data_name(data),
@@ -568,14 +569,18 @@ def audit(
         >>> audit(random_tree(1), selection=wanted).is_complete
         True
     """
-    from fuzzytree.auditing.engine.clock import Clock
-    from fuzzytree.auditing.engine.domain import limited
-    from fuzzytree.auditing.findings import audit as auditing
-    from fuzzytree.auditing.findings.configuration import check_settings
-    from fuzzytree.auditing.findings.domains import AuditDomain, domain_of
-    from fuzzytree.auditing.findings.records import AuditSelection, AuditSettings
-    from fuzzytree.auditing.findings.results import with_results
-    from fuzzytree.auditing.findings.subject import Material
+    from fuzzytree import auditing
+    from fuzzytree.auditing import (
+        AuditDomain,
+        AuditSelection,
+        AuditSettings,
+        Clock,
+        Material,
+        check_settings,
+        domain_of,
+        limited,
+        with_results,
+    )
 
     chosen = settings or AuditSettings()
     check_settings(chosen)
@@ -632,9 +637,7 @@ def material(
         TableError: If a column is absent or holds text, the table has no row, or it
             changes while it is read.
     """
-    from fuzzytree.auditing.findings.locations import model_file
-    from fuzzytree.auditing.findings.results import read_results
-    from fuzzytree.auditing.findings.subject import Material
+    from fuzzytree.auditing import Material, model_file, read_results
 
     file = None
     if isinstance(model, str | os.PathLike):
@@ -686,9 +689,7 @@ def _bytes_of(path: str | os.PathLike[str]) -> bytes:
 
 def _source_of(data: object, name: str | None = None) -> SourceFile | None:
     """Return the name and the hash of a table that is a file, None for another."""
-    from fuzzytree.auditing.findings.audit import source_of
-    from fuzzytree.auditing.findings.locations import writable
-    from fuzzytree.auditing.findings.records import SourceFile
+    from fuzzytree.auditing import SourceFile, source_of, writable
 
     table = data.source if isinstance(data, TableSource) else data
     if isinstance(table, io.BytesIO):
@@ -723,7 +724,7 @@ def audited_rows(
         TableError: If a column is absent or holds text, or the table has no row, or
             none of a class of the model.
     """
-    from fuzzytree.auditing.findings.subject import AuditRows
+    from fuzzytree.auditing import AuditRows
 
     if data is None:
         return None
@@ -791,16 +792,17 @@ def diff(
         >>> diff(tree, rules_from_tree(tree)).verdict
         'equal'
     """
-    from fuzzytree.auditing.diff.decisions import all_inputs
-    from fuzzytree.auditing.diff.differences import (
+    from fuzzytree.auditing import (
+        AuditRows,
+        AuditSettings,
+        Clock,
+        ModelFile,
+        all_inputs,
         check_common_inputs,
         difference,
         joined_domain,
+        model_file,
     )
-    from fuzzytree.auditing.engine.clock import Clock
-    from fuzzytree.auditing.findings.locations import ModelFile, model_file
-    from fuzzytree.auditing.findings.records import AuditSettings
-    from fuzzytree.auditing.findings.subject import AuditRows
 
     clock = Clock(budget_s, report=progress)
     models: list[Document] = []
@@ -872,11 +874,11 @@ def needs(
         >>> needs(random_tree(1)).ok
         True
     """
-    from fuzzytree.benchmarking import savings
-    from fuzzytree.semantics.simplification import pruned
+    from fuzzytree import benchmarking
+    from fuzzytree.semantics import pruned
 
     first = _model_of(model, "needs")
-    return savings.report(
+    return benchmarking.report(
         first,
         pruned(first, uses=uses, inputs="inputs" in drop, rules="rules" in drop),
         uses=uses,
@@ -901,7 +903,7 @@ def explain(code: str) -> Code:
         >>> explain("FT101").title
         'dead rule'
     """
-    from fuzzytree.auditing.findings.codes import CODES
+    from fuzzytree.auditing import CODES
 
     if not isinstance(code, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise TypeError(
@@ -924,7 +926,7 @@ def recheck(
     Raises:
         ReadError: If one of the files cannot be read.
     """
-    from fuzzytree.auditing.recheck import CannotRunError, recheck_files
+    from fuzzytree.auditing import CannotRunError, recheck_files
 
     try:
         return recheck_files(os.fspath(audit), os.fspath(model))
@@ -947,9 +949,9 @@ def draw(tree: ModelSource, *, title: str | None = None) -> Figure:
         ValueError: If the tree is too large for a picture.
         MissingExtraError: If matplotlib is not installed.
     """
-    from fuzzytree.report import plots
+    from fuzzytree import report
 
-    return plots.draw_tree(_tree_of(tree, "draw"), title=title)
+    return report.draw_tree(_tree_of(tree, "draw"), title=title)
 
 
 def stability(
@@ -979,7 +981,7 @@ def stability(
         >>> stability(random_tree(1), runtimes=["native"], only=["N3", "N7"]).ok
         True
     """
-    from fuzzytree.checking.stability.suite import examine
+    from fuzzytree.checking import examine
 
     first = _model_of(model, "stability")
     chosen = chosen_runtimes(runtimes)

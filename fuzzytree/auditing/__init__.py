@@ -1,1 +1,5 @@
 """Audits of rule bases: findings, the engine that proves them, diffs, re-checks."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

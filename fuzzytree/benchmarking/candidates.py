@@ -27,18 +27,15 @@ from fuzzytree.benchmarking.records import (
     Question,
 )
 from fuzzytree.errors import install_hint
-from fuzzytree.model.contracts import Dtype, Model, Outcome, Prepared, Runtime
-from fuzzytree.model.rulebase import LR, Band, RuleBase
-from fuzzytree.numerics.approximation import ApproximateRules, by_degree, by_points
-from fuzzytree.numerics.bounds import certify
-from fuzzytree.runtimes import all_runtimes, is_installed, needed_by
-from fuzzytree.runtimes.predictions import predictions_of
-from fuzzytree.semantics.lowering import forms
+from fuzzytree.model import LR, Band, Dtype, Model, Outcome, Prepared, RuleBase, Runtime
+from fuzzytree.numerics import ApproximateRules, by_degree, by_points, certify
+from fuzzytree.runtimes import all_runtimes, is_installed, needed_by, predictions_of
+from fuzzytree.semantics import forms
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 Bounds = Callable[[RuleBase, Dtype], Bound | None]
 """The certified error of a rule base's strengths in a number type, if there is one."""
@@ -258,7 +255,7 @@ def _load_reading(threads: int) -> LoadedCandidate:
 def _load_session(threads: int) -> LoadedCandidate:
     from onnx import TensorProto, helper
 
-    from fuzzytree.exporters.onnx_session import open_bare
+    from fuzzytree.exporters import open_bare
 
     shapes = [
         helper.make_tensor_value_info(name, TensorProto.DOUBLE, ["rows", "columns"])

@@ -20,7 +20,7 @@ from itertools import repeat
 import msgspec
 
 from fuzzytree.benchmarking.records import Timing
-from fuzzytree.model.contracts import Progress
+from fuzzytree.model import Progress
 
 CONFIDENCE = 0.95
 """Of all intervals."""

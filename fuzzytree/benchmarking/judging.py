@@ -17,19 +17,18 @@ from fuzzytree.benchmarking.records import (
     LoadedCandidate,
     Question,
 )
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.numerics.oracle import (
+from fuzzytree.model import Model, RuleBase
+from fuzzytree.numerics import (
     Decisions,
     ErrorMeasure,
     decide,
     error_against_exact,
     strength_errors,
 )
-from fuzzytree.semantics.probing import landmarks, probe_values
+from fuzzytree.semantics import landmarks, probe_values
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 MOST_ROWS = 2_000
 """Rows on which errors are observed, of those that are timed."""

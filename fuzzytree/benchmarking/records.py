@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
-from fuzzytree.semantics.lowering import Form
+from fuzzytree.semantics import Form
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 Question = Form
 """What a candidate computes. Errors are measured against the exact answer to it."""

@@ -15,25 +15,18 @@ from msgspec.structs import replace
 
 from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.records import Timing
-from fuzzytree.checking.dependencies import DTYPES, Needs, needs, prove
+from fuzzytree.checking import DTYPES, Needs, needs, prove
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters import find_format
-from fuzzytree.exporters.onnx import write_onnx as write_onnx
-from fuzzytree.exporters.onnx_compare import contents
-from fuzzytree.model.agreement import Agreement
-from fuzzytree.model.contracts import Dtype, Model, Progress
-from fuzzytree.model.rulebase import Variable, summary
-from fuzzytree.model.tree import Use
-from fuzzytree.runtimes import baseline
-from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.semantics.lowering import forms
-from fuzzytree.semantics.probing import probe_values
-from fuzzytree.semantics.simplification import Pruned, Removed
+from fuzzytree.exporters import contents, find_format
+from fuzzytree.exporters import write_onnx as write_onnx
+from fuzzytree.model import Agreement, Dtype, Model, Progress, Use, Variable, summary
+from fuzzytree.runtimes import baseline, open_onnx
+from fuzzytree.semantics import Pruned, Removed, forms, probe_values
 from fuzzytree.tables import batches, path_of
 
 if TYPE_CHECKING:
     from fuzzytree.benchmarking.clock import Call
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 ALL_COLUMNS, AS_IT_IS, PRUNED = "all columns", "as it is", "pruned"
 

@@ -31,14 +31,11 @@ from fuzzytree.benchmarking.records import (
     Study,
     Timing,
 )
-from fuzzytree.model.contracts import Model, Progress
-from fuzzytree.model.interrupts import noticed
-from fuzzytree.model.naming import as_names
-from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model import Model, Progress, as_names, fingerprint, noticed
 from fuzzytree.runtimes import baseline
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 ROWS = (1, 1_000, 1_000_000)
 THREADS = (1, 2)

@@ -24,10 +24,10 @@ from typing import IO, TYPE_CHECKING, cast
 
 from fuzzytree.benchmarking.candidates import foreign
 from fuzzytree.benchmarking.records import Candidate
-from fuzzytree.model.contracts import Model, Progress
+from fuzzytree.model import Model, Progress
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _START = """
 import json, sys

@@ -10,9 +10,8 @@ import msgspec
 from fuzzytree.checking.converting import formed, kind_of
 from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.model.contracts import Document, Format, Written
-from fuzzytree.model.options import options_of
-from fuzzytree.semantics.samples import samples
+from fuzzytree.model import Document, Format, Written, options_of
+from fuzzytree.semantics import all_samples
 
 Outcome = Literal["equal", "alike", "written", "points", "lossy", "refused", "no"]
 """How far a format carries something, the best first; see `Ability`."""
@@ -46,7 +45,7 @@ class Ability(msgspec.Struct, frozen=True):
     bound: float | None = None
 
 
-def abilities(
+def abilities_of(
     form: Format,
     models: Mapping[str, Document] | None = None,
     *,
@@ -64,10 +63,10 @@ def abilities(
 
     Example:
         >>> from fuzzytree.exporters import find_format
-        >>> abilities(find_format("python"))[0].outcome
+        >>> abilities_of(find_format("python"))[0].outcome
         'written'
     """
-    found = samples() if models is None else models
+    found = all_samples() if models is None else models
     options = {} if dialect is None else {"dialect": dialect}
     return tuple(_ability(form, name, model, options) for name, model in found.items())
 

@@ -9,17 +9,28 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.model.agreement import Basis, Certified, Comparison, Verdict
-from fuzzytree.model.contracts import Dtype, Model, Outcome
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
-from fuzzytree.numerics.oracle import Decisions, strength_errors
-from fuzzytree.semantics.probing import probe_values
-from fuzzytree.semantics.reference import Status
+from fuzzytree.model import (
+    Basis,
+    Certified,
+    Comparison,
+    Dtype,
+    FuzzyTree,
+    Model,
+    Outcome,
+    RuleBase,
+    Verdict,
+)
+from fuzzytree.numerics import (
+    Decisions,
+    certify,
+    open_paths,
+    strength_bounds,
+    strength_errors,
+)
+from fuzzytree.semantics import Status, probe_values
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 BoolArray = npt.NDArray[np.bool_]
 

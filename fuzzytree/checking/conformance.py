@@ -18,15 +18,15 @@ from typing import get_args
 from fuzzytree.checking.converting import kind_of
 from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
-from fuzzytree.model.contracts import (
+from fuzzytree.model import (
     Document,
     Format,
     Loss,
     ModelKind,
     Reading,
     Written,
+    fingerprint,
 )
-from fuzzytree.model.rulebase import fingerprint
 
 _PATIENCE_S = 10.0  # for one hostile input
 _LONGEST = 300  # characters of an error that are shown

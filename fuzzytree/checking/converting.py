@@ -14,34 +14,38 @@ from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded
-from fuzzytree.formats.simpful import from_simpful
-from fuzzytree.formats.skfuzzy import from_skfuzzy
-from fuzzytree.formats.sklearn import from_sklearn
-from fuzzytree.model.contracts import (
+from fuzzytree.formats import from_simpful, from_skfuzzy, from_sklearn
+from fuzzytree.model import (
+    Conjunction,
     Document,
     Dtype,
     Format,
+    FuzzySystem,
+    FuzzyTree,
+    Kind,
     Loss,
     Model,
     ModelKind,
     ModelSource,
+    Option,
     Reading,
+    RuleBase,
     Written,
+    check_options,
     loss_text,
+    sampled_values,
 )
-from fuzzytree.model.options import Option, check_options
-from fuzzytree.model.rulebase import Conjunction, Kind, RuleBase
-from fuzzytree.model.system import FuzzySystem, sampled_values
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.conversion import check_tolerance
-from fuzzytree.semantics.inference import unsampled_terms
-from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.probing import probes
-from fuzzytree.semantics.reference import evaluate
+from fuzzytree.semantics import (
+    check_tolerance,
+    evaluate,
+    probes,
+    rules_from_tree,
+    unsampled_terms,
+)
 
 if TYPE_CHECKING:
-    from fuzzytree.model.agreement import Coverage
-    from fuzzytree.numerics.bounds import Certificate
+    from fuzzytree.model import Coverage
+    from fuzzytree.numerics import Certificate
 
 _FEW = 200  # probes of a file that is run
 _TRIED = 1000  # probes of what a loss does to decisions
@@ -328,7 +332,7 @@ def formed(
     if isinstance(model, RuleBase):
         if (representation or _nearest("rules", form)) != "system":
             return model
-        from fuzzytree.semantics.conversion import as_system
+        from fuzzytree.semantics import as_system
 
         return as_system(model, scores="winner")
     return _formed_system(model, form, representation, kind, conjunction)
@@ -359,7 +363,7 @@ def _formed_system(
             )
     if (representation or _nearest("system", form)) == "system":
         return system
-    from fuzzytree.semantics.conversion import as_rules
+    from fuzzytree.semantics import as_rules
 
     found = as_rules(system, None)
     if found is not None:
@@ -552,7 +556,7 @@ def _decided(model: Document, other: Document) -> str:
 
 
 def _certified(model: Model, form: Format, dtype: object) -> Proof:
-    from fuzzytree.numerics.bounds import certify
+    from fuzzytree.numerics import certify
 
     wanted = [name for name in get_args(Dtype) if name == dtype]
     known = wanted or [name for name in get_args(Dtype) if name == form.dtype]
@@ -567,7 +571,7 @@ def _run(system: FuzzySystem, written: Written) -> Proof:
         DisagreementError: If it answers other numbers, though no loss was reported.
     """
     from fuzzytree.checking.systems import check_system
-    from fuzzytree.runtimes.onnxruntime import open_onnx
+    from fuzzytree.runtimes import open_onnx
 
     model = open_onnx(written.content, "the file")
     found = check_system(system, model, runtimes=[], limit=_FEW)
@@ -585,7 +589,7 @@ def _exact(model: Document, origin: str) -> Certificate | None:
     """Return the certificate of a file with a deciding model, unchanged."""
     if isinstance(model, FuzzySystem):
         return None
-    from fuzzytree.numerics.bounds import Certificate
+    from fuzzytree.numerics import Certificate
 
     return Certificate(None, kind_of(model), 0.0, origin)
 

@@ -24,36 +24,40 @@ from fuzzytree.checking.comparing import (
     probed,
 )
 from fuzzytree.errors import LossError, MissingExtraError
-from fuzzytree.exporters.onnx import write_onnx as write_onnx
-from fuzzytree.exporters.onnx_compare import Contents, contents
-from fuzzytree.model.agreement import Agreement, Comparison
-from fuzzytree.model.contracts import Dtype, Model, ModelKind, Outcome
-from fuzzytree.model.rulebase import (
+from fuzzytree.exporters import Contents, contents
+from fuzzytree.exporters import write_onnx as write_onnx
+from fuzzytree.model import (
     LR,
+    Agreement,
     Band,
     Clause,
+    Comparison,
+    Dtype,
+    FuzzyTree,
+    Model,
+    ModelKind,
+    Outcome,
     Points,
     RuleBase,
     Shape,
+    Use,
     fingerprint,
 )
-from fuzzytree.model.tree import FuzzyTree, Use
-from fuzzytree.runtimes import find_runtime
-from fuzzytree.runtimes.rows import axis_lines, plan_axes
-from fuzzytree.semantics.crisp_regions import free_axes
-from fuzzytree.semantics.lowering import forms
-from fuzzytree.semantics.simplification import (
+from fuzzytree.runtimes import axis_lines, find_runtime, plan_axes
+from fuzzytree.semantics import (
     Pruned,
     Removed,
+    forms,
+    free_axes,
     proof_faults,
     pruned,
     unguarded,
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.exporters.onnx import Output
-    from fuzzytree.model.contracts import FloatArray
-    from fuzzytree.runtimes.rows import Real
+    from fuzzytree.exporters import Output
+    from fuzzytree.model import FloatArray
+    from fuzzytree.runtimes import Real
 
 DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
 

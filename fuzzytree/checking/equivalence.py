@@ -9,50 +9,60 @@ from typing import Literal, get_args
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Document, Reading, Written
-from fuzzytree.model.rulebase import (
-    Band,
-    Clause,
-    Flank,
-    Part,
-    Points,
-    Rule,
-    RuleBase,
-    Semantics,
-    Shape,
-    Term,
-    Variable,
-    fingerprint,
-    shapes_of,
-)
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
+    Band,
+    Branch,
     Call,
+    Clause,
     Conclusion,
     Condition,
     Curve,
+    Document,
     Expression,
+    Flank,
     Formula,
     FuzzySystem,
+    FuzzyTree,
     Hedge,
     Is,
+    Leaf,
     Name,
+    Node,
     Not,
     Or,
+    Part,
+    Points,
+    Reading,
+    Rule,
+    RuleBase,
     RuleBlock,
+    Semantics,
+    Sets,
+    Shape,
     SystemInput,
     SystemOutput,
     SystemRule,
     SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
+    Written,
+    fingerprint,
     joints,
     questions,
+    shapes_of,
 )
-from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
-from fuzzytree.semantics.conversion import Scores, as_system
-from fuzzytree.semantics.conversion.points import EXACT, shape_of, stepped, straightened
-from fuzzytree.semantics.probing import landmarks
-from fuzzytree.semantics.reference import degree
+from fuzzytree.semantics import (
+    EXACT,
+    Scores,
+    as_system,
+    degree,
+    landmarks,
+    shape_of,
+    stepped,
+    straightened,
+)
 
 Likeness = Literal["equal", "alike", "renamed", "other"]
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, get_args
 import msgspec
 import numpy as np
 
+from fuzzytree import semantics
 from fuzzytree.checking.comparing import (
     BoolArray,
     ModelRun,
@@ -32,22 +33,31 @@ from fuzzytree.checking.comparing import (
 )
 from fuzzytree.checking.programs import ProgramFile, check_program
 from fuzzytree.errors import FuzzyTreeError, LossError
-from fuzzytree.model.agreement import Agreement, Certified, Comparison, Count
-from fuzzytree.model.contracts import Dtype, Model, Outcome, Progress, Run, Runtime
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Kind, RuleBase, fingerprint
-from fuzzytree.model.tree import FuzzyTree, Use
-from fuzzytree.numerics.bounds import open_paths, strength_bounds
-from fuzzytree.numerics.oracle import decide
+from fuzzytree.model import (
+    Agreement,
+    Certified,
+    Comparison,
+    Count,
+    Dtype,
+    FuzzyTree,
+    Kind,
+    Model,
+    Outcome,
+    Progress,
+    RuleBase,
+    Run,
+    Runtime,
+    Use,
+    checkpoint,
+    fingerprint,
+)
+from fuzzytree.numerics import decide, open_paths, strength_bounds
 from fuzzytree.runtimes import baseline, chosen_runtimes, is_installed, needed_by
-from fuzzytree.semantics import crisp_regions
-from fuzzytree.semantics.lowering import forms, rules_from_tree
-from fuzzytree.semantics.reference import Status
-from fuzzytree.semantics.simplification import proof_faults, pruned
+from fuzzytree.semantics import Status, forms, proof_faults, pruned, rules_from_tree
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
-    from fuzzytree.runtimes.onnxruntime import OnnxModel
+    from fuzzytree.model import FloatArray
+    from fuzzytree.runtimes import OnnxModel
 
 GRID_LIMIT = 1 << 21
 """The most points at which all cells are tried one by one; the proof needs no limit."""
@@ -124,7 +134,7 @@ def check(
         tuple(f for f in findings if isinstance(f, Comparison)),
         tuple(map(_count, representations)),
         tuple(dict.fromkeys(f for f in findings if isinstance(f, str))),
-        crisp_regions.cell_count(model) if isinstance(model, FuzzyTree) else None,
+        semantics.cell_count(model) if isinstance(model, FuzzyTree) else None,
         rows.probes,
         tuple(certificates),
         rows_only,
@@ -145,10 +155,10 @@ def _equivalence(
 ) -> Iterator[Finding]:
     """Show that the relative rules are the tree, and how far the raw rules are not."""
     path, relative, *raw = representations
-    faults = tuple(crisp_regions.node_faults(tree))
-    points = sum(map(len, map(crisp_regions.node_points, tree.nodes)))
+    faults = tuple(semantics.node_faults(tree))
+    points = sum(map(len, map(semantics.node_points, tree.nodes)))
     yield counted("proof", relative.title, path.title, points, faults)
-    size = crisp_regions.grid_size(tree)
+    size = semantics.grid_size(tree)
     if size <= GRID_LIMIT:
         yield _all_cells(tree, relative.title, path.title, size)
     else:
@@ -164,11 +174,11 @@ def _equivalence(
 def _all_cells(
     tree: FuzzyTree, representation: str, against: str, size: int
 ) -> Comparison:
-    free = crisp_regions.free_axes(tree)
+    free = semantics.free_axes(tree)
     native = baseline()
     descend, fire = native.load(free), native.load(rules_from_tree(free))
     faults: list[str] = []
-    for points in crisp_regions.grid(tree):
+    for points in semantics.grid(tree):
         path, fired = descend(points), fire(points)
         for row in np.flatnonzero(path.rule != fired.rule).tolist():
             values = zip(free.inputs, points[:, row].tolist(), strict=True)
@@ -406,7 +416,7 @@ def _shipped_onnx(
         )
         yield counted("file", title, "the model's facts", 1, (fault,))
         return
-    from fuzzytree.exporters.onnx_compare import Differences, differences
+    from fuzzytree.exporters import Differences, differences
 
     expected = _onnx_counterpart(other, model)
     if expected is None:

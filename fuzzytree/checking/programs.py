@@ -25,15 +25,19 @@ from fuzzytree.checking.comparing import (
 )
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
-from fuzzytree.model.agreement import Comparison
-from fuzzytree.model.contracts import Document, Format, Model, Written
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.bounds import open_paths
-from fuzzytree.runtimes import baseline
-from fuzzytree.runtimes.written import ENGINES, Options
-from fuzzytree.semantics.lowering import forms, rules_from_tree
+from fuzzytree.model import (
+    Comparison,
+    Document,
+    Format,
+    FuzzySystem,
+    FuzzyTree,
+    Model,
+    RuleBase,
+    Written,
+)
+from fuzzytree.numerics import open_paths
+from fuzzytree.runtimes import ENGINES, Options, baseline
+from fuzzytree.semantics import forms, rules_from_tree
 
 _MOST_ROWS: Final = 2_000  # that a program answers
 _LONGEST: Final = 80  # characters of a line

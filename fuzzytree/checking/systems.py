@@ -20,24 +20,43 @@ from fuzzytree.checking.equivalence import is_equivalent
 from fuzzytree.checking.models import first_difference
 from fuzzytree.checking.programs import ProgramFile, check_program
 from fuzzytree.errors import FuzzyTreeError, LossError
-from fuzzytree.model.agreement import Agreement, Comparison, Count, Coverage
-from fuzzytree.model.contracts import Progress, Runtime, SystemOutcome, SystemRun
-from fuzzytree.model.rulebase import fingerprint
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.runtimes import baseline, chosen_runtimes, is_installed, needed_by
-from fuzzytree.runtimes.programs import run_system
-from fuzzytree.runtimes.reference import infer_rows
-from fuzzytree.semantics.probing import Aim, Row, range_rows, system_probes
-from fuzzytree.semantics.programs.bounds import ORIGIN, error_bounds
-from fuzzytree.semantics.programs.system_program import from_system
-from fuzzytree.semantics.reference import Status
+from fuzzytree.model import (
+    Agreement,
+    Comparison,
+    Count,
+    Coverage,
+    FuzzySystem,
+    Progress,
+    Runtime,
+    SystemOutcome,
+    SystemRun,
+    fingerprint,
+)
+from fuzzytree.runtimes import (
+    baseline,
+    chosen_runtimes,
+    infer_rows,
+    is_installed,
+    needed_by,
+    run_system,
+)
+from fuzzytree.semantics import (
+    ORIGIN,
+    Aim,
+    Row,
+    Status,
+    error_bounds,
+    from_system,
+    range_rows,
+    system_probes,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
-    from fuzzytree.runtimes.onnxruntime import OnnxModel
-    from fuzzytree.semantics.programs.steps import Program
+    from fuzzytree.model import FloatArray, IntArray
+    from fuzzytree.runtimes import OnnxModel
+    from fuzzytree.semantics import Program
 
 _SLOW_STEPS = 2_000_000  # operations that a slow runtime computes
 _EDGE = 1e-6  # share of a range; a wider bound says little
@@ -162,8 +181,8 @@ def coverage_of(system: FuzzySystem) -> Coverage:
     """Return which rules of a system fire in probes, and how much is uncovered.
 
     Example:
-        >>> from fuzzytree.semantics.samples import samples
-        >>> coverage_of(samples()["Mamdani, singletons"]).unfired
+        >>> from fuzzytree.semantics.samples import all_samples
+        >>> coverage_of(all_samples()["Mamdani, singletons"]).unfired
         ()
     """
     return _probes(system, run_system(system, activations=True), _FEW)[1]
@@ -454,7 +473,7 @@ def _shipped(
         )
         yield counted("file", title, "the system's facts", 1, (fault,))
         return
-    from fuzzytree.exporters.onnx_compare import differences
+    from fuzzytree.exporters import differences
 
     apart = differences(other.content, system)
     yield counted("file", title, "the system's metadata", 1, apart.metadata)

@@ -31,12 +31,10 @@ from fuzzytree.cli.console import (
     wrong_options,
 )
 from fuzzytree.files import check_places, write_atomically
-from fuzzytree.model.naming import printable, printable_json
+from fuzzytree.model import printable, printable_json
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.findings.configuration import FailOn
-    from fuzzytree.auditing.findings.records import Audit
-    from fuzzytree.auditing.findings.subject import Material
+    from fuzzytree.auditing import Audit, FailOn, Material
 
 _MOST_LIMITS = 3  # undeclared ranges that are reported one by one
 
@@ -148,15 +146,15 @@ def command(
     Exit 0 without findings, 1 with findings that are not accepted, 2 if the audit
     cannot run, 130 if interrupted.
     """
-    from fuzzytree.api import verbs
-    from fuzzytree.auditing.findings.baselines import (
+    from fuzzytree import api
+    from fuzzytree.auditing import (
+        AuditDomain,
+        AuditSelection,
         baseline_of,
         read_baseline,
         resolved_ids,
     )
-    from fuzzytree.auditing.findings.domains import AuditDomain
-    from fuzzytree.auditing.findings.records import AuditSelection
-    from fuzzytree.report.audit import audit_lines, audit_verdict
+    from fuzzytree.report import audit_lines, audit_verdict
 
     if target is not None and data is None:
         raise click.UsageError(
@@ -172,14 +170,14 @@ def command(
     path = baseline or known.baseline
     accepted: Mapping[str, str] = {} if path is None else read_baseline(path)
     with wrong_options(), progress_bar(quiet=quiet) as show:
-        material = verbs.material(
+        material = api.material(
             model,
             data=table_of(data, delimiter),
             target=target,
             results=results,
             allow_loss=allow_loss,
         )
-        found = verbs.audit(
+        found = api.audit(
             material,
             domain=AuditDomain(
                 within=within,
@@ -242,11 +240,11 @@ def _for_programs(found: Audit, form: Form, baseline: Mapping[str, str] | None) 
     """Return an audit as JSON, SARIF or annotations of a code host."""
     match form:
         case "sarif":
-            from fuzzytree.report.sarif import sarif
+            from fuzzytree.report import sarif_text
 
-            return printable_json(sarif(found, baseline))
+            return printable_json(sarif_text(found, baseline))
         case "github":
-            from fuzzytree.report.sarif import annotation_lines
+            from fuzzytree.report import annotation_lines
 
             return "\n".join(annotation_lines(found))
         case _:
@@ -255,7 +253,7 @@ def _for_programs(found: Audit, form: Form, baseline: Mapping[str, str] | None) 
 
 def _lines_of(material: Material) -> list[str]:
     """Return the lines of a model's file, for people."""
-    from fuzzytree.formats.text_files import split_lines
+    from fuzzytree.formats import split_lines
 
     content = material.file.content if material.file else b""
     is_wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
@@ -286,12 +284,12 @@ def _tell_domain(found: Audit, *, quiet: bool) -> None:
 
 
 def _write_page(found: Audit, material: Material, page: str) -> None:
-    from fuzzytree.checking.stability.results import Stability
-    from fuzzytree.model.agreement import Agreement
-    from fuzzytree.report import audit_page
+    from fuzzytree import report
+    from fuzzytree.checking import Stability
+    from fuzzytree.model import Agreement
 
     given = [one.found for one in material.given]
-    text = audit_page.page(
+    text = report.page(
         found,
         material.model,
         rows=material.rows,

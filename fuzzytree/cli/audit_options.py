@@ -14,8 +14,7 @@ import msgspec
 from fuzzytree.cli.console import say, setting, standard_input
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.findings.configuration import Configuration
-    from fuzzytree.auditing.findings.records import AuditSettings
+    from fuzzytree.auditing import AuditSettings, Configuration
 
 
 _OPTIONS = (
@@ -90,11 +89,7 @@ def with_options(function: Callable[..., int]) -> Callable[..., int]:
 
 def configured(path: str | None, *, quiet: bool) -> Configuration:
     """Return the configuration of a file: the named one, or one that is here."""
-    from fuzzytree.auditing.findings.configuration import (
-        FILE,
-        Configuration,
-        read_configuration,
-    )
+    from fuzzytree.auditing import FILE, Configuration, read_configuration
 
     if path is None and not Path(FILE).is_file():
         return Configuration()
@@ -159,7 +154,7 @@ def settings_of(
     Raises:
         ValueError: If one is out of its range.
     """
-    from fuzzytree.auditing.findings.configuration import check_settings, settings_with
+    from fuzzytree.auditing import check_settings, settings_with
 
     found = settings_with(known.settings, dict(map(setting, texts)))
     if budget is not None:

@@ -27,7 +27,7 @@ from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import check_place, write_atomically
 
 if TYPE_CHECKING:
-    from fuzzytree.benchmarking.records import Study
+    from fuzzytree.benchmarking import Study
 
 INTERRUPTED = 130
 
@@ -137,9 +137,9 @@ def command(
     study early, keeps its results, and exits with 130; exit 1 if an error is larger
     than its certified bound.
     """
-    from fuzzytree.api import verbs
-    from fuzzytree.benchmarking.study import BenchSettings
-    from fuzzytree.report.bench import study_lines
+    from fuzzytree import api
+    from fuzzytree.benchmarking import BenchSettings
+    from fuzzytree.report import study_lines
 
     _check_places(output, plots)
     with (
@@ -147,7 +147,7 @@ def command(
         progress_bar(quiet=quiet) as show,
         contextlib.redirect_stdout(sys.stderr),  # libraries of others may print
     ):
-        found = verbs.bench(
+        found = api.bench(
             model,
             data=table_source(data, delimiter),
             only=only,
@@ -180,7 +180,7 @@ def command(
 
 def _ending(found: Study, *, as_json: bool, quiet: bool) -> int:
     """Report what went wrong, and return the exit code."""
-    from fuzzytree.benchmarking.study import faults
+    from fuzzytree.benchmarking import faults
 
     if found.is_interrupted:
         known = "the result has what was measured before"
@@ -201,7 +201,7 @@ def _ending(found: Study, *, as_json: bool, quiet: bool) -> int:
 
 def _check_places(output: str | None, plots: Sequence[str]) -> None:
     """Refuse what cannot be written, before minutes of work."""
-    from fuzzytree.report.plots import SUFFIXES
+    from fuzzytree.report import SUFFIXES
 
     for place in (output, *plots):
         if place:
@@ -218,12 +218,12 @@ def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
     """Draw the study for most rows; return which files were written."""
     if not places:
         return ()
-    from fuzzytree.report import plots
+    from fuzzytree import report
 
     timings = [timing for point in found.points for timing in point.timings]
     rows = max(timing.rows for timing in timings)
     threads = min(timing.threads for timing in timings)
-    figure = plots.work_precision(found, rows=rows, threads=threads)
+    figure = report.work_precision(found, rows=rows, threads=threads)
     for place in places:
-        plots.save(figure, place)
+        report.save(figure, place)
     return places

@@ -72,12 +72,11 @@ def command(
     system, each runtime and each file. Exit 1 if two of them disagree. A program (C,
     Python, JavaScript, SQL, PMML) runs only if its text equals a new export.
     """
-    from fuzzytree.api import verbs
-    from fuzzytree.model.agreement import CheckSettings
-    from fuzzytree.report import text
+    from fuzzytree import api, report
+    from fuzzytree.model import CheckSettings
 
     with wrong_options(), progress_bar(quiet=quiet) as show:
-        found = verbs.check(
+        found = api.check(
             model,
             *files,
             data=table_source(data, delimiter),
@@ -86,7 +85,7 @@ def command(
             allow_loss=allow_loss,
             progress=show,
         )
-    lines = text.agreement_lines(found, is_verbose=verbose, is_full=is_full)
+    lines = report.agreement_lines(found, is_verbose=verbose, is_full=is_full)
     is_silent = quiet and found.ok
     answer_result(found.to_json, lines, as_json=as_json, is_silent=is_silent)
     return 0 if found.ok else 1

@@ -12,7 +12,7 @@ import click
 import msgspec
 
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.model.naming import printable, printable_json, printable_lines
+from fuzzytree.model import printable, printable_json, printable_lines
 
 if TYPE_CHECKING:
     from rich.progress import Progress

@@ -33,13 +33,20 @@ from fuzzytree.cli.representation import (
 )
 from fuzzytree.errors import LossError
 from fuzzytree.files import LIMIT, write_atomically
-from fuzzytree.model.contracts import Document, Format, ModelKind, Reading, Written
-from fuzzytree.model.rulebase import Conjunction, Kind
+from fuzzytree.model import (
+    Conjunction,
+    Document,
+    Format,
+    Kind,
+    ModelKind,
+    Reading,
+    Written,
+)
 
 if TYPE_CHECKING:
-    from fuzzytree.checking.converting import Proof
-    from fuzzytree.model.options import Option
-    from fuzzytree.numerics.bounds import Certificate
+    from fuzzytree.checking import Proof
+    from fuzzytree.model import Option
+    from fuzzytree.numerics import Certificate
 
 
 @click.command("convert", short_help="Convert a model from one format to another.")
@@ -101,7 +108,7 @@ def command(
     """
     if output == "-" and to is None:
         raise click.UsageError("`-` has no suffix; name the format with --to")
-    from fuzzytree.report.systems import document_text
+    from fuzzytree.report import document_text
 
     given = [("dialect", dialect), ("tolerance", tolerance), *map(setting, settings)]
     form = wanted_format(output, to)
@@ -128,7 +135,7 @@ def command(
 def _options(
     form: Format, given: Sequence[tuple[str, str | None]]
 ) -> dict[str, Option]:
-    from fuzzytree.model.options import option_value
+    from fuzzytree.model import option_value
 
     options: dict[str, Option] = {}
     for name, text in given:
@@ -142,23 +149,23 @@ def _options(
 
 def read_source(source: str, read_as: str | None) -> tuple[Reading, str]:
     """Return what a file or standard input holds, and the name of its format."""
-    from fuzzytree.checking import converting
+    from fuzzytree import checking
     from fuzzytree.errors import ReadError
     from fuzzytree.exporters import find_format
 
     if source != "-":
         with wrong_options():
-            form = find_format(read_as) if read_as else converting.format_of(source)
-        return converting.read(source, format=form.name), form.name
+            form = find_format(read_as) if read_as else checking.format_of(source)
+        return checking.read(source, format=form.name), form.name
     if read_as is None:
         raise click.UsageError("`-` has no suffix; name the format with --from")
     with wrong_options():
         form = find_format(read_as)
-    converting.refuse_unreadable(form, "standard input")
+    checking.refuse_unreadable(form, "standard input")
     content = standard_input().read(LIMIT + 1)
     if len(content) > LIMIT:
         raise ReadError(f"standard input: is larger than {LIMIT} bytes")
-    return converting.read_content(content, form, name="standard input"), form.name
+    return checking.read_content(content, form, name="standard input"), form.name
 
 
 class Choice(msgspec.Struct, frozen=True):
@@ -188,10 +195,10 @@ def carry(
 
     `notes` are lines to print behind those of the file and its proof.
     """
-    from fuzzytree.checking.converting import export, kind_of, proved
+    from fuzzytree import report
+    from fuzzytree.checking import export, kind_of, proved
     from fuzzytree.cli.representation import represented
-    from fuzzytree.model.contracts import loss_text
-    from fuzzytree.report import systems
+    from fuzzytree.model import loss_text
 
     model = represented(
         found.model,
@@ -204,7 +211,7 @@ def carry(
         "read": {
             "file": source,
             "format": read_as,
-            **systems.document_facts(found.model),
+            **report.document_facts(found.model),
             "losses": found.losses,
             "remarks": found.remarks,
         },
@@ -277,7 +284,7 @@ def _written(
     Raises:
         LossError: If it cannot be written at all.
     """
-    from fuzzytree.checking.converting import export
+    from fuzzytree.checking import export
 
     try:
         return export(model, form.name, allow_loss=allow_loss, **options), ""
@@ -289,7 +296,7 @@ def _written(
 
 def _refuse(found: Reading, refusal: str, *, verbose: bool) -> None:
     """Report what would be lost, and that nothing is written."""
-    from fuzzytree.model.contracts import loss_text
+    from fuzzytree.model import loss_text
 
     losses = [f"lost     {loss_text(loss)}" for loss in found.losses]
     if "--allow-loss" in refusal:

@@ -65,11 +65,11 @@ def command(
     proved equal, or a point is shown at which they differ. Exit 1 if a decision
     changes, or if programs that call the model must change.
     """
-    from fuzzytree.api import verbs
-    from fuzzytree.report.diff import diff_lines
+    from fuzzytree import api
+    from fuzzytree.report import diff_lines
 
     with wrong_options(), progress_bar(quiet=quiet) as show:
-        found = verbs.diff(
+        found = api.diff(
             old,
             new,
             data=table_source(data, delimiter),

@@ -14,7 +14,10 @@ import fuzzytree
 from fuzzytree.cli.console import answer, answer_json, json_option, verbose_option
 from fuzzytree.errors import FuzzyTreeError, install_hint
 
-CORE = ("numpy", "pyarrow", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark")
+CORE = (
+    *("numpy", "pyarrow", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark"),
+    "lazy-loader",
+)
 
 EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -73,7 +76,7 @@ def command(verbose: bool, as_json: bool) -> int:
     Exit 1 if the small model fails. The packages that only the test suite and the
     benchmarks use are listed by `--verbose`.
     """
-    from fuzzytree.report import text
+    from fuzzytree import report
 
     packages = [*CORE, *(name for extra in EXTRAS.values() for name in extra)]
     versions = {
@@ -92,7 +95,7 @@ def command(verbose: bool, as_json: bool) -> int:
         answer("self-test passed: learning, writing, reading and running agree")
     hidden = {n for extra in FOR_TESTS for n in EXTRAS[extra] if not verbose}
     shown = [item for item in versions.items() if item[0] not in hidden]
-    answer("\n".join(text.aligned(shown)))
+    answer("\n".join(report.aligned(shown)))
     for extra in missing:
         if verbose or extra not in FOR_TESTS:
             answer(f"extra {extra!r} is not installed; it needs {install_hint(extra)}")
@@ -110,22 +113,22 @@ def self_test(has_onnx: bool) -> list[str]:
     """Take a small table through learning, YAML, native and, if there, ONNX."""
     import numpy as np
 
-    from fuzzytree.api import verbs
-    from fuzzytree.formats.yaml.yaml_reader import read_yaml
-    from fuzzytree.runtimes.predictions import Predictions
+    from fuzzytree import api
+    from fuzzytree.formats import read_yaml
+    from fuzzytree.runtimes import Predictions
 
     table = np.array([[k, k % 3] for k in range(12)], np.float64)
     classes = ["low"] * 6 + ["high"] * 6
     try:
-        tree = verbs.learn(table, target=classes)
-        content = verbs.export(tree, "yaml").content
+        tree = api.learn(table, target=classes)
+        content = api.export(tree, "yaml").content
         again = read_yaml(content, "self-test")
-        answers = verbs.run(again, table)
+        answers = api.run(again, table)
         found = answers.classes if isinstance(answers, Predictions) else []
         faults = [] if again == tree else ["YAML does not give the tree back"]
         faults += [] if found == classes else ["the tree answers other classes"]
         if has_onnx:
-            onnx = verbs.run(verbs.export(tree, "onnx").content, table)
+            onnx = api.run(api.export(tree, "onnx").content, table)
             same = isinstance(onnx, Predictions) and onnx.classes == found
             faults += [] if same else ["ONNX answers other classes"]
     except FuzzyTreeError as error:

@@ -17,9 +17,9 @@ def command(code: str | None, verbose: bool, as_json: bool) -> None:
     CODE is a code such as FT101, the id of a finding such as FT101-1a2b3c4d, or the
     beginning of codes to list, such as FT1.
     """
-    from fuzzytree.auditing.findings.codes import CODES
-    from fuzzytree.model.rulebase import name_choice
-    from fuzzytree.report.explanations import code_lines, explanation_lines
+    from fuzzytree.auditing import CODES
+    from fuzzytree.model import name_choice
+    from fuzzytree.report import code_lines, explanation_lines
 
     name = (code or "FT").upper().partition("-")[0]
     if name in CODES:

@@ -17,8 +17,7 @@ from fuzzytree.cli.representation import (
     terms_option,
     wanted_format,
 )
-from fuzzytree.model.contracts import ModelKind
-from fuzzytree.model.rulebase import Conjunction, Kind
+from fuzzytree.model import Conjunction, Kind, ModelKind
 
 
 @click.command("export", short_help="Write a model in another format.")
@@ -91,7 +90,7 @@ def command(
     It is `convert` with the options of onnx by name. An export that would lose
     information is refused with a list of the losses, unless allowed: exit 1.
     """
-    from fuzzytree.model.options import check_names
+    from fuzzytree.model import check_names
 
     given = {
         "dtype": dtype,

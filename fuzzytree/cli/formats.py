@@ -17,9 +17,9 @@ from fuzzytree.cli.console import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from fuzzytree.checking.abilities import Ability
-    from fuzzytree.exporters.plugins import Plugin
-    from fuzzytree.model.contracts import Format
+    from fuzzytree.checking import Ability
+    from fuzzytree.exporters import Plugin
+    from fuzzytree.model import Format
 
 
 @click.command("formats", short_help="List formats and runtimes.")
@@ -37,10 +37,9 @@ def command(name: str | None, verbose: bool, as_json: bool) -> None:
     With `--verbose`, each format writes and reads a small model of each kind, and a
     table shows the results.
     """
+    from fuzzytree import report
     from fuzzytree.cli.doctor import missing_extras
-    from fuzzytree.exporters import all_formats, find_format
-    from fuzzytree.exporters.plugins import all_plugins
-    from fuzzytree.report import formats as shown
+    from fuzzytree.exporters import all_formats, all_plugins, find_format
     from fuzzytree.runtimes import all_runtimes
 
     missing = missing_extras()
@@ -58,12 +57,12 @@ def command(name: str | None, verbose: bool, as_json: bool) -> None:
         answer_json(
             {
                 "formats": [_facts(one, found[one.name], missing) for one in formats],
-                "runtimes": [shown.runtime_facts(one, missing) for one in runtimes],
+                "runtimes": [report.runtime_facts(one, missing) for one in runtimes],
                 "plugins": [_plugin_facts(one) for one in plugins],
             }
         )
         return
-    lines = shown.overview_lines(formats, runtimes, missing, is_verbose=verbose)
+    lines = report.overview_lines(formats, runtimes, missing, is_verbose=verbose)
     answer("\n".join(lines))
     if plugins:
         answer("formats of other packages:")
@@ -71,21 +70,21 @@ def command(name: str | None, verbose: bool, as_json: bool) -> None:
         answer("\n".join(rows))
     if verbose:
         answer("")
-        answer("\n".join(shown.ability_lines(found)))
+        answer("\n".join(report.ability_lines(found)))
 
 
 def _abilities(
     form: Format, missing: set[str], dialect: str | None = None
 ) -> tuple[Ability, ...] | str:
     """Return what a format can carry, or why that cannot be tried."""
-    from fuzzytree.checking.abilities import abilities
+    from fuzzytree.checking import abilities_of
     from fuzzytree.errors import FuzzyTreeError, install_hint
     from fuzzytree.exporters import TABLE
 
     if form.extra in missing:
         return f"not tried: it needs {install_hint(form.extra)}"
     try:
-        return abilities(form, dialect=dialect)
+        return abilities_of(form, dialect=dialect)
     except FuzzyTreeError as error:
         return f"not tried: {error}"
     except Exception as error:
@@ -98,9 +97,9 @@ def _abilities(
 def _answer_one(
     form: Format, missing: set[str], *, verbose: bool, as_json: bool
 ) -> None:
-    from fuzzytree.checking.abilities import dialects_of
-    from fuzzytree.model.options import options_of
-    from fuzzytree.report import formats as shown
+    from fuzzytree import report
+    from fuzzytree.checking import dialects_of
+    from fuzzytree.model import options_of
 
     found = _abilities(form, missing)
     wanted = dialects_of(form) if verbose or as_json else ()
@@ -109,7 +108,7 @@ def _answer_one(
         known = {k: v for k, v in dialects.items() if not isinstance(v, str)}
         answer_json({**_facts(form, found, missing), "dialects": known})
         return
-    lines = shown.detail_lines(
+    lines = report.detail_lines(
         form, found, options_of(form), dialects, is_verbose=verbose
     )
     answer("\n".join(lines))
@@ -118,12 +117,12 @@ def _answer_one(
 def _facts(
     form: Format, found: Sequence[Ability] | str, missing: set[str]
 ) -> dict[str, object]:
-    from fuzzytree.model.options import options_of
-    from fuzzytree.report import formats as shown
+    from fuzzytree import report
+    from fuzzytree.model import options_of
 
     is_known = not isinstance(found, str)
     return {
-        **shown.format_facts(form, missing),
+        **report.format_facts(form, missing),
         "options": options_of(form),
         "abilities": found if is_known else [],
         "not_tried": "" if is_known else found,

@@ -31,14 +31,11 @@ from fuzzytree.cli.representation import (
     wanted_format,
 )
 from fuzzytree.files import check_place, read_bounded, write_atomically
-from fuzzytree.model.contracts import Document, Format, ModelKind
-from fuzzytree.model.naming import printable
-from fuzzytree.model.rulebase import Conjunction, Kind
+from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind, printable
 
 if TYPE_CHECKING:
-    from fuzzytree.api.holdout import Accuracy, Summary
-    from fuzzytree.learning import LearningSettings, Learnt
-    from fuzzytree.learning.findings import LearningReport
+    from fuzzytree.api import Accuracy, Summary
+    from fuzzytree.learning import LearningReport, LearningSettings, Learnt
     from fuzzytree.tables import Table
 
 
@@ -199,9 +196,8 @@ def command(
     that each fold chooses anew. In a table of more than 32,768 numbers the folds take
     the settings chosen from all rows, and are made of 20,000 rows at most.
     """
-    from fuzzytree.api.holdout import accuracy
-    from fuzzytree.api.verbs import export, learn_table
-    from fuzzytree.learning.findings import remarks
+    from fuzzytree.api import accuracy, export, learn_table
+    from fuzzytree.learning import remarks
     from fuzzytree.tables import read_table
 
     form = wanted_format(output, None)
@@ -268,7 +264,7 @@ def _written_rows(
     model: Document, output: str, form: Format, rest: Sequence[str]
 ) -> Iterator[tuple[str, str, str]]:
     """Yield lines about the files and the next step; write the model if it has none."""
-    from fuzzytree.api.verbs import export
+    from fuzzytree.api import export
 
     files = [(_model_file(output, form), "yaml"), (output, form.name)]
     if form.read:
@@ -328,8 +324,8 @@ def _summary(
     seed: int,
     output: str,
 ) -> Summary:
-    from fuzzytree.api.holdout import Summary, majority
-    from fuzzytree.model.rulebase import fingerprint
+    from fuzzytree.api import Summary, majority
+    from fuzzytree.model import fingerprint
 
     return Summary(
         file=output,
@@ -353,7 +349,7 @@ def _summary(
 
 
 def _read_text(table: Table) -> str:
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
 
     text = (
         f"{counted(len(table.codes), 'row')}, {counted(len(table.columns), 'column')}, "
@@ -370,8 +366,8 @@ def _read_text(table: Table) -> str:
 
 
 def _accuracy_text(tested: Accuracy | None, table: Table) -> str:
-    from fuzzytree.api.holdout import majority
-    from fuzzytree.report.text import counted
+    from fuzzytree.api import majority
+    from fuzzytree.report import counted
 
     baseline = f"majority class {majority(table):.3f}"
     if tested is None:
@@ -390,7 +386,7 @@ def _timed(text: str, begin: float) -> str:
 
 
 def _tree_row(learnt: Learnt, begin: float) -> tuple[str, str, str]:
-    from fuzzytree.report.text import counted, depth
+    from fuzzytree.report import counted, depth
 
     tree = learnt.tree
     size = f"depth {depth(tree)}, {len(tree.inputs)} of {len(tree.columns)} columns"
@@ -401,7 +397,7 @@ def _report_rows(
     report: LearningReport, *, is_verbose: bool
 ) -> list[tuple[str, str, str]]:
     """Return lines about what the learner left out or changed."""
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
 
     rows: list[tuple[str, str, str]] = []
     if report.rows_dropped:

@@ -24,7 +24,7 @@ from fuzzytree.cli.console import (
 from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
-    from fuzzytree.model.tree import Use
+    from fuzzytree.model import Use
 
 
 @click.command("needs", short_help="Report what a model needs, and leave out the rest.")
@@ -79,15 +79,14 @@ def command(
     """
     from pathlib import Path
 
-    from fuzzytree.api import verbs
-    from fuzzytree.benchmarking import savings
-    from fuzzytree.checking.converting import deciding
+    from fuzzytree import api, benchmarking
+    from fuzzytree.checking import deciding
     from fuzzytree.cli.convert import next_check
     from fuzzytree.exporters import find_format
-    from fuzzytree.report.needs import report_lines
-    from fuzzytree.semantics.simplification import pruned
+    from fuzzytree.report import report_lines
+    from fuzzytree.semantics import pruned
 
-    first = deciding(verbs.load(model), "needs")
+    first = deciding(api.load(model), "needs")
     wanted = tuple(uses) or ("tree", "relative")
     with wrong_options():
         find_format(Path(output or "").suffix or "yaml")  # before any work
@@ -96,9 +95,9 @@ def command(
         )
     if output is not None:
         check_place(output)
-    rows = verbs.rows_of(table_source(data, delimiter), first)
+    rows = api.rows_of(table_source(data, delimiter), first)
     with progress_bar(quiet=quiet) as show:
-        report = savings.report(
+        report = benchmarking.report(
             first,
             found,
             uses=wanted,
@@ -116,7 +115,7 @@ def command(
         say(f"the simplified model differs in {wrong} ways; nothing is written")
         return 1
     if output is not None:
-        verbs.save(found.model, output)
+        api.save(found.model, output)
         after = f"predicts some rows differently from {model}"
         if found.is_same:
             files = [

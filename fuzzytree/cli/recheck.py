@@ -17,7 +17,7 @@ def command(audit: str, model: str) -> int:
     of fuzzytree and runs alone; `python -m fuzzytree.auditing.recheck` is the same.
     Exit 1 if something does not hold.
     """
-    from fuzzytree.auditing.recheck import CannotRunError, recheck_files
+    from fuzzytree.auditing import CannotRunError, recheck_files
     from fuzzytree.errors import ReadError
 
     try:

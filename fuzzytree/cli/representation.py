@@ -8,8 +8,7 @@ import click
 
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters import find_format
-from fuzzytree.model.contracts import Document, Format, ModelKind
-from fuzzytree.model.rulebase import Conjunction, Kind
+from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind
 
 as_option = click.option(
     "--as",
@@ -62,7 +61,7 @@ def represented(
         click.UsageError: If the model cannot be had in that form.
         LossError: If the format does not carry it in any form.
     """
-    from fuzzytree.checking.converting import formed
+    from fuzzytree.checking import formed
 
     if representation == "tree" and (kind is not None or conjunction is not None):
         raise click.UsageError("--terms and --conjunction are for --as rules")

@@ -23,16 +23,12 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
-from fuzzytree.model.naming import printable_json
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase, printable_json
+from fuzzytree.semantics import rules_from_tree
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import Document
-    from fuzzytree.runtimes.onnxruntime import OnnxModel
-    from fuzzytree.runtimes.predictions import By, Outputs, Predictions
+    from fuzzytree.model import Document
+    from fuzzytree.runtimes import By, OnnxModel, Outputs, Predictions
     from fuzzytree.tables import Batch
 
 Columns = dict[str, Sequence[object]]
@@ -100,11 +96,11 @@ def command(
     file or ONNX; TABLE is CSV or Parquet, or `-` for standard input. Columns are
     matched by name. Rule numbers count from 1; 0 is no rule.
     """
-    from fuzzytree.api import verbs
+    from fuzzytree import api
 
     if as_json and safe_csv:
         raise click.UsageError("--safe-csv is about CSV, and --json writes none")
-    found = verbs.opened(model, allow_loss=allow_loss)
+    found = api.opened(model, allow_loss=allow_loss)
     reason = _reasons(model, found) if why else None
     if strengths and isinstance(found, FuzzyTree):
         found = rules_from_tree(found)
@@ -115,7 +111,7 @@ def command(
         )
     is_weighed = strengths is not None or (why and isinstance(found, FuzzySystem))
     with wrong_options():
-        answer = verbs.answering(found, runtime, with_strengths=is_weighed)
+        answer = api.prepare_answering(found, runtime, with_strengths=is_weighed)
     source = table_source(table, delimiter)
     name = "standard input" if table == "-" else table
     tally = _Tally(_has_status(found))
@@ -135,7 +131,7 @@ def command(
 def _answered(
     answers: Predictions | Outputs, strengths: By | None, model: str
 ) -> Columns:
-    from fuzzytree.runtimes.predictions import Outputs
+    from fuzzytree.runtimes import Outputs
 
     if isinstance(answers, Outputs):
         return answers.columns(with_activations=strengths is not None)
@@ -175,9 +171,8 @@ def _has_status(model: Document | OnnxModel) -> bool:
 def _reasons(
     path: str, model: Document | OnnxModel
 ) -> Callable[[Batch, Predictions | Outputs], list[str]]:
-    from fuzzytree.report.systems import system_reasons
-    from fuzzytree.runtimes.onnxruntime import OnnxModel
-    from fuzzytree.runtimes.predictions import Outputs, Predictions, reasons
+    from fuzzytree.report import system_reasons
+    from fuzzytree.runtimes import OnnxModel, Outputs, Predictions, reasons
 
     if isinstance(model, OnnxModel):
         raise click.UsageError(
@@ -278,7 +273,7 @@ class _Tally:
 
     def add(self, batch: Batch, answers: Predictions | Outputs) -> None:
         """Take the answers to a piece."""
-        from fuzzytree.runtimes.predictions import Outputs
+        from fuzzytree.runtimes import Outputs
         from fuzzytree.tables import trimmed
 
         self.rows += len(answers)
@@ -298,7 +293,7 @@ class _Tally:
 
     def report(self, output: str, *, quiet: bool) -> None:
         """Report on stderr what was predicted and what was unusual."""
-        from fuzzytree.report.text import counted, number
+        from fuzzytree.report import counted, number
 
         counts = [f"{name} {count}" for name, count in self.classes.items()]
         counts += [

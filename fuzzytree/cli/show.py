@@ -17,8 +17,7 @@ from fuzzytree.cli.console import (
 from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
-    from fuzzytree.model.agreement import Coverage
-    from fuzzytree.model.contracts import Document, Reading
+    from fuzzytree.model import Coverage, Document, Reading
 
 
 @click.command("show", short_help="Show a model and its rules.")
@@ -36,24 +35,23 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
     """
     from pathlib import Path
 
-    from fuzzytree.api import verbs
-    from fuzzytree.report import text
-    from fuzzytree.runtimes.onnxruntime import OnnxModel
+    from fuzzytree import api, report
+    from fuzzytree.runtimes import OnnxModel
 
     if picture is not None:
         check_place(picture)
     if Path(model).suffix.lower() == ".onnx":
         if picture is not None:
             raise click.UsageError(f"--picture: {model} contains a graph and no tree")
-        opened = verbs.opened(model)
+        opened = api.opened(model)
         assert isinstance(opened, OnnxModel)
-        facts = text.onnx_facts(opened)
+        facts = report.onnx_facts(opened)
         if as_json:
             answer_json(facts)
         else:
-            answer("\n".join(text.fact_lines(facts)))
+            answer("\n".join(report.fact_lines(facts)))
         return
-    found = verbs.read(model)
+    found = api.read(model)
     coverage = _coverage(found.model)
     _tell(found, coverage, quiet=quiet)
     if picture is not None:
@@ -66,18 +64,18 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
 
 def _coverage(model: Document) -> Coverage | None:
     """Return which rules of a fuzzy system fire in probes; None for other models."""
-    from fuzzytree.model.system import FuzzySystem
+    from fuzzytree.model import FuzzySystem
 
     if not isinstance(model, FuzzySystem):
         return None
-    from fuzzytree.checking.systems import coverage_of
+    from fuzzytree.checking import coverage_of
 
     return coverage_of(model)
 
 
 def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
     """Say on stderr what is not shown."""
-    from fuzzytree.model.contracts import loss_text
+    from fuzzytree.model import loss_text
 
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")
@@ -86,22 +84,21 @@ def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
 
 
 def _draw(model: Document, picture: str, *, quiet: bool) -> None:
-    from fuzzytree.model.tree import FuzzyTree
-    from fuzzytree.report import plots
+    from fuzzytree import report
+    from fuzzytree.model import FuzzyTree
 
     if not isinstance(model, FuzzyTree):
         raise click.UsageError(
             f"--picture: {model.name} is no tree; rules have none to draw"
         )
     with wrong_options():
-        plots.save(plots.draw_tree(model), picture)
+        report.save(report.draw_tree(model), picture)
     say(f"wrote    {picture}", quiet=quiet)
 
 
 def _lines(model: Document) -> list[str]:
-    from fuzzytree.model.system import FuzzySystem
-    from fuzzytree.report.systems import system_lines
-    from fuzzytree.report.text import model_lines
+    from fuzzytree.model import FuzzySystem
+    from fuzzytree.report import model_lines, system_lines
 
     if isinstance(model, FuzzySystem):
         return [*system_lines(model)]
@@ -111,10 +108,9 @@ def _lines(model: Document) -> list[str]:
 def _facts(found: Reading) -> dict[str, object]:
     import msgspec
 
-    from fuzzytree.checking.converting import kind_of
-    from fuzzytree.model.rulebase import fingerprint
-    from fuzzytree.model.system import FuzzySystem
-    from fuzzytree.report import systems, text
+    from fuzzytree import report
+    from fuzzytree.checking import kind_of
+    from fuzzytree.model import FuzzySystem, fingerprint
 
     model = found.model
     facts: dict[str, object] = {
@@ -124,10 +120,10 @@ def _facts(found: Reading) -> dict[str, object]:
     if isinstance(model, FuzzySystem):
         facts["inputs"] = model.columns
         facts["outputs"] = [one.name for one in model.outputs]
-        facts["rules"] = systems.system_rule_facts(model)
+        facts["rules"] = report.system_rule_facts(model)
     else:
         facts["inputs"] = model.inputs
-        facts["rules"] = text.rule_facts(model)
+        facts["rules"] = report.rule_facts(model)
     return {
         **facts,
         "losses": found.losses,

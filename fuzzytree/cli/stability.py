@@ -52,11 +52,11 @@ def command(
     within the certified bounds, and curves that can be evaluated; the price of float32
     is reported for each input. Exit 1 if a check fails.
     """
-    from fuzzytree.api import verbs
-    from fuzzytree.report.stability import stability_lines
+    from fuzzytree import api
+    from fuzzytree.report import stability_lines
 
     with wrong_options(), progress_bar(quiet=quiet) as show:
-        found = verbs.stability(
+        found = api.stability(
             model,
             data=table_source(data, delimiter),
             only=only,

@@ -1,1 +1,5 @@
 """Readers of rule bases and trees, one module per format."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

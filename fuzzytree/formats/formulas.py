@@ -18,14 +18,14 @@ import msgspec
 
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.text_files import LONGEST_NAME
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FUNCTIONS,
     MOST_LEVELS,
     Call,
     Expression,
     Name,
     Number,
+    name_choice,
 )
 
 MOST_CHARACTERS: Final = 20_000

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import msgspec
 
 from fuzzytree.formats.text_files import FileMistake, Position
-from fuzzytree.model.rulebase import Mistake, Path
-from fuzzytree.semantics.conversion.facts import numbers_of, places_of
+from fuzzytree.model import Mistake, Path
+from fuzzytree.semantics import numbers_of, places_of
 
 
 class PositionGroup(NamedTuple):

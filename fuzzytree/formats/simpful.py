@@ -16,8 +16,7 @@ from typing import Any, Final, NamedTuple
 from fuzzytree.errors import LossError
 from fuzzytree.formats.formulas import parse
 from fuzzytree.formats.yaml.clauses import blocks_of, joined
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -30,6 +29,7 @@ from fuzzytree.model.system import (
     Linear,
     Not,
     Or,
+    Points,
     Sigmoid,
     Singleton,
     SNorm,

@@ -15,8 +15,7 @@ import numpy as np
 
 from fuzzytree.errors import LossError
 from fuzzytree.formats.yaml.clauses import blocks_of, joined
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -25,6 +24,7 @@ from fuzzytree.model.system import (
     Is,
     Not,
     Or,
+    Points,
     SNorm,
     SystemInput,
     SystemOutput,

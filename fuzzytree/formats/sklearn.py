@@ -18,17 +18,21 @@ import msgspec
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     Band,
+    Branch,
     Flank,
+    FuzzyTree,
     LabelType,
+    Leaf,
+    Node,
     Semantics,
     Term,
     Variable,
+    interval_names,
     label_type_of,
     name_choice,
 )
-from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, interval_names
 
 _BEYOND = 2.0**128  # where the floats of 32 bits would go on
 

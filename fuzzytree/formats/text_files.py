@@ -13,8 +13,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.model.contracts import Document, Loss, Reading
-from fuzzytree.model.rulebase import name_choice
+from fuzzytree.model import Document, Loss, Reading, name_choice
 
 MOST_BYTES: Final = 4 * 2**20
 MOST_SHOWN: Final = 100

@@ -1,17 +1,5 @@
 """The paper's learner, a module for each of its sections."""
 
-from __future__ import annotations
+import lazy_loader
 
-from fuzzytree.learning.findings import LearningReport
-from fuzzytree.learning.learner import Learner, Learnt, learn_arrays
-from fuzzytree.learning.settings import LearningSettings
-from fuzzytree.learning.statistics import Statistics
-
-__all__ = [
-    "Learner",
-    "LearningReport",
-    "LearningSettings",
-    "Learnt",
-    "Statistics",
-    "learn_arrays",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -22,8 +22,21 @@ from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.sums import Totals, totals_of
 from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray
 from fuzzytree.learning.windows import window_counts
-from fuzzytree.model.rulebase import LR, Band, Flank, Part, Side, Term, Variable
-from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets, interval_names
+from fuzzytree.model import (
+    LR,
+    Band,
+    Branch,
+    Flank,
+    FuzzyTree,
+    Leaf,
+    Node,
+    Part,
+    Sets,
+    Side,
+    Term,
+    Variable,
+    interval_names,
+)
 
 ZERO_SPREAD_SHARE = 0.1
 """A set without spread gets this share of the spread within the other patterns."""

@@ -13,7 +13,7 @@ import numpy as np
 from fuzzytree.errors import LearningError
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
     from fuzzytree.tables import Table
 
 

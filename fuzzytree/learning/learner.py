@@ -19,8 +19,7 @@ from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.learning.validation import ChosenTree, chosen_tree
-from fuzzytree.model.rulebase import text_fault
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import FuzzyTree, text_fault
 from fuzzytree.tables import numbers_only, unmasked
 
 Progress = Callable[[str, float], None]

@@ -1,1 +1,5 @@
 """Values: variables, membership functions, rules, trees, systems and their records."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

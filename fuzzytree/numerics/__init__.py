@@ -1,1 +1,5 @@
 """What rounding can do to a model, derived and not tuned."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

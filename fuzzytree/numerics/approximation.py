@@ -27,16 +27,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import (
-    LR,
-    Band,
-    Flank,
-    Points,
-    RuleBase,
-    Shape,
-    Side,
-    Term,
-)
+from fuzzytree.model import LR, Band, Flank, Points, RuleBase, Shape, Side, Term
 from fuzzytree.numerics.curves import (
     BELOW_ONE,
     body_coefficients,
@@ -49,7 +40,7 @@ from fuzzytree.numerics.curves import (
 from fuzzytree.numerics.placing import points_of
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 _GRID = 512  # places at which a fit is looked at
 _EXCHANGES = 200  # of places in a fit, at most

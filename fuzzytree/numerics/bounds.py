@@ -23,9 +23,15 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.model.contracts import Dtype, Model, ModelKind
-from fuzzytree.model.rulebase import Clause, RuleBase, Variable
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import (
+    Clause,
+    Dtype,
+    FuzzyTree,
+    Model,
+    ModelKind,
+    RuleBase,
+    Variable,
+)
 from fuzzytree.numerics.enclosures import axis_value
 from fuzzytree.numerics.rounding import (
     FLOAT32_MAX,
@@ -41,7 +47,7 @@ from fuzzytree.numerics.rounding import (
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
     from fuzzytree.numerics.rounding import Reals
 
     BoolArray = npt.NDArray[np.bool_]

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple, assert_never
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.model import LR, Band, Flank, Points, Shape, Side
 
 Curve = tuple[Fraction, ...]
 """Coefficients of powers of the position, the lowest first."""

@@ -22,9 +22,10 @@ from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from typing import Final, NamedTuple
 
-from fuzzytree.model.rulebase import LR, Band, Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    LR,
     Arc,
+    Band,
     Bell,
     Binary,
     Concave,
@@ -34,6 +35,7 @@ from fuzzytree.model.system import (
     Gaussian,
     Linear,
     PiCurve,
+    Points,
     SCurve,
     SemiEllipse,
     Sigmoid,

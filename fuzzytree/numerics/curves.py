@@ -29,10 +29,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.model.rulebase import Flank, Side
+from fuzzytree.model import Flank, Side
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 BELOW_ONE = 1.0 - 2.0**-53
 """The largest double below 1: the highest degree off a plateau."""

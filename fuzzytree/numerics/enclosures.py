@@ -39,8 +39,7 @@ from typing import TYPE_CHECKING, NamedTuple, assert_never
 
 import numpy as np
 
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
     Clause,
@@ -49,10 +48,11 @@ from fuzzytree.model.rulebase import (
     Shape,
     Side,
     Variable,
+    checkpoint,
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 U = 2.0**-53
 """The unit roundoff of doubles."""

@@ -26,20 +26,20 @@ from typing import assert_never
 
 import msgspec
 
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
     Clause,
     Flank,
+    FuzzyTree,
+    Model,
     Points,
     RuleBase,
     Shape,
     Side,
     Variable,
+    checkpoint,
 )
-from fuzzytree.model.tree import FuzzyTree
 
 DECIDED, TIE, UNCOVERED, MISSING = range(4)
 """How an answer came about, numbered as in `fuzzytree.model.contracts.Outcome`."""

@@ -13,9 +13,18 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.model.contracts import Dtype, Loss, Model
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Variable
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import (
+    LR,
+    Band,
+    Dtype,
+    Flank,
+    FuzzyTree,
+    Loss,
+    Model,
+    Points,
+    Shape,
+    Variable,
+)
 
 RealKind = np.float64 | np.float32
 RealArray = npt.NDArray[np.float64] | npt.NDArray[np.float32]

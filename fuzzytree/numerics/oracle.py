@@ -23,9 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import Clause, RuleBase
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import Clause, FuzzyTree, Model, RuleBase
 from fuzzytree.numerics.enclosures import (
     EnclosedValue,
     Enclosure,
@@ -51,7 +49,7 @@ from fuzzytree.numerics.exact import (
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     BoolArray = npt.NDArray[np.bool_]
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import LR, MOST_POINTS, Band, Flank, Points
+from fuzzytree.model import LR, MOST_POINTS, Band, Flank, Points
 from fuzzytree.numerics.curves import (
     BELOW_ONE,
     DegreePiece,
@@ -31,7 +31,7 @@ from fuzzytree.numerics.curves import (
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _GRID = 512  # places on a curve at which its bend is looked at
 _TRIES = 12  # of placing points before the bound counts as out of reach

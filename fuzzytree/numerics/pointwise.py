@@ -16,7 +16,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import MOST_POINTS, Points
+from fuzzytree.model import MOST_POINTS, Points
 from fuzzytree.numerics.curves import BELOW_ONE
 
 _FARTHEST = Fraction(sys.float_info.max)  # between neighbouring points

@@ -35,14 +35,22 @@ from typing import TYPE_CHECKING, NamedTuple, assert_never
 
 import numpy as np
 
-from fuzzytree.model.contracts import Dtype
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side, Variable
+from fuzzytree.model import (
+    LR,
+    Band,
+    Dtype,
+    Flank,
+    Points,
+    Shape,
+    Side,
+    Variable,
+    checkpoint,
+)
 from fuzzytree.numerics.enclosures import U
 from fuzzytree.numerics.exact import exact_flank, outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
     Reals = FloatArray
 

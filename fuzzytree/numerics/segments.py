@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Points
+from fuzzytree.model import Points, checkpoint
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import IntArray
+    from fuzzytree.model import IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
     Real = np.dtype[np.floating[Any]]
@@ -55,7 +54,7 @@ class Segments:
     far: Reals
 
 
-def segments(shapes: Sequence[Points], axis: Real, degree: Real) -> Segments:
+def segments_of(shapes: Sequence[Points], axis: Real, degree: Real) -> Segments:
     """Return the lines of shapes, rounded to nearest.
 
     A degree below 1 stays below 1, and a value stays finite. Different values that
@@ -68,7 +67,7 @@ def segments(shapes: Sequence[Points], axis: Real, degree: Real) -> Segments:
 
     Example:
         >>> double = np.dtype(np.float64)
-        >>> segments([Points((1.0, 3.0), (0.0, 1.0))], double, double).far.tolist()
+        >>> segments_of([Points((1.0, 3.0), (0.0, 1.0))], double, double).far.tolist()
         [0.0, 1.0, 1.0, 0.0]
     """
     checkpoint()

@@ -7,10 +7,18 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final
 
-from fuzzytree.auditing.engine.states import Bracket, Coordinate, Declined, Witness
-from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, Audit, FileLocation, Measure
-from fuzzytree.model.naming import printable
+from fuzzytree.auditing import (
+    CODES,
+    Answer,
+    Audit,
+    Bracket,
+    Coordinate,
+    Declined,
+    FileLocation,
+    Measure,
+    Witness,
+)
+from fuzzytree.model import printable
 from fuzzytree.report.audit_states import (
     SEVERITIES,
     STATES,

@@ -7,11 +7,19 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Literal, NamedTuple
 
-from fuzzytree.auditing.engine.states import Bracket, Span, Witness, point_of
-from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, FileLocation, Measure, Severity
-from fuzzytree.auditing.findings.views import AuditView
-from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.auditing import (
+    CODES,
+    Answer,
+    AuditView,
+    Bracket,
+    FileLocation,
+    Measure,
+    Severity,
+    Span,
+    Witness,
+    point_of,
+)
+from fuzzytree.model import RuleBase
 from fuzzytree.report.audit_model import MOST_RULES, sentence_of
 from fuzzytree.report.audit_states import (
     SEVERITIES,

@@ -5,12 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.auditing.engine.states import Sampled
-from fuzzytree.auditing.findings.records import Answer
-from fuzzytree.auditing.findings.views import AuditView
-from fuzzytree.model.rulebase import Rule, RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.auditing import Answer, AuditView, Sampled
+from fuzzytree.model import FuzzySystem, FuzzyTree, Rule, RuleBase
 from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
 from fuzzytree.report.drawing import Axis

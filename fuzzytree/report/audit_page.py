@@ -16,15 +16,8 @@ from importlib import resources
 from string import Template
 from typing import TYPE_CHECKING
 
-from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, Audit
-from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.findings.views import view
-from fuzzytree.model.agreement import Agreement, Comparison
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.auditing import CODES, Answer, Audit, AuditRows, Declined, view
+from fuzzytree.model import Agreement, Comparison, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import ORIGINS, gathered
 from fuzzytree.report.audit_findings import (
     Scene,
@@ -75,7 +68,7 @@ from fuzzytree.report.text import (
 from fuzzytree.report.text import agreement_verdict as agreement_text
 
 if TYPE_CHECKING:
-    from fuzzytree.checking.stability.results import Stability
+    from fuzzytree.checking import Stability
 
 MOST_QUESTIONS = 1000
 """That are listed one by one."""

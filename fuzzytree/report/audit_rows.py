@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.model.rulebase import RuleBase, Variable
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes.rows import axis_lines, plan_axes
+from fuzzytree.auditing import AuditRows
+from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase, Variable
+from fuzzytree.runtimes import axis_lines, plan_axes
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 Counts = tuple[int, ...]
 """Rows of each class, in the order of the classes; rows of no class come last."""

@@ -6,18 +6,21 @@ from collections.abc import Sequence
 
 import msgspec
 
-from fuzzytree.auditing.engine.states import (
+from fuzzytree.auditing import (
+    CODES,
+    Answer,
+    Audit,
     Bracket,
     Claim,
     Coordinate,
     Declined,
     Proved,
     Sampled,
+    Severity,
     State,
+    VerbResult,
     Witness,
 )
-from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, Audit, Severity, VerbResult
 from fuzzytree.report.markup import Markup, folded, joined, table, tag
 from fuzzytree.report.text import counted, number
 

@@ -6,15 +6,17 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import get_args
 
-from fuzzytree.benchmarking.candidates import READING, title
-from fuzzytree.benchmarking.clock import CONFIDENCE, times_faster
-from fuzzytree.benchmarking.records import (
+from fuzzytree.benchmarking import (
+    CONFIDENCE,
+    READING,
     Machine,
     Omission,
     Point,
     Question,
     Study,
     Timing,
+    times_faster,
+    title,
 )
 from fuzzytree.report.text import aligned, counted, digits, duration
 from fuzzytree.runtimes import baseline

@@ -6,10 +6,17 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from fuzzytree.auditing.diff.difference_records import Change, ComparedModel, Difference
-from fuzzytree.auditing.engine.states import Bracket, Coordinate, Witness
-from fuzzytree.auditing.findings.records import Answer, FileLocation
-from fuzzytree.model.naming import printable
+from fuzzytree.auditing import (
+    Answer,
+    Bracket,
+    Change,
+    ComparedModel,
+    Coordinate,
+    Difference,
+    FileLocation,
+    Witness,
+)
+from fuzzytree.model import printable
 from fuzzytree.report.audit_states import state_text, state_word
 from fuzzytree.report.svg_terms import span_text
 from fuzzytree.report.text import counted

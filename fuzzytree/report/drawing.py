@@ -8,15 +8,27 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.model.naming import printable
-from fuzzytree.model.rulebase import LR, Band, Part, Points, RuleBase, Shape, Variable
-from fuzzytree.model.system import Curve as SystemCurve
-from fuzzytree.model.system import Formula, FuzzySystem, Linear, SystemInput, SystemTerm
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.auditing import Domain
+from fuzzytree.model import (
+    LR,
+    Band,
+    Formula,
+    FuzzySystem,
+    FuzzyTree,
+    Linear,
+    Part,
+    Points,
+    RuleBase,
+    Shape,
+    SystemInput,
+    SystemTerm,
+    Variable,
+    printable,
+)
+from fuzzytree.model import Curve as SystemCurve
+from fuzzytree.numerics import exact_degree
 from fuzzytree.report.markup import Attribute, Content, Markup, tag, trimmed
-from fuzzytree.semantics.inference.membership import curve_degree
+from fuzzytree.semantics import curve_degree
 
 LETTER = 0.58
 """How wide a letter of a picture is on average, in sizes of its font."""

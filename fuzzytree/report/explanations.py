@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.auditing.findings.codes import Code
+from fuzzytree.auditing import Code
 from fuzzytree.report.audit import WIDTH
 from fuzzytree.report.text import aligned, counted
 

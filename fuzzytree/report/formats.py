@@ -5,9 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from fuzzytree.checking.abilities import MEANINGS, Ability, Outcome
-from fuzzytree.model.contracts import Format, Runtime
-from fuzzytree.model.options import OptionFacts
+from fuzzytree.checking import MEANINGS, Ability, Outcome
+from fuzzytree.model import Format, OptionFacts, Runtime
 from fuzzytree.report.text import aligned, counted
 
 Found = Mapping[str, tuple[Ability, ...] | str]

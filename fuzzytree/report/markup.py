@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
-from fuzzytree.model.naming import printable
+from fuzzytree.model import printable
 
 MOST_LETTERS = 400
 """Of one text on a page; a longer one is cut, and says how long it is."""

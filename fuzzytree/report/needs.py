@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.benchmarking.clock import times_faster
-from fuzzytree.benchmarking.savings import Cost, File, Footprint, Size
-from fuzzytree.checking.dependencies import Because, Graph, Needs
+from fuzzytree.benchmarking import Cost, File, Footprint, Size, times_faster
+from fuzzytree.checking import Because, Graph, Needs
 from fuzzytree.report.text import agreement_lines, aligned, counted, duration
-from fuzzytree.semantics.simplification import Removed
+from fuzzytree.semantics import Removed
 
 _MOST = 6  # parts printed one by one, unless all are
 

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fuzzytree.auditing.findings.records import Audit
-from fuzzytree.model.agreement import Agreement
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.auditing import Audit
+from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.report.audit_model import sentence_of
 from fuzzytree.report.audit_page import agreement_section

@@ -9,11 +9,17 @@ from urllib.parse import quote
 
 import msgspec
 
-from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.baselines import resolved_ids
-from fuzzytree.auditing.findings.codes import CODES, Code
-from fuzzytree.auditing.findings.records import Answer, Audit, FileLocation, Severity
-from fuzzytree.model.naming import printable
+from fuzzytree.auditing import (
+    CODES,
+    Answer,
+    Audit,
+    Code,
+    Declined,
+    FileLocation,
+    Severity,
+    resolved_ids,
+)
+from fuzzytree.model import printable
 from fuzzytree.report.audit_states import SEVERITIES, as_in_file, state_text, state_word
 
 SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -21,7 +27,7 @@ SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 _Json = dict[str, object]
 
 
-def sarif(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
+def sarif_text(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
     """Return an audit as SARIF.
 
     Each code is a rule, each finding a result with its id as a fingerprint. With a

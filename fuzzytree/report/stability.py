@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fuzzytree.checking.stability.results import (
-    Criterion,
-    CurveFault,
-    OffsetCost,
-    Stability,
-    Stiff,
-)
+from fuzzytree.checking import Criterion, CurveFault, OffsetCost, Stability, Stiff
 from fuzzytree.report.text import aligned, counted, number
 
 _CURVES_SHOWN = 5  # curves with a fault, unless all are printed

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.states import Span
-from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.auditing import Span
+from fuzzytree.model import RuleBase
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
     LETTER,
@@ -30,10 +30,10 @@ from fuzzytree.report.drawing import (
 from fuzzytree.report.markup import Markup, tag, trimmed
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import number
-from fuzzytree.runtimes.native_rules import fire
+from fuzzytree.runtimes import fire
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import IntArray
+    from fuzzytree.model import IntArray
 
 WIDE = 340.0
 MOST_CURVES = 24

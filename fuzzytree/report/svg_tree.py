@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from fuzzytree.model.tree import FuzzyTree, Node, intervals
+from fuzzytree.model import FuzzyTree, Node, intervals
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import LETTER, cut, svg, words
 from fuzzytree.report.markup import Markup, tag

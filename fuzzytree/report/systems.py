@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.formats.formulas import text_of
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import LR, Band, Part, Points, RuleBase
-from fuzzytree.model.system import (
+from fuzzytree.formats import text_of
+from fuzzytree.model import (
+    LR,
     Activation,
     And,
+    Band,
     Binary,
     Conclusion,
     Condition,
     Curve,
+    Document,
     Formula,
     FuzzySystem,
+    FuzzyTree,
     Is,
     Linear,
     Not,
     Or,
+    Part,
+    Points,
+    RuleBase,
     RuleBlock,
     SigmoidDifference,
     SigmoidProduct,
@@ -30,10 +35,9 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
-from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.text import aligned, counted, depth, number, shape_text
-from fuzzytree.runtimes.predictions import Outputs
-from fuzzytree.semantics.reference import Status
+from fuzzytree.runtimes import Outputs
+from fuzzytree.semantics import Status
 
 
 def document_text(model: Document) -> str:

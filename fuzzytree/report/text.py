@@ -8,15 +8,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
-from fuzzytree.auditing.engine.states import (  # for other reports too
-    counted as counted,
-)
-from fuzzytree.auditing.engine.states import number_text
-from fuzzytree.model.agreement import Agreement, Certified, Comparison
-from fuzzytree.model.rulebase import (
+from fuzzytree.auditing import counted as counted
+from fuzzytree.auditing import number_text
+from fuzzytree.model import (
     LR,
+    Agreement,
     Band,
+    Branch,
+    Certified,
+    Comparison,
     Flank,
+    FuzzyTree,
+    Leaf,
+    Node,
     Points,
     RuleBase,
     Semantics,
@@ -25,9 +29,8 @@ from fuzzytree.model.rulebase import (
     Variable,
     sentence,
 )
-from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
-from fuzzytree.runtimes.onnxruntime import Facts, OnnxModel
-from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.runtimes import Facts, OnnxModel
+from fuzzytree.semantics import rules_from_tree
 
 _MOST_PAIRS = 6  # points that a line of text shows one by one
 _UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))

@@ -28,13 +28,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.model.contracts import Outcome, Run
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
     Clause,
+    Outcome,
     Points,
     RuleBase,
+    Run,
     Shape,
     shapes_of,
 )
@@ -52,7 +53,7 @@ from fuzzytree.runtimes.rows import axis_lines, checked, missing_rows, plan_axes
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 _CHUNK = 1 << 13  # rows: their cells shall stay in the cache
 _PAIRS = 1 << 11  # rows and rules whose strengths are computed together

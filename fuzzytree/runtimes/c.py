@@ -17,23 +17,23 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters.c import write_c
-from fuzzytree.model.contracts import (
+from fuzzytree.exporters import write_c
+from fuzzytree.model import (
+    FuzzySystem,
     Model,
     Outcome,
+    RuleBase,
     Run,
     Runtime,
     SystemOutcome,
     SystemRun,
 )
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.runtimes.rows import checked
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
     Decide = Callable[..., None]
 

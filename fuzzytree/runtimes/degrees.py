@@ -22,14 +22,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model.contracts import Dtype
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import LR, Flank, Points, Shape, Side
-from fuzzytree.numerics.segments import segments
+from fuzzytree.model import LR, Dtype, Flank, Points, Shape, Side, checkpoint
+from fuzzytree.numerics import segments_of
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import IntArray
-    from fuzzytree.numerics.segments import Reals, Segments
+    from fuzzytree.model import IntArray
+    from fuzzytree.numerics import Reals, Segments
 
     Real = np.dtype[np.floating[Any]]
 
@@ -299,7 +297,7 @@ def _polylines(
     atoms: Sequence[Polyline], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     shapes = [atom.points for atom in atoms]
-    lines = segments(shapes, numbers.axis, numbers.degree)
+    lines = segments_of(shapes, numbers.axis, numbers.degree)
     shape = np.arange(len(atoms)).reshape(-1, 1)
     is_few = len(shapes[0].values) < _MANY
 

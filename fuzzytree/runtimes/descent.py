@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model.contracts import Dtype, Outcome, Run
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import Dtype, FuzzyTree, Outcome, Run
 from fuzzytree.runtimes.degrees import NUMBERS
 from fuzzytree.runtimes.rows import (
     Axes,
@@ -33,7 +32,7 @@ from fuzzytree.runtimes.rows import (
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     Real = np.dtype[np.floating[Any]]
     Reals = npt.NDArray[np.floating[Any]]

@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
     Clause,
@@ -44,13 +44,13 @@ from fuzzytree.model.rulebase import (
     Side,
     shapes_of,
 )
-from fuzzytree.numerics.segments import Segments, segments
+from fuzzytree.numerics import Segments, segments_of
 from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS, halved, join
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     Singles = npt.NDArray[np.float32]
     Bools = npt.NDArray[np.bool_]
@@ -176,7 +176,7 @@ def plan_envelope(
     number = {shape: position for position, shape in enumerate(ordered)}
     line = np.array([at_line[c.variable] if c.terms else 0 for c in clauses], np.int64)
     members = [np.array([number[s] for s in result], np.int64) for result in of_clause]
-    lines = segments(points, DOUBLE, DOUBLE)
+    lines = segments_of(points, DOUBLE, DOUBLE)
     by_kind = Shapes(_slopes(sets), _edges(bands), points, lines)
     negated = np.array([clause.negated for clause in clauses])
     with np.errstate(all="ignore"):

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Dtype, Model, Run, Runtime
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.numerics.narrowing import losses
+from fuzzytree.model import Dtype, Model, RuleBase, Run, Runtime
+from fuzzytree.numerics import losses
 from fuzzytree.runtimes.best_first import search
 from fuzzytree.runtimes.descent import follow
 from fuzzytree.runtimes.native_rules import fire

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model.contracts import Dtype, Outcome, Run
-from fuzzytree.model.rulebase import Clause, RuleBase, shapes_of
+from fuzzytree.model import Clause, Dtype, Outcome, RuleBase, Run, shapes_of
 from fuzzytree.runtimes.degrees import (
     NUMBERS,
     Atom,
@@ -35,7 +34,7 @@ from fuzzytree.runtimes.rows import (
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
 

@@ -10,15 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fuzzytree.model.contracts import Model, Outcome, Run
-from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model import Model, Outcome, RuleBase, Run
 from fuzzytree.runtimes import native, reference
-from fuzzytree.semantics.programs.evaluate import still_results
-from fuzzytree.semantics.programs.operations import INEXACT, LOGICAL, NUMERIC
-from fuzzytree.semantics.programs.steps import Program
+from fuzzytree.semantics import INEXACT, LOGICAL, NUMERIC, Program, still_results
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _FEW_RULES = 16  # from about twice as many on, numpy is faster on one row too
 

@@ -14,29 +14,30 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
-from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write_onnx
-from fuzzytree.model.contracts import (
+from fuzzytree.exporters import FORMAT_VERSION, Output, write_onnx
+from fuzzytree.model import (
     Dtype,
+    FuzzySystem,
+    FuzzyTree,
     Model,
     ModelKind,
     Outcome,
     Prepared,
     Run,
     Runtime,
+    Semantics,
     SystemOutcome,
     SystemRun,
+    text_fault,
 )
-from fuzzytree.model.rulebase import Semantics, text_fault
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
     import onnx
 
-    from fuzzytree.exporters.onnx_session import Bare, Session
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.exporters import Bare, Session
+    from fuzzytree.model import FloatArray
 
     Outputs = dict[str, npt.NDArray[np.generic]]
 
@@ -126,7 +127,7 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
     proto = parsed(content, name)
     facts = _facts(proto, name)
     _check_signature(proto, facts, name)
-    from fuzzytree.exporters.onnx_session import named
+    from fuzzytree.exporters import named
 
     session = named(loaded(content, name))
     has_labels = "label" in facts.outputs
@@ -164,7 +165,7 @@ def prepare(
     if plain and not isinstance(model, FuzzyTree):
         raise LossError("onnxruntime plain runs trees, and these are rules")
     _require_packages("running")
-    from fuzzytree.exporters.onnx_session import named, open_bare
+    from fuzzytree.exporters import named, open_bare
 
     outputs: tuple[Output, ...] = ("rule", "status", "strengths")
     if isinstance(model, FuzzyTree):
@@ -270,7 +271,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
         MissingExtraError: If onnx or onnxruntime is not installed.
     """
     _require_packages("running")
-    from fuzzytree.exporters.onnx_session import open_session
+    from fuzzytree.exporters import open_session
 
     outputs: tuple[Output, ...] = ("outputs", "status", "activations")
     outputs = outputs if activations else outputs[:2]
@@ -297,7 +298,7 @@ def _chunks(
     names: Sequence[str],
 ) -> Iterator[tuple[int, Outputs]]:
     """Yield the outputs, by name, of some rows at a time, with the first row."""
-    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line
+    from fuzzytree.exporters import RUNTIME_ERRORS, first_line
 
     rows = _rows_at_once(facts)
     for start in range(0, max(values.shape[1], 1), rows):
@@ -381,7 +382,7 @@ def loaded(content: bytes, name: str) -> Bare:
     Raises:
         ReadError: If onnxruntime does not load it.
     """
-    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_bare
+    from fuzzytree.exporters import RUNTIME_ERRORS, first_line, open_bare
 
     try:
         return open_bare(content)

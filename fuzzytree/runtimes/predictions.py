@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 import msgspec
 import numpy as np
 
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     Label,
     LabelType,
     RuleBase,
@@ -22,14 +22,14 @@ from fuzzytree.model.rulebase import (
     shapes_of,
     summary,
 )
-from fuzzytree.semantics.reference import Status, axis_values, clause_degree, evaluate
+from fuzzytree.semantics import Status, axis_values, clause_degree, evaluate
 from fuzzytree.tables import arrow_table, pandas_frame
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-    from fuzzytree.model.contracts import FloatArray, IntArray, Outcome
+    from fuzzytree.model import FloatArray, IntArray, Outcome
 
 By = Literal["class", "rule"]
 T = TypeVar("T")

@@ -14,18 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model.contracts import SystemOutcome, SystemRun
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model import FuzzySystem, SystemOutcome, SystemRun, checkpoint
 from fuzzytree.runtimes.rows import checked
-from fuzzytree.semantics.programs.evaluate import StepValue, still_results
-from fuzzytree.semantics.programs.steps import Program, Step
-from fuzzytree.semantics.programs.system_program import from_system
+from fuzzytree.semantics import Program, Step, StepValue, from_system, still_results
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
     Values = npt.NDArray[Any]
     Function = Callable[..., Values]

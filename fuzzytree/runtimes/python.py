@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fuzzytree.exporters.python import write_python
-from fuzzytree.model.contracts import Model, Outcome, Run, Runtime
-from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.exporters import write_python
+from fuzzytree.model import Model, Outcome, RuleBase, Run, Runtime
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
     RowAnswer = tuple[str | None, int, int] | tuple[str | None, int, int, list[float]]
 

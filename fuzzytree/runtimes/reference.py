@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fuzzytree.model.contracts import (
+from fuzzytree.model import (
+    FuzzySystem,
     Model,
     Outcome,
+    RuleBase,
     Run,
     Runtime,
     SystemOutcome,
     SystemRun,
 )
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.semantics.inference import infer
-from fuzzytree.semantics.reference import Answer, descend, evaluate
+from fuzzytree.semantics import Answer, descend, evaluate, infer
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 
 def load(model: Model) -> Run:

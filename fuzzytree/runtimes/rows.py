@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model.rulebase import Part, Variable
+from fuzzytree.model import Part, Variable
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
     Real = np.dtype[np.floating[Any]]

@@ -17,18 +17,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.model.rulebase import (
-    LR,
-    Band,
-    Flank,
-    Points,
-    RuleBase,
-    Shape,
-    Side,
-    shapes_of,
-)
+from fuzzytree.model import LR, Band, Flank, Points, RuleBase, Shape, Side, shapes_of
 from fuzzytree.runtimes.degrees import shape_degrees
-from fuzzytree.semantics.probing import landmarks
+from fuzzytree.semantics import landmarks
 
 FloatArray = npt.NDArray[np.float64]
 

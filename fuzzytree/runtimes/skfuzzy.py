@@ -17,11 +17,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
-from fuzzytree.model.contracts import Model, Outcome, Run, Runtime
-from fuzzytree.model.rulebase import Clause, RuleBase, Shape
+from fuzzytree.model import Clause, Model, Outcome, RuleBase, Run, Runtime, Shape
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _MOST_POINTS = 128  # on each curved piece of a shape
 _MOST_NUMBERS = 1 << 20  # samples of one variable, over all of its terms

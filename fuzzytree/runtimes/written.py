@@ -22,15 +22,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError, MissingExtraError
-from fuzzytree.exporters.c import beginning
-from fuzzytree.model.contracts import Model, Outcome
-from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.exporters import beginning
+from fuzzytree.model import Model, Outcome, RuleBase
 from fuzzytree.runtimes import c
-from fuzzytree.semantics.reference import Status
+from fuzzytree.semantics import Status
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
-    from fuzzytree.model.options import Option
+    from fuzzytree.model import FloatArray, Option
 
 Options = Mapping[str, "Option"]
 _LONGEST_WAIT = 600.0  # seconds

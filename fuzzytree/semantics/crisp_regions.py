@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msgspec.structs import replace
 
-from fuzzytree.model.rulebase import Clause, RuleBase, Variable, shapes_of
-from fuzzytree.model.tree import FuzzyTree, Node
+from fuzzytree.model import Clause, FuzzyTree, Node, RuleBase, Variable, shapes_of
 from fuzzytree.semantics.reference import clause_degree
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _Model = TypeVar("_Model", bound=FuzzyTree | RuleBase)
 

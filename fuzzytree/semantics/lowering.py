@@ -16,16 +16,18 @@ from typing import Literal
 import msgspec
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    Branch,
     Clause,
     Conjunction,
+    FuzzyTree,
     Kind,
     Rule,
     RuleBase,
     Term,
+    Use,
     Variable,
 )
-from fuzzytree.model.tree import Branch, FuzzyTree, Use
 
 Form = Literal["tree", "relative rules", "raw rules", "rules"]
 """What can be made of a model, as people call it."""

@@ -15,47 +15,45 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
-    Band,
-    Clause,
-    Points,
-    Rule,
-    RuleBase,
-    Shape,
-    Variable,
-    shapes_of,
-)
-from fuzzytree.model.system import (
     And,
+    Band,
     Bell,
     Binary,
+    Clause,
     Condition,
     Cosine,
     Curve,
     Formula,
     FuzzySystem,
+    FuzzyTree,
     Gaussian,
     Hedge,
     Is,
     Linear,
     Not,
     Or,
+    Points,
+    Rule,
+    RuleBase,
+    Shape,
     Sigmoid,
     SigmoidDifference,
     SigmoidProduct,
     Spike,
     SystemRule,
     TwoGaussians,
+    Variable,
+    shapes_of,
 )
-from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.inference import curve_degree
 from fuzzytree.semantics.inference.norms import hedges_applied
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import axis_values
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 SPECIAL = (
     math.nan,

@@ -6,13 +6,14 @@ import random
 from collections.abc import Mapping, Sequence
 from typing import Final, Literal, get_args
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, Side
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FUNCTIONS,
+    LR,
     Activation,
     ActivationMethod,
     And,
     Arc,
+    Band,
     Bell,
     Binary,
     Call,
@@ -24,6 +25,7 @@ from fuzzytree.model.system import (
     Defuzzifier,
     DefuzzifierMethod,
     Expression,
+    Flank,
     Formula,
     FuzzySystem,
     Gaussian,
@@ -35,11 +37,14 @@ from fuzzytree.model.system import (
     Not,
     Number,
     Or,
+    Part,
     PiCurve,
+    Points,
     Relation,
     RuleBlock,
     SCurve,
     SemiEllipse,
+    Side,
     Sigmoid,
     SigmoidDifference,
     SigmoidProduct,

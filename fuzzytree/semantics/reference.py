@@ -14,11 +14,12 @@ from enum import IntEnum
 
 import msgspec
 
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
     Clause,
     Flank,
+    FuzzyTree,
     Points,
     RuleBase,
     Shape,
@@ -26,7 +27,6 @@ from fuzzytree.model.rulebase import (
     Variable,
     shapes_of,
 )
-from fuzzytree.model.tree import FuzzyTree
 
 BELOW_ONE = 1.0 - 2.0**-53
 """The largest double below 1: the highest degree off a plateau."""

@@ -10,57 +10,59 @@ from collections.abc import Callable, Mapping
 
 from msgspec.structs import replace
 
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
-    Band,
-    Clause,
-    Flank,
-    Part,
-    Points,
-    Rule,
-    RuleBase,
-    Semantics,
-    Side,
-    Term,
-    Variable,
-)
-from fuzzytree.model.system import (
     Activation,
     And,
+    Band,
+    Branch,
     Call,
+    Clause,
     Conclusion,
     Condition,
     Curve,
     Defuzzifier,
+    Document,
+    Flank,
     Formula,
     FuzzySystem,
+    FuzzyTree,
     Gaussian,
     Is,
+    Leaf,
     Linear,
     Name,
+    Node,
     Not,
     Number,
     Or,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
     RuleBlock,
     SCurve,
+    Semantics,
+    Sets,
+    Side,
     Sigmoid,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
     SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
-from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
 from fuzzytree.semantics.lowering import rules_from_tree
 
 
-def samples() -> dict[str, Document]:
+def all_samples() -> dict[str, Document]:
     """Return every sample, by what is special about it.
 
     Example:
-        >>> list(samples())[:3]
+        >>> list(all_samples())[:3]
         ['tree', 'tree with combined features', 'relative rules']
     """
     return {name: make() for name, make in SAMPLES.items()}

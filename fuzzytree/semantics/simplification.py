@@ -27,21 +27,24 @@ from functools import partial
 import msgspec
 from msgspec.structs import replace
 
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     Band,
+    Branch,
     Clause,
+    FuzzyTree,
+    Model,
     Part,
     Rule,
     RuleBase,
+    Sets,
     Shape,
     Term,
+    Use,
     Value,
     Variable,
     clause_text,
     shapes_of,
 )
-from fuzzytree.model.tree import Branch, FuzzyTree, Sets, Use
 from fuzzytree.semantics.satisfiability import always_holds, never_firing
 
 USES: tuple[Use, ...] = ("tree", "relative", "raw")

@@ -10,13 +10,23 @@ from typing import Annotated, ClassVar, Final, Literal, assert_never
 from msgspec import Meta, field
 
 from fuzzytree.errors import InvalidModelError, ReadError
-from fuzzytree.exporters.yaml_text import Entry, Noted, Short, joined
+from fuzzytree.exporters import Entry, Noted, Short, joined
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.formats.text_files import FileMistake, report
-from fuzzytree.formats.yaml.binding import entries, located, record, value_of
-from fuzzytree.formats.yaml.layout import FileRecord, KeyForm, Name
-from fuzzytree.formats.yaml.nodes import MappingNode, Scalar, compose
-from fuzzytree.model.rulebase import Mistake
+from fuzzytree.formats import (
+    FileMistake,
+    FileRecord,
+    KeyForm,
+    MappingNode,
+    Name,
+    Scalar,
+    compose,
+    entries,
+    located,
+    record,
+    report,
+    value_of,
+)
+from fuzzytree.model import Mistake
 from fuzzytree.tactile.boards import (
     HEXADECIMAL,
     LARGEST_BAUD,

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Final, Literal
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model.rulebase import Mistake, Value
+from fuzzytree.model import Mistake, Value
 from fuzzytree.tactile.sensor import Sensor
 
 LONGEST_NAME: Final = 1000

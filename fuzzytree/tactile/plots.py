@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.sheet import SIZE, short
+from fuzzytree.report import SIZE, short, style
 
 if TYPE_CHECKING:
     import numpy.typing as npt

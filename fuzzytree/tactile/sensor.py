@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import InvalidModelError, TableError
-from fuzzytree.model.rulebase import Mistake, Value
+from fuzzytree.model import Mistake, Value
 
 Cells = npt.NDArray[np.integer]
 """Whole numbers of shape (rows, columns) or (frames, rows, columns)."""

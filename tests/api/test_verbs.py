@@ -20,7 +20,7 @@ from sklearn.tree import DecisionTreeClassifier
 import fuzzytree as ft
 from fuzzytree.api import answering
 from fuzzytree.errors import LossError, ReadError, TableError
-from fuzzytree.exporters import TABLE
+from fuzzytree.exporters.table import TABLE
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.onnxruntime import open_onnx

@@ -29,9 +29,9 @@ from fuzzytree.errors import install_hint
 from fuzzytree.model.contracts import Dtype, Outcome, Run, Runtime
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.numerics import bounds
-from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.native import load
 from fuzzytree.runtimes.onnxruntime import prepare
+from fuzzytree.runtimes.table import all_runtimes, find_runtime, is_installed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.benchmarking.studies import error, point, timing

@@ -13,7 +13,7 @@ from fuzzytree.errors import DisagreementError
 from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.rulebase import Band, Flank, Kind, RuleBase
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import all_runtimes, is_installed
+from fuzzytree.runtimes.table import all_runtimes, is_installed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 
@@ -261,14 +261,14 @@ def test_a_runtime_that_gives_other_answers_is_found(
         return lie
 
     liar = msgspec.structs.replace(honest, name="liar", load=load)
-    monkeypatch.setattr("fuzzytree.runtimes.find_runtime", _found(liar))
+    monkeypatch.setattr("fuzzytree.runtimes.table.find_runtime", _found(liar))
     found = check(TREE, limit=300, runtimes=["liar"])
     assert by(found, "liar: tree")[0] == "DISAGREES"
     assert by(found, "liar: relative rules")[0] == "DISAGREES"
 
 
 def _found(extra: object) -> Callable[[str], object]:
-    from fuzzytree.runtimes import find_runtime
+    from fuzzytree.runtimes.table import find_runtime
 
     return lambda name: extra if name == "liar" else find_runtime(name)
 

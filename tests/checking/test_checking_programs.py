@@ -15,7 +15,7 @@ from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
 from fuzzytree.runtimes import written
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree
 
 TREE = random_tree(3, leaves=6, inputs=3)
@@ -175,7 +175,7 @@ def test_a_program_that_fails_is_a_disagreement(
         ),
         (TREE, "m.js", {"module": "script"}, "only JavaScript modules are run"),
         (
-            samples()["Mamdani, centroid"],
+            all_samples()["Mamdani, centroid"],
             "m.c",
             {},
             "programs of fuzzy systems in c are compared by their text",

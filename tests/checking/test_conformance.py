@@ -13,7 +13,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.errors import DisagreementError, LossError, ReadError
-from fuzzytree.exporters import TABLE, find_format
+from fuzzytree.exporters.table import TABLE, find_format
 from fuzzytree.model.contracts import Document, Format, Loss, Reading, Written
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.testing import check_exporter

@@ -23,10 +23,10 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.model.system import FuzzySystem, Is, SystemTerm, Trapezoid
 from fuzzytree.semantics.conversion import as_system
 from fuzzytree.semantics.conversion.points import straightened
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 
-RULES = samples()["point lists"]
-TREE = samples()["tree"]
+RULES = all_samples()["point lists"]
+TREE = all_samples()["tree"]
 
 
 def _one(shape: Shape) -> RuleBase:
@@ -43,14 +43,14 @@ def _seen(model: Document, other: Document, *remarks: str) -> str:
 
 
 def test_a_model_is_equal_to_itself() -> None:
-    for model in samples().values():
+    for model in all_samples().values():
         assert _seen(model, model) == "equal"
         assert is_equivalent(model, model)
 
 
 @pytest.mark.heavy
 def test_no_sample_is_like_another() -> None:
-    known = list(samples().items())
+    known = list(all_samples().items())
     alike = [
         (name, other_name)
         for name, one in known
@@ -61,7 +61,7 @@ def test_no_sample_is_like_another() -> None:
 
 
 def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> None:
-    always = samples()["a conclusion without a condition"]
+    always = all_samples()["a conclusion without a condition"]
     assert isinstance(always, FuzzySystem)
     heat, damp = always.inputs
     label = SystemTerm("always", Trapezoid(None, 0.0, 0.0, None))
@@ -97,7 +97,7 @@ def test_rules_are_like_the_systems_that_decide_as_they_do(scores: str) -> None:
     for how in ("winner", "rule", "class"):
         if how == scores:
             assert is_equivalent(RULES, as_system(RULES, how))
-    other = samples()["AND as product"]
+    other = all_samples()["AND as product"]
     assert isinstance(other, RuleBase)
     assert not is_equivalent(other, as_system(RULES, "winner"))
 

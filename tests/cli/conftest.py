@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 from fuzzytree.model.rulebase import Band, Flank, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.api import verbs
+from fuzzytree import api
 from fuzzytree.benchmarking.records import Study
 from fuzzytree.report.bench import study_lines
 from fuzzytree.report.text import duration
@@ -135,7 +135,7 @@ def test_an_interrupted_study_is_reported_and_exits_with_130(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = replace(made(), is_interrupted=True, is_complete=False)
-    monkeypatch.setattr(verbs, "bench", lambda *_, **__: found)
+    monkeypatch.setattr(api, "bench", lambda *_, **__: found)
     code, out, err = call("bench", "grip.yaml", "-o", "study.json")
     assert code == 130
     assert out.startswith("rules, 1,000 rows: for an error of at most 1e-15")
@@ -149,7 +149,7 @@ def test_an_error_beyond_the_certified_one_exits_with_1(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = study(point("native", 9.0, error(1e-3, 1e-6)))
-    monkeypatch.setattr(verbs, "bench", lambda *_, **__: found)
+    monkeypatch.setattr(api, "bench", lambda *_, **__: found)
     code, _, err = call("bench", "grip.yaml")
     assert code == 1
     assert err == (
@@ -165,7 +165,7 @@ def test_what_libraries_print_is_no_part_of_the_answer(
         sys.stdout.write("welcome to a library\n")
         return made()
 
-    monkeypatch.setattr(verbs, "bench", talkative)
+    monkeypatch.setattr(api, "bench", talkative)
     _, out, err = call("bench", "grip.yaml", "--json")
     assert json.loads(out)["model"] == "grip"
     assert err.startswith("welcome to a library\n")
@@ -223,7 +223,7 @@ def test_pictures_are_drawn_for_most_rows(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("matplotlib")
-    monkeypatch.setattr(verbs, "bench", lambda *_, **__: made())
+    monkeypatch.setattr(api, "bench", lambda *_, **__: made())
     code, _, err = call("bench", "grip.yaml", "--plot", "a.svg", "--plot", "a.png")
     assert code == 0
     assert err.splitlines()[:2] == ["wrote    a.svg", "wrote    a.png"]
@@ -236,12 +236,12 @@ def test_a_study_of_nothing_leaves_files_as_they_were(
 ) -> None:
     Path("a.json").write_text("an earlier study", "utf-8")
     words = ("bench", "grip.yaml", "--plot", "a.svg", "-o", "a.json")
-    monkeypatch.setattr(verbs, "bench", lambda *_, **__: study())
+    monkeypatch.setattr(api, "bench", lambda *_, **__: study())
     code, out, err = call(*words)
     assert (code, err) == (2, "nothing could be measured\n")
     assert "\n1 candidate left out\n" in out
     early = replace(study(), is_interrupted=True, is_complete=False)
-    monkeypatch.setattr(verbs, "bench", lambda *_, **__: early)
+    monkeypatch.setattr(api, "bench", lambda *_, **__: early)
     code, _, err = call(*words)
     assert (code, err) == (
         130,
@@ -254,7 +254,7 @@ def test_a_study_of_nothing_leaves_files_as_they_were(
 def test_a_place_that_cannot_be_written_is_reported_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verbs, "bench", None)
+    monkeypatch.setattr(api, "bench", None)
     message = (
         "no/such.json: cannot be written: "
         "there is no folder 'no'; mkdir -p no makes it\n"

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.cli import VERBS, main, run
+from fuzzytree.cli import main, run
 from fuzzytree.cli.console import progress_bar
+from fuzzytree.cli.program import VERBS
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, yaml
 from fuzzytree.formats.yaml.yaml_reader import yaml_reading
@@ -19,7 +19,7 @@ from fuzzytree.model.contracts import Document, Loss, Reading, Written
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.random_systems import random_system
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 
@@ -439,7 +439,7 @@ def test_losses_in_python_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_relative_rules_keep_their_decisions_where_curves_become_points(
     call: Call, name: str
 ) -> None:
-    ft.save(samples()[name], "rules.yaml")
+    ft.save(all_samples()[name], "rules.yaml")
     code, _, err = call("convert", "rules.yaml", "a.fll", "--allow-loss")
     assert code == 0
     assert "becomes" in err or "points" in err
@@ -448,7 +448,7 @@ def test_relative_rules_keep_their_decisions_where_curves_become_points(
 
 
 def test_a_smaller_tolerance_gives_a_smaller_bound(call: Call) -> None:
-    ft.save(samples()["relative rules"], "rules.yaml")
+    ft.save(all_samples()["relative rules"], "rules.yaml")
     bounds = []
     for tolerance in ("1e-2", "1e-5"):
         words = ("--tolerance", tolerance, "--allow-loss", "--json", "--quiet")

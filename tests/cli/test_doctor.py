@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.checking.abilities import Ability, abilities
+from fuzzytree.checking.abilities import Ability, abilities_of
 from fuzzytree.cli.doctor import CORE, EXTRAS
-from fuzzytree.exporters import TABLE, all_formats, find_format
-from fuzzytree.runtimes import all_runtimes
+from fuzzytree.exporters.table import TABLE, all_formats, find_format
 from fuzzytree.runtimes.predictions import Predictions
+from fuzzytree.runtimes.table import all_runtimes
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -24,13 +24,14 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 
 @functools.cache
 def abilities_of_yaml() -> tuple[Ability, ...]:
-    return abilities(find_format("yaml"))
+    return abilities_of(find_format("yaml"))
 
 
 @pytest.fixture(autouse=True)
 def _one_format_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "fuzzytree.checking.abilities.abilities", lambda *_, **__: abilities_of_yaml()
+        "fuzzytree.checking.abilities.abilities_of",
+        lambda *_, **__: abilities_of_yaml(),
     )
 
 

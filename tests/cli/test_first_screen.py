@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.cli import VERBS, main
+from fuzzytree.cli.program import VERBS, main
 
 WINE = Path(__file__).resolve().parents[2] / "examples" / "wine" / "wine.csv"
 SCREEN = 30

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.exporters import TABLE
+from fuzzytree.exporters.table import TABLE
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.model.system import FuzzySystem
 from tests.cli.conftest import GRASPS, Call

@@ -9,7 +9,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.checking import dependencies
-from fuzzytree.exporters import TABLE
+from fuzzytree.exporters.table import TABLE
 from fuzzytree.model.rulebase import Band, Term, Variable
 from fuzzytree.semantics.simplification import Pruned, pruned
 from fuzzytree.testing import random_tree
@@ -119,7 +119,7 @@ def test_a_pruned_model_that_differs_is_not_written(
             (),
         )
 
-    monkeypatch.setattr("fuzzytree.semantics.simplification.pruned", planted)
+    monkeypatch.setattr("fuzzytree.semantics.pruned", planted)
     code, out, err = call("needs", "grip.yaml", "-o", "left.yaml")
     assert code == 1
     assert "node 1 is another node" in out

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.exporters import TABLE
+from fuzzytree.exporters.table import TABLE
 from tests.cli.conftest import Call
 
 EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fuzzytree import tables
-from fuzzytree.exporters import TABLE
+from fuzzytree.exporters.table import TABLE
 from tests.cli.conftest import GRASPS, Call
 
 ANSWERS = (

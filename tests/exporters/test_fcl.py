@@ -33,13 +33,15 @@ from fuzzytree.semantics.inference import infer, input_values
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.random_systems import random_rows, random_system
 from fuzzytree.semantics.reference import evaluate
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree, with_points
 from tests.exporters.fcl_systems import tamed
 
 DIALECTS: tuple[Dialect, ...] = get_args(Dialect)
 SAMPLES = {
-    name: model for name, model in samples().items() if isinstance(model, FuzzySystem)
+    name: model
+    for name, model in all_samples().items()
+    if isinstance(model, FuzzySystem)
 }
 
 

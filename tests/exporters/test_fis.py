@@ -12,9 +12,9 @@ from msgspec.structs import replace
 
 from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
-from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fis import write
 from fuzzytree.exporters.fis_terms import term_of
+from fuzzytree.exporters.table import find_format
 from fuzzytree.formats.fis.fis_reader import DEFAULTS, always_concluded, read_fis
 from fuzzytree.formats.fis.fis_words import (
     CONCLUDING_HEDGES,

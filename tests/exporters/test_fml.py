@@ -10,8 +10,8 @@ from msgspec.structs import replace
 
 from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
-from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fml import write
+from fuzzytree.exporters.table import find_format
 from fuzzytree.formats.fml.fml_reader import read_fml
 from fuzzytree.formats.fml.fml_words import FML_FAR, MODIFIERS, USUAL
 from fuzzytree.model.rulebase import Clause, Kind, Points, Rule

@@ -21,7 +21,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.probing import probe_values
 
 pytest.importorskip("onnxruntime")

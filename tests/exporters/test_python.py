@@ -26,7 +26,7 @@ from fuzzytree.model.rulebase import (
     fingerprint,
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import descend, evaluate
 from fuzzytree.testing import probes, random_tree

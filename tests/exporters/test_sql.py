@@ -21,7 +21,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree, with_points
 

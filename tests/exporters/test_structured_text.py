@@ -24,7 +24,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree
 
 
@@ -192,7 +192,7 @@ def test_nothing_is_lost_and_the_same_model_gives_the_same_bytes() -> None:
 
 
 def test_a_system_has_its_outputs_and_reports_whether_they_are_numbers() -> None:
-    system = samples()["Sugeno, numbers"]
+    system = all_samples()["Sugeno, numbers"]
     written = write(system)
     text = written.content.decode("ascii")
     outputs = text[text.index("VAR_OUTPUT") : text.index("\nVAR\n")]
@@ -212,7 +212,7 @@ def test_a_system_has_its_outputs_and_reports_whether_they_are_numbers() -> None
 
 def test_a_system_that_needs_what_the_language_has_not_is_refused() -> None:
     with pytest.raises(LossError) as caught:
-        write(samples()["Sugeno, formulas"], allow_loss=True)
+        write(all_samples()["Sugeno, formulas"], allow_loss=True)
     assert str(caught.value) == (
         "cannot write fan as structured-text: "
         "it needs a division or a power ('slow' of 'fan')"

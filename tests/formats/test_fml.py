@@ -31,7 +31,7 @@ from fuzzytree.model.system import (
     TwoGaussians,
 )
 from fuzzytree.semantics.inference import infer
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 
 TIPPER = """\
 <?xml version="1.0" encoding="UTF-8"?>
@@ -211,7 +211,7 @@ def test_operators_are_read_in_any_case() -> None:
         text = text.replace(f'"{word}"', f'"{word.lower()}"')
     assert text != TIPPER
     assert read(text) == read(TIPPER)
-    system = samples()["Mamdani, mean of maximum"]
+    system = all_samples()["Mamdani, mean of maximum"]
     assert isinstance(system, FuzzySystem)
     written = write(system, allow_loss=True).content.decode()
     keys = "(andMethod|orMethod|activationMethod|accumulation|defuzzifier)"

@@ -17,10 +17,10 @@ from sklearn import datasets
 from sklearn.tree import DecisionTreeClassifier
 
 from fuzzytree import from_sklearn
-from fuzzytree.checking.abilities import MEANINGS, Ability, abilities, dialects_of
+from fuzzytree.checking.abilities import MEANINGS, Ability, abilities_of, dialects_of
 from fuzzytree.checking.converting import export, formed
 from fuzzytree.errors import LossError
-from fuzzytree.exporters import TABLE, all_formats, find_format
+from fuzzytree.exporters.table import TABLE, all_formats, find_format
 from fuzzytree.learning import learn_arrays
 from fuzzytree.learning.units import FloatArray
 from fuzzytree.model.contracts import Document, Loss, Written
@@ -31,7 +31,7 @@ from fuzzytree.report.formats import SIGNS, ability_table
 from fuzzytree.semantics.conversion import as_system, flattened
 from fuzzytree.semantics.inference import input_values
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "formats.md"
 MARKED = re.compile(r"(<!-- abilities -->\n\n).*?(<!-- end -->\n)", re.DOTALL)
@@ -40,13 +40,13 @@ YAML = find_format("yaml")
 
 @functools.cache
 def _tried(form: str) -> tuple[Ability, ...]:
-    return abilities(find_format(form))
+    return abilities_of(find_format(form))
 
 
 def _page() -> str:
     made = ability_table({one.name: _tried(one.name) for one in all_formats()})
     for form in all_formats():
-        known = {name: abilities(form, dialect=name) for name in dialects_of(form)}
+        known = {name: abilities_of(form, dialect=name) for name in dialects_of(form)}
         lines = zip(*known.values(), strict=True)
         if any(len({one.outcome for one in line}) > 1 for line in lines):
             table = ability_table(known, legend=False)
@@ -106,7 +106,7 @@ def test_a_file_has_the_inputs_that_rules_use_and_no_row_is_outside_their_ranges
 
 
 def test_there_is_a_sample_of_every_kind_of_model() -> None:
-    kinds = {type(model) for model in samples().values()}
+    kinds = {type(model) for model in all_samples().values()}
     assert kinds == {FuzzyTree, RuleBase, FuzzySystem}
 
 
@@ -114,9 +114,9 @@ def test_each_dialect_of_a_format_is_tried() -> None:
     assert dialects_of(YAML) == ()
     fcl = find_format("fcl")
     assert dialects_of(fcl) == ("portable", "iec", "fuzzylite", "jfuzzylogic")
-    one = {"Sugeno, linear": samples()["Sugeno, linear"]}
-    assert abilities(fcl, one)[0].outcome == "refused"
-    assert abilities(fcl, one, dialect="fuzzylite")[0].outcome == "alike"
+    one = {"Sugeno, linear": all_samples()["Sugeno, linear"]}
+    assert abilities_of(fcl, one)[0].outcome == "refused"
+    assert abilities_of(fcl, one, dialect="fuzzylite")[0].outcome == "alike"
 
 
 def test_every_outcome_has_a_sign_and_a_meaning() -> None:
@@ -129,7 +129,7 @@ def test_every_outcome_has_a_sign_and_a_meaning() -> None:
 def test_a_format_carries_what_it_says(name: str) -> None:
     form = find_format(name)
     found = {one.sample: one.outcome for one in _tried(name)}
-    for sample, model in samples().items():
+    for sample, model in all_samples().items():
         kind = {FuzzyTree: "tree", RuleBase: "rules", FuzzySystem: "system"}[
             type(model)
         ]
@@ -139,7 +139,7 @@ def test_a_format_carries_what_it_says(name: str) -> None:
 
 def test_yaml_carries_trees_and_rules_as_they_are() -> None:
     for one in _tried("yaml"):
-        model = samples()[one.sample]
+        model = all_samples()[one.sample]
         if not isinstance(model, FuzzySystem):
             assert one.outcome == "equal"
 
@@ -152,7 +152,7 @@ def _outcome(sample: str, *, bound: float | None, read: bool = True) -> str:
         return replace(written, losses=(Loss("all", "is less", bound),))
 
     form = replace(YAML, write=write, read=YAML.read if read else None)
-    (found,) = abilities(form, {sample: samples()[sample]})
+    (found,) = abilities_of(form, {sample: all_samples()[sample]})
     return found.outcome
 
 
@@ -165,8 +165,8 @@ def test_a_refusal_is_reported_with_its_reason() -> None:
     def write(model: Document, /, *, allow_loss: bool = False) -> Written:
         raise LossError("turtles only")
 
-    models = {"tree": samples()["tree"]}
-    found = abilities(replace(YAML, write=write), models)[0]
+    models = {"tree": all_samples()["tree"]}
+    found = abilities_of(replace(YAML, write=write), models)[0]
     assert (found.outcome, found.reasons) == ("refused", ("turtles only",))
 
 
@@ -175,8 +175,8 @@ def test_what_is_read_back_as_another_model_is_lossy() -> None:
         assert isinstance(model, FuzzyTree)
         return YAML.write(replace(model, leaves=model.leaves[::-1]))
 
-    models = {"tree": samples()["tree"]}
-    found = abilities(replace(YAML, write=write), models)[0]
+    models = {"tree": all_samples()["tree"]}
+    found = abilities_of(replace(YAML, write=write), models)[0]
     assert (found.outcome, found.reasons) == (
         "lossy",
         ("it is read back as another model",),
@@ -184,7 +184,7 @@ def test_what_is_read_back_as_another_model_is_lossy() -> None:
 
 
 def test_a_tree_goes_as_rules_and_rules_as_a_system() -> None:
-    tree = samples()["tree"]
+    tree = all_samples()["tree"]
     rules = formed(tree, replace(YAML, carries=("rules",)))
     assert isinstance(rules, RuleBase)
     system = formed(tree, replace(YAML, carries=("system",)))
@@ -196,7 +196,7 @@ def test_a_tree_goes_as_rules_and_rules_as_a_system() -> None:
 
 def test_a_system_whose_outputs_are_numbers_is_no_rule_base() -> None:
     with pytest.raises(LossError) as caught:
-        formed(samples()["Mamdani, centroid"], replace(YAML, carries=("rules",)))
+        formed(all_samples()["Mamdani, centroid"], replace(YAML, carries=("rules",)))
     representations = [form.name for form in all_formats() if "system" in form.carries]
     assert str(caught.value) == (
         "cannot write fan as yaml: it carries rules, "
@@ -207,7 +207,7 @@ def test_a_system_whose_outputs_are_numbers_is_no_rule_base() -> None:
 
 def test_a_tree_is_refused_with_what_to_do() -> None:
     with pytest.raises(LossError) as caught:
-        export(samples()["tree"], "fll")
+        export(all_samples()["tree"], "fll")
     assert str(caught.value) == (
         "cannot write grip as fll: it carries rules or system, and this is a tree; "
         "fuzzytree.convert makes rules of it"

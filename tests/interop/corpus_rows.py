@@ -13,9 +13,9 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.exporters import find_format
 from fuzzytree.exporters.onnx import write_onnx as write_onnx
 from fuzzytree.exporters.onnx_session import open_session
+from fuzzytree.exporters.table import find_format
 from fuzzytree.formats.fll.fll_reader import read_fll as read_fll
 from fuzzytree.formats.fll.fll_words import SAMPLES as SAMPLED
 from fuzzytree.model.contracts import Reading, Written

@@ -23,7 +23,7 @@ from fuzzytree.semantics.conversion import as_system, pointed, winner
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import evaluate
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import (
     exporter_models,
     random_rows,
@@ -126,7 +126,7 @@ SYSTEMS = (
 def test_a_system_answers_alike_in_fuzzylite(
     program: Need, tmp_path: Path, name: str
 ) -> None:
-    system = samples()[name]
+    system = all_samples()[name]
     assert isinstance(system, FuzzySystem)
     rows = random_rows(system, 3, 40)
     written = write(system, dialect="fuzzylite")
@@ -195,7 +195,7 @@ def test_names_of_all_sorts_reach_fuzzylite(
 def test_a_portable_system_answers_alike_in_fuzzylite(
     program: Need, tmp_path: Path
 ) -> None:
-    system = samples()["a default answer"]
+    system = all_samples()["a default answer"]
     assert isinstance(system, FuzzySystem)
     rows = random_rows(system, 4, 60)
     given = [list(row.values()) for row in rows]
@@ -208,7 +208,7 @@ def test_a_portable_system_answers_alike_in_fuzzylite(
 
 def _mamdani() -> FuzzySystem:
     """Return a system of points as the standard has it."""
-    system = samples()["Mamdani, centroid"]
+    system = all_samples()["Mamdani, centroid"]
     assert isinstance(system, FuzzySystem)
     pointy, _ = pointed(system, 1e-3)
     outputs = tuple(
@@ -264,7 +264,7 @@ def _is_within(variable: object, value: float) -> bool:
 def test_a_file_that_fuzzylite_wrote_of_ours_is_ours(
     program: Need, tmp_path: Path
 ) -> None:
-    system = samples()["Mamdani, centroid"]
+    system = all_samples()["Mamdani, centroid"]
     assert isinstance(system, FuzzySystem)
     first, second = tmp_path / "ours.fcl", tmp_path / "theirs.fcl"
     first.write_bytes(write(system, dialect="fuzzylite").content)

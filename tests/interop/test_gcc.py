@@ -30,13 +30,13 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.c import load_system
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import system_probes
 from fuzzytree.semantics.reference import evaluate
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.tables import read_table
 from fuzzytree.testing import random_system, random_tree, with_points
 
@@ -339,7 +339,7 @@ def test_compiled_c_has_the_strengths_of_every_rule_on_every_wine(
             np.testing.assert_array_equal(found.strengths, right.strengths)
 
 
-SYSTEMS = {n: m for n, m in samples().items() if isinstance(m, FuzzySystem)}
+SYSTEMS = {n: m for n, m in all_samples().items() if isinstance(m, FuzzySystem)}
 
 
 @pytest.mark.heavy

@@ -38,7 +38,7 @@ from fuzzytree.semantics.probing import Row, probes, system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.semantics.reference import descend, evaluate
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import exporter_models, random_system, random_tree, with_points
 
 if TYPE_CHECKING:
@@ -150,8 +150,8 @@ def test_node_answers_the_wine_table_as_the_reference(
 def systems(kind: str) -> dict[str, FuzzySystem]:
     if kind == "random":
         return {str(seed): random_system(seed) for seed in range(24)}
-    models = {**samples(), **dict(exporter_models())}
-    chosen = [*samples(), "a system with extreme numbers", "a system by lines"]
+    models = {**all_samples(), **dict(exporter_models())}
+    chosen = [*all_samples(), "a system with extreme numbers", "a system by lines"]
     return {n: m for n in chosen if isinstance(m := models[n], FuzzySystem)}
 
 
@@ -207,7 +207,7 @@ def test_a_file_tests_itself_and_tells_changed_numbers(
     tmp_path: Path, program: Need, name: str, module: Kind, suffix: str
 ) -> None:
     node = program("node")
-    model = samples()["Mamdani, centroid"] if name == "system" else models()[name]
+    model = all_samples()["Mamdani, centroid"] if name == "system" else models()[name]
     text = write(model, module=module).content.decode("ascii")
     file = tmp_path / f"a model #1{suffix}"
     file.write_text(text)

@@ -16,7 +16,7 @@ import fuzzytree as ft
 from fuzzytree.model.contracts import Document, Dtype
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.probing import probes, system_probes
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree, with_points
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def graphs() -> Iterator[tuple[str, Document, dict[str, Any]]]:
         yield f"points {dtype}", with_points(product, 3), {"dtype": dtype, **all_of}
     yield "plain tree", tree, {"plain": True, **few}
     yield "readable", relative, {"readable": True, **all_of}
-    systems = [one for one in samples().values() if isinstance(one, FuzzySystem)]
+    systems = [one for one in all_samples().values() if isinstance(one, FuzzySystem)]
     yield "system", systems[0], {}
 
 

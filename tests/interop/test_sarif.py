@@ -11,7 +11,7 @@ import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.report.sarif import sarif
+from fuzzytree.report.sarif import sarif_text
 from fuzzytree.testing import random_tree
 from tests.cli.test_audit_surroundings import NAMES, hostile
 from tests.report.audits import every_state
@@ -40,21 +40,21 @@ def test_every_state_is_sarif_with_and_without_a_baseline(
     validate: Callable[[str], None],
 ) -> None:
     known = {"FT301-00000003": "a gap", "FT401-00000009": ""}
-    validate(sarif(every_state()))
-    validate(sarif(every_state("grün b#\n.yaml", "said\n*'<>"), known))
+    validate(sarif_text(every_state()))
+    validate(sarif_text(every_state("grün b#\n.yaml", "said\n*'<>"), known))
 
 
 def test_an_audit_of_a_model_is_sarif(validate: Callable[[str], None]) -> None:
     found = ft.audit(
         random_tree(2), selection=ft.AuditSelection(select=["FT1", "FT4", "FT5"])
     )
-    validate(sarif(found, {}))
+    validate(sarif_text(found, {}))
 
 
 def test_hostile_names_are_sarif(validate: Callable[[str], None]) -> None:
     for name in NAMES.values():
         validate(
-            sarif(
+            sarif_text(
                 ft.audit(
                     hostile(name), selection=ft.AuditSelection(select=["FT1", "FT4"])
                 ),
@@ -64,6 +64,6 @@ def test_hostile_names_are_sarif(validate: Callable[[str], None]) -> None:
 
 
 def test_the_schema_refuses_what_is_none(validate: Callable[[str], None]) -> None:
-    broken = sarif(every_state()).replace('"level": "error"', '"level": "grave"')
+    broken = sarif_text(every_state()).replace('"level": "error"', '"level": "grave"')
     with pytest.raises(jsonschema.ValidationError):
         validate(broken)

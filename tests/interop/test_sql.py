@@ -22,7 +22,7 @@ from fuzzytree.checking.comparing import same_bits
 from fuzzytree.exporters.sql import Dialect, write
 from fuzzytree.model.contracts import Model, Outcome
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.tables import read_table
 from fuzzytree.testing import probe_values

@@ -38,7 +38,7 @@ from fuzzytree.semantics.probing import Row, probes, system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.semantics.reference import descend, evaluate
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import (
     exporter_models,
     random_system,
@@ -184,7 +184,7 @@ def test_our_evaluator_has_the_numbers_of_systems_within_derived_bounds(
     library: Need, kind: str, fewest: int
 ) -> None:
     library(GRAMMAR)
-    systems = {n: m for n, m in samples().items() if isinstance(m, FuzzySystem)}
+    systems = {n: m for n, m in all_samples().items() if isinstance(m, FuzzySystem)}
     if kind == "random":
         systems = {f"random {seed}": random_system(seed) for seed in range(60)}
     compared = exact = refused = 0
@@ -205,7 +205,7 @@ def test_systems_in_real_are_near_those_in_double(library: Need) -> None:
     from tests.interop.st_evaluator import Block
 
     for name in ("Mamdani, centroid", "Sugeno, linear", "gaussian curves", "S curves"):
-        system = samples()[name]
+        system = all_samples()[name]
         assert isinstance(system, FuzzySystem)
         block = Block(write(system, dtype="float32").content)
         inputs, worst = block.sections["VAR_INPUT"], 0.0
@@ -307,7 +307,7 @@ def test_blark_parses_it_and_finds_its_variables(library: Need, name: str) -> No
     library("blark")
     parse_source_code = importlib.import_module("blark.parse").parse_source_code
 
-    every: dict[str, Document] = {**models(), **samples()}
+    every: dict[str, Document] = {**models(), **all_samples()}
     model = every[name]
     found = parse_source_code(write(model).content.decode("ascii"))
     assert found.exception is None

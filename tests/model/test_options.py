@@ -8,7 +8,7 @@ from typing import Literal
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.exporters import all_formats, find_format
+from fuzzytree.exporters.table import all_formats, find_format
 from fuzzytree.model.contracts import Model, Written
 from fuzzytree.model.options import check_options, option_value, options_of
 

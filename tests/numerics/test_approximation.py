@@ -30,8 +30,8 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.numerics.approximation import by_degree, by_points, lower_curve
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.numerics.placing import points_of
-from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.crisp_regions import free_axes, grid, grid_size
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree, evaluate

@@ -27,7 +27,7 @@ from fuzzytree.numerics import bounds, rounding
 from fuzzytree.numerics.bounds import strength_bounds
 from fuzzytree.numerics.oracle import strength_errors
 from fuzzytree.numerics.rounding import TYPES, Type
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree, with_points

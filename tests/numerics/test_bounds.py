@@ -23,7 +23,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide, strength_errors
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probes
 from fuzzytree.testing import random_tree, with_points

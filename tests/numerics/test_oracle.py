@@ -42,7 +42,7 @@ from fuzzytree.numerics.oracle import (
     exact_answer,
     strength_errors,
 )
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import landmarks, neighbours, probes
 from fuzzytree.testing import random_tree, with_points

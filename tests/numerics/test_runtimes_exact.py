@@ -8,7 +8,7 @@ from fuzzytree.model.contracts import Runtime
 from fuzzytree.model.rulebase import Conjunction, Kind
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide, strength_errors
-from fuzzytree.runtimes import all_runtimes, is_installed
+from fuzzytree.runtimes.table import all_runtimes, is_installed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.report.sarif import sarif
+from fuzzytree.report.sarif import sarif_text
 from tests.report.audits import every_state
 
 
@@ -21,7 +21,7 @@ def run_of(text: str) -> Any:
 
 
 def test_each_code_is_a_rule_and_each_finding_a_result_of_its_rule() -> None:
-    run = run_of(sarif(every_state()))
+    run = run_of(sarif_text(every_state()))
     rules = run["tool"]["driver"]["rules"]
     assert [rule["id"] for rule in rules] == [*CODES]
     assert len(run["results"]) == 3
@@ -32,7 +32,7 @@ def test_each_code_is_a_rule_and_each_finding_a_result_of_its_rule() -> None:
 
 
 def test_a_result_has_its_place_its_id_and_its_state() -> None:
-    first = run_of(sarif(every_state()))["results"][0]
+    first = run_of(sarif_text(every_state()))["results"][0]
     assert first["locations"] == [
         {
             "physicalLocation": {
@@ -47,7 +47,7 @@ def test_a_result_has_its_place_its_id_and_its_state() -> None:
 
 
 def test_without_a_place_it_is_the_file() -> None:
-    second = run_of(sarif(every_state()))["results"][1]
+    second = run_of(sarif_text(every_state()))["results"][1]
     assert second["locations"] == [
         {"physicalLocation": {"artifactLocation": {"uri": "grip.yaml"}}}
     ]
@@ -55,7 +55,7 @@ def test_without_a_place_it_is_the_file() -> None:
 
 def test_a_baseline_distinguishes_new_known_and_gone() -> None:
     known = {"FT301-00000003": "a gap", "FT401-00000009": "an empty term"}
-    results = run_of(sarif(every_state(), known))["results"]
+    results = run_of(sarif_text(every_state(), known))["results"]
     states = [(one["ruleId"], one["baselineState"]) for one in results]
     assert states == [
         ("FT101", "new"),
@@ -64,11 +64,11 @@ def test_a_baseline_distinguishes_new_known_and_gone() -> None:
         ("FT401", "absent"),
     ]
     assert results[2]["suppressions"] == [{"kind": "external", "status": "accepted"}]
-    assert "baselineState" not in run_of(sarif(every_state()))["results"][0]
+    assert "baselineState" not in run_of(sarif_text(every_state()))["results"][0]
 
 
 def test_what_was_not_examined_is_reported_and_the_run_did_not_succeed() -> None:
-    (invocation,) = run_of(sarif(every_state()))["invocations"]
+    (invocation,) = run_of(sarif_text(every_state()))["invocations"]
     assert invocation["executionSuccessful"] is False
     notes = [n["message"]["text"] for n in invocation["toolExecutionNotifications"]]
     assert notes == [*every_state().unasked]
@@ -85,11 +85,11 @@ def test_what_was_not_examined_is_reported_and_the_run_did_not_succeed() -> None
     ids=ascii,
 )
 def test_a_path_is_written_as_a_reference(name: str, uri: str) -> None:
-    run = run_of(sarif(every_state(name)))
+    run = run_of(sarif_text(every_state(name)))
     place = run["results"][0]["locations"][0]["physicalLocation"]
     assert place["artifactLocation"]["uri"] == uri
     assert run["artifacts"][0]["location"]["uri"] == uri
 
 
 def test_the_same_audit_has_the_same_bytes() -> None:
-    assert sarif(every_state()) == sarif(every_state())
+    assert sarif_text(every_state()) == sarif_text(every_state())

@@ -9,8 +9,8 @@ import pytest
 
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
-from fuzzytree.runtimes import find_runtime, is_installed, needed_by
 from fuzzytree.runtimes.c import load, load_best_first
+from fuzzytree.runtimes.table import find_runtime, is_installed, needed_by
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree
 

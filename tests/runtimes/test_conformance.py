@@ -31,8 +31,8 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.bounds import strength_bounds
-from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.reference import load as load_reference
+from fuzzytree.runtimes.table import all_runtimes, find_runtime, is_installed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree, with_points
 

@@ -35,10 +35,10 @@ from fuzzytree.model.rulebase import (
     fingerprint,
 )
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.runtimes.reference import infer_rows
 from fuzzytree.runtimes.reference import load as load_reference
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.system_program import from_system

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.api.answering import answering
+from fuzzytree.api.answering import prepare_answering
 from fuzzytree.errors import LossError
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.report.systems import system_lines, system_reasons
@@ -17,7 +17,7 @@ from fuzzytree.runtimes.predictions import Outputs, joined_outputs
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.random_systems import random_rows, random_system
 from fuzzytree.semantics.reference import Status
-from fuzzytree.semantics.samples import samples
+from fuzzytree.semantics.samples import all_samples
 
 FOUND = Outputs(
     ("fan", "status"),
@@ -26,7 +26,7 @@ FOUND = Outputs(
     np.array([[0.5, 0.0, math.nan]]),
 )
 TIPPER = Path(__file__).resolve().parents[2] / "examples" / "tipper.fll"
-SYSTEMS = [one for one in samples().values() if isinstance(one, FuzzySystem)]
+SYSTEMS = [one for one in all_samples().values() if isinstance(one, FuzzySystem)]
 
 
 def test_no_number_is_an_empty_cell() -> None:
@@ -86,7 +86,7 @@ def test_every_runtime_gives_the_numbers_of_the_inference(seed: int) -> None:
 
 def test_a_runtime_that_runs_no_systems_says_so() -> None:
     with pytest.raises(LossError) as caught:
-        answering(SYSTEMS[0], "best-first")
+        prepare_answering(SYSTEMS[0], "best-first")
     assert str(caught.value) == (
         "cannot run fan in best-first: it runs rules, not a fuzzy system"
     )

@@ -22,9 +22,9 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
 )
-from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.programs import run_system
 from fuzzytree.runtimes.reference import infer_rows
+from fuzzytree.runtimes.table import all_runtimes, find_runtime, is_installed
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds

@@ -29,8 +29,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.numerics.segments import segments
-from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
+from fuzzytree.numerics.segments import segments_of
 from fuzzytree.runtimes.envelope import (
     cell_ends,
     cells_of,
@@ -38,6 +37,7 @@ from fuzzytree.runtimes.envelope import (
     plan_envelope,
 )
 from fuzzytree.runtimes.native_rules import fire
+from fuzzytree.runtimes.table import all_runtimes, find_runtime, is_installed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import landmarks
 from fuzzytree.semantics.reference import BELOW_ONE, degree
@@ -301,7 +301,7 @@ def test_a_point_of_three_numbers_is_refused() -> None:
 def test_points_that_become_one_in_float32_are_a_step() -> None:
     close = Points((1.0, 1.0 + 1e-12, 2.0), (0.0, 0.5, 1.0))
     single = np.dtype(np.float32)
-    lines = segments([close], single, single)
+    lines = segments_of([close], single, single)
     assert lines.values[:3].tolist() == [1.0, 1.0, 2.0]
     rules = rules_of(close)
     rows = np.array([[1.0, 1.0 + 2.0**-23, 2.0]])

@@ -12,7 +12,7 @@ import fuzzytree as ft
 from fuzzytree.checking.converting import read_content
 from fuzzytree.checking.systems import check_system
 from fuzzytree.errors import InvalidModelError, LossError, ReadError
-from fuzzytree.exporters import find_format
+from fuzzytree.exporters.table import find_format
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     Conclusion,

@@ -413,7 +413,7 @@ def test_the_example_of_the_page_gives_the_papers_cells() -> None:
 def test_the_commands_of_the_page_write_what_they_say(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from fuzzytree.cli import main
+    from fuzzytree.cli.program import main
 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(DOCS.parents[1] / "examples")

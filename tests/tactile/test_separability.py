@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = {
-    "fuzzytree/cli/__init__.py": 1,
+    "fuzzytree/cli/program.py": 1,
     "fuzzytree/runtimes/onnxruntime.py": 1,
     "schemas/generation.py": 1,
 }

@@ -42,15 +42,12 @@ from fuzzytree.auditing.findings.domains import inputs_of
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Rule, RuleBase, Variable
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.oracle import MISSING, TIE, UNCOVERED, Decisions, decide
-from fuzzytree.semantics.probing import probe_values
-from fuzzytree.semantics.simplification import proof_faults, unguarded
+from fuzzytree.model import Document, FuzzyTree, Rule, RuleBase, Variable
+from fuzzytree.numerics import MISSING, TIE, UNCOVERED, Decisions, decide
+from fuzzytree.semantics import probe_values, proof_faults, unguarded
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 _PROBES = 4_000  # of each model
 _SEGMENTS = 64  # between points of different decisions, halved down to doubles

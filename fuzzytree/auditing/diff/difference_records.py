@@ -15,7 +15,7 @@ from fuzzytree.auditing.findings.records import (
     Measure,
     SourceFile,
 )
-from fuzzytree.model.rulebase import Path, Value
+from fuzzytree.model import Path, Value
 
 FORMAT: Final = "fuzzytree-diff/1"
 

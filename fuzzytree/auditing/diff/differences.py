@@ -22,16 +22,20 @@ from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.checking.converting import kind_of
+from fuzzytree.checking import kind_of
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.positions import in_system
-from fuzzytree.model.agreement import version
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Path, RuleBase, fingerprint, name_choice
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.conversion import as_rules
-from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.formats import in_system
+from fuzzytree.model import (
+    Document,
+    FuzzySystem,
+    FuzzyTree,
+    Path,
+    RuleBase,
+    fingerprint,
+    name_choice,
+    version,
+)
+from fuzzytree.semantics import as_rules, rules_from_tree
 
 
 def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) -> None:

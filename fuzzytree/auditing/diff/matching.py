@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 from fuzzytree.auditing.engine.contenders import AxisKey
 from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
-from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape, shapes_of
+from fuzzytree.model import Clause, Rule, RuleBase, Shape, shapes_of
 
 How = Literal["same", "class", "curves", "clauses"]
 

@@ -22,7 +22,8 @@ from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.measures import curve_distance
 from fuzzytree.auditing.engine.states import answer_text, listed
 from fuzzytree.auditing.findings.records import Measure
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    FuzzyTree,
     Path,
     Rule,
     RuleBase,
@@ -31,8 +32,7 @@ from fuzzytree.model.rulebase import (
     clause_text,
     sentence,
 )
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics import outwards
 
 
 def draft_changes(

@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from fuzzytree.auditing.diff.system_keys import Contribution, contributions, facts_of
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     Formula,
@@ -30,9 +30,8 @@ from fuzzytree.model.system import (
     SystemOutput,
     SystemTerm,
 )
-from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.semantics.conversion import joined_outputs
-from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.numerics import exact_degree
+from fuzzytree.semantics import joined_outputs, shape_of
 
 _ONE = Fraction(1)
 _Operation = Callable[[Fraction, Fraction], Fraction]

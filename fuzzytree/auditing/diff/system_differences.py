@@ -15,9 +15,9 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.model.rulebase import Path
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FuzzySystem,
+    Path,
     RuleBlock,
     SystemInput,
     SystemOutput,

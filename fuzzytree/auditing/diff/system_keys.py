@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     Formula,
@@ -28,11 +27,11 @@ from fuzzytree.model.system import (
     SystemOutput,
     SystemRule,
     SystemTerm,
+    checkpoint,
     names_in,
     questions,
 )
-from fuzzytree.semantics.conversion import joined_outputs
-from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.semantics import joined_outputs, shape_of
 
 _STEPPED = {
     *("drastic product", "nilpotent minimum", "drastic sum", "nilpotent maximum")

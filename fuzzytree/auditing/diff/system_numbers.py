@@ -35,13 +35,13 @@ from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.records import Answer, AuditSettings, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sampled_share
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.numerics.exact import outwards
-from fuzzytree.runtimes.programs import run_system
-from fuzzytree.semantics.probing import system_probes
+from fuzzytree.model import FuzzySystem
+from fuzzytree.numerics import outwards
+from fuzzytree.runtimes import run_system
+from fuzzytree.semantics import system_probes
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, SystemRun
+    from fuzzytree.model import FloatArray, SystemRun
 
 _PROBES = 2_000  # of each system
 _DRAWN = 4_000  # at most, for numbers take longer than decisions

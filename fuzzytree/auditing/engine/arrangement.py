@@ -25,14 +25,13 @@ from fuzzytree.auditing.engine.levels import AlgebraicLevel, level_at, separate_
 from fuzzytree.auditing.engine.linear import ZERO
 from fuzzytree.auditing.engine.pieces import ALWAYS, ChangePoint, RuleCurve, places
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Variable, shapes_of
-from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.model import Clause, Rule, RuleBase, Variable, checkpoint, shapes_of
+from fuzzytree.numerics import exact_degree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import IntArray
+    from fuzzytree.model import IntArray
 
     BoolArray = npt.NDArray[np.bool_]
 

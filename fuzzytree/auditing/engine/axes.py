@@ -31,20 +31,19 @@ from fuzzytree.auditing.engine.polynomials import (
     refined,
     value_at,
 )
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Clause, Shape
-from fuzzytree.numerics.enclosures import (
+from fuzzytree.model import Clause, Shape, checkpoint
+from fuzzytree.numerics import (
     EnclosedValue,
     Enclosure,
     clause_enclosure,
     degree_enclosure,
+    outwards,
 )
-from fuzzytree.numerics.exact import outwards
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     BoolArray = npt.NDArray[np.bool_]
     Values = npt.NDArray[np.float64] | npt.NDArray[np.object_]

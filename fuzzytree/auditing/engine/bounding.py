@@ -37,12 +37,11 @@ from fuzzytree.auditing.engine.states import (
     counted,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.numerics.enclosures import U
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import RuleBase
+from fuzzytree.numerics import U, outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 
 TOO_MANY: Final = "too many boxes are left"

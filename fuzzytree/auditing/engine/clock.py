@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Generator
 from typing import Final
 
-from fuzzytree.model.interrupts import watched
+from fuzzytree.model import watched
 
 GRACE_S: Final = 0.25
 """Seconds beyond the budget in which a caller can return what is known."""

@@ -31,9 +31,8 @@ from fuzzytree.auditing.engine.polynomials import (
     difference,
     roots,
 )
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Conjunction, Part, RuleBase, Shape, shapes_of
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import Conjunction, Part, RuleBase, Shape, checkpoint, shapes_of
+from fuzzytree.numerics import outwards
 
 AxisKey = str | tuple[Part, ...]
 """What an axis is known by in any model: an input, or the summands of a combination."""

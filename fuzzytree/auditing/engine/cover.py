@@ -40,7 +40,7 @@ from fuzzytree.auditing.engine.witnesses import (
     point_with,
     zone_of,
 )
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics import outwards
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs
 _MOST_FINE = 300  # levels that are worth knowing as fractions

@@ -36,14 +36,13 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.ties import decides_by_order
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Clause, RuleBase, Variable, shapes_of
-from fuzzytree.numerics.enclosures import Enclosure, U, axis_value, strength_enclosure
+from fuzzytree.model import Clause, RuleBase, Variable, checkpoint, shapes_of
+from fuzzytree.numerics import Enclosure, U, axis_value, strength_enclosure
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
     BoolArray = npt.NDArray[np.bool_]
 

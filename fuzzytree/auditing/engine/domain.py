@@ -11,9 +11,7 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Literal
 
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Part, Value, Variable, name_choice
-from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model import Document, FuzzySystem, Part, Value, Variable, name_choice
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
 """The origin of a side: the range in the model, the smallest and largest value of the

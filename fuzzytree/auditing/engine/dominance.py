@@ -29,12 +29,12 @@ from fuzzytree.auditing.engine.factors import (
     least_ratios,
     meets,
 )
-from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model import checkpoint
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     BoolArray = npt.NDArray[np.bool_]
     ByteArray = npt.NDArray[np.int8]

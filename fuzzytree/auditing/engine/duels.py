@@ -58,7 +58,7 @@ from fuzzytree.auditing.engine.witnesses import (
     region_around,
     stretch,
 )
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics import outwards
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs, in one question
 _DEEPEST = 4  # halvings of levels for axes that share inputs

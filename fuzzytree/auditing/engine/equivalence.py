@@ -39,7 +39,7 @@ from fuzzytree.auditing.engine.contenders import (
 from fuzzytree.auditing.engine.domain import Domain, linear_form, span
 from fuzzytree.auditing.engine.linear import ZERO, Row, feasible
 from fuzzytree.auditing.engine.states import Bracket, Proved, Span, State, Witness
-from fuzzytree.model.rulebase import RuleBase, Variable
+from fuzzytree.model import RuleBase, Variable
 
 Point = Mapping[str, Fraction]
 

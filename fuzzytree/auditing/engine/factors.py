@@ -33,12 +33,11 @@ from fuzzytree.auditing.engine.polynomials import (
     roots,
     value_at,
 )
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Clause, Shape, shapes_of
+from fuzzytree.model import Clause, Shape, checkpoint, shapes_of
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.arrangement import BoolArray
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 UNKNOWN: Final = Fraction(1 << 4096)
 """The upper bound of a ratio of which none was found."""

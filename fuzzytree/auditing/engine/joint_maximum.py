@@ -43,11 +43,11 @@ from fuzzytree.auditing.engine.witnesses import (
     stretch,
     widest,
 )
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import checkpoint
+from fuzzytree.numerics import outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 
 _MOST_CHOICES = 1000  # of parts of axes that share inputs

@@ -36,13 +36,13 @@ from fuzzytree.auditing.engine.polynomials import (
     roots,
     squarefree,
 )
-from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model import checkpoint
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import IntArray
+    from fuzzytree.model import IntArray
 
 _BITS: Final = (0, 512, 1024, 4096)  # to which places are known, one after another
 

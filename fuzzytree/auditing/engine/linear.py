@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model import checkpoint
 
 ZERO, ONE = Fraction(0), Fraction(1)
 

@@ -34,11 +34,10 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
 )
 from fuzzytree.auditing.engine.ranges import shape_ranges
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Shape
+from fuzzytree.model import Shape, checkpoint
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 
 class Bounds(NamedTuple):

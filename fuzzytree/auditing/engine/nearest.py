@@ -38,12 +38,11 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     point_of,
 )
-from fuzzytree.model.rulebase import Value, Variable
-from fuzzytree.numerics.enclosures import U
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import Value, Variable
+from fuzzytree.numerics import U, outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 
 NARROW = Fraction(1, 1000)

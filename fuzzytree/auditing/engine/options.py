@@ -34,12 +34,12 @@ from fuzzytree.auditing.engine.witnesses import (
     stretch,
     widest,
 )
-from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model import checkpoint
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import IntArray
+    from fuzzytree.model import IntArray
 
 
 def maximal(masks: Iterable[int]) -> tuple[int, ...]:

@@ -30,9 +30,8 @@ from fuzzytree.auditing.engine.polynomials import (
     squarefree,
     value_at,
 )
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side, Value
-from fuzzytree.numerics.exact import CAP
+from fuzzytree.model import LR, Band, Flank, Points, Shape, Side, Value, checkpoint
+from fuzzytree.numerics import CAP
 
 ZERO, ONE = Fraction(0), Fraction(1)
 

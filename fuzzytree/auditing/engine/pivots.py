@@ -31,11 +31,11 @@ from fuzzytree.auditing.engine.witnesses import (
     part_of,
     stretch,
 )
-from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model import checkpoint
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.arrangement import BoolArray
-    from fuzzytree.model.contracts import IntArray
+    from fuzzytree.model import IntArray
 
 
 class TieQuestion(NamedTuple):

@@ -14,8 +14,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Value
+from fuzzytree.model import Value, checkpoint
 
 Polynomial = tuple[Fraction, ...]
 

@@ -19,13 +19,16 @@ from fuzzytree.auditing.engine.domain import Domain, Point, variable_value
 from fuzzytree.auditing.engine.linear import simple
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
 from fuzzytree.auditing.engine.witnesses import is_within, point_with
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Rule, RuleBase, shapes_of
-from fuzzytree.numerics.enclosures import axis_value, clause_enclosure, degree_enclosure
-from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.model import Rule, RuleBase, checkpoint, shapes_of
+from fuzzytree.numerics import (
+    axis_value,
+    clause_enclosure,
+    degree_enclosure,
+    exact_degree,
+)
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 
 _FIRST = 4096  # points drawn in the whole domain

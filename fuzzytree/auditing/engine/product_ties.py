@@ -42,7 +42,7 @@ from fuzzytree.auditing.engine.witnesses import (
     direction_of,
     point_with,
 )
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics import outwards
 
 
 class Run(NamedTuple):

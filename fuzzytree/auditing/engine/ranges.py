@@ -16,17 +16,17 @@ import numpy as np
 
 from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
 from fuzzytree.auditing.engine.polynomials import composed, derivative, roots
-from fuzzytree.model.rulebase import Clause, Shape
-from fuzzytree.numerics.enclosures import (
+from fuzzytree.model import Clause, Shape
+from fuzzytree.numerics import (
     EnclosedValue,
     Enclosure,
     clause_enclosure,
     degree_enclosure,
+    outwards,
 )
-from fuzzytree.numerics.exact import outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 _ZERO = Fraction(0)
 

@@ -21,9 +21,8 @@ from fuzzytree.auditing.engine.domain import (
     variable_value,
 )
 from fuzzytree.auditing.engine.linear import Row, feasible
-from fuzzytree.model.rulebase import Value, Variable
-from fuzzytree.model.tree import Branch, FuzzyTree, intervals
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import Branch, FuzzyTree, Value, Variable, intervals
+from fuzzytree.numerics import outwards
 
 Interval = tuple[float | None, float | None]
 """An open lower and a closed upper end; None is no end."""

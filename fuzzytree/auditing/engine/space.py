@@ -23,15 +23,13 @@ from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, linear_form
 from fuzzytree.auditing.engine.linear import Row, feasible
 from fuzzytree.auditing.engine.ranges import bends, clause_ranges
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Clause, RuleBase, Shape, Variable, shapes_of
-from fuzzytree.numerics.enclosures import LEAST, Enclosure, U
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import Clause, RuleBase, Shape, Variable, checkpoint, shapes_of
+from fuzzytree.numerics import LEAST, Enclosure, U, outwards
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 
 _CELLS = 16  # of a part, in which degrees are enclosed

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Literal
 
-from fuzzytree.model.rulebase import Value
+from fuzzytree.model import Value
 
 Representation = Literal["rules", "tree", "raw rules", "old", "new"]
 """Which model a claim is about: the audited rules, their tree, its raw rules, or one of

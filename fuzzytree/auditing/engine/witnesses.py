@@ -30,7 +30,7 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
 )
 from fuzzytree.auditing.engine.states import Span
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics import outwards
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.axes import Values

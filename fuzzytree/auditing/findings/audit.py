@@ -36,10 +36,14 @@ from fuzzytree.auditing.findings.records import (
 )
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.auditing.findings.views import AuditView, view
-from fuzzytree.model.agreement import version
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import RuleBase, fingerprint, name_choice
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import (
+    Document,
+    FuzzyTree,
+    RuleBase,
+    fingerprint,
+    name_choice,
+    version,
+)
 
 FamilyFunction = Callable[[Subject], Iterator[Answer]]
 

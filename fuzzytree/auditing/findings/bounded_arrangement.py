@@ -37,27 +37,19 @@ from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model.rulebase import (
-    Clause,
-    Points,
-    Rule,
-    RuleBase,
-    Term,
-    Variable,
-    shapes_of,
-)
-from fuzzytree.numerics.enclosures import (
+from fuzzytree.model import Clause, Points, Rule, RuleBase, Term, Variable, shapes_of
+from fuzzytree.numerics import (
     EnclosedValue,
     Enclosure,
     clause_enclosure,
     degree_enclosure,
+    outwards,
     strength_enclosure,
 )
-from fuzzytree.numerics.exact import outwards
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.arrangement import BoolArray
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 
 _BELOW: Final = "from below: "

@@ -30,11 +30,11 @@ from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.auditing.findings.support import sample_points
-from fuzzytree.model.rulebase import Clause, Rule, RuleBase, clause_text
-from fuzzytree.numerics.oracle import decide
+from fuzzytree.model import Clause, Rule, RuleBase, clause_text
+from fuzzytree.numerics import decide
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 MOST_ROWS: Final = 4096
 """The most rows that are drawn to find an input where a clause matters."""

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from fuzzytree.auditing.findings.records import Severity
-from fuzzytree.model.rulebase import Value
+from fuzzytree.model import Value
 
 
 class Code(Value, frozen=True):

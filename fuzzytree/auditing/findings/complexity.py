@@ -24,8 +24,7 @@ from fuzzytree.auditing.engine.states import Proved, counted, short
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import FuzzyTree, RuleBase
 
 
 def answers(subject: Subject) -> Iterator[Answer]:

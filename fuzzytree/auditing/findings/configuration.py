@@ -26,12 +26,17 @@ from msgspec import Meta, field
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.formats.text_files import FileMistake, report
-from fuzzytree.formats.yaml.binding import bind, find
-from fuzzytree.formats.yaml.layout import FileRecord, Name
-from fuzzytree.formats.yaml.nodes import MappingNode, compose
-from fuzzytree.model.naming import as_names
-from fuzzytree.model.rulebase import name_choice
+from fuzzytree.formats import (
+    FileMistake,
+    FileRecord,
+    MappingNode,
+    Name,
+    bind,
+    compose,
+    find,
+    report,
+)
+from fuzzytree.model import as_names, name_choice
 
 _RANGES: Mapping[str, tuple[float, float, str]] = {
     "epsilon": (0.0, 1.0, "above 0 and at most 1"),

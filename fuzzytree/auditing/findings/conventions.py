@@ -25,22 +25,17 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import rows_outside, sample_points
-from fuzzytree.checking.comparing import ModelRun, labels
+from fuzzytree.checking import ModelRun, labels
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Model, SystemOutcome
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.oracle import TIE, decide, exact_answer
+from fuzzytree.model import FuzzySystem, FuzzyTree, Model, RuleBase, SystemOutcome
+from fuzzytree.numerics import TIE, decide, exact_answer
 from fuzzytree.runtimes import all_runtimes, is_installed
-from fuzzytree.semantics.lowering import forms
-from fuzzytree.semantics.probing import few_probes, probe_values
-from fuzzytree.semantics.reference import Status
+from fuzzytree.semantics import Status, few_probes, forms, probe_values
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray, Run, Runtime, SystemRun
+    from fuzzytree.model import FloatArray, IntArray, Run, Runtime, SystemRun
 
     BoolArray = npt.NDArray[np.bool_]
 

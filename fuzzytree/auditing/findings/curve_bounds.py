@@ -34,8 +34,8 @@ from typing import Final, Literal, NamedTuple
 
 from fuzzytree.auditing.engine.pieces import RuleCurve
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import MOST_POINTS, Points, Shape
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    MOST_POINTS,
     Bell,
     Concave,
     Cosine,
@@ -43,15 +43,16 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     PiCurve,
+    Points,
     SCurve,
+    Shape,
     Sigmoid,
     SigmoidProduct,
     Spike,
     TwoGaussians,
 )
-from fuzzytree.numerics.curve_values import Between, degree_between, powered, root
-from fuzzytree.numerics.exact import outwards
-from fuzzytree.semantics.conversion.points import points_for
+from fuzzytree.numerics import Between, degree_between, outwards, powered, root
+from fuzzytree.semantics import points_for
 
 HALF_GAP: Final = 2.0**-11
 """How far a curve is from the points in its place at most."""

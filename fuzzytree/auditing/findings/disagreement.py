@@ -48,10 +48,8 @@ from fuzzytree.auditing.findings.rows import (
     rows_left_out,
 )
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.exact import outwards
-from fuzzytree.numerics.oracle import decide
+from fuzzytree.model import FuzzyTree, RuleBase
+from fuzzytree.numerics import decide, outwards
 
 MOST_ROWS = 2000
 """Rows around which the nearest disagreement is sought."""

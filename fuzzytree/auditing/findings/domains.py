@@ -11,20 +11,23 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import LR, Band, Points, Variable
-from fuzzytree.model.system import FuzzySystem, SystemInput
-from fuzzytree.model.system.curves import (
+from fuzzytree.model import (
+    LR,
     Arc,
+    Band,
     Bell,
     Binary,
     Concave,
     Cosine,
     Curve,
+    Document,
     Formula,
+    FuzzySystem,
+    FuzzyTree,
     Gaussian,
     Linear,
     PiCurve,
+    Points,
     SCurve,
     SemiEllipse,
     Sigmoid,
@@ -32,13 +35,14 @@ from fuzzytree.model.system.curves import (
     SigmoidProduct,
     Singleton,
     Spike,
+    SystemInput,
     Trapezoid,
     TwoGaussians,
+    Variable,
 )
-from fuzzytree.model.tree import FuzzyTree
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 Within = Literal["model", "data"]
 

@@ -22,7 +22,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.rows import rank_by_distance
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics import outwards
 
 MOST_GAPS: Final = 8
 """The most gaps that are listed one by one."""

@@ -28,7 +28,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import FuzzyTree
 
 MOST_BOXES = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""

@@ -9,12 +9,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import msgspec
 
 from fuzzytree.auditing.findings.records import Answer, FileLocation, TermName
-from fuzzytree.checking.converting import format_of
+from fuzzytree.checking import format_of
 from fuzzytree.errors import ReadError
-from fuzzytree.model.contracts import Document, Locate
-from fuzzytree.model.rulebase import Path, Rule, RuleBase, sentence, shapes_of
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import (
+    Document,
+    FuzzySystem,
+    FuzzyTree,
+    Locate,
+    Path,
+    Rule,
+    RuleBase,
+    sentence,
+    shapes_of,
+)
 
 
 def _nowhere(_: Path) -> None:

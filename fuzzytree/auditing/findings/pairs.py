@@ -28,7 +28,7 @@ from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 NEARLY: Final = Fraction(1, 10**6)
 """Two antecedents are nearly the same if no degree differs by more than this."""

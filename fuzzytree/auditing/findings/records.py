@@ -12,7 +12,7 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Span, State
-from fuzzytree.model.rulebase import Value, summary
+from fuzzytree.model import Value, summary
 
 FORMAT: Final = "fuzzytree-audit/1"
 INTERRUPTED: Final = "interrupted"

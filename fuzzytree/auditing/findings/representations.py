@@ -20,18 +20,15 @@ from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
-from fuzzytree.checking.comparing import probed
-from fuzzytree.checking.models import check
-from fuzzytree.checking.systems import check_system
-from fuzzytree.model.agreement import Agreement, Basis, Certified, Comparison
-from fuzzytree.model.contracts import Dtype, Model
-from fuzzytree.numerics.bounds import Certificate, certify
+from fuzzytree.checking import check, check_system, probed
+from fuzzytree.model import Agreement, Basis, Certified, Comparison, Dtype, Model
+from fuzzytree.numerics import Certificate, certify
 from fuzzytree.runtimes import all_runtimes
-from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics import forms
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
-    from fuzzytree.runtimes.onnxruntime import OnnxModel
+    from fuzzytree.model import FloatArray
+    from fuzzytree.runtimes import OnnxModel
 
 
 RUNTIMES: Final = (

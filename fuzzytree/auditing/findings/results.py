@@ -13,12 +13,10 @@ from msgspec import inspect
 
 from fuzzytree.auditing.findings.locations import writable
 from fuzzytree.auditing.findings.records import Audit, SourceFile, VerbResult, digest_of
-from fuzzytree.checking.stability.results import Stability
+from fuzzytree.checking import Stability
 from fuzzytree.errors import ReadError
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.model.agreement import Agreement, version
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model import Agreement, Document, fingerprint, version
 
 _MOST_BYTES = 64 * 2**20
 _KINDS: dict[str, type[Agreement] | type[Stability]] = {

@@ -53,8 +53,8 @@ from fuzzytree.auditing.findings.rows import (
     rows_left_out,
 )
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import FuzzyTree
+from fuzzytree.numerics import outwards
 
 Point = dict[str, Fraction]
 

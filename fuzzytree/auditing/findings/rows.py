@@ -24,9 +24,8 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
-from fuzzytree.model.rulebase import Variable
-from fuzzytree.numerics.exact import outwards
-from fuzzytree.numerics.oracle import decide
+from fuzzytree.model import Variable
+from fuzzytree.numerics import decide, outwards
 
 OF_RANGES = "of each input's range"
 """The unit of distances: the largest difference of an input, in its range's width."""

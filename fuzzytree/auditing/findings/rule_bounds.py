@@ -30,7 +30,7 @@ from fuzzytree.auditing.findings.curve_bounds import (
     gap,
     scale,
 )
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     Clause,
     Points,
     Rule,
@@ -40,7 +40,7 @@ from fuzzytree.model.rulebase import (
     Variable,
     shapes_of,
 )
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics import outwards
 
 
 class BoundedRules(msgspec.Struct, frozen=True, eq=False, dict=True):

@@ -17,15 +17,12 @@ from fuzzytree.auditing.findings.records import (
     SourceFile,
 )
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.model import Document, FuzzySystem, FuzzyTree, RuleBase
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.findings.locations import ModelFile
     from fuzzytree.auditing.findings.results import LoadedResult
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 
 class AuditRows(msgspec.Struct, frozen=True, eq=False):

@@ -19,18 +19,16 @@ from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
-from fuzzytree.model.rulebase import Clause, RuleBase, shapes_of
-from fuzzytree.numerics.enclosures import (
-    Enclosure,
-    axis_value,
-    clause_enclosure,
-    degree_enclosure,
-)
-from fuzzytree.numerics.oracle import (
+from fuzzytree.model import Clause, RuleBase, shapes_of
+from fuzzytree.numerics import (
     MISSING,
     UNCOVERED,
     Decisions,
+    Enclosure,
+    axis_value,
+    clause_enclosure,
     decide,
+    degree_enclosure,
     exact_answer,
     exact_axis,
     outwards,
@@ -39,7 +37,7 @@ from fuzzytree.numerics.oracle import (
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
     BoolArray = npt.NDArray[np.bool_]
 

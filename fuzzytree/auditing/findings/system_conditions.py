@@ -27,29 +27,27 @@ from fuzzytree.auditing.findings.curve_bounds import (
     scale,
 )
 from fuzzytree.auditing.findings.records import Answer, TermName
-from fuzzytree.model.rulebase import (
-    Clause,
-    Conjunction,
-    Points,
-    Shape,
-    Term,
-    Variable,
-    shape_mistakes,
-)
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
+    Clause,
     Condition,
+    Conjunction,
     FuzzySystem,
     Hedge,
     Is,
     Not,
     Or,
+    Points,
     RuleBlock,
+    Shape,
     SystemInput,
+    Term,
+    Variable,
     questions,
+    shape_mistakes,
 )
-from fuzzytree.model.system import SystemTerm as SystemLabel
-from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.model import SystemTerm as SystemLabel
+from fuzzytree.semantics import shape_of
 
 
 class SystemTerms:

@@ -39,7 +39,7 @@ from fuzzytree.auditing.findings.terms import (
     ranges,
     term_name,
 )
-from fuzzytree.model.rulebase import Points, Shape, Term
+from fuzzytree.model import Points, Shape, Term
 
 SHALLOW: Final = Fraction(1, 100)
 """Excesses and dips of degrees below this are counted and not listed."""

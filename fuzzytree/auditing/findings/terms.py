@@ -14,9 +14,8 @@ from fuzzytree.auditing.engine.pieces import RuleCurve, pieces
 from fuzzytree.auditing.engine.states import Bracket, Proved, counted, short
 from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model.rulebase import Term, Variable
-from fuzzytree.model.system import questions
-from fuzzytree.numerics.exact import outwards
+from fuzzytree.model import Term, Variable, questions
+from fuzzytree.numerics import outwards
 
 
 class VariableRange(NamedTuple):

@@ -34,21 +34,23 @@ from fuzzytree.auditing.findings.system_conditions import (
     ranges_of,
     terms_of,
 )
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Conjunction, Rule, RuleBase, Semantics
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
+    Conjunction,
+    Document,
     FuzzySystem,
+    FuzzyTree,
+    Rule,
+    RuleBase,
     RuleBlock,
+    Semantics,
     SystemInput,
     SystemRule,
     joints,
     questions,
 )
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.conversion import as_rules
-from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics import as_rules, rules_from_tree
 
 
 class AuditView(msgspec.Struct, frozen=True, eq=False):

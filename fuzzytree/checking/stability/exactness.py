@@ -19,13 +19,12 @@ from fuzzytree.checking.stability.runs import (
 from fuzzytree.checking.stability.sensitivity import InputScale, input_scales
 from fuzzytree.checking.stability.transforms import moved
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
-from fuzzytree.numerics.oracle import Decisions, decide
-from fuzzytree.semantics.lowering import forms
-from fuzzytree.semantics.probing import probe_values
+from fuzzytree.model import Dtype, Model, Outcome, Runtime
+from fuzzytree.numerics import Decisions, decide
+from fuzzytree.semantics import forms, probe_values
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _ADVICE = (
     "the runtime computes something else, or in another number type than it says; "

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import msgspec
 
-from fuzzytree.model.agreement import version
+from fuzzytree.model import version
 
 Verdict = Literal["holds", "FAILS", "not applicable"]
 

@@ -11,17 +11,21 @@ from fuzzytree.checking.equivalence import is_equivalent
 from fuzzytree.checking.stability.results import Criterion, judged
 from fuzzytree.checking.stability.runs import first_line, unequal
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
-from fuzzytree.model.contracts import Dtype, Format, Model, Outcome, Run, Written
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
-from fuzzytree.runtimes import baseline
-from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.runtimes.python import load_content
-from fuzzytree.semantics.conversion.points import EXACT
-from fuzzytree.semantics.lowering import forms
+from fuzzytree.model import (
+    Dtype,
+    Format,
+    FuzzySystem,
+    Model,
+    Outcome,
+    RuleBase,
+    Run,
+    Written,
+)
+from fuzzytree.runtimes import baseline, load_content, open_onnx
+from fuzzytree.semantics import EXACT, forms
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _ADVICE = "keep the YAML file as the model, and do not ship the file that failed"
 

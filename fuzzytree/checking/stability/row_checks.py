@@ -22,12 +22,12 @@ from fuzzytree.checking.stability.runs import (
 )
 from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
 from fuzzytree.errors import InvalidModelError, LossError
-from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
-from fuzzytree.semantics.reference import Status
+from fuzzytree.model import Dtype, Model, Outcome, Runtime
+from fuzzytree.semantics import Status
 
 if TYPE_CHECKING:
     from fuzzytree.checking.stability.runs import BoolArray
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 BATCHES = (1, 7, 33, 1000)
 """Rows answered at a time."""

@@ -18,16 +18,19 @@ import numpy.typing as npt
 
 from fuzzytree.checking.comparing import ModelRun, labels, same_bits
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Dtype, Model, Outcome, Run, Runtime
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.bounds import open_paths, strength_bounds
-from fuzzytree.numerics.oracle import Decisions, decide, strength_errors
+from fuzzytree.model import Dtype, FuzzyTree, Model, Outcome, RuleBase, Run, Runtime
+from fuzzytree.numerics import (
+    Decisions,
+    decide,
+    open_paths,
+    strength_bounds,
+    strength_errors,
+)
 from fuzzytree.runtimes import is_installed, needed_by
-from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics import forms
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
     BoolArray = npt.NDArray[np.bool_]
 

@@ -15,17 +15,22 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.checking.stability.results import Criterion, CurveFault, Stiff, judged
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import LR, Band, Points, RuleBase, Shape, Term, Variable
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.numerics.bounds import UNIT, degree_bound
-from fuzzytree.numerics.conditioning import Conduct, conduct
-from fuzzytree.numerics.oracle import Decisions, decide
-from fuzzytree.semantics.lowering import forms
-from fuzzytree.semantics.probing import landmarks
+from fuzzytree.model import (
+    LR,
+    Band,
+    FuzzyTree,
+    Model,
+    Points,
+    RuleBase,
+    Shape,
+    Term,
+    Variable,
+)
+from fuzzytree.numerics import UNIT, Conduct, Decisions, conduct, decide, degree_bound
+from fuzzytree.semantics import forms, landmarks
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 SAFE = 1e-4
 """The error of a degree up to which a number type is called safe."""

@@ -26,26 +26,28 @@ from fuzzytree.checking.stability.runs import (
     unequal,
 )
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
     Clause,
+    Dtype,
     Flank,
+    Model,
+    Outcome,
     Points,
     Rule,
     RuleBase,
+    Runtime,
     Shape,
     Side,
     Term,
     Variable,
 )
-from fuzzytree.numerics.oracle import exact_degree
-from fuzzytree.semantics.lowering import forms
-from fuzzytree.semantics.probing import landmarks, neighbours
+from fuzzytree.numerics import exact_degree
+from fuzzytree.semantics import forms, landmarks, neighbours
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 Demand = Literal["one", "below one", "zero"]
 

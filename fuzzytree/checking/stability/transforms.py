@@ -10,11 +10,13 @@ from typing import TypeVar, assert_never
 import msgspec
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Dtype, Model
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
+    Dtype,
     Flank,
+    FuzzyTree,
+    Model,
     Part,
     Points,
     Shape,
@@ -22,7 +24,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.tree import FuzzyTree
 
 AnyModel = TypeVar("AnyModel", bound=Model)
 

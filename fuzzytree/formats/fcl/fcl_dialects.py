@@ -25,8 +25,7 @@ from fuzzytree.formats.fcl.fcl_syntax import (
 from fuzzytree.formats.fll.fll_terms import CLASSES
 from fuzzytree.formats.fll.fll_words import FLL_METHODS, S_NORMS, T_NORMS, Method
 from fuzzytree.formats.text_files import ReaderNotes
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import Defuzzifier, SNorm, TNorm
+from fuzzytree.model import Defuzzifier, SNorm, TNorm, name_choice
 
 _Norm = TypeVar("_Norm")
 

@@ -45,17 +45,19 @@ from fuzzytree.formats.fll.fll_differences import constant_degrees, fuzzylite_lo
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree
 from fuzzytree.formats.positions import PositionGroup, Positions
 from fuzzytree.formats.text_files import PartError, ReaderNotes, number_of, report
-from fuzzytree.model.contracts import Document, Locate, Reading
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Defuzzifier,
+    Document,
     FuzzySystem,
+    Locate,
+    Reading,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemTerm,
+    name_choice,
 )
-from fuzzytree.semantics.conversion import as_rules, joined_by_number
+from fuzzytree.semantics import as_rules, joined_by_number
 
 FACTS = " facts "
 """How the comment begins that says what rules have no place for in a system."""

@@ -27,21 +27,22 @@ from fuzzytree.formats.fcl.fcl_syntax import (
     raw,
 )
 from fuzzytree.formats.text_files import ReaderNotes, number_of
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import Points, name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
     FuzzySystem,
     Hedge,
     Is,
+    Loss,
     Not,
     Or,
+    Points,
     RuleBlock,
     SNorm,
     SystemRule,
     TNorm,
+    name_choice,
     questions,
 )
 

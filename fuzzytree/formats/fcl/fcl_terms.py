@@ -13,13 +13,15 @@ from fuzzytree.formats.fcl.fcl_dialects import Dialect
 from fuzzytree.formats.fcl.fcl_syntax import TermStatement, place
 from fuzzytree.formats.fll.fll_terms import CLASSES, FllTerm, TermScope, read_term
 from fuzzytree.formats.text_files import PartError, Word, number_of
-from fuzzytree.model.rulebase import LR, Band, Points, name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    LR,
+    Band,
     Bell,
     Cosine,
     Curve,
     Gaussian,
     PiCurve,
+    Points,
     Sigmoid,
     SigmoidDifference,
     SigmoidProduct,
@@ -28,6 +30,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
     curve_mistakes,
+    name_choice,
 )
 
 _FORMULA = "FUNCTION"

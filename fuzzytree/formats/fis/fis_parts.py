@@ -12,9 +12,7 @@ from fuzzytree.formats.fis.fis_text import FisEntry
 from fuzzytree.formats.fis.fis_words import Dialect
 from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import ReaderNotes
-from fuzzytree.model.naming import numbered
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -32,6 +30,8 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
     curve_mistakes,
+    name_choice,
+    numbered,
 )
 
 About = tuple[str, Dialect, tuple[bool, int] | None]

@@ -24,20 +24,22 @@ from fuzzytree.formats.fis.fis_words import Dialect
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
 from fuzzytree.formats.positions import Positions
 from fuzzytree.formats.text_files import ReaderNotes, number_of, report
-from fuzzytree.model.contracts import Locate, Reading
-from fuzzytree.model.naming import numbered, printable
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
+    Locate,
+    Reading,
     RuleBlock,
     SNorm,
     SystemInput,
     SystemOutput,
     SystemRule,
     TNorm,
+    name_choice,
+    numbered,
+    printable,
 )
-from fuzzytree.semantics.conversion import as_written, joined_by_number
+from fuzzytree.semantics import as_written, joined_by_number
 
 DIALECT: Final = "dialect: "
 

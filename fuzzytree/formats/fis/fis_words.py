@@ -12,8 +12,8 @@ from typing import Final, Literal, get_args
 
 import msgspec
 
-from fuzzytree.model.rulebase import MOST_POINTS, Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    MOST_POINTS,
     Bell,
     Binary,
     Concave,
@@ -22,6 +22,7 @@ from fuzzytree.model.system import (
     Gaussian,
     Hedge,
     PiCurve,
+    Points,
     SCurve,
     Sigmoid,
     SigmoidDifference,

@@ -6,9 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Arc,
     Call,
     Concave,
@@ -17,7 +15,9 @@ from fuzzytree.model.system import (
     Formula,
     FuzzySystem,
     Linear,
+    Loss,
     Number,
+    Points,
     SCurve,
     SemiEllipse,
     Singleton,
@@ -25,7 +25,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     names_in,
 )
-from fuzzytree.semantics.inference import value_at
+from fuzzytree.semantics import value_at
 
 
 def differences(system: FuzzySystem) -> Iterator[str]:

@@ -34,25 +34,26 @@ from fuzzytree.formats.text_files import (
     number_of,
     report,
 )
-from fuzzytree.model.contracts import Locate, Reading
-from fuzzytree.model.naming import printable
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     Defuzzifier,
     FuzzySystem,
     Is,
+    Locate,
     Not,
     Or,
+    Points,
+    Reading,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
     SystemTerm,
+    printable,
 )
-from fuzzytree.semantics.conversion import as_written
+from fuzzytree.semantics import as_written
 
 
 def read_fll(content: bytes, name: str) -> Reading:

@@ -14,8 +14,7 @@ from fuzzytree.formats.text_files import (
     Word,
     number_of,
 )
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     MOST_LEVELS,
     And,
     Conclusion,
@@ -24,6 +23,7 @@ from fuzzytree.model.system import (
     Is,
     Or,
     SystemRule,
+    name_choice,
 )
 
 FLL_HEDGES: Mapping[str, Hedge] = {

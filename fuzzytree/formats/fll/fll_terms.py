@@ -10,8 +10,7 @@ import msgspec
 
 from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import FileMistake, PartError, Word, number_of
-from fuzzytree.model.rulebase import Points, name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Arc,
     Bell,
     Binary,
@@ -26,6 +25,7 @@ from fuzzytree.model.system import (
     Name,
     Number,
     PiCurve,
+    Points,
     SCurve,
     SemiEllipse,
     Sigmoid,
@@ -37,8 +37,9 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
     curve_mistakes,
+    name_choice,
 )
-from fuzzytree.semantics.conversion.points import stepped
+from fuzzytree.semantics import stepped
 
 _FURTHEST: Final = 1e308  # an end that no value comes near
 

@@ -17,8 +17,7 @@ from fuzzytree.formats.text_files import (
     split_lines,
     words,
 )
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import Activation, Defuzzifier, SNorm, TNorm
+from fuzzytree.model import Activation, Defuzzifier, SNorm, TNorm, name_choice
 
 KEYS: Mapping[str, tuple[str, ...]] = {
     "Engine": ("description",),

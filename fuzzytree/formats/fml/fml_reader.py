@@ -19,21 +19,23 @@ from fuzzytree.formats.fml.fml_words import CIRCULAR, curve_of, number
 from fuzzytree.formats.fml.xml import FmlElement
 from fuzzytree.formats.positions import PositionGroup, Positions
 from fuzzytree.formats.text_files import ReaderNotes, report
-from fuzzytree.model.contracts import Locate, Reading
-from fuzzytree.model.naming import numbered
-from fuzzytree.model.rulebase import Points, name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Linear,
+    Locate,
+    Points,
+    Reading,
     RuleBlock,
     SCurve,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemTerm,
+    name_choice,
+    numbered,
 )
-from fuzzytree.semantics.conversion import as_written
+from fuzzytree.semantics import as_written
 
 _T = TypeVar("_T")
 

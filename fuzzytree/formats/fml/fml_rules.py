@@ -11,8 +11,7 @@ from fuzzytree.formats.fml import fml_words as words
 from fuzzytree.formats.fml.fml_words import number
 from fuzzytree.formats.fml.xml import FmlElement
 from fuzzytree.formats.text_files import ReaderNotes
-from fuzzytree.model.rulebase import name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -25,6 +24,7 @@ from fuzzytree.model.system import (
     SystemOutput,
     SystemRule,
     TNorm,
+    name_choice,
 )
 
 _Norm = TypeVar("_Norm")

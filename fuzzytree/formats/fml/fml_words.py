@@ -8,13 +8,13 @@ from typing import Final, Literal
 
 from fuzzytree.formats.fml.xml import FmlElement
 from fuzzytree.formats.text_files import ReaderNotes, number_of
-from fuzzytree.model.rulebase import Points, name_choice
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Curve,
     Defuzzifier,
     Gaussian,
     Hedge,
     PiCurve,
+    Points,
     SCurve,
     Singleton,
     SNorm,
@@ -22,6 +22,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
     curve_mistakes,
+    name_choice,
 )
 
 NAMESPACE: Final = "http://www.ieee1855.org"

@@ -20,7 +20,7 @@ from fuzzytree.formats.yaml.nodes import (
     Scalar,
     meaning,
 )
-from fuzzytree.model.rulebase import Mistake, Path
+from fuzzytree.model import Mistake, Path
 
 R = TypeVar("R", bound=FileRecord)
 Entries = dict[str, Node]

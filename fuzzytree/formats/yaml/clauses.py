@@ -13,17 +13,23 @@ import msgspec
 from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.binding import shortened
-from fuzzytree.model.rulebase import Clause, Mistake, Path, Rule, Variable, clause_text
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
+    Branch,
+    Clause,
     Condition,
+    Mistake,
+    Node,
     Or,
+    Path,
+    Rule,
     RuleBlock,
     SNorm,
     SystemRule,
     TNorm,
+    Variable,
+    clause_text,
 )
-from fuzzytree.model.tree import Branch, Node
 
 _IS: Final = " is "
 _OR: Final = " or "

@@ -16,16 +16,7 @@ from typing import Final, get_args
 
 import msgspec
 
-from fuzzytree.model.system import (
-    MOST_LEVELS,
-    And,
-    Conclusion,
-    Condition,
-    Hedge,
-    Is,
-    Not,
-    Or,
-)
+from fuzzytree.model import MOST_LEVELS, And, Conclusion, Condition, Hedge, Is, Not, Or
 
 ALWAYS: Final = "always"
 HEDGES: Final[Mapping[str, Hedge]] = {

@@ -13,18 +13,19 @@ from msgspec import Meta, field
 
 from fuzzytree.formats.formulas import MOST_CHARACTERS
 from fuzzytree.formats.text_files import LONGEST_NAME
-from fuzzytree.model.rulebase import MOST_POINTS, LabelType
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    MOST_POINTS,
     MOST_SAMPLES,
     ActivationMethod,
     DefuzzifierMethod,
     Grid,
+    LabelType,
     Relation,
     SNorm,
     TNorm,
 )
 
-FORMAT: Final = "fuzzytree/1"
+YAML_FORMAT: Final = "fuzzytree/1"
 LONGEST_SENTENCE: Final = 100_000
 LARGEST_COUNT: Final = 2**53
 

@@ -29,10 +29,10 @@ from fuzzytree.formats.yaml.conditions import (
     parse_condition,
 )
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar
-from fuzzytree.model.rulebase import Band, Mistake, Part, Path
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     Arc,
+    Band,
     Bell,
     Binary,
     Concave,
@@ -45,7 +45,10 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Gaussian,
     Linear,
+    Mistake,
     Number,
+    Part,
+    Path,
     PiCurve,
     RuleBlock,
     SCurve,

@@ -5,19 +5,22 @@ from __future__ import annotations
 import msgspec
 
 from fuzzytree.formats.yaml import layout
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     Band,
+    Branch,
     Flank,
+    Leaf,
+    Node,
     Part,
     Points,
     Semantics,
+    Sets,
     Shape,
     Side,
     Term,
     Variable,
 )
-from fuzzytree.model.tree import Branch, Leaf, Node, Sets
 
 
 def variable(one: layout.VariableOfModel) -> Variable:

@@ -35,18 +35,20 @@ from fuzzytree.formats.yaml.clauses import (
 from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
 from fuzzytree.formats.yaml.system_reader import read_system
-from fuzzytree.model.contracts import Document, Locate, Reading
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     Band,
+    Document,
+    FuzzyTree,
+    Locate,
     Mistake,
     Path,
+    Reading,
     RuleBase,
     Term,
     Variable,
     naming_mistakes,
     variable_mistakes,
 )
-from fuzzytree.model.tree import FuzzyTree
 
 R = TypeVar("R")
 
@@ -116,13 +118,13 @@ def _check_format(root: MappingNode) -> None:
         text = "no 'format: fuzzytree/1' says what this file is"
         raise _UnreadableError((root.line, root.column, text))
     value = node.text if isinstance(node, Scalar) else ""
-    if value == layout.FORMAT:
+    if value == layout.YAML_FORMAT:
         return
-    text = f"'format' must be {layout.FORMAT!r}"
+    text = f"'format' must be {layout.YAML_FORMAT!r}"
     if re.fullmatch(r"fuzzytree/[1-9][0-9]{0,8}", value):
         text = (
             f"a file of format {value!r} needs a newer fuzzytree, one that reads "
-            f"{value!r}; this one reads {layout.FORMAT!r}"
+            f"{value!r}; this one reads {layout.YAML_FORMAT!r}"
         )
     raise _UnreadableError((node.line, node.column, text))
 

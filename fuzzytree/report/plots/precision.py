@@ -7,8 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from fuzzytree.benchmarking.front import error_of
-from fuzzytree.benchmarking.records import Kind, Point, Question, Study, Timing
+from fuzzytree.benchmarking import Kind, Point, Question, Study, Timing, error_of
 from fuzzytree.report.plots.saving import style
 from fuzzytree.report.plots.sheet import SIZE
 from fuzzytree.report.text import counted

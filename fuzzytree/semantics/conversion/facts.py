@@ -16,26 +16,24 @@ import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    Activation,
+    And,
     Clause,
+    Condition,
+    FuzzySystem,
+    Is,
     Kind,
+    Not,
+    Or,
     Part,
     Rule,
     RuleBase,
+    RuleBlock,
     Semantics,
     Term,
     Value,
     Variable,
-)
-from fuzzytree.model.system import (
-    Activation,
-    And,
-    Condition,
-    FuzzySystem,
-    Is,
-    Not,
-    Or,
-    RuleBlock,
     questions,
 )
 from fuzzytree.semantics.conversion.points import shape_of

@@ -21,7 +21,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Arc,
     Bell,
     Concave,

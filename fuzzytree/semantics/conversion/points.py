@@ -29,26 +29,23 @@ from typing import NamedTuple, TypeVar, get_args
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
     LR,
     MOST_POINTS,
     Band,
-    Points,
-    RuleBase,
-    Shape,
-    Term,
-)
-from fuzzytree.model.system import (
     Binary,
     Curve,
     FuzzySystem,
+    Loss,
+    Points,
+    RuleBase,
+    Shape,
     Singleton,
     SystemTerm,
+    Term,
     Trapezoid,
 )
-from fuzzytree.numerics.curves import BELOW_ONE
-from fuzzytree.numerics.placing import points_of
+from fuzzytree.numerics import BELOW_ONE, points_of
 from fuzzytree.semantics.conversion.point_plans import CurvePiece, PointPlan, plan_of
 from fuzzytree.semantics.inference.membership import curve_degree
 

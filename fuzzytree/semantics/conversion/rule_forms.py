@@ -15,14 +15,14 @@ from collections.abc import Iterable, Iterator
 
 from msgspec.structs import replace
 
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     Curve,
     FuzzySystem,
     Hedge,
     Is,
+    Loss,
     Not,
     Or,
     RuleBlock,

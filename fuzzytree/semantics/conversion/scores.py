@@ -38,12 +38,10 @@ from typing import Literal, NamedTuple
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Loss
-from fuzzytree.model.naming import unlike
-from fuzzytree.model.rulebase import Clause, Points, RuleBase, Variable
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
+    Clause,
     Conclusion,
     Condition,
     Defuzzifier,
@@ -51,8 +49,11 @@ from fuzzytree.model.system import (
     FuzzySystem,
     Is,
     Linear,
+    Loss,
     Not,
     Or,
+    Points,
+    RuleBase,
     RuleBlock,
     Singleton,
     SystemInput,
@@ -60,7 +61,9 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
     TNorm,
+    Variable,
     questions,
+    unlike,
 )
 
 Scores = Literal["rule", "class", "winner"]

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FUNCTIONS,
     Activation,
     And,

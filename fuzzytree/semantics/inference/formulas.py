@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from fuzzytree.model.system import Call, Expression, Name, Number
+from fuzzytree.model import Call, Expression, Name, Number
 
 
 def value_of(expression: Expression, names: Mapping[str, float]) -> float:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Final, assert_never
 
-from fuzzytree.model.rulebase import LR, Band, Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    LR,
     Arc,
+    Band,
     Bell,
     Binary,
     Concave,
@@ -18,6 +19,7 @@ from fuzzytree.model.system import (
     Gaussian,
     Linear,
     PiCurve,
+    Points,
     SCurve,
     SemiEllipse,
     Sigmoid,

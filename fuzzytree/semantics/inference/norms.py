@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
-from fuzzytree.model.system import Hedge, SNorm, TNorm
+from fuzzytree.model import Hedge, SNorm, TNorm
 from fuzzytree.semantics.inference.formulas import (
     maximum,
     minimum,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from fuzzytree.model.system import Call, Expression, Name, Number
+from fuzzytree.model import Call, Expression, Name, Number
 from fuzzytree.semantics.programs.steps import Maker
 
 _SAME: Mapping[str, str] = {

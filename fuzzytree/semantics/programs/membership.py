@@ -13,20 +13,25 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import assert_never
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side, Variable
-from fuzzytree.model.system import (
+from fuzzytree.model import (
+    LR,
     Arc,
+    Band,
     Bell,
     Binary,
     Concave,
     Cosine,
     Curve,
+    Flank,
     Formula,
     Gaussian,
     Linear,
     PiCurve,
+    Points,
     SCurve,
     SemiEllipse,
+    Shape,
+    Side,
     Sigmoid,
     SigmoidDifference,
     SigmoidProduct,
@@ -34,9 +39,11 @@ from fuzzytree.model.system import (
     Spike,
     Trapezoid,
     TwoGaussians,
+    Variable,
 )
 from fuzzytree.semantics.programs.formulas import as_number, value_of
 from fuzzytree.semantics.programs.steps import Maker
+from fuzzytree.semantics.reference import BELOW_ONE
 
 
 def is_unit(curve: Curve) -> bool:
@@ -260,8 +267,6 @@ def _semi_ellipse(make: Maker, x: int, start: float, end: float) -> int:
     inside = make("and", above, make("at_most", x, make.constant(end)))
     return make("where", inside, degree, make.constant(0.0))
 
-
-BELOW_ONE = 1.0 - 2.0**-53
 
 FEW_POINTS = 8
 """Up to so many points each line has steps of its own; more are looked up."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from fuzzytree.model.system import Activation, Hedge, SNorm, TNorm
+from fuzzytree.model import Activation, Hedge, SNorm, TNorm
 from fuzzytree.semantics.programs.steps import Maker
 
 Norm = Callable[[Maker, int, int], int]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fuzzytree.model.rulebase import Clause, Rule, RuleBase, shapes_of
+from fuzzytree.model import Clause, Rule, RuleBase, shapes_of
 from fuzzytree.semantics.programs.membership import axis, shape_degree
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
 

@@ -43,7 +43,7 @@ import struct
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from typing import Literal
 
-from fuzzytree.model.rulebase import Value
+from fuzzytree.model import Value
 from fuzzytree.semantics.programs.operations import (
     NUMERIC,
     OPERATIONS,

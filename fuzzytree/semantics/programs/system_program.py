@@ -15,8 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import msgspec
 
-from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Condition,
@@ -33,6 +32,7 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
     TNorm,
+    checkpoint,
     is_drawn_by_lines,
     sampled_values,
 )

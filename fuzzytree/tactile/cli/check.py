@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from fuzzytree.cli.console import (
+from fuzzytree.cli import (
     answer,
     answer_json,
     json_option,
@@ -56,7 +56,7 @@ def command(
     generated frames are aimed at bounds and cuts. Exit 1 if not.
     """
     from fuzzytree.files import read_bounded
-    from fuzzytree.report.text import agreement_lines, agreement_verdict
+    from fuzzytree.report import agreement_lines, agreement_verdict
     from fuzzytree.tactile.presses import read_frames
     from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
 

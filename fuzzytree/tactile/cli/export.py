@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from fuzzytree.cli.console import (
+from fuzzytree.cli import (
     answer,
     answer_bytes,
     answer_json,
@@ -76,7 +76,7 @@ def command(
     All implementations from frame to class are compared first, bit by bit, and with
     exact arithmetic. If one disagrees, nothing is written: exit 1. `-` is stdout.
     """
-    from fuzzytree.report.text import agreement_verdict
+    from fuzzytree.report import agreement_verdict
     from fuzzytree.tactile.recognition.agreement import check_frames_agree
     from fuzzytree.tactile.recognition.recogniser import check_inputs
 
@@ -127,7 +127,7 @@ def _form(output: str, to: Form | None) -> Form:
 
 def _lines(found: FramesAgreement) -> Iterator[str]:
     """Yield a check of frames: its verdict, the comparisons, and what frames show."""
-    from fuzzytree.report.text import agreement_lines, counted
+    from fuzzytree.report import agreement_lines, counted
 
     yield from agreement_lines(found)
     shown = found.shown
@@ -144,8 +144,7 @@ def _lines(found: FramesAgreement) -> Iterator[str]:
 
 def _writer(form: Form, settings: Sequence[str]) -> tuple[Any, dict[str, Any]]:
     """Return the writer of a form, and its options from `--set`."""
-    from fuzzytree.model.contracts import Format
-    from fuzzytree.model.options import option_value
+    from fuzzytree.model import Format, option_value
     from fuzzytree.tactile.exporters.c_frames import write_frames_c
     from fuzzytree.tactile.exporters.onnx_frames import write_frames
 

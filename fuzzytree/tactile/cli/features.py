@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.console import (
+from fuzzytree.cli import (
     answer_bytes,
     answer_json,
     json_option,
@@ -157,7 +157,7 @@ def _table(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
     from fuzzytree.tactile.runtimes.frames import features_of
     from fuzzytree.tactile.sensor import saturated
 

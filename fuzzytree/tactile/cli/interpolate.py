@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fuzzytree.cli.console import (
+from fuzzytree.cli import (
     answer_json,
     json_option,
     quiet_option,
@@ -82,7 +82,7 @@ def command(
     `times_N` of each number of times. `docs/explanation/interpolation.md` has the
     mathematics.
     """
-    from fuzzytree.report.plots.saving import SUFFIXES
+    from fuzzytree.report import SUFFIXES
     from fuzzytree.tactile.sensor import pressed
 
     suffix = Path(output).suffix.lower()
@@ -135,7 +135,7 @@ def _facts(
 def _tell(
     source: str, output: str, facts: Mapping[str, Any], *, full: int, size: int
 ) -> None:
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
 
     rows, columns = facts["rows"], facts["columns"]
     one = f"frame {facts['frame']} of {counted(facts['of'], 'frame')}"
@@ -205,7 +205,7 @@ def _picture(
     source: str,
     is_marked: bool,
 ) -> bytes:
-    from fuzzytree.report.plots.saving import drawn
+    from fuzzytree.report import drawn
     from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames
     from fuzzytree.tactile.sensor import pressed

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from fuzzytree.cli.console import quiet_option, say_rows, wrong_options
+from fuzzytree.cli import quiet_option, say_rows, wrong_options
 from fuzzytree.tactile.cli.sensors import frames_model
 
 if TYPE_CHECKING:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import click
 
-from fuzzytree.cli.console import answer, answer_json, json_option, say
+from fuzzytree.cli import answer, answer_json, json_option, say
 
 
 @click.command("ports", short_help="List the serial ports.")
 @json_option
 def command(as_json: bool) -> None:
     """List the serial ports of this computer, one a line."""
-    from fuzzytree.report.text import aligned
+    from fuzzytree.report import aligned
     from fuzzytree.tactile.link import ports
 
     found = ports()

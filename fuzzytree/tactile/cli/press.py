@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from fuzzytree.cli.console import (
+from fuzzytree.cli import (
     answer_bytes,
     answer_json,
     json_option,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from fuzzytree.cli.console import answer_json, json_option, quiet_option, say, say_rows
+from fuzzytree.cli import answer_json, json_option, quiet_option, say, say_rows
 from fuzzytree.errors import PortError, WriteError
 from fuzzytree.files import check_place
 from fuzzytree.tactile.cli.signals import stop_signal
@@ -226,7 +226,7 @@ def _waiting(board: Board) -> int:
 
 
 def _tell_start(started: Started, *, quiet: bool) -> None:
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
 
     board = started.board
     baseline = board.sensor.baseline
@@ -246,7 +246,7 @@ def _tell(
     *,
     quiet: bool,
 ) -> None:
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
 
     rate = ""
     if coming.seconds:

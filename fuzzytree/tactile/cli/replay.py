@@ -11,14 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.console import (
-    answer,
-    answer_json,
-    json_option,
-    quiet_option,
-    say,
-    say_rows,
-)
+from fuzzytree.cli import answer, answer_json, json_option, quiet_option, say, say_rows
 from fuzzytree.files import check_place, open_atomically, write_atomically
 from fuzzytree.tactile.cli.signals import stop_signal
 
@@ -97,7 +90,7 @@ def _facts(file: RecordingFile, found: Review) -> dict[str, object]:
 
 def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
     """Yield what is in a recording, in words."""
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
     from fuzzytree.tactile.link.starting import named
 
     board, sensor = file.board, file.board.sensor
@@ -175,7 +168,7 @@ _WRITERS = {".csv": _write_table, ".npz": _write_arrays, ".yaml": _write_board}
 
 def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
     """Send the frames through a port of our own, each when it came."""
-    from fuzzytree.report.text import counted
+    from fuzzytree.report import counted
     from fuzzytree.tactile.recognition.frame_sources import Paced
     from fuzzytree.tactile.simulation.device import Device
 

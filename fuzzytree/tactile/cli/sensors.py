@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fuzzytree.cli.console import say_rows, wrong_options
+from fuzzytree.cli import say_rows, wrong_options
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import Model
+    from fuzzytree.model import Model
     from fuzzytree.tactile.presses import SensorFrames
     from fuzzytree.tactile.sensor import Cells, Sensor
 
@@ -143,12 +143,11 @@ def frames_model(path: str) -> Model:
     Raises:
         TableError: If the file holds something else.
     """
-    from fuzzytree.api import verbs
+    from fuzzytree import api
     from fuzzytree.errors import TableError
-    from fuzzytree.model.rulebase import RuleBase
-    from fuzzytree.model.tree import FuzzyTree
+    from fuzzytree.model import FuzzyTree, RuleBase
 
-    found = verbs.opened(path)
+    found = api.opened(path)
     if not isinstance(found, FuzzyTree | RuleBase):
         raise TableError(f"{path}: a model of frames is a tree or a rule base")
     return found

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.console import (
+from fuzzytree.cli import (
     answer,
     answer_json,
     json_option,

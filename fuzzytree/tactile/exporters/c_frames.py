@@ -11,10 +11,18 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.exporters.c import CFile, beginning
-from fuzzytree.exporters.c_steps import LIBRARY, CSteps
-from fuzzytree.exporters.c_text import DOUBLE, fill, remark, whole_lines, whole_table
-from fuzzytree.model.contracts import Model, Written
+from fuzzytree.exporters import (
+    DOUBLE,
+    LIBRARY,
+    CFile,
+    CSteps,
+    beginning,
+    fill,
+    remark,
+    whole_lines,
+    whole_table,
+)
+from fuzzytree.model import Model, Written
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
 from fuzzytree.tactile.features.plain import check_reject, plain_answer, plain_features

@@ -18,10 +18,8 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from fuzzytree.errors import DisagreementError
-from fuzzytree.exporters.onnx import FORMAT_VERSION, IRS, OPSETS, require, version
-from fuzzytree.model.contracts import Model, Written
-from fuzzytree.model.rulebase import RuleBase, fingerprint
-from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.exporters import FORMAT_VERSION, IRS, OPSETS, require, version
+from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, fingerprint
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
 from fuzzytree.tactile.features.plain import State, check_reject
@@ -30,8 +28,7 @@ from fuzzytree.tactile.sensor import Sensor, offsets
 if TYPE_CHECKING:
     import onnx
 
-    from fuzzytree.exporters.onnx_ends import InputBlock
-    from fuzzytree.exporters.onnx_graph import OnnxGraph
+    from fuzzytree.exporters import InputBlock, OnnxGraph
 
 Output = Literal["label", "state", "rule", "features", "strengths"]
 
@@ -144,7 +141,7 @@ def _model_proto(
 ) -> onnx.ModelProto:
     from onnx import TensorProto, helper
 
-    from fuzzytree.exporters.onnx_graph import TREES, OnnxGraph
+    from fuzzytree.exporters import TREES, OnnxGraph
 
     sheet, sensor = OnnxGraph(opset), made.sensor
     _fill(sheet, made, model, outputs, reject, plain=plain)
@@ -235,8 +232,7 @@ def _fill(
     plain: bool,
 ) -> None:
     """Add all nodes of a graph to a sheet."""
-    from fuzzytree.exporters.onnx_ends import NUMBERS, is_known, scalar
-    from fuzzytree.exporters.onnx_steps import add_steps
+    from fuzzytree.exporters import NUMBERS, add_steps, is_known, scalar
 
     with sheet.about("sums"):
         columns = _sums(sheet, made)
@@ -251,15 +247,14 @@ def _fill(
     numbers = NUMBERS["float64"]
     strengths = ""
     if isinstance(model, FuzzyTree):
-        from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
+        from fuzzytree.exporters import needs_plain, tree_graph
 
         is_plain = plain or needs_plain(model)
         axes = tree_graph(
             sheet, model, numbers, model.inputs, is_plain=is_plain, named="winner"
         )
     else:
-        from fuzzytree.exporters.onnx_ends import add_winner
-        from fuzzytree.exporters.onnx_rules import rules_graph
+        from fuzzytree.exporters import add_winner, rules_graph
 
         axes, strengths = rules_graph(sheet, model, numbers, model.inputs)
         add_winner(sheet, strengths, "winner")
@@ -277,8 +272,7 @@ def _fill(
 
 def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
     """Add the sums as the sheet's source, shape (frames, sums); return their names."""
-    from fuzzytree.exporters.onnx_ends import scalar
-    from fuzzytree.exporters.onnx_steps import np_to_onnx
+    from fuzzytree.exporters import np_to_onnx, scalar
 
     sensor = made.sensor
     double, size = int(np_to_onnx(np.float64)), sensor.rows * sensor.columns
@@ -307,7 +301,7 @@ def _taken(
     sheet: OnnxGraph, sums: Sequence[Sum], values: str, is_pressed: str
 ) -> list[str]:
     """Add what the sums take from the cells: a product, single cells, the others."""
-    from fuzzytree.exporters.onnx_steps import np_to_onnx, reduced
+    from fuzzytree.exporters import np_to_onnx, reduced
 
     single = [one for one in sums if one.of == "cells" and sum(one.weights) == 1]
     single = [one for one in single if max(one.weights) == 1 and min(one.weights) == 0]
@@ -352,7 +346,7 @@ def _flat(sheet: OnnxGraph, truth: str) -> str:
 
 def _is_answer(sheet: OnnxGraph, model: Model, axes: InputBlock) -> str:
     """Return whether the model knows an answer to the features."""
-    from fuzzytree.exporters.onnx_ends import NUMBERS, is_known
+    from fuzzytree.exporters import NUMBERS, is_known
 
     semantics = model.semantics
     if isinstance(model, RuleBase) and semantics.uncovered is not None:
@@ -362,8 +356,7 @@ def _is_answer(sheet: OnnxGraph, model: Model, axes: InputBlock) -> str:
 
 def _is_strong(sheet: OnnxGraph, strengths: str, reject: float) -> str:
     """Return whether the rule that decides is as strong as the floor, or is none."""
-    from fuzzytree.exporters.onnx_ends import scalar
-    from fuzzytree.exporters.onnx_steps import reduced
+    from fuzzytree.exporters import reduced, scalar
 
     with sheet.about("strongest"):
         strongest = reduced(sheet, "ReduceMax", strengths, axis=0, keepdims=0)
@@ -405,7 +398,7 @@ def _ends(
 
 def _all_strengths(sheet: OnnxGraph, model: Model, strengths: str, finite: str) -> None:
     """Add the strengths of all rules, 0 where nothing presses."""
-    from fuzzytree.exporters.onnx_ends import scalar
+    from fuzzytree.exporters import scalar
 
     count = len(model.rules) if isinstance(model, RuleBase) else 0
     ends = [sheet.numbers([end], "end") for end in (1, 1 + count)]

@@ -9,8 +9,8 @@ import numpy as np
 import onnxruntime
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_bare
-from fuzzytree.model.contracts import Model
+from fuzzytree.exporters import RUNTIME_ERRORS, first_line, open_bare
+from fuzzytree.model import Model
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.features.plain import Shown, plain_answer, plain_features
 from fuzzytree.tactile.sensor import Cells

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model.rulebase import Value
-from fuzzytree.semantics.programs.steps import Maker, Program, Result
+from fuzzytree.model import Value
+from fuzzytree.semantics import Maker, Program, Result
 from fuzzytree.tactile.features.moments import (
     ORDER,
     Centred,

@@ -8,10 +8,8 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.probing import landmarks
-from fuzzytree.semantics.reference import axis_values
+from fuzzytree.model import FuzzyTree, Model
+from fuzzytree.semantics import axis_values, landmarks
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.features.plain import plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor

@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fuzzytree.semantics.programs.steps import Maker
+from fuzzytree.semantics import Maker
 
 UNIT = 2.0**-53
 """The largest relative error of one rounding."""

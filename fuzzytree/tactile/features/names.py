@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from fuzzytree.errors import TableError
-from fuzzytree.model.rulebase import Value
+from fuzzytree.model import Value
 
 LOG = "log "
 PER_FORCE = " / force"

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import IntEnum
 
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import RuleBase, Value
-from fuzzytree.semantics.programs.evaluate import evaluate_program as run
-from fuzzytree.semantics.reference import Status, descend, evaluate
+from fuzzytree.model import Model, RuleBase, Value
+from fuzzytree.semantics import Status, descend, evaluate
+from fuzzytree.semantics import evaluate_program as run
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.sensor import Cells, pressed
 

@@ -15,9 +15,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.errors import TableError
-from fuzzytree.model.agreement import Agreement, Comparison
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import RuleBase, fingerprint
+from fuzzytree.model import Agreement, Comparison, Model, RuleBase, fingerprint
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
 from fuzzytree.tactile.features.exact import exact_features
@@ -35,7 +33,7 @@ from fuzzytree.tactile.recognition.runners import (
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed, saturated
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 
 _PARTS = {

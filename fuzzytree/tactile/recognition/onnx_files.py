@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.comparing import counted, judged
+from fuzzytree.checking import counted, judged
 from fuzzytree.errors import InvalidModelError, ReadError
-from fuzzytree.model.agreement import Agreement, Comparison
-from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import fingerprint
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes.onnxruntime import loaded, parsed, texts_of
+from fuzzytree.model import Agreement, Comparison, FuzzyTree, Model, fingerprint
+from fuzzytree.runtimes import loaded, parsed, texts_of
 from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
@@ -26,8 +23,7 @@ from fuzzytree.tactile.sensor import Cells, Sensor
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.exporters.onnx_compare import Differences
-    from fuzzytree.exporters.onnx_session import Bare
+    from fuzzytree.exporters import Bare, Differences
 
 
 _SHOWN = 3
@@ -187,8 +183,7 @@ def _differences(model: Model, known: FramesFile, content: bytes) -> Differences
     """Compare the file with the one that the model gives now."""
     import onnx
 
-    from fuzzytree.exporters.onnx_compare import Differences, proto_differences
-    from fuzzytree.exporters.onnx_graph import TREES
+    from fuzzytree.exporters import TREES, Differences, proto_differences
 
     proto = onnx.load_model_from_string(content)
     versions = {one.domain: one.version for one in proto.opset_import}
@@ -238,7 +233,7 @@ def _answers(
 def _run(
     bare: Bare, known: FramesFile, frames: Cells, name: str
 ) -> dict[Output, npt.NDArray[np.generic]]:
-    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line
+    from fuzzytree.exporters import RUNTIME_ERRORS, first_line
 
     try:
         found = bare(list(known.outputs), {"frames": frames})

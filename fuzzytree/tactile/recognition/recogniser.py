@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.errors import TableError
-from fuzzytree.model.contracts import Model, Run
-from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes.one_row import load
-from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.reference import Status
+from fuzzytree.model import FuzzyTree, Model, RuleBase, Run
+from fuzzytree.runtimes import load
+from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tactile.features.names import feature_of
 from fuzzytree.tactile.features.plain import State as State
 from fuzzytree.tactile.features.plain import check_reject
@@ -23,7 +20,7 @@ from fuzzytree.tactile.sensor import Cells, Sensor, saturated
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
 
 
 USUAL_FLOOR = 0.001

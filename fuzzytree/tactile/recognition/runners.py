@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.errors import install_hint
-from fuzzytree.model.contracts import Model
-from fuzzytree.runtimes.c import COMPILERS, compiled
-from fuzzytree.runtimes.one_row import load
+from fuzzytree.model import Model
+from fuzzytree.runtimes import COMPILERS, compiled, load
 from fuzzytree.tactile.exporters.c_frames import write_frames_c
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import frame_type
@@ -27,7 +26,7 @@ from fuzzytree.tactile.sensor import Cells, Sensor, check_frames
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.model import FloatArray, IntArray
     from fuzzytree.tactile.exporters.onnx_frames import Output
 
 NUMPY, ONNX, C, PLAIN = "numpy", "onnx", "c", "plain Python"
@@ -161,7 +160,7 @@ def _plain(model: Model, sensor: Sensor, reject: float) -> Runner:
 
 
 def _onnx(model: Model, sensor: Sensor, reject: float) -> Runner:
-    from fuzzytree.exporters.onnx_session import open_bare
+    from fuzzytree.exporters import open_bare
     from fuzzytree.tactile.exporters.onnx_frames import frames_at_once, write_frames
 
     every: tuple[Output, ...] = (*_ANSWERS, "features")

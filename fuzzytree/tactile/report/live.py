@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from rich.cells import cell_len, set_cell_size
 
-from fuzzytree.model.naming import printable
+from fuzzytree.model import printable
 from fuzzytree.tactile.interpolation import interpolated
 from fuzzytree.tactile.recognition.live import SENTENCES, STATES, LiveResult, LiveView
 from fuzzytree.tactile.recognition.recogniser import State

@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.runtimes.one_row import row_runner
-from fuzzytree.runtimes.programs import ProgramPlan, plan_program, run_program
+from fuzzytree.runtimes import ProgramPlan, plan_program, row_runner, run_program
 from fuzzytree.tactile.features import FrameProgram, frame_program
 from fuzzytree.tactile.sensor import Cells, Sensor, check_frames, pressed
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model import FloatArray
 
 _CELLS_AT_ONCE = 1 << 15  # blocks of them stay in the cache
 

@@ -27,7 +27,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import InvalidModelError, WriteError
 from fuzzytree.files import reason
-from fuzzytree.model.rulebase import Mistake, Value
+from fuzzytree.model import Mistake, Value
 from fuzzytree.tactile.boards import Board, Port, Request, Sentinel
 from fuzzytree.tactile.sensor import Cells
 from fuzzytree.tactile.simulation.encoding import banner, encoded

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.model.rulebase import Value
+from fuzzytree.model import Value
 
 FloatArray = npt.NDArray[np.float64]
 

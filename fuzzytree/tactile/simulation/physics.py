@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model.rulebase import Mistake, Value
+from fuzzytree.model import Mistake, Value
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.objects import (
     OBJECTS,

@@ -32,8 +32,8 @@ from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import Points, RuleBase, Term
 from fuzzytree.numerics.exact import exact_answer
-from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.auditing.findings.test_support import RULES, subject_of

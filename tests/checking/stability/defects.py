@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.exporters import find_format
+from fuzzytree.exporters.table import find_format
 from fuzzytree.model.contracts import (
     Dtype,
     Format,
@@ -33,8 +33,8 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
-from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.rows import checked, winners
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.reference import axis_values, degree, horner
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from fuzzytree.checking.stability.transforms import scaled
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model.rulebase import LR
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import baseline
+from fuzzytree.runtimes.table import baseline
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import axis_values, degree
 

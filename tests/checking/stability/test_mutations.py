@@ -13,10 +13,10 @@ from fuzzytree.checking.stability.roundtrips import roundtrips
 from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
 from fuzzytree.checking.stability.sensitivity import curves
 from fuzzytree.checking.stability.term_checks import degenerate, edges
-from fuzzytree.exporters import find_format
+from fuzzytree.exporters.table import find_format
 from fuzzytree.model.contracts import Model, Runtime
 from fuzzytree.model.rulebase import LR, Band, Flank, Side, Term
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree
 from tests.checking.stability import defects, learners

@@ -16,7 +16,7 @@ import fuzzytree as ft
 from fuzzytree.checking.stability.results import TITLES, Stability
 from fuzzytree.checking.stability.sensitivity import stiffness
 from fuzzytree.checking.stability.suite import examine
-from fuzzytree.exporters import all_formats
+from fuzzytree.exporters.table import all_formats
 from fuzzytree.learning.sums import totals_of
 from fuzzytree.learning.windows import window_counts as counted
 from fuzzytree.model.contracts import Model
@@ -32,7 +32,7 @@ from fuzzytree.model.rulebase import (
     Term,
 )
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import all_runtimes, find_runtime
+from fuzzytree.runtimes.table import all_runtimes, find_runtime
 from fuzzytree.testing import random_tree
 from tests.checking.stability.defects import learning_table, one_rule, small_rules
 from tests.checking.stability.learners import learner_criteria, window_counts

@@ -10,7 +10,7 @@ import pytest
 from commands import run
 from tactile_bench import command
 
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "frames.md"
 

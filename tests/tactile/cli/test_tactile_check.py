@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fuzzytree import export, learn, save, table
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 from fuzzytree.model.tree import FuzzyTree
 
 

@@ -8,7 +8,7 @@ import onnx
 import pytest
 
 from fuzzytree.api.verbs import save
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 from fuzzytree.tactile.cli.sensors import frames_of_file
 from fuzzytree.tactile.presses import Presses, write_presses
 from fuzzytree.tactile.recognition import agreement

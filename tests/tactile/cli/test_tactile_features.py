@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link.recording import Recorder
 from fuzzytree.tactile.presses import Presses, write_presses

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 from fuzzytree.tactile.interpolation import interpolated
 from fuzzytree.tactile.presses import Presses, write_presses
 

@@ -27,7 +27,7 @@ import pytest
 from serial_faults import ConnectionFaults, FaultyDevice
 
 import fuzzytree as ft
-from fuzzytree.cli import main
+from fuzzytree.cli.program import main
 from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.boards import Board, Marker, Start
 from fuzzytree.tactile.cli.screen import look_of

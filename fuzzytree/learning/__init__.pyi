@@ -1,0 +1,6 @@
+from .findings import LearningReport as LearningReport
+from .findings import remarks as remarks
+from .learner import Learner as Learner
+from .learner import Learnt as Learnt
+from .learner import learn_arrays as learn_arrays
+from .settings import LearningSettings as LearningSettings
