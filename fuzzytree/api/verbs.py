@@ -107,7 +107,6 @@ __all__ = [
     "material",
     "needs",
     "opened",
-    "prepare_answering",
     "read",
     "recheck",
     "rows_of",
