@@ -32,7 +32,8 @@ for name in ("tree.schema.json", "rulebase.schema.json"):
     assert (files("fuzzytree.schemas") / name).is_file(), name
 import numpy as np
 values = np.array([[1.0], [1.5], [2.0], [2.5], [7.0], [7.5], [8.0], [8.5]])
-tree = fuzzytree.learn(values, target=list("aaaabbbb"), columns=["size"])
+table = fuzzytree.table(values, columns=["size"])
+tree = fuzzytree.learn(table, target=list("aaaabbbb"))
 rules = fuzzytree.rules_from_tree(tree)
 fuzzytree.save(rules, "model.yaml")
 assert fuzzytree.load("model.yaml") == rules
