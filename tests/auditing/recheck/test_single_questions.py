@@ -275,7 +275,7 @@ def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
         return grid.decided(strengths) == grid.decided(other)
     if answer.code == "FT201":
         level = grid.one * Fraction(found.settings.level)
-        omitted = next(m.value for m in answer.measures if "not told" in m.name)
+        omitted = next(m.value for m in answer.measures if "not listed" in m.name)
         return omitted > 0 or all(
             (a + 1, b + 1) in reported
             or np.minimum(strengths[a], strengths[b]).max() < level
