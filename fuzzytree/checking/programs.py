@@ -185,8 +185,9 @@ def _run(
     """Run a program, and compare its answers with those of the form it was made of."""
     model = cast("Model", text.form)  # no system: see `_why_not`
     some = rows.part(slice(None, None, -(-len(rows.numbers) // _MOST_ROWS)))
-    is_single = text.options == _FLOAT32 and isinstance(model, RuleBase)
-    native = baseline("float32" if is_single else "float64")
+    is_single = text.options == _FLOAT32
+    is_rules = isinstance(model, RuleBase)
+    native = baseline("float32" if is_single and is_rules else "float64")
     base = ModelRun("the model", model, native.load(model)(some.values))
     try:
         result = ENGINES[program.format](
