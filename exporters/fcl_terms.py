@@ -160,6 +160,7 @@ def as_points(
                 labels.append(_pointed(label, variable, words, tolerance, losses))
             except LossError as error:
                 reasons.append(f"{where}: {error}")
+                labels.append(label)  # rules name it; the system is refused below
         return tuple(labels)
 
     system = with_labels(system, changed)

@@ -123,9 +123,9 @@ def test_equal_models_give_equal_bytes_in_another_process() -> None:
     code = (
         "import hashlib; from fuzzytree.testing import random_tree; "
         "from fuzzytree.semantics.lowering import rules_from_tree; "
-        "from fuzzytree.exporters.onnx import write; "
+        "from fuzzytree.exporters import write_onnx; "
         "tree = random_tree(5, leaves=12); "
-        "made = [write(m, readable=r).content for m, r in "
+        "made = [write_onnx(m, readable=r).content for m, r in "
         "((tree, False), (rules_from_tree(tree, 'raw'), True))]; "
         "print(hashlib.sha256(b''.join(made)).hexdigest())"
     )
