@@ -1,0 +1,40 @@
+from .api import audit as audit
+from .api import bench as bench
+from .api import certify as certify
+from .api import check as check
+from .api import convert as convert
+from .api import diff as diff
+from .api import draw as draw
+from .api import explain as explain
+from .api import export as export
+from .api import learn as learn
+from .api import load as load
+from .api import material as material
+from .api import needs as needs
+from .api import read as read
+from .api import recheck as recheck
+from .api import rules_from_tree as rules_from_tree
+from .api import run as run
+from .api import save as save
+from .api import stability as stability
+from .auditing import AuditDomain as AuditDomain
+from .auditing import AuditSelection as AuditSelection
+from .auditing import AuditSettings as AuditSettings
+from .benchmarking import BenchSettings as BenchSettings
+from .errors import FuzzyTreeError as FuzzyTreeError
+from .estimator import FuzzyTreeClassifier as FuzzyTreeClassifier
+from .formats import from_simpful as from_simpful
+from .formats import from_skfuzzy as from_skfuzzy
+from .formats import from_sklearn as from_sklearn
+from .learning import LearningSettings as LearningSettings
+from .model import Agreement as Agreement
+from .model import CheckSettings as CheckSettings
+from .model import FuzzySystem as FuzzySystem
+from .model import FuzzyTree as FuzzyTree
+from .model import RuleBase as RuleBase
+from .runtimes import Outputs as Outputs
+from .runtimes import Predictions as Predictions
+from .tables import table as table
+
+__all__: list[str]
+__version__: str
