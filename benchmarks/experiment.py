@@ -282,8 +282,8 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
         )
         return {}
     import numpy as np
+    from confusion import MOST_CLASSES, draw_confusion
 
-    from fuzzytree.report.plots.confusion import MOST_CLASSES, draw_confusion
     from fuzzytree.report.plots.saving import drawn
     from fuzzytree.report.plots.trees import MOST_LEAVES, draw_tree
     from fuzzytree.tactile.interpolation import interpolated

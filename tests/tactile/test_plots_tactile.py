@@ -14,6 +14,7 @@ import interpolation
 import numpy as np
 import numpy.typing as npt
 import pytest
+from confusion import draw_confusion
 
 import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
@@ -293,7 +294,7 @@ def test_a_tree_of_too_many_levels_is_refused() -> None:
 
 
 def test_a_confusion_shows_counts_rates_and_the_whole() -> None:
-    figure = plots.draw_confusion(np.array([[48, 2, 0], [7, 42, 1]]), ["bar", "disc"])
+    figure = draw_confusion(np.array([[48, 2, 0], [7, 42, 1]]), ["bar", "disc"])
     assert said(figure) >= {
         "48", "2", "7", "42", "1", "bar", "disc", "none of them",
         "96.0 %", "84.0 %", "90.0 %",
@@ -305,7 +306,7 @@ def test_a_confusion_shows_counts_rates_and_the_whole() -> None:
 def test_no_words_of_a_confusion_cover_each_other(count: int) -> None:
     table = np.full((count, count + 1), 3) + np.eye(count, count + 1, dtype=int) * 9990
     names = [f"rectangle in {k}" for k in range(count)]
-    figure = plots.draw_confusion(table, names, title="all")
+    figure = draw_confusion(table, names, title="all")
     slanted = {text.get_text() for text in words(figure) if text.get_rotation()}
     covered = overlapping(figure)
     # The boxes of slanted names meet; the names, in parallel, do not.
@@ -313,7 +314,7 @@ def test_no_words_of_a_confusion_cover_each_other(count: int) -> None:
 
 
 def test_a_class_that_never_was_has_no_rate() -> None:
-    figure = plots.draw_confusion(np.array([[5, 0], [0, 0]]), ["a", "b"])
+    figure = draw_confusion(np.array([[5, 0], [0, 0]]), ["a", "b"])
     assert {"100.0 %", "-"} <= said(figure)
 
 
@@ -332,7 +333,7 @@ def test_tables_that_are_no_confusion_are_refused(
     table: npt.NDArray[Any], text: str
 ) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
-        plots.draw_confusion(table, ["a", "b"])
+        draw_confusion(table, ["a", "b"])
     assert str(caught.value) == text
 
 
@@ -340,7 +341,7 @@ def pictures() -> list[Figure]:
     return [
         draw_frames([FRAME, FRAME], axes=[None, FrameAxis(0.0, 0.0, 45.0)]),
         plots.draw_tree(learnt(3)),
-        plots.draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
+        draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
     ]
 
 
@@ -370,7 +371,7 @@ def test_drawing_without_matplotlib_says_what_installs_it(
     draws: list[Callable[[], object]] = [
         lambda: draw_frames([FRAME]),
         lambda: plots.draw_tree(tree),
-        lambda: plots.draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
+        lambda: draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
     ]
     for draw in draws:
         with pytest.raises(MissingExtraError, match="pip install 'matplotlib"):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from fuzzytree.report.plots.confusion import draw_confusion
 from fuzzytree.report.plots.precision import work_precision
 from fuzzytree.report.plots.saving import SUFFIXES, save
 from fuzzytree.report.plots.trees import draw_tree
 
 __all__ = [
     "SUFFIXES",
-    "draw_confusion",
     "draw_tree",
     "save",
     "work_precision",
