@@ -180,7 +180,7 @@ class SystemFields:
         return ref(full)
 
     def _total(self, place: int, samples: list[Value]) -> Value:
-        """Return the sum by halves, as `inference.tree_sum` has it."""
+        """Return the sum by halves, as `programs.operations.total` has it."""
         size = 1 << (len(samples) - 1).bit_length()
         level = [*samples, *([0.0] * (size - len(samples)))]
         count = 0

@@ -88,6 +88,7 @@ from .system import Defuzzifier as Defuzzifier
 from .system import DefuzzifierMethod as DefuzzifierMethod
 from .system import FuzzySystem as FuzzySystem
 from .system import Grid as Grid
+from .system import SystemCurve as SystemCurve
 from .system import SystemInput as SystemInput
 from .system import SystemOutput as SystemOutput
 from .system import SystemTerm as SystemTerm

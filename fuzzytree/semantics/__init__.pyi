@@ -30,8 +30,8 @@ from .crisp_regions import node_faults as node_faults
 from .crisp_regions import node_points as node_points
 from .inference import infer as infer
 from .inference import unsampled_terms as unsampled_terms
-from .inference.membership import curve_degree as curve_degree
-from .inference.membership import value_at as value_at
+from .inference.degrees import curve_degree as curve_degree
+from .inference.degrees import value_at as value_at
 from .lowering import Form as Form
 from .lowering import forms as forms
 from .lowering import rules_from_tree as rules_from_tree

@@ -47,8 +47,7 @@ from fuzzytree.model import (
     Variable,
     shapes_of,
 )
-from fuzzytree.semantics.inference import curve_degree
-from fuzzytree.semantics.inference.norms import hedges_applied
+from fuzzytree.semantics.inference.degrees import curve_degree, hedged
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import axis_values
 
@@ -294,7 +293,7 @@ class Aim:
         degrees = []
         for label, hedges, is_true in wish_set:
             curve = self._curves[variable, label]
-            degree = hedges_applied(hedges, curve_degree(curve, value, names))
+            degree = hedged(hedges, curve_degree(curve, value, names))
             degrees.append(degree if is_true else 1.0 - degree)
         return min((one for one in degrees if not math.isnan(one)), default=0.0)
 

@@ -43,14 +43,9 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.inference import infer
-from fuzzytree.semantics.inference.formulas import (
-    exponential,
-    logarithm,
-    power,
-    quotient,
-)
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probes
+from fuzzytree.semantics.programs.operations import NUMERIC, divide, power
 from fuzzytree.semantics.reference import descend, evaluate
 from fuzzytree.testing import random_rows, random_system, random_tree, with_points
 
@@ -153,7 +148,7 @@ BUILT_IN: dict[str, Callable[..., float]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
-    "/": quotient,
+    "/": divide,
     "min": min,
     "max": max,
     "abs": abs,
@@ -169,10 +164,10 @@ BUILT_IN: dict[str, Callable[..., float]] = {
     "floor": math.floor,
     "ceil": math.ceil,
     "rint": round,
-    "exp": exponential,
+    "exp": NUMERIC["exponential"],
     "sqrt": math.sqrt,
     "pow": power,
-    "ln": logarithm,
+    "ln": NUMERIC["logarithm"],
     "log10": math.log10,
     "cos": math.cos,
     "sin": math.sin,

@@ -218,7 +218,7 @@ def test_a_hedge_is_pyfuzzylites(name: Hedge) -> None:
     hedge = fl.settings.factory_manager.hedge.construct(name)
     chance = random.Random(name)
     for degree in (0.0, 1.0, 0.5, *(chance.random() for _ in range(200))):
-        assert hedged(name, degree) == float(hedge.hedge(degree))
+        assert hedged([name], degree) == float(hedge.hedge(degree))
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)

@@ -16,7 +16,7 @@ from fuzzytree.numerics.pointwise import (
     product,
     rounded_lines,
 )
-from fuzzytree.semantics.inference.membership import curve_degree
+from fuzzytree.semantics.inference.degrees import curve_degree
 
 
 def random_points(chance: random.Random) -> Points:

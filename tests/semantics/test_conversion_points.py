@@ -43,7 +43,7 @@ from fuzzytree.model.system import (
 from fuzzytree.numerics.approximation import by_points
 from fuzzytree.semantics.conversion import pointed
 from fuzzytree.semantics.conversion.points import points_for
-from fuzzytree.semantics.inference.membership import curve_degree
+from fuzzytree.semantics.inference.degrees import curve_degree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree
 from fuzzytree.testing import random_tree

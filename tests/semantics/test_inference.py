@@ -64,10 +64,10 @@ from fuzzytree.semantics.inference import (
     infer,
     s_norm,
     t_norm,
-    tree_sum,
     value_at,
+    value_of,
 )
-from fuzzytree.semantics.inference.formulas import value_of
+from fuzzytree.semantics.programs.operations import total
 from fuzzytree.semantics.reference import Status
 from fuzzytree.testing import random_rows, random_system
 
@@ -222,11 +222,11 @@ def test_norms_are_those_of_exact_arithmetic(a: Fraction, b: Fraction) -> None:
 )
 def test_a_hedge_changes_a_degree(hedge: Hedge, expected: dict[float, float]) -> None:
     for degree, value in expected.items():
-        assert hedged(hedge, degree) == pytest.approx(value, rel=1e-15, nan_ok=True)
+        assert hedged([hedge], degree) == pytest.approx(value, rel=1e-15, nan_ok=True)
 
 
 def test_a_cube_root_is_good_to_the_last_digits() -> None:
-    assert hedged("cube root", 0.125) == pytest.approx(0.5, rel=1e-15)
+    assert hedged(["cube root"], 0.125) == pytest.approx(0.5, rel=1e-15)
 
 
 def test_norms_pass_nan_on() -> None:
@@ -318,10 +318,10 @@ def test_a_sum_adds_halves_and_fills_up_with_zeros() -> None:
     chance = random.Random(0)
     for count in (1, 2, 3, 7, 8, 100):
         values = [chance.uniform(-1.0, 1.0) for _ in range(count)]
-        assert tree_sum(values) == pytest.approx(math.fsum(values), abs=1e-14)
+        assert total(values) == pytest.approx(math.fsum(values), abs=1e-14)
     big = 2.0**53
-    assert tree_sum([big, -big, 1.0, 1.0]) == 1.0  # (big + 1) + (1 - big)
-    assert tree_sum([big, 1.0, -big]) == 1.0  # (big - big) + (1 + 0)
+    assert total([big, -big, 1.0, 1.0]) == 1.0  # (big + 1) + (1 - big)
+    assert total([big, 1.0, -big]) == 1.0  # (big - big) + (1 + 0)
 
 
 def system(

@@ -196,7 +196,7 @@ class Name(Value, frozen=True, tag="name"):
 class Call(Value, frozen=True, tag="call"):
     """An operation or a function of a formula, such as `+`, `^`, `sqrt` or `max`.
 
-    `FUNCTIONS` lists them, and `fuzzytree.semantics.inference.formulas` says what they
+    `FUNCTIONS` lists them, and `fuzzytree.semantics.programs.formulas` says what they
     do.
     """
 
@@ -227,11 +227,8 @@ class Formula(Value, frozen=True, tag="formula"):
     expression: Expression
 
 
-Curve = (
-    Band
-    | LR
-    | Points
-    | Trapezoid
+SystemCurve = (
+    Trapezoid
     | Gaussian
     | TwoGaussians
     | Bell
@@ -250,6 +247,8 @@ Curve = (
     | Linear
     | Formula
 )
+"""The membership functions that rule bases do not have."""
+Curve = Band | LR | Points | SystemCurve
 
 
 def names_in(expression: Expression) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """The rules of a fuzzy system as frozen values: conditions, conclusions, blocks.
 
 What they *mean* is computed in `fuzzytree.semantics.inference` and
-`fuzzytree.semantics.inference.norms`.
+`fuzzytree.semantics.programs.norms`.
 """
 
 from __future__ import annotations

@@ -37,9 +37,9 @@ from fuzzytree.model import (
     Spike,
     TwoGaussians,
 )
-from fuzzytree.semantics.inference.formulas import power as raised
-from fuzzytree.semantics.inference.formulas import quotient
-from fuzzytree.semantics.inference.membership import curve_degree
+from fuzzytree.semantics.inference.degrees import curve_degree
+from fuzzytree.semantics.programs.operations import divide
+from fuzzytree.semantics.programs.operations import power as raised
 
 Function = Callable[[float], float]
 Error = Callable[[float, float], float]
@@ -168,7 +168,7 @@ def _slack(scale: float, knots: Iterable[float], power: float = 1.0) -> float:
     inflection that is rounded by h leaves a stretch of that width, and a bend of its
     order, on the wrong side: it moves a chord by the order of its square.
     """
-    coarse = quotient(16.0 * math.ulp(max(map(abs, knots))), scale)
+    coarse = divide(16.0 * math.ulp(max(map(abs, knots))), scale)
     return (2.0**-44 + coarse * coarse) * (1.0 + power)
 
 
@@ -221,7 +221,7 @@ def _bell(curve: Bell, tail: float) -> PointPlan:
         if distance == 0.0:
             return 0.0 if power > 1.0 else math.inf if power < 1.0 else sign / width
         u = raised(distance / width, power)
-        return sign * power / distance / ((1.0 + u) * (1.0 + quotient(1.0, u)))
+        return sign * power / distance / ((1.0 + u) * (1.0 + divide(1.0, u)))
 
     places = [width * raised(1.0 / tail - 1.0, 1.0 / power)]
     if power > 1.0:

@@ -47,7 +47,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.numerics import BELOW_ONE, points_of
 from fuzzytree.semantics.conversion.point_plans import CurvePiece, PointPlan, plan_of
-from fuzzytree.semantics.inference.membership import curve_degree
+from fuzzytree.semantics.inference.degrees import curve_degree
 
 EXACT = 2.0**-52
 """Bounds up to this are no loss: rounding alone makes as much."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import msgspec
@@ -31,8 +32,10 @@ from fuzzytree.model import (
     Linear,
     Not,
     Or,
+    Relation,
     RuleBlock,
     Singleton,
+    SNorm,
     SystemInput,
     SystemOutput,
     SystemTerm,
@@ -40,17 +43,15 @@ from fuzzytree.model import (
     is_drawn_by_lines,
     sampled_values,
 )
-from fuzzytree.semantics.inference.formulas import maximum, quotient, value_of
-from fuzzytree.semantics.inference.membership import curve_degree, value_at
-from fuzzytree.semantics.inference.norms import (
-    RELATIONS,
-    S_NORMS,
-    T_NORMS,
+from fuzzytree.semantics.inference.degrees import (
+    curve_degree,
     hedged,
-    hedges_applied,
     s_norm,
     t_norm,
+    value_at,
+    value_of,
 )
+from fuzzytree.semantics.programs.operations import divide, maximum, total
 from fuzzytree.semantics.reference import Status
 
 __all__ = [
@@ -61,7 +62,6 @@ __all__ = [
     "infer",
     "s_norm",
     "t_norm",
-    "tree_sum",
     "unsampled_terms",
     "value_at",
     "value_of",
@@ -228,10 +228,10 @@ class _Run:
                 return self._proposition(condition)
             case And(parts=parts):
                 degrees = [self._degree(part, block) for part in parts]
-                return _folded(T_NORMS[block.conjunction or "minimum"], degrees)
+                return _folded(_and(block.conjunction), degrees)
             case Or(parts=parts):
                 degrees = [self._degree(part, block) for part in parts]
-                return _folded(S_NORMS[block.disjunction or "maximum"], degrees)
+                return _folded(_or(block.disjunction), degrees)
             case Not(part=part):
                 return 1.0 - self._degree(part, block)
 
@@ -246,7 +246,7 @@ class _Run:
                 value = self.values[proposition.variable]
                 self.degrees[key] = self._label_degree(*key, value)
             degree = self.degrees[key]
-        return hedges_applied(proposition.hedges, degree)
+        return hedged(proposition.hedges, degree)
 
     def _label_degree(self, variable: str, label: str, value: float) -> float:
         result = self.labels[variable, label]
@@ -254,7 +254,7 @@ class _Run:
 
     def _so_far(self, output: SystemOutput, label: str) -> float:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
-        join = S_NORMS[output.aggregation or "sum"]
+        join = _or(output.aggregation or "sum")
         degrees = [
             one.degree for one in self._of(output) if one.conclusion.label == label
         ]
@@ -271,7 +271,7 @@ class _Run:
         if not degree > 0.0:
             return
         for offset, one in enumerate(block.rules[index].then):
-            degree = hedges_applied(one.hedges, degree)
+            degree = hedged(one.hedges, degree)
             if degree > 0.0:
                 noted = _Concluded(place + offset, one, degree, block.implication)
                 self.concluded[one.output].append(noted)
@@ -288,7 +288,7 @@ class _Run:
             case "centroid":
                 areas = _areas(output, degrees)
                 moments = [x * area for x, area in zip(xs, areas, strict=True)]
-                return quotient(tree_sum(moments), tree_sum(areas))
+                return divide(total(moments), total(areas))
             case "bisector":
                 return _bisector(xs, _areas(output, degrees))
             case method:
@@ -296,12 +296,16 @@ class _Run:
 
     def _aggregated(self, output: SystemOutput, xs: Sequence[float]) -> list[float]:
         """Return the degree of the joined conclusions at each value, from 0 on."""
-        join = S_NORMS[output.aggregation or "maximum"]
+        join = _or(output.aggregation)
         total = [0.0] * len(xs)
         for one in self._of(output):
-            cut = T_NORMS[one.implication or "minimum"]
-            for position, x in enumerate(xs):
-                degree = self._label_degree(output.name, one.conclusion.label, x)
+            cut = _and(one.implication)
+            label = self.labels[output.name, one.conclusion.label]
+            if isinstance(label.curve, Formula):
+                degrees = [self._label_degree(output.name, label.name, x) for x in xs]
+            else:
+                degrees = sampled_degrees(output, label)
+            for position, degree in enumerate(degrees):
                 total[position] = join(total[position], cut(one.degree, degree))
         return total
 
@@ -338,7 +342,7 @@ class _Run:
             width = right - left
             areas.append(width * area)
             moments.append(width * (left * area + width * moment / 3.0))
-        return quotient(tree_sum(moments), tree_sum(areas))
+        return divide(total(moments), total(areas))
 
     def _weighted(self, output: SystemOutput) -> float:
         """Return the weighted sum or average of numbers, from left to right."""
@@ -349,7 +353,7 @@ class _Run:
         total = _left_to_right([product for _, product in weighted])
         weight = _left_to_right([degree for degree, _ in weighted])
         if output.defuzzifier.method == "weighted average":
-            return quotient(total, weight)
+            return divide(total, weight)
         return total if weighted else math.nan
 
     def _weights(self, output: SystemOutput) -> Iterator[tuple[SystemTerm, float]]:
@@ -382,13 +386,31 @@ class _Run:
                 return self._label_degree(output.name, label.name, degree)
 
 
+def _and(name: TNorm | None) -> Callable[[float, float], float]:
+    return functools.partial(t_norm, name or "minimum")
+
+
+def _or(name: SNorm | None) -> Callable[[float, float], float]:
+    return functools.partial(s_norm, name or "maximum")
+
+
+_RELATIONS: Mapping[Relation, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    "==": operator.eq,
+    "!=": operator.ne,
+    ">=": operator.ge,
+    ">": operator.gt,
+}
+
+
 def _passes(how: Activation, degree: float, count: int) -> bool:
     """Return whether a rule is activated when `count` were before it."""
     match how.method:
         case "first" | "last":
             return count < how.count and degree >= how.threshold
         case "threshold":
-            return RELATIONS[how.relation](degree, how.threshold)
+            return _RELATIONS[how.relation](degree, how.threshold)
         case _:
             return True
 
@@ -450,15 +472,20 @@ class Lines(msgspec.Struct, frozen=True):
 
 
 @functools.lru_cache(maxsize=256)
+def sampled_degrees(output: SystemOutput, label: SystemTerm) -> list[float]:
+    """Return the degrees of a term that has no formula, where an output is sampled."""
+    xs = sampled_values(output)
+    return [label.height * curve_degree(label.curve, x) for x in xs]
+
+
+@functools.lru_cache(maxsize=256)
 def line_tables(output: SystemOutput, label: SystemTerm) -> Lines:
     """Return the lines of a label of an output whose grid is `lines`."""
-    degrees = [
-        label.height * curve_degree(label.curve, x, {}) for x in sampled_values(output)
-    ]
+    degrees = sampled_degrees(output, label)
     rows: list[tuple[float, float, float, float, float]] = []
     for left, right in itertools.pairwise(degrees):
         rise = right - left
-        slope = quotient(1.0, rise)
+        slope = divide(1.0, rise)
         if not math.isfinite(slope):
             rows.append((left, rise, 0.0, 0.0, 0.0))
         elif rise > 0.0:
@@ -483,7 +510,7 @@ def _bisector(xs: Sequence[float], areas: Sequence[float]) -> float:
     of all is nearest to 1/2.
     """
     sums = [*itertools.accumulate(areas)]
-    misses = [abs(quotient(part, sums[-1]) - 0.5) for part in sums]
+    misses = [abs(divide(part, sums[-1]) - 0.5) for part in sums]
     if any(map(math.isnan, misses)):
         return math.nan
     return _mean(xs, [miss == min(misses) for miss in misses])
@@ -502,24 +529,7 @@ def _of_maximum(method: str, xs: Sequence[float], degrees: Sequence[float]) -> f
 
 def _mean(xs: Sequence[float], chosen: Sequence[bool]) -> float:
     kept = [x if one else 0.0 for x, one in zip(xs, chosen, strict=True)]
-    return tree_sum(kept) / sum(chosen)
-
-
-def tree_sum(values: Sequence[float]) -> float:
-    """Return a sum: first half plus second half, until one number is left.
-
-    Zeros fill the values up to a power of two. Runtimes that add arrays can do the same
-    additions.
-
-    Example:
-        >>> tree_sum([1.0, 2.0, 3.0])  # (1 + 3) + (2 + 0)
-        6.0
-    """
-    left = [*values, *[0.0] * ((1 << (len(values) - 1).bit_length()) - len(values))]
-    while len(left) > 1:
-        half = len(left) // 2
-        left = [a + b for a, b in zip(left[:half], left[half:], strict=True)]
-    return left[0]
+    return total(kept) / sum(chosen)
 
 
 def _left_to_right(values: Sequence[float]) -> float:

@@ -1,11 +1,16 @@
-"""Formulas as steps: the operations of `fuzzytree.semantics.inference.formulas`."""
+"""Formulas: what each of their functions is, in operations of programs.
+
+Truth is 1 and untruth 0; what is not 0 is true, NaN too, and NaN equals NaN. `round`
+takes a half to the even neighbour, `%` has the sign of its second number and `fmod`
+that of its first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from fuzzytree.model import Call, Expression, Name, Number
-from fuzzytree.semantics.programs.steps import Maker
+from fuzzytree.semantics.programs.operations import N, Numbers
 
 _SAME: Mapping[str, str] = {
     "+": "add",
@@ -43,7 +48,7 @@ _SAME: Mapping[str, str] = {
 """Functions of formulas that are one operation each."""
 
 
-def value_of(make: Maker, expression: Expression, names: Mapping[str, int]) -> int:
+def value_of(make: Numbers[N], expression: Expression, names: Mapping[str, N]) -> N:
     """Return the value of a formula.
 
     Raises:
@@ -60,36 +65,54 @@ def value_of(make: Maker, expression: Expression, names: Mapping[str, int]) -> i
                 return make(_SAME[function], *operands)
             if function == "not":
                 zero = make.constant(0.0)
-                return as_number(make, make("equal", operands[0], zero))
+                return as_number(make, make("equal", *operands, zero))
             one, other = operands
-            return _OTHERS[function](make, one, other)
+            if function == "%":
+                return _modulo(make, one, other)
+            return as_number(make, _truth(make, function, one, other))
 
 
-def is_nan(make: Maker, a: int) -> int:
+def is_nan(make: Numbers[N], a: N) -> N:
     """Return whether a number is NaN."""
     return make("not", make("equal", a, a))
 
 
-def as_number(make: Maker, truth: int) -> int:
+def as_number(make: Numbers[N], truth: N) -> N:
     """Return 1 for a truth and 0 for an untruth."""
     return make("where", truth, make.constant(1.0), make.constant(0.0))
 
 
-def _is_true(make: Maker, a: int) -> int:
+def _is_true(make: Numbers[N], a: N) -> N:
     return make("not", make("equal", a, make.constant(0.0)))
 
 
-def _is_same(make: Maker, a: int, b: int) -> int:
+def _is_same(make: Numbers[N], a: N, b: N) -> N:
     both = make("and", is_nan(make, a), is_nan(make, b))
     return make("or", make("equal", a, b), both)
 
 
-def _le(make: Maker, a: int, b: int) -> int:
-    holds = make("or", make("at_most", a, b), _is_same(make, a, b))
-    return as_number(make, holds)
+def _truth(make: Numbers[N], function: str, a: N, b: N) -> N:
+    """Return whether a relation of two numbers is true."""
+    match function:
+        case "and" | "or":
+            return make(function, _is_true(make, a), _is_true(make, b))
+        case "lt":
+            return make("less", a, b)
+        case "gt":
+            return make("less", b, a)
+        case "le":
+            return make("or", make("at_most", a, b), _is_same(make, a, b))
+        case "ge":
+            return _truth(make, "le", b, a)
+        case "eq":
+            return _is_same(make, a, b)
+        case "neq":
+            return make("not", _is_same(make, a, b))
+        case _:
+            raise KeyError(function)
 
 
-def _modulo(make: Maker, a: int, b: int) -> int:
+def _modulo(make: Numbers[N], a: N, b: N) -> N:
     """Return what is left of a, with the sign of b."""
     zero = make.constant(0.0)
     rest = make("remainder", a, b)
@@ -98,21 +121,3 @@ def _modulo(make: Maker, a: int, b: int) -> int:
     one = make("and", is_below, divides_above)
     two = make("and", is_above, divides_below)
     return make("where", make("or", one, two), make("add", rest, b), rest)
-
-
-_OTHERS: Mapping[str, Callable[[Maker, int, int], int]] = {
-    "%": _modulo,
-    "and": lambda make, a, b: as_number(
-        make, make("and", _is_true(make, a), _is_true(make, b))
-    ),
-    "or": lambda make, a, b: as_number(
-        make, make("or", _is_true(make, a), _is_true(make, b))
-    ),
-    "lt": lambda make, a, b: as_number(make, make("less", a, b)),
-    "le": _le,
-    "gt": lambda make, a, b: as_number(make, make("less", b, a)),
-    "ge": lambda make, a, b: _le(make, b, a),
-    "eq": lambda make, a, b: as_number(make, _is_same(make, a, b)),
-    "neq": lambda make, a, b: as_number(make, make("not", _is_same(make, a, b))),
-}
-"""Functions of two numbers that are several operations."""

@@ -1,9 +1,10 @@
-"""Membership functions as steps: the operations of the reference, in its order.
+"""What each membership function is, in operations of programs.
 
-Where `fuzzytree.semantics.inference.membership` chooses between formulas, all are
-computed here and `where` takes one, so that a formula may give NaN or an infinity where
-it is not taken. Functions of rule bases mirror `fuzzytree.semantics.reference`; they
-may leave out what changes no bit, such as a multiplication by 1, and nothing else.
+The inference performs the operations on doubles, programs hold them as steps. Where
+there is a choice between formulas, all are computed and `where` takes one, so that a
+formula may give NaN or an infinity where it is not taken. The steps of rule bases'
+functions mirror `fuzzytree.semantics.reference`; they may leave out what changes no
+bit, such as a multiplication by 1, and nothing else.
 """
 
 from __future__ import annotations
@@ -37,11 +38,13 @@ from fuzzytree.model import (
     SigmoidProduct,
     Singleton,
     Spike,
+    SystemCurve,
     Trapezoid,
     TwoGaussians,
     Variable,
 )
 from fuzzytree.semantics.programs.formulas import as_number, value_of
+from fuzzytree.semantics.programs.operations import N, Numbers
 from fuzzytree.semantics.programs.steps import Maker
 from fuzzytree.semantics.reference import BELOW_ONE
 
@@ -71,10 +74,19 @@ def is_unit(curve: Curve) -> bool:
 
 
 def curve_degree(make: Maker, curve: Curve, x: int, names: Mapping[str, int]) -> int:
-    """Return the degree at a value, without the label's height."""
+    """Return the step of the degree at a value, without the term's height."""
     match curve:
         case Band() | LR() | Points():
             return shape_degree(make, curve, x)
+        case _:
+            return system_degree(make, curve, x, names)
+
+
+def system_degree(
+    make: Numbers[N], curve: SystemCurve, x: N, names: Mapping[str, N]
+) -> N:
+    """Return the degree at a value, without the term's height."""
+    match curve:
         case Trapezoid():
             return _trapezoid(make, curve, x)
         case Gaussian(mean=mean, deviation=deviation):
@@ -95,10 +107,10 @@ def curve_degree(make: Maker, curve: Curve, x: int, names: Mapping[str, int]) ->
             steep = make("multiply", make.constant(-slope), offset)
             return _one_by_one_plus(make, make("exponential", steep))
         case SigmoidDifference(first=first, second=second):
-            pair = [curve_degree(make, one, x, names) for one in (first, second)]
+            pair = [system_degree(make, one, x, names) for one in (first, second)]
             return make("absolute", make("subtract", *pair))
         case SigmoidProduct(first=first, second=second):
-            pair = [curve_degree(make, one, x, names) for one in (first, second)]
+            pair = [system_degree(make, one, x, names) for one in (first, second)]
             return make("multiply", *pair)
         case SCurve(start=start, end=end):
             return _s(make, x, start, end)
@@ -129,7 +141,7 @@ def curve_degree(make: Maker, curve: Curve, x: int, names: Mapping[str, int]) ->
             assert_never(curve)
 
 
-def value_at(make: Maker, curve: Curve, degree: int) -> int | None:
+def value_at(make: Numbers[N], curve: Curve, degree: N) -> N | None:
     """Return where a monotone curve has a degree; None for the other curves."""
     one = make.constant(1.0)
     match curve:
@@ -165,25 +177,25 @@ def value_at(make: Maker, curve: Curve, degree: int) -> int | None:
             return None
 
 
-def _odds(make: Maker, degree: int) -> int:
+def _odds(make: Numbers[N], degree: N) -> N:
     one = make.constant(1.0)
     return make("subtract", make("divide", one, degree), one)
 
 
-def _scaled(make: Maker, x: int, start: float, width: float) -> int:
+def _scaled(make: Numbers[N], x: N, start: float, width: float) -> N:
     offset = make("subtract", x, make.constant(start))
     return make("divide", offset, make.constant(width))
 
 
-def _one_by_one_plus(make: Maker, a: int) -> int:
+def _one_by_one_plus(make: Numbers[N], a: N) -> N:
     one = make.constant(1.0)
     return make("divide", one, make("add", one, a))
 
 
-def _trapezoid(make: Maker, curve: Trapezoid, x: int) -> int:
+def _trapezoid(make: Numbers[N], curve: Trapezoid, x: N) -> N:
     """Return the smaller slope, clamped to [0, 1]; an upright side is cut off last."""
     a, b, c, d = curve.a, curve.b, curve.c, curve.d
-    slopes: list[int] = []
+    slopes: list[N] = []
     if a is not None and a < b:
         slopes.append(_scaled(make, x, a, b - a))
     if d is not None and c < d:
@@ -201,13 +213,24 @@ def _trapezoid(make: Maker, curve: Trapezoid, x: int) -> int:
     return result
 
 
-def _gaussian(make: Maker, x: int, mean: float, deviation: float) -> int:
+def smaller_slope(make: Numbers[N], slopes: Sequence[N], *, is_peak: bool) -> N:
+    """Return the smaller of some slopes, clamped to [0, 1].
+
+    Rounding keeps order, so a slope is at least 1 wherever the other one counts.
+    """
+    result = make.chain("minimum", slopes)
+    if not is_peak:
+        result = make("minimum", result, make.constant(1.0))
+    return make("maximum", result, make.constant(0.0))
+
+
+def _gaussian(make: Numbers[N], x: N, mean: float, deviation: float) -> N:
     t = _scaled(make, x, mean, deviation)
     square = make("multiply", t, t)
     return make("exponential", make("multiply", make.constant(-0.5), square))
 
 
-def _s(make: Maker, x: int, start: float, end: float) -> int:
+def _s(make: Numbers[N], x: N, start: float, end: float) -> N:
     zero, one, two = (make.constant(number) for number in (0.0, 1.0, 2.0))
     if start == end:
         return make("where", make("at_most", x, make.constant(start)), zero, one)
@@ -220,7 +243,7 @@ def _s(make: Maker, x: int, start: float, end: float) -> int:
     return make("where", make("at_most", t, zero), zero, result)
 
 
-def _pi(make: Maker, curve: PiCurve, x: int) -> int:
+def _pi(make: Numbers[N], curve: PiCurve, x: N) -> N:
     zero, one = make.constant(0.0), make.constant(1.0)
     falling = _s(make, x, curve.d, curve.c)
     is_behind = make("at_most", make.constant(curve.d), x)
@@ -229,7 +252,7 @@ def _pi(make: Maker, curve: PiCurve, x: int) -> int:
     return make("multiply", _s(make, x, curve.a, curve.b), falling)
 
 
-def _cosine(make: Maker, t: int) -> int:
+def _cosine(make: Numbers[N], t: N) -> N:
     one, half = make.constant(1.0), make.constant(0.5)
     wave = make("cosine", make("multiply", make.constant(2.0 * math.pi), t))
     inside = make("at_most", make("absolute", t), half)
@@ -237,7 +260,7 @@ def _cosine(make: Maker, t: int) -> int:
     return make("where", inside, degree, make.constant(0.0))
 
 
-def _concave(make: Maker, x: int, inflection: float, end: float) -> int:
+def _concave(make: Numbers[N], x: N, inflection: float, end: float) -> N:
     one, there = make.constant(1.0), make.constant(end)
     if inflection <= end:
         width, gap = make.constant(end - inflection), make("subtract", there, x)
@@ -249,7 +272,7 @@ def _concave(make: Maker, x: int, inflection: float, end: float) -> int:
     return make("where", outside, share, one)
 
 
-def _arc(make: Maker, u: int) -> int:
+def _arc(make: Numbers[N], u: N) -> N:
     zero, one = make.constant(0.0), make.constant(1.0)
     rest = make("subtract", make.constant(2.0), u)
     root = make("square_root", make("multiply", u, rest))
@@ -257,7 +280,7 @@ def _arc(make: Maker, u: int) -> int:
     return make("where", make("at_most", u, zero), zero, result)
 
 
-def _semi_ellipse(make: Maker, x: int, start: float, end: float) -> int:
+def _semi_ellipse(make: Numbers[N], x: N, start: float, end: float) -> N:
     width = make.constant(end - start)
     left = _scaled(make, x, start, end - start)
     right = make("divide", make("subtract", make.constant(end), x), width)
@@ -345,17 +368,6 @@ def _side(make: Maker, side: Side, distance: int) -> int:
     w = clip(make, make("divide", rest, make.constant(side.reach - 1.0)), 1.0)
     square = make("multiply", w, w)
     return make("multiply", body, make("multiply", square, square))
-
-
-def smaller_slope(make: Maker, slopes: Sequence[int], *, is_peak: bool) -> int:
-    """Return the smaller of some slopes, clamped to [0, 1].
-
-    Rounding keeps order, so a slope is at least 1 wherever the other one counts.
-    """
-    result = make.chain("minimum", slopes)
-    if not is_peak:
-        result = make("minimum", result, make.constant(1.0))
-    return make("maximum", result, make.constant(0.0))
 
 
 def _points_degree(make: Maker, points: Points, x: int) -> int:

@@ -1,13 +1,26 @@
-"""ANDs, ORs, hedges and the activation of rules as steps."""
+"""ANDs, ORs and hedges, and the activation of rules as steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from fuzzytree.model import Activation, Hedge, SNorm, TNorm
+from fuzzytree.semantics.programs.operations import N, Numbers
 from fuzzytree.semantics.programs.steps import Maker
 
-Norm = Callable[[Maker, int, int], int]
+
+class Norm(Protocol):
+    """An AND or an OR of two degrees."""
+
+    def __call__(self, make: Numbers[N], a: N, b: N, /) -> N:
+        """Return what it makes of two degrees."""
+        ...
+
+
+class _Hedging(Protocol):
+    def __call__(self, make: Numbers[N], degree: N, /) -> N: ...
+
 
 KEEPS_UNIT: frozenset[str] = frozenset(
     (
@@ -26,114 +39,122 @@ KEEPS_UNIT: frozenset[str] = frozenset(
 """Norms whose result lies in [0, 1] if both degrees do, in rounded numbers too."""
 
 
-def hedged(make: Maker, hedges: Sequence[Hedge], degree: int) -> int:
+def hedged(make: Numbers[N], hedges: Sequence[Hedge], degree: N) -> N:
     """Return what hedges make of a degree, the last first."""
     for hedge in reversed(hedges):
         degree = _HEDGES[hedge](make, degree)
     return degree
 
 
-def _one_minus(make: Maker, a: int) -> int:
+def _one_minus(make: Numbers[N], a: N) -> N:
     return make("subtract", make.constant(1.0), a)
 
 
-def _twice(make: Maker, a: int) -> int:
+def _twice(make: Numbers[N], a: N) -> N:
     return make("multiply", make.constant(2.0), a)
 
 
-def _half(make: Maker, a: int) -> int:
+def _half(make: Numbers[N], a: N) -> N:
     return make("multiply", make.constant(0.5), a)
 
 
-def _square(make: Maker, a: int) -> int:
+def _square(make: Numbers[N], a: N) -> N:
     return make("multiply", a, a)
 
 
-def _in_halves(make: Maker, d: int, low: int, high: int) -> int:
+def _cubed(make: Numbers[N], a: N) -> N:
+    return make("multiply", _square(make, a), a)
+
+
+def _fourth(make: Numbers[N], a: N) -> N:
+    return _square(make, _square(make, a))
+
+
+def _in_halves(make: Numbers[N], d: N, low: N, high: N) -> N:
     return make("where", make("at_most", d, make.constant(0.5)), low, high)
 
 
-def _extremely(make: Maker, d: int) -> int:
+def _extremely(make: Numbers[N], d: N) -> N:
     low = _twice(make, _square(make, d))
     high = _one_minus(make, _twice(make, _square(make, _one_minus(make, d))))
     return _in_halves(make, d, low, high)
 
 
-def _seldom(make: Maker, d: int) -> int:
+def _seldom(make: Numbers[N], d: N) -> N:
     low = make("square_root", _half(make, d))
     root = make("square_root", _half(make, _one_minus(make, d)))
     return _in_halves(make, d, low, _one_minus(make, root))
 
 
-_HEDGES: Mapping[Hedge, Callable[[Maker, int], int]] = {
+_HEDGES: Mapping[Hedge, _Hedging] = {
     "any": lambda make, d: make.constant(1.0),
     "not": _one_minus,
     "very": _square,
     "somewhat": lambda make, d: make("square_root", d),
     "extremely": _extremely,
     "seldom": _seldom,
-    "cubed": lambda make, d: make("multiply", _square(make, d), d),
-    "very very": lambda make, d: _square(make, _square(make, d)),
+    "cubed": _cubed,
+    "very very": _fourth,
     "plus": lambda make, d: make("power", d, make.constant(1.25)),
     "minus": lambda make, d: make("power", d, make.constant(0.75)),
     "cube root": lambda make, d: make("power", d, make.constant(1.0 / 3.0)),
 }
 
 
-def _sum_less_product(make: Maker, a: int, b: int) -> int:
+def _sum_less_product(make: Numbers[N], a: N, b: N) -> N:
     return make("subtract", make("add", a, b), make("multiply", a, b))
 
 
-def _bounded_difference(make: Maker, a: int, b: int) -> int:
+def _bounded_difference(make: Numbers[N], a: N, b: N) -> N:
     rest = make("subtract", make("add", a, b), make.constant(1.0))
     return make("maximum", make.constant(0.0), rest)
 
 
-def _drastic_product(make: Maker, a: int, b: int) -> int:
+def _drastic_product(make: Numbers[N], a: N, b: N) -> N:
     is_one = make("equal", make("maximum", a, b), make.constant(1.0))
     return make("where", is_one, make("minimum", a, b), make.constant(0.0))
 
 
-def _einstein_product(make: Maker, a: int, b: int) -> int:
+def _einstein_product(make: Numbers[N], a: N, b: N) -> N:
     below = make("subtract", make.constant(2.0), _sum_less_product(make, a, b))
     return make("divide", make("multiply", a, b), below)
 
 
-def _hamacher_product(make: Maker, a: int, b: int) -> int:
+def _hamacher_product(make: Numbers[N], a: N, b: N) -> N:
     zero = make.constant(0.0)
     share = make("divide", make("multiply", a, b), _sum_less_product(make, a, b))
     return make("where", make("equal", make("add", a, b), zero), zero, share)
 
 
-def _nilpotent_minimum(make: Maker, a: int, b: int) -> int:
+def _nilpotent_minimum(make: Numbers[N], a: N, b: N) -> N:
     is_above = make("less", make.constant(1.0), make("add", a, b))
     return make("where", is_above, make("minimum", a, b), make.constant(0.0))
 
 
-def _drastic_sum(make: Maker, a: int, b: int) -> int:
+def _drastic_sum(make: Numbers[N], a: N, b: N) -> N:
     is_zero = make("equal", make("minimum", a, b), make.constant(0.0))
     return make("where", is_zero, make("maximum", a, b), make.constant(1.0))
 
 
-def _einstein_sum(make: Maker, a: int, b: int) -> int:
+def _einstein_sum(make: Numbers[N], a: N, b: N) -> N:
     below = make("add", make.constant(1.0), make("multiply", a, b))
     return make("divide", make("add", a, b), below)
 
 
-def _hamacher_sum(make: Maker, a: int, b: int) -> int:
+def _hamacher_sum(make: Numbers[N], a: N, b: N) -> N:
     one, product = make.constant(1.0), make("multiply", a, b)
     above = make("subtract", make("add", a, b), _twice(make, product))
     share = make("divide", above, make("subtract", one, product))
     return make("where", make("equal", product, one), one, share)
 
 
-def _nilpotent_maximum(make: Maker, a: int, b: int) -> int:
+def _nilpotent_maximum(make: Numbers[N], a: N, b: N) -> N:
     one = make.constant(1.0)
     is_below = make("less", make("add", a, b), one)
     return make("where", is_below, make("maximum", a, b), one)
 
 
-def _normalized_sum(make: Maker, a: int, b: int) -> int:
+def _normalized_sum(make: Numbers[N], a: N, b: N) -> N:
     both = make("add", a, b)
     return make("divide", both, make("maximum", make.constant(1.0), both))
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 import operator
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
-from typing import Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal, Protocol, TypeVar
 
 import msgspec
 
@@ -164,16 +164,13 @@ def picked(table: tuple[float, ...], place: float) -> float:
     return table[int(place) if inside else 0]
 
 
-def _floor(a: float) -> float:
-    return float(math.floor(a)) if math.isfinite(a) else a
+def _whole(function: Callable[[float], int]) -> Callable[[float], float]:
+    """Return a function to whole numbers that keeps the sign of 0."""
 
+    def whole(a: float) -> float:
+        return math.copysign(float(function(a)), a) if math.isfinite(a) else a
 
-def _ceiling(a: float) -> float:
-    return float(math.ceil(a)) if math.isfinite(a) else a
-
-
-def _round(a: float) -> float:
-    return float(round(a)) if math.isfinite(a) else a
+    return whole
 
 
 def _quiet(function: Callable[[float], float]) -> Callable[[float], float]:
@@ -226,9 +223,9 @@ NUMERIC: Mapping[str, Callable[..., float]] = {
     "maximum": maximum,
     "negate": operator.neg,
     "absolute": abs,
-    "floor": _floor,
-    "ceiling": _ceiling,
-    "round": _round,
+    "floor": _whole(math.floor),
+    "ceiling": _whole(math.ceil),
+    "round": _whole(round),
     "square_root": _quiet(math.sqrt),
     "exponential": _quiet(math.exp),
     "logarithm": _logarithm(math.log, 0.0),
@@ -263,6 +260,42 @@ LOGICAL: Mapping[str, Callable[..., bool]] = {
     "not": operator.not_,
 }
 """What each operation that gives a truth makes of its arguments."""
+
+
+N = TypeVar("N")
+
+
+class Numbers(Protocol[N]):
+    """What formulas are computed with: doubles, or the steps of a program."""
+
+    def constant(self, number: float, /) -> N:
+        """Return a constant."""
+        ...
+
+    def __call__(self, operation: str, /, *arguments: N) -> N:
+        """Return what an operation of `OPERATIONS` makes of numbers or truths."""
+        ...
+
+    def chain(self, operation: str, numbers: Sequence[N], /) -> N:
+        """Return an operation carried along from left to right."""
+        total = numbers[0]
+        for number in numbers[1:]:
+            total = self(operation, total, number)
+        return total
+
+
+class _Doubles(Numbers[float]):
+    """Computes each operation at once; truths are 0 and 1."""
+
+    def constant(self, number: float, /) -> float:
+        return number
+
+    def __call__(self, operation: str, /, *arguments: float) -> float:
+        return _MEANINGS[operation](*arguments)
+
+
+_MEANINGS: Mapping[str, Callable[..., float]] = {**NUMERIC, **LOGICAL}
+DOUBLES = _Doubles()
 
 
 def of_table(operation: str, table: tuple[float, ...], a: float) -> float:

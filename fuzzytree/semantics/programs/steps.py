@@ -49,6 +49,7 @@ from fuzzytree.semantics.programs.operations import (
     OPERATIONS,
     OVER_SAMPLES,
     Kind,
+    Numbers,
     of_table,
 )
 
@@ -141,7 +142,7 @@ class Program(Value, frozen=True):
         return sum(step.samples or 1 for step in self.steps)
 
 
-class Maker:
+class Maker(Numbers[int]):
     """Collects steps; a step that stands there already is not added again.
 
     Steps on constants alone are computed at once. `x * 1`, `x / 1`, `x - 0` and the
@@ -154,7 +155,7 @@ class Maker:
         self._topic = ""
         self._known: dict[tuple[object, ...], int] = {}
 
-    def constant(self, number: float) -> int:
+    def constant(self, number: float, /) -> int:
         """Return the place of a constant."""
         return self._added(Step("constant", number=float(number)))
 
@@ -175,7 +176,7 @@ class Maker:
         step = Step(operation, (argument,), table=numbers, samples=operands.samples)
         return self._added(step)
 
-    def __call__(self, operation: str, *arguments: int) -> int:
+    def __call__(self, operation: str, /, *arguments: int) -> int:
         """Return the place of an operation on earlier steps."""
         operands = [self._steps[argument] for argument in arguments]
         if all(step.operation == "constant" for step in operands):
@@ -226,13 +227,6 @@ class Maker:
     def samples(self, place: int) -> int:
         """Return how many samples a step has results for."""
         return self._steps[place].samples
-
-    def chain(self, operation: str, places: Sequence[int]) -> int:
-        """Return an operation carried along from left to right."""
-        total = places[0]
-        for place in places[1:]:
-            total = self(operation, total, place)
-        return total
 
     def program(
         self, name: str, inputs: tuple[str, ...], results: tuple[Result, ...]

@@ -1,0 +1,115 @@
+"""Membership functions, norms, hedges and formulas in plain floats; none of them fails.
+
+What they are stands in `fuzzytree.semantics.programs`; here each of its operations is
+performed at once. Where an operation has no value the result is what IEEE 754 and the C
+library say: NaN, or an infinity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from fuzzytree.model import LR, Band, Curve, Expression, Hedge, Points, SNorm, TNorm
+from fuzzytree.semantics.programs import formulas, membership, norms
+from fuzzytree.semantics.programs.operations import DOUBLES
+from fuzzytree.semantics.reference import degree as shape_degree
+
+_NOTHING: Final[Mapping[str, float]] = {}
+
+
+def curve_degree(
+    curve: Curve, x: float, names: Mapping[str, float] = _NOTHING
+) -> float:
+    """Return the degree of a finite value, without the term's height.
+
+    Args:
+        curve: The membership function. A `Linear` one, a sum of inputs, has the degree
+            NaN.
+        x: The value.
+        names: The values of the variables, for formulas; `x` itself is added.
+
+    Returns:
+        A degree in [0, 1]. Of a formula any number, also NaN or an infinity.
+
+    Raises:
+        KeyError: If a formula needs a name that has no value.
+
+    Example:
+        >>> from fuzzytree.model.system import Arc, Trapezoid
+        >>> curve_degree(Trapezoid(0.0, 2.0, 3.0, 4.0), 0.5)
+        0.25
+        >>> curve_degree(Arc(0.0, 1.0), 0.0), curve_degree(Arc(0.0, 1.0), 2.0)
+        (0.0, 1.0)
+    """
+    match curve:
+        case Band() | LR() | Points():
+            return shape_degree(curve, x)
+        case _:
+            return membership.system_degree(DOUBLES, curve, x, names)
+
+
+def value_at(curve: Curve, degree: float) -> float | None:
+    """Return where a monotone membership function has a degree, after Tsukamoto.
+
+    Monotone are `Sigmoid`, `SCurve`, `Concave` and `Arc`, and a ramp: two points of
+    which one has degree 0 and the other 1. Degrees above 1, which sums can make, follow
+    the same formulas: on along the line of a ramp, NaN for roots and logarithms.
+
+    Returns:
+        The value; None for every other function. Where only the infinite has the degree
+        (1 of a sigmoid), an infinity.
+
+    Example:
+        >>> from fuzzytree.model.system import Concave, Gaussian, SCurve
+        >>> value_at(SCurve(0.0, 4.0), 0.125), value_at(Concave(0.0, 1.0), 0.5)
+        (1.0, 0.0)
+        >>> value_at(Gaussian(0.0, 1.0), 0.5) is None
+        True
+    """
+    return membership.value_at(DOUBLES, curve, degree)
+
+
+def value_of(expression: Expression, names: Mapping[str, float]) -> float:
+    """Return the value of a formula.
+
+    Raises:
+        KeyError: If a name has no value, or a function is unknown.
+
+    Example:
+        >>> from fuzzytree.model.system import Call, Name, Number
+        >>> twice = Call("*", (Number(2.0), Name("dirt")))
+        >>> value_of(Call("+", (twice, Number(1.0))), {"dirt": 0.25})
+        1.5
+    """
+    return formulas.value_of(DOUBLES, expression, names)
+
+
+def hedged(hedges: Sequence[Hedge], degree: float) -> float:
+    """Return what hedges make of a degree, the last first.
+
+    Example:
+        >>> hedged(["not", "very"], 0.5), hedged(["any"], 0.25)
+        (0.75, 1.0)
+    """
+    return norms.hedged(DOUBLES, hedges, degree)
+
+
+def t_norm(name: TNorm, a: float, b: float) -> float:
+    """Return the AND of two degrees.
+
+    Example:
+        >>> t_norm("bounded difference", 0.5, 0.75)
+        0.25
+    """
+    return norms.T_NORMS[name](DOUBLES, a, b)
+
+
+def s_norm(name: SNorm, a: float, b: float) -> float:
+    """Return the OR of two degrees.
+
+    Example:
+        >>> s_norm("algebraic sum", 0.5, 0.5), s_norm("sum", 1.0, 1.0)
+        (0.75, 2.0)
+    """
+    return norms.S_NORMS[name](DOUBLES, a, b)
