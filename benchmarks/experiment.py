@@ -25,11 +25,14 @@ from experiment_tasks import KNOWN, Task, file_task, known_task
 from fuzzytree.cli.console import (
     answer,
     answer_json,
+    argument,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     say,
     say_rows,
+    takes,
     wrong_options,
 )
 from fuzzytree.errors import WriteError, install_hint
@@ -53,73 +56,79 @@ _ONLY = {
 """The kinds of task that an option is for."""
 
 
+class ExperimentOptions:
+    """The arguments and options of the verb."""
+
+    task: str = argument(metavar="[TASK]", default="paper")
+    features: str | None = option(
+        "--features", metavar="NAMES", help="Names and sets of features, with commas."
+    )
+    mode: Literal["default", "paper"] | None = option(
+        "--mode",
+        type=click.Choice(["default", "paper"]),
+        help="`paper` is the paper's learner to the letter.",
+    )
+    patterns: int | None = option(
+        "--patterns", type=click.IntRange(1), help="For each class."
+    )
+    shrinkage: float | None = option(
+        "--shrinkage", type=float, help="Of off-diagonal scatter, 0 to 1."
+    )
+    entry: float | None = option(
+        "--entry", type=float, help="What a further feature must gain."
+    )
+    choose: bool = option(
+        "--choose",
+        is_flag=True,
+        help="Choose patterns, shrinkage and entry without those who are tested.",
+    )
+    sensor: str = option(
+        "--sensor",
+        type=click.Choice(["paper", "ideal"]),
+        default="paper",
+        help="Of TASK paper: `ideal` is even and linear.",
+    )
+    seed: int = option(
+        "--seed", type=click.IntRange(0), default=0, help="Of presses and peers."
+    )
+    repeats: int = option(
+        "--repeats",
+        type=click.IntRange(1, 100),
+        default=5,
+        show_default=True,
+        help="Of TASK paper, each pressed anew.",
+    )
+    test: str | None = option(
+        "--test", metavar="FILE.npz", help="What FILE.npz is tested on."
+    )
+    label: str = option(
+        "--label",
+        metavar="ARRAY",
+        default="label",
+        help="The classes in FILE.npz; `label`.",
+    )
+    full: int | None = option(
+        "--full", type=int, help="What a cell of FILE.npz reads at most."
+    )
+    threshold: int | None = option(
+        "--threshold", type=int, help="Above it a cell is pressed."
+    )
+    data: str | None = option(
+        "--data", metavar="FOLDER", help="Where the project's frames lie."
+    )
+    no_peers: bool = option(
+        "--no-peers", is_flag=True, help="Without learners of scikit-learn."
+    )
+    output: str | None = option(
+        "-o", "--output", metavar="FOLDER", help="For models and pictures."
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("experiment.py")
-@click.argument("task", metavar="[TASK]", default="paper")
-@click.option(
-    "--features", metavar="NAMES", help="Names and sets of features, with commas."
-)
-@click.option(
-    "--mode",
-    type=click.Choice(["default", "paper"]),
-    help="`paper` is the paper's learner to the letter.",
-)
-@click.option("--patterns", type=click.IntRange(1), help="For each class.")
-@click.option("--shrinkage", type=float, help="Of off-diagonal scatter, 0 to 1.")
-@click.option("--entry", type=float, help="What a further feature must gain.")
-@click.option(
-    "--choose",
-    is_flag=True,
-    help="Choose patterns, shrinkage and entry without those who are tested.",
-)
-@click.option(
-    "--sensor",
-    type=click.Choice(["paper", "ideal"]),
-    default="paper",
-    help="Of TASK paper: `ideal` is even and linear.",
-)
-@click.option("--seed", type=click.IntRange(0), default=0, help="Of presses and peers.")
-@click.option(
-    "--repeats",
-    type=click.IntRange(1, 100),
-    default=5,
-    show_default=True,
-    help="Of TASK paper, each pressed anew.",
-)
-@click.option("--test", metavar="FILE.npz", help="What FILE.npz is tested on.")
-@click.option(
-    "--label",
-    metavar="ARRAY",
-    default="label",
-    help="The classes in FILE.npz; `label`.",
-)
-@click.option("--full", type=int, help="What a cell of FILE.npz reads at most.")
-@click.option("--threshold", type=int, help="Above it a cell is pressed.")
-@click.option("--data", metavar="FOLDER", help="Where the project's frames lie.")
-@click.option("--no-peers", is_flag=True, help="Without learners of scikit-learn.")
-@click.option("-o", "--output", metavar="FOLDER", help="For models and pictures.")
-@json_option
-@quiet_option
-def command(
-    task: str,
-    features: str | None,
-    mode: Literal["default", "paper"] | None,
-    patterns: int | None,
-    shrinkage: float | None,
-    entry: float | None,
-    choose: bool,
-    sensor: str,
-    seed: int,
-    repeats: int,
-    test: str | None,
-    label: str,
-    full: int | None,
-    threshold: int | None,
-    data: str | None,
-    no_peers: bool,
-    output: str | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+@takes(ExperimentOptions)
+def command(options: ExperimentOptions) -> None:
     """Learn a tree of TASK, test it on frames it has not learnt from, and compare.
 
     TASK is paper (seven objects on the simulated sensor), postures or postures-17
@@ -127,44 +136,51 @@ def command(
     frames of one's own with `label`, `label_names` and `subject`. Each subject is left
     out in turn and tested on; frames are never divided at random.
     """
-    _check_options(task)
-    if output is not None:
-        _check_folder(Path(output))
+    _check_options(options.task)
+    if options.output is not None:
+        _check_folder(Path(options.output))
     given = {
-        "mode": mode,
-        "patterns_per_class": patterns,
-        "shrinkage": shrinkage,
-        "entry": entry,
+        "mode": options.mode,
+        "patterns_per_class": options.patterns,
+        "shrinkage": options.shrinkage,
+        "entry": options.entry,
     }
     with wrong_options():
-        if task == "paper":
-            found = _paper(sensor, seed, repeats)
+        if options.task == "paper":
+            found = _paper(options.sensor, options.seed, options.repeats)
         else:
-            found = _real(task, test, label, full, threshold, data)
+            found = _real(
+                options.task,
+                options.test,
+                options.label,
+                options.full,
+                options.threshold,
+                options.data,
+            )
         settings = _changed(found.settings, given)
-    peers = () if no_peers or not are_there() else tuple(PEERS)
-    with wrong_options(), progress_bar(quiet=quiet) as tell:
+    peers = () if options.no_peers or not are_there() else tuple(PEERS)
+    with wrong_options(), progress_bar(quiet=options.quiet) as tell:
         outcome = experiment(
             found,
-            features=features,
+            features=options.features,
             settings=settings,
-            choose=CANDIDATES if choose else (),
+            choose=CANDIDATES if options.choose else (),
             peers=peers,
-            seed=seed,
+            seed=options.seed,
             progress=tell,
         )
-    lines = [*experiment_lines(outcome.study, printed=_printed(task))]
-    if as_json:
+    lines = [*experiment_lines(outcome.study, printed=_printed(options.task))]
+    if options.as_json:
         answer_json(outcome.study.to_json())
     else:
         answer("\n".join(lines))
-    if not (peers or no_peers):
+    if not (peers or options.no_peers):
         say(
             f"without other learners: they need {install_hint('sklearn')}",
-            quiet=quiet,
+            quiet=options.quiet,
         )
-    if output is not None:
-        _write(Path(output), found, outcome, lines, quiet=quiet)
+    if options.output is not None:
+        _write(Path(options.output), found, outcome, lines, quiet=options.quiet)
 
 
 def _check_options(task: str) -> None:

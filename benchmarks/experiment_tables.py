@@ -21,9 +21,12 @@ from commands import run
 from fuzzytree.cli.console import (
     answer,
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     say,
+    takes,
     wrong_options,
 )
 from fuzzytree.tactile.cli.press import physics_settings
@@ -252,53 +255,54 @@ def discriminate(
     return nearest
 
 
+class TablesOptions:
+    """The arguments and options of the verb."""
+
+    name: str = argument(metavar="OBJECT")
+    count: int = option(
+        "--count", metavar="NUMBER", type=int, default=50, show_default=True
+    )
+    seed: int = option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
+    changes: Sequence[str] = option(
+        "--set",
+        metavar="NAME=VALUE",
+        multiple=True,
+        help="A number of the simulator (repeat); docs/explanation/simulator.md.",
+    )
+    means: bool = option(
+        "--means", is_flag=True, help="Print mean invariants beside Table 2."
+    )
+    is_each: bool = option(
+        "--effects",
+        is_flag=True,
+        help="Print the recognition rates without each effect of the sensor.",
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("experiment_tables.py")
-@click.argument("name", metavar="OBJECT")
-@click.option("--count", metavar="NUMBER", type=int, default=50, show_default=True)
-@click.option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
-@click.option(
-    "--set",
-    "changes",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="A number of the simulator (repeat); docs/explanation/simulator.md.",
-)
-@click.option("--means", is_flag=True, help="Print mean invariants beside Table 2.")
-@click.option(
-    "--effects",
-    "is_each",
-    is_flag=True,
-    help="Print the recognition rates without each effect of the sensor.",
-)
-@json_option
-@quiet_option
-def command(
-    name: str,
-    count: int,
-    seed: int,
-    changes: Sequence[str],
-    means: bool,
-    is_each: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+@takes(TablesOptions)
+def command(options: TablesOptions) -> None:
     """Compare simulated presses of OBJECT, or of `all`, with the paper's."""
-    if not (means or is_each):
+    if not (options.means or options.is_each):
         raise click.UsageError("choose --means or --effects")
-    if is_each and (name != "all" or count < 2):
+    if options.is_each and (options.name != "all" or options.count < 2):
         raise click.UsageError("--effects needs all objects, and 2 presses of each")
-    settings = physics_settings(changes)
-    names = tuple(OBJECTS) if name == "all" else (name,)
+    settings = physics_settings(options.changes)
+    names = tuple(OBJECTS) if options.name == "all" else (options.name,)
     facts: dict[str, object] = {}
     with wrong_options():
-        if means:
-            table = compare(settings, seed, count=count, objects=names)
+        if options.means:
+            table = compare(settings, options.seed, count=options.count, objects=names)
             facts["means"] = _means_facts(table)
-            if not as_json:
-                _print_means(table, quiet=quiet)
-        if is_each:
-            facts["effects"] = _print_effects(settings, seed, count, is_silent=as_json)
-    if as_json:
+            if not options.as_json:
+                _print_means(table, quiet=options.quiet)
+        if options.is_each:
+            facts["effects"] = _print_effects(
+                settings, options.seed, options.count, is_silent=options.as_json
+            )
+    if options.as_json:
         answer_json(facts)
 
 

@@ -17,98 +17,94 @@ from fuzzytree.benchmarking.records import Timing
 from fuzzytree.cli.console import (
     answer,
     answer_json,
+    argument,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     say,
+    takes,
     wrong_options,
 )
 from fuzzytree.report.bench import machine_rows
 from fuzzytree.report.text import aligned, duration
 from fuzzytree.tactile.cli.sensors import (
+    SensorOptions,
     frames_model,
     frames_of_file,
     sensor_of_options,
-    sensor_options,
 )
+
+
+class TactileBenchOptions(SensorOptions):
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    data: str | None = option(
+        "--data", metavar="FRAMES", help="Frames of your own; made ones if none."
+    )
+    rows: Sequence[int] = option(
+        "--rows",
+        metavar="N",
+        type=click.IntRange(1, 1_000_000),
+        multiple=True,
+        default=(1, 10_000),
+        show_default=True,
+        help="Frames in a call.",
+    )
+    reject: float = option(
+        "--reject",
+        type=click.FloatRange(0.0, 1.0),
+        default=0.0,
+        metavar="SHARE",
+        help="What is weaker is none of the known objects; for raw rules.",
+    )
+    rounds: int = option(
+        "--rounds",
+        metavar="N",
+        type=click.IntRange(1, 1_000),
+        default=15,
+        show_default=True,
+        help="Samples of each; the interval needs 6.",
+    )
+    budget: float = option(
+        "--budget",
+        metavar="SECONDS",
+        type=click.FloatRange(0.1),
+        default=120.0,
+        show_default=True,
+        help="About how long it may take.",
+    )
+    seed: int = option("--seed", type=click.IntRange(0), default=0, show_default=True)
+    as_json: bool = json_option
+    quiet: bool = quiet_option
 
 
 @click.command("tactile_bench.py")
-@click.argument("model", metavar="MODEL")
-@sensor_options
-@click.option("--data", metavar="FRAMES", help="Frames of your own; made ones if none.")
-@click.option(
-    "--rows",
-    metavar="N",
-    type=click.IntRange(1, 1_000_000),
-    multiple=True,
-    default=(1, 10_000),
-    show_default=True,
-    help="Frames in a call.",
-)
-@click.option(
-    "--reject",
-    type=click.FloatRange(0.0, 1.0),
-    default=0.0,
-    metavar="SHARE",
-    help="What is weaker is none of the known objects; for raw rules.",
-)
-@click.option(
-    "--rounds",
-    metavar="N",
-    type=click.IntRange(1, 1_000),
-    default=15,
-    show_default=True,
-    help="Samples of each; the interval needs 6.",
-)
-@click.option(
-    "--budget",
-    metavar="SECONDS",
-    type=click.FloatRange(0.1),
-    default=120.0,
-    show_default=True,
-    help="About how long it may take.",
-)
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@json_option
-@quiet_option
-def command(
-    model: str,
-    board: str | None,
-    size: str | None,
-    full: int | None,
-    threshold: int | None,
-    data: str | None,
-    rows: Sequence[int],
-    reject: float,
-    rounds: int,
-    budget: float,
-    seed: int,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+@takes(TactileBenchOptions)
+def command(options: TactileBenchOptions) -> None:
     """Measure every way from a board's frames to the classes of MODEL, one thread.
 
     NumPy, ONNX, C and plain Python answer the same frames in interleaved rounds;
     errors are those against exact arithmetic.
     """
-    sensor = sensor_of_options(board, size, full, threshold)
-    asked = frames_model(model)
-    frames = frames_of_file(data, sensor, quiet=quiet)
-    with wrong_options(), progress_bar(quiet=quiet) as progress:
+    sensor = sensor_of_options(options)
+    asked = frames_model(options.model)
+    frames = frames_of_file(options.data, sensor, quiet=options.quiet)
+    with wrong_options(), progress_bar(quiet=options.quiet) as progress:
         found = time_frames(
             asked,
             sensor,
             frames,
-            data=Path(data).name if data else "",
-            rows=rows,
-            reject=reject,
-            rounds=rounds,
-            seconds=budget,
-            seed=seed,
+            data=Path(options.data).name if options.data else "",
+            rows=options.rows,
+            reject=options.reject,
+            rounds=options.rounds,
+            seconds=options.budget,
+            seed=options.seed,
             progress=progress,
         )
-    if as_json:
+    if options.as_json:
         answer_json(found)
     else:
         answer("\n".join(study_lines(found)))

@@ -17,16 +17,18 @@ from fuzzytree.cli.audit_options import (
     row_of,
     settings_of,
     table_of,
-    with_options,
 )
 from fuzzytree.cli.console import (
     allow_loss_option,
     answer_styled,
+    argument,
     delimiter_option,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     say,
+    takes,
     verbose_option,
     wrong_options,
 )
@@ -49,94 +51,129 @@ For example:
 """
 
 
+class AuditOptions:
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    data: str | None = option(
+        "--data",
+        metavar="TABLE",
+        help="Table of rows that the audit counts; `-` is standard input.",
+    )
+    target: str | None = option(
+        "--target",
+        metavar="COLUMN",
+        help="Column of TABLE that holds the class of each row.",
+    )
+    within: Literal["model", "data"] = option(
+        "--within",
+        type=click.Choice(["model", "data"]),
+        default="model",
+        show_default=True,
+        help="Domain of the audit: the ranges of the model, or those of TABLE.",
+    )
+    spreads: float | None = option(
+        "--spreads",
+        type=float,
+        metavar="K",
+        help="Extend the domain by K spreads around the fitted sets.",
+    )
+    limits: tuple[str, ...] = option(
+        "--limits",
+        metavar="NAME=LOW:HIGH",
+        multiple=True,
+        help="Range of values of a variable in the audit (repeat).",
+    )
+    row: str | None = option(
+        "--row",
+        metavar="NAME=VALUE,...",
+        help="Row for which to find the nearest row of another class.",
+    )
+    select: tuple[str, ...] = option(
+        "--select",
+        metavar="CODES",
+        multiple=True,
+        help="Codes to examine, such as FT1,FT301; all by default.",
+    )
+    ignore: tuple[str, ...] = option(
+        "--ignore",
+        metavar="CODES",
+        multiple=True,
+        help="Codes to leave out, such as FT5.",
+    )
+    budget: float | None = option(
+        "--budget",
+        type=float,
+        metavar="SECONDS",
+        help="Time limit of the audit in seconds; 60 by default.",
+    )
+    settings: tuple[str, ...] = option(
+        "--set",
+        metavar="NAME=VALUE",
+        multiple=True,
+        help="Threshold (epsilon, margin, lead, level, overlap), or rows, seed.",
+    )
+    config: str | None = option(
+        "--config",
+        metavar="FILE",
+        help="File with options; by default fuzzytree-audit.yaml of this folder.",
+    )
+    baseline: str | None = option(
+        "--baseline",
+        metavar="FILE",
+        help="File of accepted findings, which do not fail the audit.",
+    )
+    write_baseline: str | None = option(
+        "--write-baseline",
+        metavar="FILE",
+        help="File to write all findings to, for --baseline.",
+    )
+    fail_on: FailOn | None = option(
+        "--fail-on",
+        type=click.Choice(["error", "warning", "info", "never"]),
+        help="Least severity that makes the exit code 1; warning by default.",
+    )
+    form: Form = option(
+        "--output-format",
+        type=click.Choice(["text", "json", "sarif", "github"]),
+        default="text",
+        show_default=True,
+        help="Format of the result: for people, programs or code hosts.",
+    )
+    is_whole: bool = option(
+        "--all",
+        is_flag=True,
+        help="List every answer, also those that are no findings.",
+    )
+    output: str | None = option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="File to write the result to, in place of stdout.",
+    )
+    page: str | None = option(
+        "--page", metavar="FILE", help="HTML file to write the audit to, in addition."
+    )
+    results: tuple[str, ...] = option(
+        "--results",
+        metavar="FILE",
+        multiple=True,
+        help="Result of `check --json` or `stability --json` to include (repeat).",
+    )
+    delimiter: str | None = delimiter_option
+    allow_loss: bool = allow_loss_option
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command(
     "audit",
     short_help="Find faults of a rule base, with proofs.",
     epilog=_EXAMPLES,
 )
-@click.argument("model", metavar="MODEL")
-@with_options
-@click.option(
-    "--config",
-    metavar="FILE",
-    help="File with options; by default fuzzytree-audit.yaml of the current folder.",
-)
-@click.option(
-    "--baseline",
-    metavar="FILE",
-    help="File of accepted findings, which do not fail the audit.",
-)
-@click.option(
-    "--write-baseline",
-    metavar="FILE",
-    help="File to write all findings to, for --baseline.",
-)
-@click.option(
-    "--fail-on",
-    type=click.Choice(["error", "warning", "info", "never"]),
-    help="Least severity that makes the exit code 1; warning by default.",
-)
-@click.option(
-    "--output-format",
-    "form",
-    type=click.Choice(["text", "json", "sarif", "github"]),
-    default="text",
-    show_default=True,
-    help="Format of the result: for people, programs or code hosts.",
-)
-@click.option(
-    "--all",
-    "is_whole",
-    is_flag=True,
-    help="List every answer, also those that are no findings.",
-)
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    help="File to write the result to, in place of stdout.",
-)
-@click.option(
-    "--page", metavar="FILE", help="HTML file to write the audit to, in addition."
-)
-@click.option(
-    "--results",
-    metavar="FILE",
-    multiple=True,
-    help="Result of `check --json` or `stability --json` to include (repeat).",
-)
-@delimiter_option
-@allow_loss_option
-@verbose_option
-@json_option
-@quiet_option
-def command(
-    model: str,
-    data: str | None,
-    target: str | None,
-    config: str | None,
-    baseline: str | None,
-    write_baseline: str | None,
-    fail_on: FailOn | None,
-    form: Form,
-    is_whole: bool,
-    output: str | None,
-    page: str | None,
-    results: tuple[str, ...],
-    delimiter: str | None,
-    allow_loss: bool,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-    within: Literal["model", "data"],
-    spreads: float | None,
-    limits: tuple[str, ...],
-    row: str | None,
-    select: tuple[str, ...],
-    ignore: tuple[str, ...],
-    budget: float | None,
-    settings: tuple[str, ...],
-) -> int:
+@takes(AuditOptions)
+def command(options: AuditOptions) -> int:
     """Find rules that never win, gaps and conflicts in MODEL, any readable file.
 
     Each answer is PROVED on the whole domain, shown by a WITNESS, enclosed by a
@@ -156,45 +193,52 @@ def command(
     )
     from fuzzytree.report import audit_lines, audit_verdict
 
-    if target is not None and data is None:
+    if options.target is not None and options.data is None:
         raise click.UsageError(
             "--target names a column of a table; give it with --data"
         )
-    output = None if output == "-" else output
-    if "-" in (page, write_baseline):
+    output = None if options.output == "-" else options.output
+    if "-" in (options.page, options.write_baseline):
         raise click.UsageError("`-` is stdout, where the findings go; name a file")
-    read = [one for one in (model, data, config, *results) if one is not None]
-    places = [one for one in (output, page, write_baseline) if one is not None]
+    read = [
+        one
+        for one in (options.model, options.data, options.config, *options.results)
+        if one is not None
+    ]
+    places = [
+        one for one in (output, options.page, options.write_baseline) if one is not None
+    ]
     check_places(places, read)
-    known = configured(config, quiet=quiet)
-    path = baseline or known.baseline
+    known = configured(options.config, quiet=options.quiet)
+    path = options.baseline or known.baseline
     accepted: Mapping[str, str] = {} if path is None else read_baseline(path)
-    with wrong_options(), progress_bar(quiet=quiet) as show:
+    with wrong_options(), progress_bar(quiet=options.quiet) as show:
         material = api.material(
-            model,
-            data=table_of(data, delimiter),
-            target=target,
-            results=results,
-            allow_loss=allow_loss,
+            options.model,
+            data=table_of(options.data, options.delimiter),
+            target=options.target,
+            results=options.results,
+            allow_loss=options.allow_loss,
         )
         found = api.audit(
             material,
             domain=AuditDomain(
-                within=within,
-                spreads=spreads,
-                limits={n: (a, b) for n, a, b in known.limits} | limits_of(limits),
-                row=row_of(row),
+                within=options.within,
+                spreads=options.spreads,
+                limits={n: (a, b) for n, a, b in known.limits}
+                | limits_of(options.limits),
+                row=row_of(options.row),
             ),
             selection=AuditSelection(
-                select=codes_of(select) or known.select,
-                ignore=codes_of(ignore) or known.ignore,
+                select=codes_of(options.select) or known.select,
+                ignore=codes_of(options.ignore) or known.ignore,
                 accepted=accepted,
             ),
-            settings=settings_of(settings, budget, known),
+            settings=settings_of(options.settings, options.budget, known),
             repeat=repeating(click.get_current_context()),
             progress=show,
         )
-    form = "json" if as_json else form
+    form = "json" if options.as_json else options.form
     known_ids = accepted if path else None
     lost = [*resolved_ids(accepted, found)]
     if form == "text":
@@ -204,8 +248,8 @@ def command(
                 _lines_of(material),
                 gone=lost,
                 is_coloured=_is_coloured(),
-                is_verbose=verbose,
-                is_whole=is_whole,
+                is_verbose=options.verbose,
+                is_whole=options.is_whole,
             )
         )
     else:
@@ -215,24 +259,26 @@ def command(
         if output is not None:
             write_atomically(output, f"{text}\n".encode())
             wrote.append(output)
-        if page is not None:
-            _write_page(found, material, page)
-            wrote.append(page)
-        if write_baseline is not None:
-            write_atomically(write_baseline, baseline_of(found))
-            said = f"{len(found.findings)} accepted with --baseline {write_baseline}"
-            wrote.append(f"{write_baseline} {said}")
+        if options.page is not None:
+            _write_page(found, material, options.page)
+            wrote.append(options.page)
+        if options.write_baseline is not None:
+            write_atomically(options.write_baseline, baseline_of(found))
+            said = f"{len(found.findings)} accepted with --baseline"
+            wrote.append(f"{options.write_baseline} {said} {options.write_baseline}")
     finally:
         if output is None and text:  # no finding is no annotation
             answer_styled(text)
         for one in wrote:
-            say(f"wrote    {one}", quiet=quiet)
-    _tell_domain(found, quiet=quiet)
+            say(f"wrote    {one}", quiet=options.quiet)
+    _tell_domain(found, quiet=options.quiet)
     for name in lost:
-        say(f"gone     {name} {printable(accepted[name])}", quiet=quiet)
-    fails = write_baseline is None and _fails(found, fail_on or known.fail_on)
+        say(f"gone     {name} {printable(accepted[name])}", quiet=options.quiet)
+    fails = options.write_baseline is None and _fails(
+        found, options.fail_on or known.fail_on
+    )
     if form != "text" or output is not None:
-        say(audit_verdict(found, lost), quiet=quiet and not fails)
+        say(audit_verdict(found, lost), quiet=options.quiet and not fails)
     return 130 if found.was_interrupted else int(fails)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,76 +15,6 @@ from fuzzytree.cli.console import say, setting, standard_input
 
 if TYPE_CHECKING:
     from fuzzytree.auditing import AuditSettings, Configuration
-
-
-_OPTIONS = (
-    click.option(
-        "--data",
-        metavar="TABLE",
-        help="Table of rows that the audit counts; `-` is standard input.",
-    ),
-    click.option(
-        "--target",
-        metavar="COLUMN",
-        help="Column of TABLE that holds the class of each row.",
-    ),
-    click.option(
-        "--within",
-        type=click.Choice(["model", "data"]),
-        default="model",
-        show_default=True,
-        help="Domain of the audit: the ranges of the model, or those of TABLE.",
-    ),
-    click.option(
-        "--spreads",
-        type=float,
-        metavar="K",
-        help="Extend the domain by K spreads around the fitted sets.",
-    ),
-    click.option(
-        "--limits",
-        metavar="NAME=LOW:HIGH",
-        multiple=True,
-        help="Range of values of a variable in the audit (repeat).",
-    ),
-    click.option(
-        "--row",
-        metavar="NAME=VALUE,...",
-        help="Row for which to find the nearest row of another class.",
-    ),
-    click.option(
-        "--select",
-        metavar="CODES",
-        multiple=True,
-        help="Codes to examine, such as FT1,FT301; all by default.",
-    ),
-    click.option(
-        "--ignore",
-        metavar="CODES",
-        multiple=True,
-        help="Codes to leave out, such as FT5.",
-    ),
-    click.option(
-        "--budget",
-        type=float,
-        metavar="SECONDS",
-        help="Time limit of the audit in seconds; 60 by default.",
-    ),
-    click.option(
-        "--set",
-        "settings",
-        metavar="NAME=VALUE",
-        multiple=True,
-        help="Threshold (epsilon, margin, lead, level, overlap), or rows, seed.",
-    ),
-)
-
-
-def with_options(function: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the options that choose the questions and the domain."""
-    for option in reversed(_OPTIONS):
-        function = option(function)
-    return function
 
 
 def configured(path: str | None, *, quiet: bool) -> Configuration:

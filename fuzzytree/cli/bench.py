@@ -14,12 +14,15 @@ import click
 from fuzzytree.cli.console import (
     answer,
     answer_json,
+    argument,
     delimiter_option,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     say,
     table_source,
+    takes,
     verbose_option,
     wrong_options,
 )
@@ -32,104 +35,95 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 
 
+class BenchOptions:
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    data: str | None = option(
+        "--data",
+        metavar="TABLE",
+        help="Table of rows to measure on; rows from the model's ranges by default.",
+    )
+    rows: Sequence[int] = option(
+        "--rows",
+        metavar="N",
+        type=int,
+        multiple=True,
+        default=(1, 1_000, 1_000_000),
+        show_default=True,
+        help="Rows in one call (repeat).",
+    )
+    threads: Sequence[int] = option(
+        "--threads",
+        metavar="N",
+        type=int,
+        multiple=True,
+        default=(1, 2),
+        show_default=True,
+        help="Threads that a candidate may use (repeat).",
+    )
+    only: Sequence[str] = option(
+        "--only",
+        metavar="NAME",
+        multiple=True,
+        help="Candidates to measure, such as native, 'raw rules', variant (repeat).",
+    )
+    skip: Sequence[str] = option(
+        "--skip",
+        metavar="NAME",
+        multiple=True,
+        help="Candidates to leave out (repeat).",
+    )
+    budget: float = option(
+        "--budget",
+        metavar="SECONDS",
+        type=float,
+        default=300.0,
+        show_default=True,
+        help="Approximate time limit in seconds.",
+    )
+    error: float | None = option(
+        "--error",
+        metavar="E",
+        type=float,
+        help="Largest error of a strength that the advice may accept.",
+    )
+    seed: int = option(
+        "--seed",
+        type=int,
+        default=0,
+        show_default=True,
+        help="Random seed for generated rows and the order of rounds.",
+    )
+    peers: str | None = option(
+        "--peers",
+        metavar="FOLDER",
+        help="Python module or package, which is run; its function "
+        "peers(model, bounds) returns further candidates and omissions.",
+    )
+    output: str | None = option(
+        "-o", "--output", metavar="FILE", help="JSON file to write the study to."
+    )
+    plots: Sequence[str] = option(
+        "--plot",
+        metavar="FILE",
+        multiple=True,
+        help="Picture of the study, as .svg or .png (repeat).",
+    )
+    is_full: bool = option(
+        "--full",
+        is_flag=True,
+        help="List variants that are slower and less exact, too.",
+    )
+    delimiter: str | None = delimiter_option
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("bench", short_help="Measure error against run time.")
-@click.argument("model", metavar="MODEL")
-@click.option(
-    "--data",
-    metavar="TABLE",
-    help="Table of rows to measure on; rows from the model's ranges by default.",
-)
-@click.option(
-    "--rows",
-    metavar="N",
-    type=int,
-    multiple=True,
-    default=(1, 1_000, 1_000_000),
-    show_default=True,
-    help="Rows in one call (repeat).",
-)
-@click.option(
-    "--threads",
-    metavar="N",
-    type=int,
-    multiple=True,
-    default=(1, 2),
-    show_default=True,
-    help="Threads that a candidate may use (repeat).",
-)
-@click.option(
-    "--only",
-    metavar="NAME",
-    multiple=True,
-    help="Candidates to measure, such as native, 'raw rules', variant (repeat).",
-)
-@click.option(
-    "--skip", metavar="NAME", multiple=True, help="Candidates to leave out (repeat)."
-)
-@click.option(
-    "--budget",
-    metavar="SECONDS",
-    type=float,
-    default=300.0,
-    show_default=True,
-    help="Approximate time limit in seconds.",
-)
-@click.option(
-    "--error",
-    metavar="E",
-    type=float,
-    help="Largest error of a strength that the advice may accept.",
-)
-@click.option(
-    "--seed",
-    type=int,
-    default=0,
-    show_default=True,
-    help="Random seed for generated rows and the order of rounds.",
-)
-@click.option(
-    "--peers",
-    metavar="FOLDER",
-    help="Python module or package, which is run; its function peers(model, bounds) "
-    "returns further candidates and omissions.",
-)
-@click.option("-o", "--output", metavar="FILE", help="JSON file to write the study to.")
-@click.option(
-    "--plot",
-    "plots",
-    metavar="FILE",
-    multiple=True,
-    help="Picture of the study, as .svg or .png (repeat).",
-)
-@click.option(
-    "--full",
-    "is_full",
-    is_flag=True,
-    help="List variants that are slower and less exact, too.",
-)
-@delimiter_option
-@verbose_option
-@json_option
-@quiet_option
-def command(
-    model: str,
-    data: str | None,
-    rows: Sequence[int],
-    threads: Sequence[int],
-    only: Sequence[str],
-    skip: Sequence[str],
-    budget: float,
-    error: float | None,
-    seed: int,
-    peers: str | None,
-    output: str | None,
-    plots: Sequence[str],
-    is_full: bool,
-    delimiter: str | None,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(BenchOptions)
+def command(options: BenchOptions) -> int:
     """Measure error against run time for every way of running MODEL, a YAML file.
 
     Runtimes, number types, approximations and what --peers adds predict the same rows
@@ -137,6 +131,8 @@ def command(
     study early, keeps its results, and exits with 130; exit 1 if an error is larger
     than its certified bound.
     """
+    output = options.output
+    plots = options.plots
     from fuzzytree import api
     from fuzzytree.benchmarking import BenchSettings
     from fuzzytree.report import study_lines
@@ -144,38 +140,38 @@ def command(
     _check_places(output, plots)
     with (
         wrong_options(),
-        progress_bar(quiet=quiet) as show,
+        progress_bar(quiet=options.quiet) as show,
         contextlib.redirect_stdout(sys.stderr),  # libraries of others may print
     ):
         found = api.bench(
-            model,
-            data=table_source(data, delimiter),
-            only=only,
-            skip=skip,
+            options.model,
+            data=table_source(options.data, options.delimiter),
+            only=options.only,
+            skip=options.skip,
             settings=BenchSettings(
-                tuple(rows),
-                tuple(threads),
-                error,
-                budget_s=budget,
-                seed=seed,
-                peers=peers,
+                tuple(options.rows),
+                tuple(options.threads),
+                options.error,
+                budget_s=options.budget,
+                seed=options.seed,
+                peers=options.peers,
             ),
             progress=show,
         )
-    lines = study_lines(found, is_verbose=verbose, is_full=is_full)
+    lines = study_lines(found, is_verbose=options.verbose, is_full=options.is_full)
     if not found.points:  # a file of an earlier study is worth more
         output, plots = None, ()
     try:
         if output:
             write_atomically(output, found.to_json().encode() + b"\n")
     finally:  # whatever happens to the file, the work is not lost
-        if as_json:
+        if options.as_json:
             answer_json(found.to_json())
         else:
             answer("\n".join(lines))
     for place in (*([output] if output else []), *_draw(found, plots)):
-        say(f"wrote    {place}", quiet=quiet)
-    return _ending(found, as_json=as_json, quiet=quiet)
+        say(f"wrote    {place}", quiet=options.quiet)
+    return _ending(found, as_json=options.as_json, quiet=options.quiet)
 
 
 def _ending(found: Study, *, as_json: bool, quiet: bool) -> int:

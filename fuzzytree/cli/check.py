@@ -9,63 +9,55 @@ import click
 from fuzzytree.cli.console import (
     allow_loss_option,
     answer_result,
+    argument,
     data_option,
     delimiter_option,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     rows_only_option,
     runtimes_option,
     table_source,
+    takes,
     verbose_option,
     wrong_options,
 )
 
 
+class CheckOptions:
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    files: Sequence[str] = argument(metavar="[FILES]...", nargs=-1)
+    data: str | None = data_option
+    runtimes: Sequence[str] = runtimes_option
+    limit: int | None = option(
+        "--limit",
+        type=click.IntRange(min=1),
+        help="Largest number of probes; 20000 by default, 2000 for a fuzzy system.",
+    )
+    is_full: bool = option(
+        "--rows", is_flag=True, help="List rows that differ by an allowed amount, too."
+    )
+    delimiter: str | None = delimiter_option
+    rows_only: bool = rows_only_option
+    run_code: bool = option(
+        "--run-code",
+        is_flag=True,
+        help="Run a program file although its text differs from a new one.",
+    )
+    allow_loss: bool = allow_loss_option
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command(
     "check", short_help="Compare a model with its rules, runtimes and files."
 )
-@click.argument("model", metavar="MODEL")
-@click.argument("files", metavar="[FILES]...", nargs=-1)
-@data_option
-@runtimes_option
-@click.option(
-    "--limit",
-    type=click.IntRange(min=1),
-    help="Largest number of probes; 20000 by default, 2000 for a fuzzy system.",
-)
-@click.option(
-    "--rows",
-    "is_full",
-    is_flag=True,
-    help="List rows that differ by an allowed amount, too.",
-)
-@delimiter_option
-@rows_only_option
-@click.option(
-    "--run-code",
-    is_flag=True,
-    help="Run a program file although its text differs from a new one.",
-)
-@allow_loss_option
-@verbose_option
-@json_option
-@quiet_option
-def command(
-    model: str,
-    files: Sequence[str],
-    data: str | None,
-    runtimes: Sequence[str],
-    limit: int | None,
-    is_full: bool,
-    delimiter: str | None,
-    rows_only: bool,
-    run_code: bool,
-    allow_loss: bool,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(CheckOptions)
+def command(options: CheckOptions) -> int:
     """Compare MODEL, any readable file, with FILES that were exported from it.
 
     The tree, its rules, each runtime and each file predict the same rows; so do a fuzzy
@@ -75,17 +67,23 @@ def command(
     from fuzzytree import api, report
     from fuzzytree.model import CheckSettings
 
-    with wrong_options(), progress_bar(quiet=quiet) as show:
+    with wrong_options(), progress_bar(quiet=options.quiet) as show:
         found = api.check(
-            model,
-            *files,
-            data=table_source(data, delimiter),
-            runtimes=runtimes or None,
-            settings=CheckSettings(limit=limit, rows_only=rows_only, run_code=run_code),
-            allow_loss=allow_loss,
+            options.model,
+            *options.files,
+            data=table_source(options.data, options.delimiter),
+            runtimes=options.runtimes or None,
+            settings=CheckSettings(
+                limit=options.limit,
+                rows_only=options.rows_only,
+                run_code=options.run_code,
+            ),
+            allow_loss=options.allow_loss,
             progress=show,
         )
-    lines = report.agreement_lines(found, is_verbose=verbose, is_full=is_full)
-    is_silent = quiet and found.ok
-    answer_result(found.to_json, lines, as_json=as_json, is_silent=is_silent)
+    lines = report.agreement_lines(
+        found, is_verbose=options.verbose, is_full=options.is_full
+    )
+    is_silent = options.quiet and found.ok
+    answer_result(found.to_json, lines, as_json=options.as_json, is_silent=is_silent)
     return 0 if found.ok else 1

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import sys
 import time
 from collections.abc import Callable, Generator, Iterable, Sequence
-from typing import TYPE_CHECKING, BinaryIO, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 import click
 import msgspec
@@ -18,43 +19,92 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 Name = TypeVar("Name", str, str | None)
+Record = TypeVar("Record")
+Code = TypeVar("Code", int, None, int | None)
 
 _PATIENCE_S = 0.5  # before a bar appears
 _MOST_LINES = 8  # of a list on stderr, unless all are printed
 
-quiet_option = click.option("--quiet", is_flag=True, help="Print errors only.")
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print the whole result as JSON to stdout."
+
+def option(*flags: str, **about: Any) -> Any:
+    """Return an option of a verb, to be the attribute of a class of options."""
+    return functools.partial(click.option, *flags, **about)
+
+
+def argument(**about: Any) -> Any:
+    """Return an argument of a verb, to be the attribute of a class of options."""
+    return functools.partial(click.argument, **about)
+
+
+def takes(
+    record: type[Record],
+) -> Callable[[Callable[[Record], Code]], Callable[..., Code]]:
+    """Give a command the options that a class has as attributes, as one object.
+
+    Attributes of a base class come first.
+
+    Example:
+        >>> class Words:
+        ...     text: str = argument()
+        ...     times: int = option("--times", type=int, default=1)
+        >>> @click.command()
+        ... @takes(Words)
+        ... def repeat(options: Words) -> None:
+        ...     print(options.text * options.times)
+        >>> repeat.main(["ab", "--times", "2"], standalone_mode=False)
+        abab
+    """
+
+    def decorate(function: Callable[[Record], Code]) -> Callable[..., Code]:
+        @functools.wraps(function)
+        def command(**values: object) -> Code:
+            options = record()
+            vars(options).update(values)
+            return function(options)
+
+        parameters = [
+            one for base in record.__mro__[::-1] for one in vars(base).items()
+        ]
+        for name, parameter in reversed(parameters):
+            if isinstance(parameter, functools.partial):
+                parameter(name)(command)
+        return command
+
+    return decorate
+
+
+quiet_option = option("--quiet", is_flag=True, help="Print errors only.")
+json_option = option(
+    "--json", is_flag=True, help="Print the whole result as JSON to stdout."
 )
-verbose_option = click.option(
+verbose_option = option(
     "--verbose", is_flag=True, help="Print every part of the result, not only counts."
 )
-delimiter_option = click.option(
+delimiter_option = option(
     "--delimiter",
     metavar="CHARACTER",
     help="Character between the cells of a CSV file; by default from its first line.",
 )
 
-allow_loss_option = click.option(
+allow_loss_option = option(
     "--allow-loss",
     is_flag=True,
     help="Read a file that a model cannot represent exactly, with the nearest values.",
 )
 
-rows_only_option = click.option(
+rows_only_option = option(
     "--rows-only",
     is_flag=True,
     help="Accept a file that predicts the same although its content differs.",
 )
 
-data_option = click.option(
+data_option = option(
     "--data",
     metavar="TABLE",
     help="Table of rows to use in addition to the generated probes.",
 )
-runtimes_option = click.option(
+runtimes_option = option(
     "--runtime",
-    "runtimes",
     metavar="NAME",
     multiple=True,
     help="Runtime to use (repeat); all installed runtimes by default.",

@@ -14,7 +14,9 @@ import msgspec
 from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
+    argument,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     say,
@@ -22,6 +24,7 @@ from fuzzytree.cli.console import (
     say_rows,
     setting,
     standard_input,
+    takes,
     verbose_option,
     wrong_options,
 )
@@ -45,96 +48,79 @@ from fuzzytree.model import (
 
 if TYPE_CHECKING:
     from fuzzytree.checking import Proof
+    from fuzzytree.cli.export import ExportOptions
     from fuzzytree.model import Option
     from fuzzytree.numerics import Certificate
 
 
+class ConvertOptions:
+    """The arguments and options of the verb."""
+
+    source: str = argument(metavar="IN")
+    output: str = argument(metavar="OUT")
+    read_as: str | None = option(
+        "--from", metavar="FORMAT", help="Format of IN; from its suffix by default."
+    )
+    to: str | None = option(
+        "--to", metavar="FORMAT", help="Format of OUT; from its suffix by default."
+    )
+    representation: ModelKind | None = as_option
+    kind: Kind | None = terms_option
+    conjunction: Conjunction | None = conjunction_option
+    dialect: str | None = option(
+        "--dialect", metavar="NAME", help="Dialect of the format of OUT."
+    )
+    tolerance: str | None = option(
+        "--tolerance",
+        metavar="NUMBER",
+        help="Largest error of a degree where a curve becomes points.",
+    )
+    settings: Sequence[str] = option(
+        "--set",
+        metavar="NAME=VALUE",
+        multiple=True,
+        help="Option of the writer (repeat); "
+        "`fuzzytree formats --format NAME` lists them.",
+    )
+    allow_loss: bool = option(
+        "--allow-loss",
+        is_flag=True,
+        help="Write the file although the conversion loses information.",
+    )
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("convert", short_help="Convert a model from one format to another.")
-@click.argument("source", metavar="IN")
-@click.argument("output", metavar="OUT")
-@click.option(
-    "--from",
-    "read_as",
-    metavar="FORMAT",
-    help="Format of IN; from its suffix by default.",
-)
-@click.option(
-    "--to", metavar="FORMAT", help="Format of OUT; from its suffix by default."
-)
-@as_option
-@terms_option
-@conjunction_option
-@click.option("--dialect", metavar="NAME", help="Dialect of the format of OUT.")
-@click.option(
-    "--tolerance",
-    metavar="NUMBER",
-    help="Largest error of a degree where a curve becomes points.",
-)
-@click.option(
-    "--set",
-    "settings",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Option of the writer (repeat); `fuzzytree formats --format NAME` lists them.",
-)
-@click.option(
-    "--allow-loss",
-    is_flag=True,
-    help="Write the file although the conversion loses information.",
-)
-@verbose_option
-@json_option
-@quiet_option
-def command(
-    source: str,
-    output: str,
-    read_as: str | None,
-    to: str | None,
-    representation: ModelKind | None,
-    kind: Kind | None,
-    conjunction: Conjunction | None,
-    dialect: str | None,
-    tolerance: str | None,
-    settings: Sequence[str],
-    allow_loss: bool,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(ConvertOptions)
+def command(options: ConvertOptions) -> int:
     """Convert the model of file IN to file OUT; their suffixes name the formats.
 
     `-` is standard input or output. A conversion that would lose information is
     refused with a list of the losses, unless --allow-loss is given: exit 1.
     """
-    if output == "-" and to is None:
+    if options.output == "-" and options.to is None:
         raise click.UsageError("`-` has no suffix; name the format with --to")
     from fuzzytree.report import document_text
 
-    given = [("dialect", dialect), ("tolerance", tolerance), *map(setting, settings)]
-    form = wanted_format(output, to)
+    given = [
+        ("dialect", options.dialect),
+        ("tolerance", options.tolerance),
+        *map(setting, options.settings),
+    ]
+    form = wanted_format(options.output, options.to)
     with wrong_options():
-        options = _options(form, given)
-    found, used = read_source(source, read_as)
+        values = _values(form, given)
+    found, used = read_source(options.source, options.read_as)
     head = f"{used}: {document_text(found.model)}"
+    notes = [("read", options.source, head)]
     return carry(
-        found,
-        source,
-        used,
-        form,
-        output,
-        choice=Choice(representation, kind, conjunction),
-        options=options,
-        notes=[("read", source, head)],
-        allow_loss=allow_loss,
-        verbose=verbose,
-        as_json=as_json,
-        quiet=quiet,
+        found, options.source, used, form, options, options=values, notes=notes
     )
 
 
-def _options(
-    form: Format, given: Sequence[tuple[str, str | None]]
-) -> dict[str, Option]:
+def _values(form: Format, given: Sequence[tuple[str, str | None]]) -> dict[str, Option]:
     from fuzzytree.model import option_value
 
     options: dict[str, Option] = {}
@@ -168,32 +154,26 @@ def read_source(source: str, read_as: str | None) -> tuple[Reading, str]:
     return checking.read_content(content, form, name="standard input"), form.name
 
 
-class Choice(msgspec.Struct, frozen=True):
-    """The representation of a model to write."""
-
-    representation: ModelKind | None = None
-    kind: Kind | None = None
-    conjunction: Conjunction | None = None
-
-
 def carry(
     found: Reading,
     source: str,
     read_as: str,
     form: Format,
-    output: str,
+    chosen: ConvertOptions | ExportOptions,
     *,
-    choice: Choice,
     options: Mapping[str, Option],
     notes: Sequence[tuple[str, str, str]] = (),
-    allow_loss: bool,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Write a model in another format, and report its proof; return 1 for a refusal.
 
-    `notes` are lines to print behind those of the file and its proof.
+    Args:
+        found: What was read.
+        source: The file that was read.
+        read_as: The format of that file.
+        form: The format to write.
+        chosen: The representation, the file to write and what to print.
+        options: The options of the writer.
+        notes: Lines to print behind those of the file and its proof.
     """
     from fuzzytree import report
     from fuzzytree.checking import export, kind_of, proved
@@ -203,9 +183,9 @@ def carry(
     model = represented(
         found.model,
         form,
-        representation=choice.representation,
-        kind=choice.kind,
-        conjunction=choice.conjunction,
+        representation=chosen.representation,
+        kind=chosen.kind,
+        conjunction=chosen.conjunction,
     )
     facts: dict[str, object] = {
         "read": {
@@ -218,27 +198,29 @@ def carry(
         "format": form.name,
         "carrier": kind_of(model),
     }
-    with progress_bar(quiet=quiet) as show:
+    with progress_bar(quiet=chosen.quiet) as show:
         show(f"writing {form.name}", 0.0)
         with wrong_options():
-            written, refusal = _written(model, form, options, allow_loss=allow_loss)
+            written, refusal = _written(
+                model, form, options, allow_loss=chosen.allow_loss
+            )
         proof = None
-        if not refusal and (allow_loss or not found.losses):
+        if not refusal and (chosen.allow_loss or not found.losses):
             show(f"comparing {form.name} with the model", 0.5)
             proof = proved(model, form, written, dtype=options.get("dtype"))
     if proof is None:
-        _refuse(found, refusal, verbose=verbose)
-        if as_json and output != "-":
+        _refuse(found, refusal, verbose=chosen.verbose)
+        if chosen.as_json and chosen.output != "-":
             losses = export(model, form.name, allow_loss=True, **options).losses
             answer_json({**facts, "file": None, "losses": losses})
         return 1
-    if output == "-":
+    if chosen.output == "-":
         answer_bytes(written.content)
     else:
-        write_atomically(output, written.content)
+        write_atomically(chosen.output, written.content)
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
-    after = next_check((source, read_as), (output, form.name))
+    after = next_check((source, read_as), (chosen.output, form.name))
     if after and found.losses:
         after += " --allow-loss"
     if kind_of(model) == "system" != kind_of(found.model):
@@ -248,20 +230,20 @@ def carry(
     coverage = proof.coverage.sentences if proof.coverage else ()
     remarks = (*found.remarks, *written.remarks, *coverage)
     say_rows(
-        ("wrote", output, f"{form.name}, {size} bytes, sha256 {digest}"),
+        ("wrote", chosen.output, f"{form.name}, {size} bytes, sha256 {digest}"),
         _proof_row(proof),
         *notes,
-        quiet=quiet,
+        quiet=chosen.quiet,
     )
     for lines in (lost, [f"remark   {text}" for text in remarks]):
-        say_first(lines, verbose=verbose, quiet=quiet)
+        say_first(lines, verbose=chosen.verbose, quiet=chosen.quiet)
     if after:
-        say(f"next     {after}{shows}", quiet=quiet)
-    if as_json and output != "-":
+        say(f"next     {after}{shows}", quiet=chosen.quiet)
+    if chosen.as_json and chosen.output != "-":
         answer_json(
             {
                 **facts,
-                "file": output,
+                "file": chosen.output,
                 "bytes": size,
                 "sha256": digest,
                 "losses": written.losses,

@@ -10,55 +10,53 @@ from fuzzytree.cli.audit_options import limits_of
 from fuzzytree.cli.console import (
     allow_loss_option,
     answer_result,
+    argument,
     delimiter_option,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     table_source,
+    takes,
     verbose_option,
     wrong_options,
 )
+
+
+class DiffOptions:
+    """The arguments and options of the verb."""
+
+    old: str = argument(metavar="OLD")
+    new: str = argument(metavar="NEW")
+    data: str | None = option(
+        "--data", metavar="TABLE", help="Table of rows that both models classify."
+    )
+    limits: Sequence[str] = option(
+        "--limits",
+        metavar="NAME=LOW:HIGH",
+        multiple=True,
+        help="Range of values of an input to compare on (repeat).",
+    )
+    budget: float = option(
+        "--budget",
+        type=float,
+        default=60.0,
+        metavar="SECONDS",
+        help="Time limit of the proofs in seconds; 60 by default.",
+    )
+    delimiter: str | None = delimiter_option
+    allow_loss: bool = allow_loss_option
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
 
 
 @click.command(
     "diff",
     short_help="Compare two models: changed rules, and rows classified differently.",
 )
-@click.argument("old", metavar="OLD")
-@click.argument("new", metavar="NEW")
-@click.option(
-    "--data", metavar="TABLE", help="Table of rows that both models classify."
-)
-@click.option(
-    "--limits",
-    metavar="NAME=LOW:HIGH",
-    multiple=True,
-    help="Range of values of an input to compare on (repeat).",
-)
-@click.option(
-    "--budget",
-    type=float,
-    default=60.0,
-    metavar="SECONDS",
-    help="Time limit of the proofs in seconds; 60 by default.",
-)
-@delimiter_option
-@allow_loss_option
-@verbose_option
-@json_option
-@quiet_option
-def command(
-    old: str,
-    new: str,
-    data: str | None,
-    limits: Sequence[str],
-    budget: float,
-    delimiter: str | None,
-    allow_loss: bool,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(DiffOptions)
+def command(options: DiffOptions) -> int:
     """Compare the model in NEW with the one in OLD, two files of any readable format.
 
     Rules and terms are matched by their content, not by their order. Decisions are
@@ -68,17 +66,17 @@ def command(
     from fuzzytree import api
     from fuzzytree.report import diff_lines
 
-    with wrong_options(), progress_bar(quiet=quiet) as show:
+    with wrong_options(), progress_bar(quiet=options.quiet) as show:
         found = api.diff(
-            old,
-            new,
-            data=table_source(data, delimiter),
-            limits=limits_of(limits),
-            budget_s=budget,
-            allow_loss=allow_loss,
+            options.old,
+            options.new,
+            data=table_source(options.data, options.delimiter),
+            limits=limits_of(options.limits),
+            budget_s=options.budget,
+            allow_loss=options.allow_loss,
             progress=show,
         )
-    is_silent = quiet and found.verdict == "equal" and found.ok
-    lines = diff_lines(found, is_verbose=verbose)
-    answer_result(found.to_json, lines, as_json=as_json, is_silent=is_silent)
+    is_silent = options.quiet and found.verdict == "equal" and found.ok
+    lines = diff_lines(found, is_verbose=options.verbose)
+    answer_result(found.to_json, lines, as_json=options.as_json, is_silent=is_silent)
     return 0 if found.ok else 1

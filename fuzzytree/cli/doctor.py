@@ -11,7 +11,13 @@ from types import MappingProxyType
 import click
 
 import fuzzytree
-from fuzzytree.cli.console import answer, answer_json, json_option, verbose_option
+from fuzzytree.cli.console import (
+    answer,
+    answer_json,
+    json_option,
+    takes,
+    verbose_option,
+)
 from fuzzytree.errors import FuzzyTreeError, install_hint
 
 CORE = (
@@ -67,10 +73,16 @@ def missing_extras() -> set[str]:
     }
 
 
+class DoctorOptions:
+    """The arguments and options of the verb."""
+
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+
+
 @click.command("doctor", short_help="Report what is installed and whether it works.")
-@verbose_option
-@json_option
-def command(verbose: bool, as_json: bool) -> int:
+@takes(DoctorOptions)
+def command(options: DoctorOptions) -> int:
     """Report versions and extras; learn, write, read and run a small model.
 
     Exit 1 if the small model fails. The packages that only the test suite and the
@@ -86,18 +98,18 @@ def command(verbose: bool, as_json: bool) -> int:
     }
     missing = sorted(missing_extras())
     faults = self_test("onnx" not in missing)
-    if as_json:
+    if options.as_json:
         answer_json({"versions": versions, "missing": missing, "faults": faults})
         return 1 if faults else 0
     for fault in faults:
         answer(f"self-test failed: {fault}")
     if not faults:
         answer("self-test passed: learning, writing, reading and running agree")
-    hidden = {n for extra in FOR_TESTS for n in EXTRAS[extra] if not verbose}
+    hidden = {n for extra in FOR_TESTS for n in EXTRAS[extra] if not options.verbose}
     shown = [item for item in versions.items() if item[0] not in hidden]
     answer("\n".join(report.aligned(shown)))
     for extra in missing:
-        if verbose or extra not in FOR_TESTS:
+        if options.verbose or extra not in FOR_TESTS:
             answer(f"extra {extra!r} is not installed; it needs {install_hint(extra)}")
     return 1 if faults else 0
 

@@ -4,14 +4,27 @@ from __future__ import annotations
 
 import click
 
-from fuzzytree.cli.console import answer, answer_json, json_option, verbose_option
+from fuzzytree.cli.console import (
+    answer,
+    answer_json,
+    argument,
+    json_option,
+    takes,
+    verbose_option,
+)
+
+
+class ExplainOptions:
+    """The arguments and options of the verb."""
+
+    code: str | None = argument(metavar="[CODE]", required=False)
+    verbose: bool = verbose_option
+    as_json: bool = json_option
 
 
 @click.command("explain", short_help="Explain a code of an audit.")
-@click.argument("code", metavar="[CODE]", required=False)
-@verbose_option
-@json_option
-def command(code: str | None, verbose: bool, as_json: bool) -> None:
+@takes(ExplainOptions)
+def command(options: ExplainOptions) -> None:
     """Explain what CODE means, why it matters, and what to do; list all codes without.
 
     CODE is a code such as FT101, the id of a finding such as FT101-1a2b3c4d, or the
@@ -21,10 +34,10 @@ def command(code: str | None, verbose: bool, as_json: bool) -> None:
     from fuzzytree.model import name_choice
     from fuzzytree.report import code_lines, explanation_lines
 
-    name = (code or "FT").upper().partition("-")[0]
+    name = (options.code or "FT").upper().partition("-")[0]
     if name in CODES:
         found = CODES[name]
-        if as_json:
+        if options.as_json:
             answer_json(found)
         else:
             answer("\n".join(explanation_lines(found)))
@@ -32,9 +45,13 @@ def command(code: str | None, verbose: bool, as_json: bool) -> None:
     begin = [one for one in CODES.values() if one.code.startswith(name)]
     if not begin:
         raise click.UsageError(
-            f"no code {(code or '')[:40]!r}; {name_choice(name[:40], [*CODES])}"
+            f"no code {(options.code or '')[:40]!r}; {name_choice(name[:40], [*CODES])}"
         )
-    if as_json:
+    if options.as_json:
         answer_json(begin)
     else:
-        answer("\n".join(code_lines(begin, is_whole=verbose or code is not None)))
+        answer(
+            "\n".join(
+                code_lines(begin, is_whole=options.verbose or options.code is not None)
+            )
+        )

@@ -10,6 +10,8 @@ from fuzzytree.cli.console import (
     answer,
     answer_json,
     json_option,
+    option,
+    takes,
     verbose_option,
     wrong_options,
 )
@@ -22,16 +24,21 @@ if TYPE_CHECKING:
     from fuzzytree.model import Format
 
 
+class FormatsOptions:
+    """The arguments and options of the verb."""
+
+    name: str | None = option(
+        "--format",
+        metavar="NAME",
+        help="Format to describe with its options and limits.",
+    )
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+
+
 @click.command("formats", short_help="List formats and runtimes.")
-@click.option(
-    "--format",
-    "name",
-    metavar="NAME",
-    help="Format to describe with its options and limits.",
-)
-@verbose_option
-@json_option
-def command(name: str | None, verbose: bool, as_json: bool) -> None:
+@takes(FormatsOptions)
+def command(options: FormatsOptions) -> None:
     """List the formats and the runtimes, with what each can and cannot carry.
 
     With `--verbose`, each format writes and reads a small model of each kind, and a
@@ -43,17 +50,24 @@ def command(name: str | None, verbose: bool, as_json: bool) -> None:
     from fuzzytree.runtimes import all_runtimes
 
     missing = missing_extras()
-    if name is not None:
+    if options.name is not None:
         with wrong_options():
-            _answer_one(find_format(name), missing, verbose=verbose, as_json=as_json)
+            _answer_one(
+                find_format(options.name),
+                missing,
+                verbose=options.verbose,
+                as_json=options.as_json,
+            )
         return
     plugins = all_plugins()
     others = [one.format for one in plugins if one.format is not None]
     formats, runtimes = (*all_formats(), *others), all_runtimes()
     found = {
-        one.name: _abilities(one, missing) for one in formats if as_json or verbose
+        one.name: _abilities(one, missing)
+        for one in formats
+        if options.as_json or options.verbose
     }
-    if as_json:
+    if options.as_json:
         answer_json(
             {
                 "formats": [_facts(one, found[one.name], missing) for one in formats],
@@ -62,13 +76,15 @@ def command(name: str | None, verbose: bool, as_json: bool) -> None:
             }
         )
         return
-    lines = report.overview_lines(formats, runtimes, missing, is_verbose=verbose)
+    lines = report.overview_lines(
+        formats, runtimes, missing, is_verbose=options.verbose
+    )
     answer("\n".join(lines))
     if plugins:
         answer("formats of other packages:")
         rows = (f"  {one.name}: {one.fault or one.package}" for one in plugins)
         answer("\n".join(rows))
-    if verbose:
+    if options.verbose:
         answer("")
         answer("\n".join(report.ability_lines(found)))
 

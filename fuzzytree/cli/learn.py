@@ -6,19 +6,22 @@ import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
+    argument,
     delimiter_option,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     say_rows,
     table_source,
+    takes,
     verbose_option,
     wrong_options,
 )
@@ -39,153 +42,129 @@ if TYPE_CHECKING:
     from fuzzytree.tables import Table
 
 
-_SETTINGS = (
-    click.option(
+class LearnOptions:
+    """The arguments and options of the verb."""
+
+    table: str = argument(metavar="TABLE")
+    target: str = option(
+        "--target",
+        required=True,
+        metavar="COLUMN",
+        help="Column that holds the class of each row.",
+    )
+    output: str = option(
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help="File to write; `-` is stdout.",
+    )
+    name: str | None = option(
+        "--name", metavar="TEXT", help="Name of the tree; the name of TABLE by default."
+    )
+    ignore: Sequence[str] = option(
+        "--ignore",
+        metavar="COLUMN",
+        multiple=True,
+        help="Column that is no input (repeat).",
+    )
+    units: Sequence[str] = option(
+        "--unit",
+        metavar="COLUMN=UNIT",
+        multiple=True,
+        help="Unit of a column (repeat).",
+    )
+    representation: ModelKind | None = as_option
+    kind: Kind | None = terms_option
+    conjunction: Conjunction | None = conjunction_option
+    no_test: bool = option(
+        "--no-test",
+        is_flag=True,
+        help="Learn without measuring the cross-validated accuracy.",
+    )
+    delimiter: str | None = delimiter_option
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+    mode: Any = option(
         "--mode",
         type=click.Choice(["default", "paper"]),
         default="default",
         show_default=True,
         help="Learner: the default one, or that of the paper exactly.",
-    ),
-    click.option(
+    )
+    alpha: Any = option(
         "--alpha",
         type=float,
         help="Weight of the means in the distance of patterns, 0 to 1.",
-    ),
-    click.option(
+    )
+    l_max: Any = option(
         "--l-max",
         type=float,
         help="Parameter L_MAX of the paper: largest ratio of distances.",
-    ),
-    click.option(
+    )
+    points: Any = option(
         "--points",
         type=int,
         help="Number n of the 2n + 1 points on a fitted set, 1 to 8.",
-    ),
-    click.option(
+    )
+    separate_sides: Any = option(
         "--separate-sides",
         is_flag=True,
         default=None,
         help="Fit the two sides of a set separately.",
-    ),
-    click.option(
+    )
+    patterns_per_class: str | None = option(
         "--patterns",
-        "patterns_per_class",
         metavar="NUMBER|auto",
         help="Number of patterns of each class; auto chooses it per class.",
-    ),
-    click.option(
+    )
+    shrinkage: Any = option(
         "--shrinkage", type=float, help="Shrinkage of the off-diagonal scatter, 0 to 1."
-    ),
-    click.option("--entry", type=float, help="Gain that a further input must bring."),
-    click.option(
+    )
+    entry: Any = option(
+        "--entry", type=float, help="Gain that a further input must bring."
+    )
+    costs: Sequence[str] = option(
         "--cost",
-        "costs",
         metavar="COLUMN=COST",
         multiple=True,
         help="Cost of computing a column (repeat).",
-    ),
-    click.option(
+    )
+    choices: Any = option(
         "--validate",
-        "choices",
         type=click.Choice(["alpha", "l_max", "shrinkage", "entry"]),
         multiple=True,
         help="Setting to choose by inner cross-validation (repeat).",
-    ),
-    click.option(
+    )
+    rows_per_class: Any = option(
         "--rows-per-class",
         type=int,
         help="Largest number of rows per class that the learner keeps.",
-    ),
-    click.option(
+    )
+    seed: int = option(
         "--seed",
         type=int,
         default=0,
         show_default=True,
         help="Random seed for the cross-validation folds.",
-    ),
-    click.option(
+    )
+    keep_reversals: Any = option(
         "--keep-reversals",
         is_flag=True,
         default=None,
         help="Let a wide set take back the far tails of others.",
-    ),
-    click.option(
+    )
+    missing: Any = option(
         "--missing",
         type=click.Choice(["drop", "refuse"]),
         help="Rows with missing values: drop them, or refuse the table.",
-    ),
-)
-"""An option for each field of `fuzzytree.learning.LearningSettings`."""
-
-
-def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
-    for option in reversed(_SETTINGS):
-        function = option(function)
-    return function
+    )
 
 
 @click.command("learn", short_help="Learn a tree from a table.")
-@click.argument("table", metavar="TABLE")
-@click.option(
-    "--target",
-    required=True,
-    metavar="COLUMN",
-    help="Column that holds the class of each row.",
-)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="FILE",
-    help="File to write; `-` is stdout.",
-)
-@click.option(
-    "--name", metavar="TEXT", help="Name of the tree; the name of TABLE by default."
-)
-@click.option(
-    "--ignore",
-    metavar="COLUMN",
-    multiple=True,
-    help="Column that is no input (repeat).",
-)
-@click.option(
-    "--unit",
-    "units",
-    metavar="COLUMN=UNIT",
-    multiple=True,
-    help="Unit of a column (repeat).",
-)
-@as_option
-@terms_option
-@conjunction_option
-@click.option(
-    "--no-test",
-    is_flag=True,
-    help="Learn without measuring the cross-validated accuracy.",
-)
-@delimiter_option
-@verbose_option
-@json_option
-@quiet_option
-@_with_settings
-def command(
-    table: str,
-    target: str,
-    output: str,
-    name: str | None,
-    ignore: Sequence[str],
-    units: Sequence[str],
-    representation: ModelKind | None,
-    kind: Kind | None,
-    conjunction: Conjunction | None,
-    no_test: bool,
-    delimiter: str | None,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-    **chosen: object,
-) -> None:
+@takes(LearnOptions)
+def command(options: LearnOptions) -> None:
     """Learn a fuzzy tree from TABLE and write it to FILE.
 
     Beside a program or a graph, which no verb reads as a model, the model itself is
@@ -200,32 +179,34 @@ def command(
     from fuzzytree.learning import remarks
     from fuzzytree.tables import read_table
 
-    form = wanted_format(output, None)
-    if output != "-":
-        check_place(output)
-        check_place(_model_file(output, form))
-    settings, units_of = _settings(chosen), dict(_pairs("--unit", units))
+    form = wanted_format(options.output, None)
+    if options.output != "-":
+        check_place(options.output)
+        check_place(_model_file(options.output, form))
+    settings, units_of = _settings(options), dict(_pairs("--unit", options.units))
     begin = time.perf_counter()
     found = read_table(
-        table_source(table, delimiter),
-        target=target,
-        ignore=ignore,
-        name="standard input" if table == "-" else None,
+        table_source(options.table, options.delimiter),
+        target=options.target,
+        ignore=options.ignore,
+        name="standard input" if options.table == "-" else None,
     )
-    is_silent = quiet or output == "-"
+    is_silent = options.quiet or options.output == "-"
     read = ("read", found.name, _timed(_read_text(found), begin))
     noticed = dict(remarks(found, lambda column: f"--ignore {shlex.quote(column)}"))
     begin = time.perf_counter()
-    title = name or ("tree" if table == "-" else printable(Path(table).stem))
+    title = options.name or (
+        "tree" if options.table == "-" else printable(Path(options.table).stem)
+    )
     with wrong_options(), progress_bar(quiet=is_silent) as show:
         learnt = learn_table(
             found, name=title, units=units_of, settings=settings, progress=show
         )
     rows = [_tree_row(learnt, begin), read]
     rows += [("remark", column, f"has {text}") for column, text in noticed.items()]
-    rows += _report_rows(learnt.report, is_verbose=verbose)
+    rows += _report_rows(learnt.report, is_verbose=options.verbose)
     tested = None
-    if not no_test:
+    if not options.no_test:
         begin = time.perf_counter()
         with progress_bar(quiet=is_silent) as show:
             tested = accuracy(
@@ -233,26 +214,28 @@ def command(
             )
         said = _timed(_accuracy_text(tested, found), begin)
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
-    width = max(map(len, (output, *(thing for _, thing, _ in rows))))
+    width = max(map(len, (options.output, *(thing for _, thing, _ in rows))))
     say_rows(*rows, width=width, quiet=is_silent)
     model = represented(
         learnt.tree,
         form,
-        representation=representation,
-        kind=kind,
-        conjunction=conjunction,
+        representation=options.representation,
+        kind=options.kind,
+        conjunction=options.conjunction,
     )
     content = export(model, form.name).content
-    if output == "-":
+    if options.output == "-":
         answer_bytes(content)
         return
-    write_atomically(output, content)
-    rest = [] if table == "-" else ["--data", table]
-    rest += ["--delimiter", delimiter] if rest and delimiter else []
-    written = _written_rows(model, output, form, rest)
+    write_atomically(options.output, content)
+    rest = [] if options.table == "-" else ["--data", options.table]
+    rest += ["--delimiter", options.delimiter] if rest and options.delimiter else []
+    written = _written_rows(model, options.output, form, rest)
     say_rows(*written, width=width, quiet=is_silent)
-    if as_json:
-        answer_json(_summary(found, noticed, learnt, tested, settings.seed, output))
+    if options.as_json:
+        answer_json(
+            _summary(found, noticed, learnt, tested, settings.seed, options.output)
+        )
 
 
 def _model_file(output: str, form: Format) -> str:
@@ -280,21 +263,25 @@ def _written_rows(
     yield "wrote", beside, f"the model; next: {after}"
 
 
-def _settings(chosen: Mapping[str, object]) -> LearningSettings:
+def _settings(options: LearnOptions) -> LearningSettings:
     """Return the settings of the options on the command line."""
     from fuzzytree.learning import LearningSettings
 
-    given = {name: value for name, value in chosen.items() if value is not None}
-    given["costs"] = {
-        column: _parsed("--cost", column, text, float)
-        for column, text in _pairs("--cost", cast("Sequence[str]", chosen["costs"]))
+    values = {
+        name: getattr(options, name)
+        for name in LearningSettings.__struct_fields__
+        if getattr(options, name) is not None
     }
-    patterns = given.get("patterns_per_class")
-    if isinstance(patterns, str) and patterns != "auto":
+    values["costs"] = {
+        column: _parsed("--cost", column, text, float)
+        for column, text in _pairs("--cost", options.costs)
+    }
+    patterns = options.patterns_per_class
+    if patterns is not None and patterns != "auto":
         number = _parsed("--patterns", "NUMBER|auto", patterns, int)
-        given["patterns_per_class"] = number
+        values["patterns_per_class"] = number
     with wrong_options():
-        return LearningSettings(**given)  # type: ignore[arg-type] # options have its types
+        return LearningSettings(**values)
 
 
 def _pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:

@@ -6,23 +6,22 @@ from pathlib import Path
 
 import click
 
+from fuzzytree.cli.console import option
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters import find_format
 from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind
 
-as_option = click.option(
+as_option = option(
     "--as",
-    "representation",
     type=click.Choice(["tree", "rules", "system"]),
     help="Representation to write: the tree, its rules, or the equivalent system.",
 )
-terms_option = click.option(
+terms_option = option(
     "--terms",
-    "kind",
     type=click.Choice(["relative", "raw"]),
     help="Rules that equal the tree (the default), or those of the paper.",
 )
-conjunction_option = click.option(
+conjunction_option = option(
     "--conjunction",
     type=click.Choice(["min", "product"]),
     help="AND operator of the rules; min by default.",

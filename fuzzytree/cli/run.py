@@ -15,10 +15,13 @@ import click
 
 from fuzzytree.cli.console import (
     allow_loss_option,
+    argument,
     delimiter_option,
+    option,
     quiet_option,
     say_rows,
     table_source,
+    takes,
     wrong_options,
 )
 from fuzzytree.errors import TableError
@@ -36,60 +39,54 @@ Columns = dict[str, Sequence[object]]
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a cell begins
 
 
+class RunOptions:
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    table: str = argument(metavar="TABLE")
+    output: str = option(
+        "-o",
+        "--output",
+        default="-",
+        metavar="FILE",
+        help="CSV file to write; stdout by default.",
+    )
+    strengths: By | None = option(
+        "--strengths",
+        type=click.Choice(["class", "rule"]),
+        help="Add a column with the firing strength of each class or rule.",
+    )
+    why: bool = option(
+        "--why",
+        is_flag=True,
+        help="Add the winning rule, with its degrees of membership.",
+    )
+    keep: bool = option(
+        "--keep", is_flag=True, help="Add the columns of TABLE before the others."
+    )
+    runtime: str | None = option(
+        "--runtime",
+        metavar="NAME",
+        help="Runtime that executes the model; native by default.",
+    )
+    delimiter: str | None = delimiter_option
+    as_json: bool = option(
+        "--json",
+        is_flag=True,
+        help="Write JSON lines in place of CSV; null for an empty cell.",
+    )
+    safe_csv: bool = option(
+        "--safe-csv",
+        is_flag=True,
+        help="Put an apostrophe before text that a spreadsheet reads as a formula.",
+    )
+    allow_loss: bool = allow_loss_option
+    quiet: bool = quiet_option
+
+
 @click.command("run", short_help="Predict the rows of a table.")
-@click.argument("model", metavar="MODEL")
-@click.argument("table", metavar="TABLE")
-@click.option(
-    "-o",
-    "--output",
-    default="-",
-    metavar="FILE",
-    help="CSV file to write; stdout by default.",
-)
-@click.option(
-    "--strengths",
-    type=click.Choice(["class", "rule"]),
-    help="Add a column with the firing strength of each class or rule.",
-)
-@click.option(
-    "--why", is_flag=True, help="Add the winning rule, with its degrees of membership."
-)
-@click.option(
-    "--keep", is_flag=True, help="Add the columns of TABLE before the others."
-)
-@click.option(
-    "--runtime",
-    metavar="NAME",
-    help="Runtime that executes the model; native by default.",
-)
-@delimiter_option
-@click.option(
-    "--json",
-    "as_json",
-    is_flag=True,
-    help="Write JSON lines in place of CSV; null for an empty cell.",
-)
-@click.option(
-    "--safe-csv",
-    is_flag=True,
-    help="Put an apostrophe before text that a spreadsheet reads as a formula.",
-)
-@allow_loss_option
-@quiet_option
-def command(
-    model: str,
-    table: str,
-    output: str,
-    strengths: By | None,
-    why: bool,
-    keep: bool,
-    runtime: str | None,
-    delimiter: str | None,
-    as_json: bool,
-    safe_csv: bool,
-    allow_loss: bool,
-    quiet: bool,
-) -> None:
+@takes(RunOptions)
+def command(options: RunOptions) -> None:
     """Predict the rows of TABLE: a class, a rule number and a status for each.
 
     A fuzzy system predicts a number for each output, and a status. MODEL is a readable
@@ -98,34 +95,42 @@ def command(
     """
     from fuzzytree import api
 
-    if as_json and safe_csv:
+    if options.as_json and options.safe_csv:
         raise click.UsageError("--safe-csv is about CSV, and --json writes none")
-    found = api.opened(model, allow_loss=allow_loss)
-    reason = _reasons(model, found) if why else None
-    if strengths and isinstance(found, FuzzyTree):
+    found = api.opened(options.model, allow_loss=options.allow_loss)
+    reason = _reasons(options.model, found) if options.why else None
+    if options.strengths and isinstance(found, FuzzyTree):
         found = rules_from_tree(found)
-    if strengths == "class" and isinstance(found, FuzzySystem):
+    if options.strengths == "class" and isinstance(found, FuzzySystem):
         raise click.UsageError(
             f"--strengths class: {found.name} is a fuzzy system, which decides for no "
             "class; there is --strengths rule"
         )
-    is_weighed = strengths is not None or (why and isinstance(found, FuzzySystem))
+    is_weighed = options.strengths is not None or (
+        options.why and isinstance(found, FuzzySystem)
+    )
     with wrong_options():
-        answer = api.prepare_answering(found, runtime, with_strengths=is_weighed)
-    source = table_source(table, delimiter)
-    name = "standard input" if table == "-" else table
+        answer = api.prepare_answering(
+            found, options.runtime, with_strengths=is_weighed
+        )
+    source = table_source(options.table, options.delimiter)
+    name = "standard input" if options.table == "-" else options.table
     tally = _Tally(_has_status(found))
-    with _opened(output) as stream:
-        batches = answer(source, name=name, with_others=keep)
-        write = _json_writer(stream) if as_json else _csv_writer(stream, safe_csv)
+    with _opened(options.output) as stream:
+        batches = answer(source, name=name, with_others=options.keep)
+        write = (
+            _json_writer(stream)
+            if options.as_json
+            else _csv_writer(stream, options.safe_csv)
+        )
         for batch, answers in batches:
-            columns = _kept(batch) if keep else {}
-            _add(columns, _answered(answers, strengths, model), name)
+            columns = _kept(batch) if options.keep else {}
+            _add(columns, _answered(answers, options.strengths, options.model), name)
             if reason:
                 _add(columns, {"why": reason(batch, answers)}, name)
             write(columns)
             tally.add(batch, answers)
-    tally.report(output, quiet=quiet)
+    tally.report(options.output, quiet=options.quiet)
 
 
 def _answered(

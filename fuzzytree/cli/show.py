@@ -9,9 +9,12 @@ import click
 from fuzzytree.cli.console import (
     answer,
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     say,
+    takes,
     wrong_options,
 )
 from fuzzytree.files import check_place
@@ -20,14 +23,22 @@ if TYPE_CHECKING:
     from fuzzytree.model import Coverage, Document, Reading
 
 
+class ShowOptions:
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    picture: str | None = option(
+        "--picture",
+        metavar="FILE",
+        help="Picture of the tree to write, as .svg or .png.",
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("show", short_help="Show a model and its rules.")
-@click.argument("model", metavar="MODEL")
-@click.option(
-    "--picture", metavar="FILE", help="Picture of the tree to write, as .svg or .png."
-)
-@json_option
-@quiet_option
-def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None:
+@takes(ShowOptions)
+def command(options: ShowOptions) -> None:
     """Show a tree, a rule base or a fuzzy system, with the numbers of its terms.
 
     MODEL is a readable file, or ONNX. Parts of the file that a model cannot represent
@@ -38,25 +49,27 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
     from fuzzytree import api, report
     from fuzzytree.runtimes import OnnxModel
 
-    if picture is not None:
-        check_place(picture)
-    if Path(model).suffix.lower() == ".onnx":
-        if picture is not None:
-            raise click.UsageError(f"--picture: {model} contains a graph and no tree")
-        opened = api.opened(model)
+    if options.picture is not None:
+        check_place(options.picture)
+    if Path(options.model).suffix.lower() == ".onnx":
+        if options.picture is not None:
+            raise click.UsageError(
+                f"--picture: {options.model} contains a graph and no tree"
+            )
+        opened = api.opened(options.model)
         assert isinstance(opened, OnnxModel)
         facts = report.onnx_facts(opened)
-        if as_json:
+        if options.as_json:
             answer_json(facts)
         else:
             answer("\n".join(report.fact_lines(facts)))
         return
-    found = api.read(model)
+    found = api.read(options.model)
     coverage = _coverage(found.model)
-    _tell(found, coverage, quiet=quiet)
-    if picture is not None:
-        _draw(found.model, picture, quiet=quiet)
-    if as_json:
+    _tell(found, coverage, quiet=options.quiet)
+    if options.picture is not None:
+        _draw(found.model, options.picture, quiet=options.quiet)
+    if options.as_json:
         answer_json({**_facts(found), "coverage": coverage})
     else:
         answer("\n".join(_lines(found.model)))

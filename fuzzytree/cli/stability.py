@@ -8,44 +8,43 @@ import click
 
 from fuzzytree.cli.console import (
     answer_result,
+    argument,
     data_option,
     delimiter_option,
     json_option,
+    option,
     progress_bar,
     quiet_option,
     runtimes_option,
     table_source,
+    takes,
     verbose_option,
     wrong_options,
 )
 
 
+class StabilityOptions:
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    data: str | None = data_option
+    only: Sequence[str] = option(
+        "--only",
+        metavar="CODE",
+        multiple=True,
+        help="Check to apply, such as N3 (repeat); all by default.",
+    )
+    runtimes: Sequence[str] = runtimes_option
+    is_full: bool = option("--rows", is_flag=True, help="The same as --verbose.")
+    delimiter: str | None = delimiter_option
+    verbose: bool = verbose_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("stability", short_help="Check that a model is numerically stable.")
-@click.argument("model", metavar="MODEL")
-@data_option
-@click.option(
-    "--only",
-    metavar="CODE",
-    multiple=True,
-    help="Check to apply, such as N3 (repeat); all by default.",
-)
-@runtimes_option
-@click.option("--rows", "is_full", is_flag=True, help="The same as --verbose.")
-@delimiter_option
-@verbose_option
-@json_option
-@quiet_option
-def command(
-    model: str,
-    data: str | None,
-    only: Sequence[str],
-    runtimes: Sequence[str],
-    is_full: bool,
-    delimiter: str | None,
-    verbose: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(StabilityOptions)
+def command(options: StabilityOptions) -> int:
     """Apply the stability checks N1 to N10 to MODEL, a YAML file.
 
     They require equal bits in other units, orders and batches, exact edges, errors
@@ -55,16 +54,16 @@ def command(
     from fuzzytree import api
     from fuzzytree.report import stability_lines
 
-    with wrong_options(), progress_bar(quiet=quiet) as show:
+    with wrong_options(), progress_bar(quiet=options.quiet) as show:
         found = api.stability(
-            model,
-            data=table_source(data, delimiter),
-            only=only,
-            runtimes=runtimes or None,
+            options.model,
+            data=table_source(options.data, options.delimiter),
+            only=options.only,
+            runtimes=options.runtimes or None,
             progress=show,
         )
     is_failed = any(one.verdict == "FAILS" for one in found.criteria)
-    lines = stability_lines(found, is_verbose=verbose or is_full)
-    is_silent = quiet and not is_failed
-    answer_result(found.to_json, lines, as_json=as_json, is_silent=is_silent)
+    lines = stability_lines(found, is_verbose=options.verbose or options.is_full)
+    is_silent = options.quiet and not is_failed
+    answer_result(found.to_json, lines, as_json=options.as_json, is_silent=is_silent)
     return int(is_failed)

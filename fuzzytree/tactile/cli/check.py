@@ -9,47 +9,43 @@ import click
 from fuzzytree.cli import (
     answer,
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     rows_only_option,
     say,
+    takes,
 )
 from fuzzytree.tactile.cli.sensors import (
+    SensorOptions,
     frames_model,
     sensor_of_options,
-    sensor_options,
 )
+
+
+class TactileCheckOptions(SensorOptions):
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    files: Sequence[str] = argument(metavar="FILE.onnx...", nargs=-1, required=True)
+    data: str | None = option(
+        "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
+    )
+    reject: float = option(
+        "--reject",
+        type=click.FloatRange(0.0, 1.0),
+        default=0.0,
+        help="Value of `reject` that the files were exported with; default 0.",
+    )
+    rows_only: bool = rows_only_option
+    as_json: bool = json_option
+    quiet: bool = quiet_option
 
 
 @click.command("check", short_help="Compare files of frames with their model.")
-@click.argument("model", metavar="MODEL")
-@click.argument("files", metavar="FILE.onnx...", nargs=-1, required=True)
-@click.option(
-    "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
-)
-@sensor_options
-@click.option(
-    "--reject",
-    type=click.FloatRange(0.0, 1.0),
-    default=0.0,
-    help="Value of `reject` that the files were exported with; default 0.",
-)
-@rows_only_option
-@json_option
-@quiet_option
-def command(
-    model: str,
-    files: Sequence[str],
-    data: str | None,
-    board: str | None,
-    size: str | None,
-    full: int | None,
-    threshold: int | None,
-    reject: float,
-    rows_only: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(TactileCheckOptions)
+def command(options: TactileCheckOptions) -> int:
     """Compare ONNX files that take frames with MODEL, as `tactile export` wrote them.
 
     Metadata, graph and predictions of a file must be those of the model, bit by bit;
@@ -60,17 +56,25 @@ def command(
     from fuzzytree.tactile.presses import read_frames
     from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
 
-    is_named = any(one is not None for one in (board, size, full, threshold))
-    sensor = sensor_of_options(board, size, full, threshold) if is_named else None
-    source = frames_model(model)
-    contents = {name: read_bounded(name) for name in files}
-    frames = None if data is None else read_frames(data).presses.frames
-    found = check_onnx_files(
-        source, contents, frames, sensor=sensor, reject=reject, rows_only=rows_only
+    is_named = any(
+        one is not None
+        for one in (options.board, options.size, options.full, options.threshold)
     )
-    if as_json:
+    sensor = sensor_of_options(options) if is_named else None
+    source = frames_model(options.model)
+    contents = {name: read_bounded(name) for name in options.files}
+    frames = None if options.data is None else read_frames(options.data).presses.frames
+    found = check_onnx_files(
+        source,
+        contents,
+        frames,
+        sensor=sensor,
+        reject=options.reject,
+        rows_only=options.rows_only,
+    )
+    if options.as_json:
         answer_json({"check": found, "ok": found.ok})
-        say(agreement_verdict(found), quiet=quiet and found.ok)
+        say(agreement_verdict(found), quiet=options.quiet and found.ok)
     else:
         answer("\n".join(agreement_lines(found)))
     return 0 if found.ok else 1

@@ -13,19 +13,22 @@ from fuzzytree.cli import (
     answer,
     answer_bytes,
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     say,
     say_rows,
     setting,
+    takes,
     wrong_options,
 )
 from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import (
+    SensorOptions,
     frames_model,
     frames_of_file,
     sensor_of_options,
-    sensor_options,
 )
 
 if TYPE_CHECKING:
@@ -36,41 +39,33 @@ if TYPE_CHECKING:
 _SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
 
 
+class TactileExportOptions(SensorOptions):
+    """The arguments and options of the verb."""
+
+    model: str = argument(metavar="MODEL")
+    output: str = argument(metavar="OUT")
+    to: Form | None = option(
+        "--to",
+        type=click.Choice(["onnx", "c"]),
+        help="Format; default by the suffix of OUT.",
+    )
+    data: str | None = option(
+        "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
+    )
+    settings: Sequence[str] = option(
+        "--set",
+        metavar="NAME=VALUE",
+        multiple=True,
+        help="Option (repeat): outputs, reject, opset, ir, plain of graphs; "
+        "name, reject of C.",
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("export", short_help="Write one file from raw frame to class.")
-@click.argument("model", metavar="MODEL")
-@click.argument("output", metavar="OUT")
-@click.option(
-    "--to",
-    type=click.Choice(["onnx", "c"]),
-    help="Format; default by the suffix of OUT.",
-)
-@sensor_options
-@click.option(
-    "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
-)
-@click.option(
-    "--set",
-    "settings",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Option (repeat): outputs, reject, opset, ir, plain of graphs; "
-    "name, reject of C.",
-)
-@json_option
-@quiet_option
-def command(
-    model: str,
-    output: str,
-    to: Form | None,
-    board: str | None,
-    size: str | None,
-    full: int | None,
-    threshold: int | None,
-    data: str | None,
-    settings: Sequence[str],
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(TactileExportOptions)
+def command(options: TactileExportOptions) -> int:
     """Write MODEL as file OUT (.onnx or .c) that takes frames as a board sends them.
 
     All implementations from frame to class are compared first, bit by bit, and with
@@ -80,38 +75,38 @@ def command(
     from fuzzytree.tactile.recognition.agreement import check_frames_agree
     from fuzzytree.tactile.recognition.recogniser import check_inputs
 
-    form = _form(output, to)
-    write, options = _writer(form, settings)
-    if output != "-":
-        check_place(output)
-    sensor = sensor_of_options(board, size, full, threshold)
-    source = frames_model(model)
+    form = _form(options.output, options.to)
+    write, values = _writer(form, options.settings)
+    if options.output != "-":
+        check_place(options.output)
+    sensor = sensor_of_options(options)
+    source = frames_model(options.model)
     check_inputs(source)
-    frames = frames_of_file(data, sensor, quiet=quiet)
+    frames = frames_of_file(options.data, sensor, quiet=options.quiet)
     with wrong_options():
-        written = write(source, sensor, **options)
-        found = check_frames_agree(
-            source, sensor, frames, reject=options.get("reject", 0.0)
-        )
+        written = write(source, sensor, **values)
+        reject = values.get("reject", 0.0)
+        found = check_frames_agree(source, sensor, frames, reject=reject)
     lines = _lines(found)
-    if output == "-":
+    if options.output == "-":
         for line in lines:
-            say(line, quiet=quiet)
-    elif as_json:
-        size_facts = {"file": output, "format": form, "bytes": len(written.content)}
-        answer_json({**size_facts, "check": found, "ok": found.ok})
+            say(line, quiet=options.quiet)
+    elif options.as_json:
+        size = len(written.content)
+        facts = {"file": options.output, "format": form, "bytes": size}
+        answer_json({**facts, "check": found, "ok": found.ok})
     else:
         answer("\n".join(lines))
     if not found.ok:
         say(f"{agreement_verdict(found)}; nothing is written")
         return 1
-    if output == "-":
+    if options.output == "-":
         answer_bytes(written.content)
     else:
-        write_atomically(output, written.content)
+        write_atomically(options.output, written.content)
     digest = hashlib.sha256(written.content).hexdigest()
-    facts = f"{form}, {len(written.content)} bytes, sha256 {digest}"
-    say_rows(("wrote", output, facts), quiet=quiet)
+    said = f"{form}, {len(written.content)} bytes, sha256 {digest}"
+    say_rows(("wrote", options.output, said), quiet=options.quiet)
     return 0
 
 

@@ -15,14 +15,17 @@ import click
 from fuzzytree.cli import (
     answer_bytes,
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     say_rows,
+    takes,
     wrong_options,
 )
 from fuzzytree.errors import ReadError
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import frames_and_sensor, frames_options
+from fuzzytree.tactile.cli.sensors import FramesOptions, frames_and_sensor
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.presses import SensorFrames
@@ -32,39 +35,33 @@ CLASS = "class"
 """The column of the classes."""
 
 
+class TactileFeaturesOptions(FramesOptions):
+    """The arguments and options of the verb."""
+
+    frames: tuple[str, ...] = argument(nargs=-1, required=True, metavar="FRAMES...")
+    text: str = option(
+        "--features",
+        metavar="NAMES",
+        default="paper",
+        show_default=True,
+        help="Names and sets of features, separated by commas.",
+    )
+    label: str = option(
+        "--label",
+        metavar="ARRAY",
+        default="label",
+        help="Array of FRAMES with the classes; default `label`.",
+    )
+    output: str | None = option(
+        "-o", "--output", metavar="FILE", help="CSV file to write; `-` is stdout."
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("features", short_help="Turn frames into a table of features.")
-@click.argument("frames", nargs=-1, required=True, metavar="FRAMES...")
-@click.option(
-    "--features",
-    "text",
-    metavar="NAMES",
-    default="paper",
-    show_default=True,
-    help="Names and sets of features, separated by commas.",
-)
-@frames_options
-@click.option(
-    "--label",
-    metavar="ARRAY",
-    default="label",
-    help="Array of FRAMES with the classes; default `label`.",
-)
-@click.option(
-    "-o", "--output", metavar="FILE", help="CSV file to write; `-` is stdout."
-)
-@json_option
-@quiet_option
-def command(
-    frames: tuple[str, ...],
-    text: str,
-    board: str | None,
-    full: int | None,
-    threshold: int | None,
-    label: str,
-    output: str | None,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(TactileFeaturesOptions)
+def command(options: TactileFeaturesOptions) -> int:
     """Compute features of FRAMES, a numpy archive (.npz) or a recording.
 
     With -o they become a table for `fuzzytree learn`; without it, the cost of each
@@ -74,24 +71,32 @@ def command(
     from fuzzytree.tactile.features import costs
     from fuzzytree.tactile.features.names import names_of
 
-    if output and output != "-":
-        check_place(output)
+    if options.output and options.output != "-":
+        check_place(options.output)
     with wrong_options():
-        names = names_of(text)
+        names = names_of(options.text)
     parts = [
-        _of_class(word, frames_and_sensor(path, board, full, threshold, label=label))
-        for word, path in _named(frames)
+        _of_class(word, frames_and_sensor(path, options, label=options.label))
+        for word, path in _named(options.frames)
     ]
-    _check_alike(frames, parts)
+    _check_alike(options.frames, parts)
     found = costs(parts[0].sensor, names)
-    if output is None:
-        if as_json:
+    if options.output is None:
+        if options.as_json:
             answer_json({"costs": found})
         else:
             for name in names:
                 click.echo(f"{found[name]:8.0f}  {name}")
         return 0
-    return _table(frames, parts, names, found, output, as_json=as_json, quiet=quiet)
+    return _table(
+        options.frames,
+        parts,
+        names,
+        found,
+        options.output,
+        as_json=options.as_json,
+        quiet=options.quiet,
+    )
 
 
 def _named(frames: Sequence[str]) -> list[tuple[str, str]]:

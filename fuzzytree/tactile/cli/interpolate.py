@@ -10,13 +10,16 @@ import click
 
 from fuzzytree.cli import (
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     say_rows,
+    takes,
     wrong_options,
 )
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import frames_and_sensor, frames_options
+from fuzzytree.tactile.cli.sensors import FramesOptions, frames_and_sensor
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,50 +35,43 @@ MOST_BYTES = 2**30
 """The most bytes of the arrays of an archive."""
 
 
+class TactileInterpolateOptions(FramesOptions):
+    """The arguments and options of the verb."""
+
+    frames: str = argument(metavar="FRAMES")
+    text: str = option(
+        "--times",
+        metavar="NUMBERS",
+        default="3,5,7",
+        show_default=True,
+        help="Points for a cell on each side, separated by commas.",
+    )
+    frame: int | None = option(
+        "--frame",
+        metavar="NUMBER",
+        type=int,
+        help="Number of the frame, from 0; "
+        "a picture shows the first pressed one if none.",
+    )
+    is_marked: bool = option(
+        "--axis",
+        is_flag=True,
+        help="Mark the centre of pressure and the principal axis.",
+    )
+    output: str = option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        required=True,
+        help="Picture of a frame (.svg, .png), or values of all frames (.npz).",
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("interpolate", short_help="Interpolate frames; a picture or numbers.")
-@click.argument("frames", metavar="FRAMES")
-@click.option(
-    "--times",
-    "text",
-    metavar="NUMBERS",
-    default="3,5,7",
-    show_default=True,
-    help="Points for a cell on each side, separated by commas.",
-)
-@click.option(
-    "--frame",
-    metavar="NUMBER",
-    type=int,
-    help="Number of the frame, from 0; a picture shows the first pressed one if none.",
-)
-@click.option(
-    "--axis",
-    "is_marked",
-    is_flag=True,
-    help="Mark the centre of pressure and the principal axis.",
-)
-@frames_options
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    required=True,
-    help="Picture of a frame (.svg, .png), or values of all frames (.npz).",
-)
-@json_option
-@quiet_option
-def command(
-    frames: str,
-    text: str,
-    frame: int | None,
-    is_marked: bool,
-    board: str | None,
-    full: int | None,
-    threshold: int | None,
-    output: str,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(TactileInterpolateOptions)
+def command(options: TactileInterpolateOptions) -> int:
     """Interpolate FRAMES, a numpy archive (.npz) or a recording, by fuzzy numbers.
 
     An archive gets an array `frames` of what presses on each cell, and an array
@@ -85,15 +81,19 @@ def command(
     from fuzzytree.report import SUFFIXES
     from fuzzytree.tactile.sensor import pressed
 
-    suffix = Path(output).suffix.lower()
+    suffix = Path(options.output).suffix.lower()
     if suffix not in (*SUFFIXES, ARCHIVE):
         names = ", ".join(SUFFIXES)
-        raise click.UsageError(f"{output}: the name ends in {names} or {ARCHIVE}")
-    times = _times(text)
-    check_place(output)
-    given = frames_and_sensor(frames, board, full, threshold)
+        raise click.UsageError(
+            f"{options.output}: the name ends in {names} or {ARCHIVE}"
+        )
+    times = _times(options.text)
+    check_place(options.output)
+    given = frames_and_sensor(options.frames, options)
     values = pressed(given.sensor, given.presses.frames)
-    number = _chosen(frames, frame, values, is_picture=suffix != ARCHIVE)
+    number = _chosen(
+        options.frames, options.frame, values, is_picture=suffix != ARCHIVE
+    )
     if number is not None:
         values = values[number : number + 1]
     with wrong_options():
@@ -101,14 +101,25 @@ def command(
             content = _archive(values, times)
         else:
             content = _picture(
-                given, number, times, suffix, source=frames, is_marked=is_marked
+                given,
+                number,
+                times,
+                suffix,
+                source=options.frames,
+                is_marked=options.is_marked,
             )
-    write_atomically(output, content)
+    write_atomically(options.output, content)
     facts = _facts(given, number, values, times)
-    if not quiet:
-        _tell(frames, output, facts, full=given.sensor.full, size=len(content))
-    if as_json:
-        answer_json({"file": output, "bytes": len(content), **facts})
+    if not options.quiet:
+        _tell(
+            options.frames,
+            options.output,
+            facts,
+            full=given.sensor.full,
+            size=len(content),
+        )
+    if options.as_json:
+        answer_json({"file": options.output, "bytes": len(content), **facts})
     return 0
 
 

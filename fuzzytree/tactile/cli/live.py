@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from fuzzytree.cli import quiet_option, say_rows, wrong_options
+from fuzzytree.cli import argument, option, quiet_option, say_rows, takes, wrong_options
 from fuzzytree.tactile.cli.sensors import frames_model
 
 if TYPE_CHECKING:
@@ -30,86 +30,83 @@ SWITCH_S = 2e-4
 """How soon a thread that reads or draws gives way to an answer."""
 
 
+class TactileLiveOptions:
+    """The arguments and options of the verb."""
+
+    source: str = argument(metavar="SOURCE")
+    model: str = option(
+        "--model",
+        required=True,
+        metavar="MODEL",
+        help="Model to run: a tree or a rule base.",
+    )
+    board: str | None = option(
+        "--board", metavar="BOARD.yaml", help="File of the board on the port."
+    )
+    reject: float | None = option(
+        "--reject",
+        type=click.FloatRange(0.0, 1.0),
+        metavar="SHARE",
+        help="Firing strength below which an object is unknown; "
+        "default 0.001, or 0 for relative rules.",
+    )
+    hold: int = option(
+        "--hold",
+        type=click.IntRange(1),
+        default=3,
+        show_default=True,
+        metavar="N",
+        help="Frames that a result must last before its line is printed.",
+    )
+    lines: bool = option(
+        "--lines", is_flag=True, help="Print lines, also on a terminal."
+    )
+    as_json: bool = option("--json", is_flag=True, help="Print each line as JSON.")
+    page: int | None = option(
+        "--page",
+        is_flag=False,
+        flag_value=0,
+        type=click.IntRange(0, 65535),
+        metavar="[PORT]",
+        help="Serve a page on this computer; a free port if none is named.",
+    )
+    times: int = option(
+        "--times",
+        type=click.IntRange(1, 9),
+        default=3,
+        show_default=True,
+        metavar="N",
+        help="Largest number of picture points for a cell, on each side.",
+    )
+    record: str | None = option(
+        "--record", metavar="FILE", help="Recording to write the frames to."
+    )
+    speed: float = option(
+        "--speed",
+        type=click.FloatRange(0.0),
+        default=1.0,
+        show_default=True,
+        metavar="X",
+        help="Speed of a recording or the simulator; 0 for no pauses.",
+    )
+    seed: int = option(
+        "--seed",
+        type=click.IntRange(0),
+        default=0,
+        help="Random seed of the simulator; default 0.",
+    )
+    frames: int | None = option(
+        "--frames",
+        type=click.IntRange(1),
+        metavar="N",
+        help="Number of frames to recognise.",
+    )
+    quiet: bool = quiet_option
+
+
 @click.command("live", short_help="Recognise what lies on a sensor, on-line.")
-@click.argument("source", metavar="SOURCE")
-@click.option(
-    "--model",
-    required=True,
-    metavar="MODEL",
-    help="Model to run: a tree or a rule base.",
-)
-@click.option("--board", metavar="BOARD.yaml", help="File of the board on the port.")
-@click.option(
-    "--reject",
-    type=click.FloatRange(0.0, 1.0),
-    metavar="SHARE",
-    help="Firing strength below which an object is unknown; default 0.001, or 0 for "
-    "relative rules.",
-)
-@click.option(
-    "--hold",
-    type=click.IntRange(1),
-    default=3,
-    show_default=True,
-    metavar="N",
-    help="Frames that a result must last before its line is printed.",
-)
-@click.option("--lines", is_flag=True, help="Print lines, also on a terminal.")
-@click.option("--json", "as_json", is_flag=True, help="Print each line as JSON.")
-@click.option(
-    "--page",
-    is_flag=False,
-    flag_value=0,
-    type=click.IntRange(0, 65535),
-    metavar="[PORT]",
-    help="Serve a page on this computer; a free port if none is named.",
-)
-@click.option(
-    "--times",
-    type=click.IntRange(1, 9),
-    default=3,
-    show_default=True,
-    metavar="N",
-    help="Largest number of picture points for a cell, on each side.",
-)
-@click.option("--record", metavar="FILE", help="Recording to write the frames to.")
-@click.option(
-    "--speed",
-    type=click.FloatRange(0.0),
-    default=1.0,
-    show_default=True,
-    metavar="X",
-    help="Speed of a recording or the simulator; 0 for no pauses.",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    help="Random seed of the simulator; default 0.",
-)
-@click.option(
-    "--frames",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Number of frames to recognise.",
-)
-@quiet_option
-def command(
-    source: str,
-    model: str,
-    board: str | None,
-    reject: float | None,
-    hold: int,
-    lines: bool,
-    as_json: bool,
-    page: int | None,
-    times: int,
-    record: str | None,
-    speed: float,
-    seed: int,
-    frames: int | None,
-    quiet: bool,
-) -> None:
+@takes(TactileLiveOptions)
+def command(options: TactileLiveOptions) -> None:
     """Recognise the object on the sensor, frame by frame.
 
     SOURCE is a serial port, a recording, or `simulator`: the paper's objects one after
@@ -119,33 +116,32 @@ def command(
     from fuzzytree.tactile.recognition.live import Hold, Live
     from fuzzytree.tactile.recognition.recogniser import Recogniser, usual_floor
 
-    known = frames_model(model)
-    floor = usual_floor(known) if reject is None else reject
+    known = frames_model(options.model)
+    floor = usual_floor(known) if options.reject is None else options.reject
     with contextlib.ExitStack() as stack:
         stack.callback(_switched(SWITCH_S))
         with wrong_options():
-            found, used = _opened(
-                source,
-                board,
-                speed=speed,
-                seed=seed,
-                is_kept=record is not None,
-                quiet=quiet,
-            )
+            found, used = _opened(options)
             stack.callback(found.close)
             recogniser = Recogniser(known, used.sensor, floor)
-        live = Live(recogniser, found, source)
-        recorder = _recorder(record, used)
+        live = Live(recogniser, found, options.source)
+        recorder = _recorder(options.record, used)
         if recorder is not None:
             stack.callback(recorder.close)
-        if page is not None:
-            url = _served(live, page, times, stack)
-            say_rows(("serves", url, ""), quiet=quiet)
+        if options.page is not None:
+            url = _served(live, options.page, options.times, stack)
+            say_rows(("serves", url, ""), quiet=options.quiet)
         tally = _Tally()
         try:
-            with _display(live, times, is_wanted=not (lines or as_json)) as shows:
-                write = None if shows else _writer(Hold(hold), as_json=as_json)
-                for answer in live.answers(frames):
+            with _display(
+                live, options.times, is_wanted=not (options.lines or options.as_json)
+            ) as shows:
+                write = (
+                    None
+                    if shows
+                    else _writer(Hold(options.hold), as_json=options.as_json)
+                )
+                for answer in live.answers(options.frames):
                     if write is not None:
                         write(answer)
                     tally.add(answer)
@@ -153,7 +149,7 @@ def command(
                         recorder.write(answer.frame, found.counters)
         except KeyboardInterrupt:
             pass
-    tally.report(live, floor, record, quiet=quiet)
+    tally.report(live, floor, options.record, quiet=options.quiet)
 
 
 def _switched(seconds: float) -> Callable[[], None]:
@@ -163,18 +159,11 @@ def _switched(seconds: float) -> Callable[[], None]:
     return lambda: sys.setswitchinterval(before)
 
 
-def _opened(
-    source: str,
-    board: str | None,
-    *,
-    speed: float,
-    seed: int,
-    is_kept: bool,
-    quiet: bool,
-) -> tuple[FrameSource, Board]:
+def _opened(options: TactileLiveOptions) -> tuple[FrameSource, Board]:
     """Return where frames come from, and the board that they fit."""
     from fuzzytree.tactile.recognition import frame_sources as sources
 
+    source, board, speed = options.source, options.board, options.speed
     is_file = Path(source).is_file()
     if board is None and source != SIMULATOR and not is_file:
         raise click.UsageError(
@@ -183,12 +172,15 @@ def _opened(
     if board is not None and (source == SIMULATOR or is_file):
         raise click.UsageError(f"--board is for a port; {source} has its own")
     if source == SIMULATOR:
-        return sources.Paced(sources.simulated(seed), speed), sources.PAPER_BOARD
+        return sources.Paced(
+            sources.simulated(options.seed), speed
+        ), sources.PAPER_BOARD
     if is_file:
         replayed = sources.Replayed(source, speed)
         return replayed, replayed.board
     assert board is not None  # refused above
-    return _line(source, board, is_kept=is_kept, quiet=quiet)
+    is_kept = options.record is not None
+    return _line(source, board, is_kept=is_kept, quiet=options.quiet)
 
 
 def _line(

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import click
 
-from fuzzytree.cli import answer, answer_json, json_option, say
+from fuzzytree.cli import answer, answer_json, json_option, say, takes
+
+
+class TactilePortsOptions:
+    """The arguments and options of the verb."""
+
+    as_json: bool = json_option
 
 
 @click.command("ports", short_help="List the serial ports.")
-@json_option
-def command(as_json: bool) -> None:
+@takes(TactilePortsOptions)
+def command(options: TactilePortsOptions) -> None:
     """List the serial ports of this computer, one a line."""
     from fuzzytree.report import aligned
     from fuzzytree.tactile.link import ports
 
     found = ports()
-    if as_json:
+    if options.as_json:
         answer_json(found)
         return
     if not found:

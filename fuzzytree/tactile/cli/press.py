@@ -14,10 +14,13 @@ import msgspec
 from fuzzytree.cli import (
     answer_bytes,
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     say_rows,
     setting,
+    takes,
     wrong_options,
 )
 
@@ -25,83 +28,86 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.simulation.physics import PhysicsSettings, Simulated
 
 
+class TactilePressOptions:
+    """The arguments and options of the verb."""
+
+    name: str = argument(metavar="OBJECT")
+    count: int = option(
+        "--count",
+        metavar="NUMBER",
+        type=int,
+        default=50,
+        show_default=True,
+        help="Presses of each object.",
+    )
+    seed: int = option(
+        "--seed",
+        metavar="NUMBER",
+        type=click.IntRange(0),
+        default=0,
+        help="Random seed of the presses; default 0.",
+    )
+    output: str = option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        required=True,
+        help="Archive to write (.npz); `-` is stdout.",
+    )
+    changes: Sequence[str] = option(
+        "--set",
+        metavar="NAME=VALUE",
+        multiple=True,
+        help="Number of the simulator (repeat); see docs/explanation/simulator.md.",
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("press", short_help="Press objects on a simulated sensor.")
-@click.argument("name", metavar="OBJECT")
-@click.option(
-    "--count",
-    metavar="NUMBER",
-    type=int,
-    default=50,
-    show_default=True,
-    help="Presses of each object.",
-)
-@click.option(
-    "--seed",
-    metavar="NUMBER",
-    type=click.IntRange(0),
-    default=0,
-    help="Random seed of the presses; default 0.",
-)
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    required=True,
-    help="Archive to write (.npz); `-` is stdout.",
-)
-@click.option(
-    "--set",
-    "changes",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Number of the simulator (repeat); see docs/explanation/simulator.md.",
-)
-@json_option
-@quiet_option
-def command(
-    name: str,
-    count: int,
-    seed: int,
-    output: str,
-    changes: Sequence[str],
-    as_json: bool,
-    quiet: bool,
-) -> None:
+@takes(TactilePressOptions)
+def command(options: TactilePressOptions) -> None:
     """Press OBJECT again and again on a sensor of 16 x 16 cells; `all` presses all.
 
     OBJECT is rectangle-0, rectangle-27, rectangle-45, circle, square, hand-0 or
     hand-45. FILE holds the frames, their labels and the reading of a saturated cell.
     """
-    if output == "-" and as_json:
+    if options.output == "-" and options.as_json:
         raise click.UsageError("`-o -` leaves no room for --json on stdout")
     from fuzzytree.files import check_place, write_atomically
     from fuzzytree.tactile.simulation.objects import OBJECTS
     from fuzzytree.tactile.simulation.physics import press
 
-    if output != "-":
-        check_place(output)
-    settings = physics_settings(changes)
-    names = tuple(OBJECTS) if name == "all" else (name,)
+    if options.output != "-":
+        check_place(options.output)
+    settings = physics_settings(options.changes)
+    names = tuple(OBJECTS) if options.name == "all" else (options.name,)
     with wrong_options():
-        found = {one: press(one, count, seed, settings) for one in names}
-    say_rows(*(_row(one, made) for one, made in found.items()), quiet=quiet)
+        found = {
+            one: press(one, options.count, options.seed, settings) for one in names
+        }
+    say_rows(*(_row(one, made) for one, made in found.items()), quiet=options.quiet)
     facts: dict[str, object] = {
-        "count": count,
-        "seed": seed,
+        "count": options.count,
+        "seed": options.seed,
         "settings": msgspec.structs.asdict(settings),
         "objects": [_facts(one, made) for one, made in found.items()],
     }
     content = _content(found)
-    if output == "-":
+    if options.output == "-":
         answer_bytes(content)
         return
-    write_atomically(output, content)
+    write_atomically(options.output, content)
     digest = hashlib.sha256(content).hexdigest()
     size = f"{len(content)} bytes, sha256 {digest}"
-    words = ["fuzzytree", "tactile", "features", output, "--features", "S1, S9"]
-    say_rows(("wrote", output, size), ("next", shlex.join(words), ""), quiet=quiet)
-    facts |= {"file": output, "bytes": len(content), "sha256": digest}
-    if as_json:
+    words = ["fuzzytree", "tactile", "features", options.output, "--features", "S1, S9"]
+    say_rows(
+        ("wrote", options.output, size),
+        ("next", shlex.join(words), ""),
+        quiet=options.quiet,
+    )
+    facts |= {"file": options.output, "bytes": len(content), "sha256": digest}
+    if options.as_json:
         answer_json(facts)
 
 

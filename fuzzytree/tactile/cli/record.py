@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from fuzzytree.cli import answer_json, json_option, quiet_option, say, say_rows
+from fuzzytree.cli import (
+    answer_json,
+    argument,
+    json_option,
+    option,
+    quiet_option,
+    say,
+    say_rows,
+    takes,
+)
 from fuzzytree.errors import PortError, WriteError
 from fuzzytree.files import check_place
 from fuzzytree.tactile.cli.signals import stop_signal
@@ -36,36 +45,37 @@ _LOOK_S = 0.1
 _WAITING_BYTES = 2**24  # of frames, while the disk is busy
 
 
+class TactileRecordOptions:
+    """The arguments and options of the verb."""
+
+    board: str = argument(metavar="BOARD.yaml")
+    port: str = argument(metavar="PORT")
+    output: str = option(
+        "-o", "--output", metavar="FILE", required=True, help="Recording to write."
+    )
+    frames: int | None = option(
+        "--frames",
+        type=click.IntRange(1),
+        metavar="N",
+        help="Number of frames to record.",
+    )
+    seconds: float | None = option(
+        "--seconds",
+        type=click.FloatRange(0.0, min_open=True),
+        metavar="S",
+        help="Seconds to record.",
+    )
+    force: bool = option("--force", is_flag=True, help="Replace FILE if it exists.")
+    no_wait: bool = option(
+        "--no-wait", is_flag=True, help="End when the port goes away."
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("record", short_help="Record the frames of a board in a file.")
-@click.argument("board", metavar="BOARD.yaml")
-@click.argument("port", metavar="PORT")
-@click.option(
-    "-o", "--output", metavar="FILE", required=True, help="Recording to write."
-)
-@click.option(
-    "--frames", type=click.IntRange(1), metavar="N", help="Number of frames to record."
-)
-@click.option(
-    "--seconds",
-    type=click.FloatRange(0.0, min_open=True),
-    metavar="S",
-    help="Seconds to record.",
-)
-@click.option("--force", is_flag=True, help="Replace FILE if it exists.")
-@click.option("--no-wait", is_flag=True, help="End when the port goes away.")
-@json_option
-@quiet_option
-def command(
-    board: str,
-    port: str,
-    output: str,
-    frames: int | None,
-    seconds: float | None,
-    force: bool,
-    no_wait: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@takes(TactileRecordOptions)
+def command(options: TactileRecordOptions) -> int:
     """Record the frames that BOARD.yaml sends through PORT in FILE, until Ctrl-C.
 
     The first frames measure the baseline: leave the sensor empty. The recording waits
@@ -75,22 +85,24 @@ def command(
     from fuzzytree.tactile.link import open_connection, start
     from fuzzytree.tactile.link.recording import Recorder
 
-    if output == "-":
+    if options.output == "-":
         raise click.UsageError("a recording is a file, and not standard output")
-    known = load_board(board)
-    check_place(output)
-    if Path(output).exists() and not force:
-        raise WriteError(f"{output}: is there already; --force replaces it")
+    known = load_board(options.board)
+    check_place(options.output)
+    if Path(options.output).exists() and not options.force:
+        raise WriteError(f"{options.output}: is there already; --force replaces it")
     with (
         stop_signal() as stop,
         open_connection(
-            known, port, wait=not no_wait, most_waiting=_waiting(known)
+            known, options.port, wait=not options.no_wait, most_waiting=_waiting(known)
         ) as line,
     ):
-        coming = _Coming(line, stop, quiet=quiet)
+        coming = _Coming(line, stop, quiet=options.quiet)
         settings = f"{known.port.baud} baud"
-        say_rows(("opened", port, f"{known.name}, {settings}"), quiet=quiet)
-        coming.begin(seconds)  # a line that stays silent ends, too
+        say_rows(
+            ("opened", options.port, f"{known.name}, {settings}"), quiet=options.quiet
+        )
+        coming.begin(options.seconds)  # a line that stays silent ends, too
         try:
             started = start(known, coming.frames())
         except PortError:
@@ -98,12 +110,14 @@ def command(
                 raise
             say("ended before the baseline was measured; nothing was written")
             return 0
-        _tell_start(started, quiet=quiet)
-        with Recorder(output, started.board, replace=force) as recorder:
-            end = _record(line, coming, recorder, frames=frames, seconds=seconds)
-    _tell(output, line, started, recorder, coming, quiet=quiet)
-    if as_json:
-        answer_json(_facts(output, line, started, recorder, coming, end))
+        _tell_start(started, quiet=options.quiet)
+        with Recorder(options.output, started.board, replace=options.force) as recorder:
+            end = _record(
+                line, coming, recorder, frames=options.frames, seconds=options.seconds
+            )
+    _tell(options.output, line, started, recorder, coming, quiet=options.quiet)
+    if options.as_json:
+        answer_json(_facts(options.output, line, started, recorder, coming, end))
     return 1 if end == "port" else 0
 
 

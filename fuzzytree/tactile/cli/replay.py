@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli import answer, answer_json, json_option, quiet_option, say, say_rows
+from fuzzytree.cli import (
+    answer,
+    answer_json,
+    argument,
+    json_option,
+    option,
+    quiet_option,
+    say,
+    say_rows,
+    takes,
+)
 from fuzzytree.files import check_place, open_atomically, write_atomically
 from fuzzytree.tactile.cli.signals import stop_signal
 
@@ -22,35 +32,34 @@ _LOOK_S = 0.1
 _LAST_S = 0.2  # for the reader of a port to take the last bytes
 
 
+class TactileReplayOptions:
+    """The arguments and options of the verb."""
+
+    recording: str = argument(metavar="FILE")
+    output: str | None = option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="File for the frames (.csv, .npz) or for the board (.yaml).",
+    )
+    to_port: bool = option(
+        "--to-port",
+        is_flag=True,
+        help="Send the frames through a new port, as the board did.",
+    )
+    speed: float | None = option(
+        "--speed",
+        type=click.FloatRange(0.0, min_open=True),
+        metavar="X",
+        help="Speed of --to-port as a multiple of the recorded one; default 1.",
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("replay", short_help="Summarise a recording, or play it again.")
-@click.argument("recording", metavar="FILE")
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    help="File for the frames (.csv, .npz) or for the board (.yaml).",
-)
-@click.option(
-    "--to-port",
-    is_flag=True,
-    help="Send the frames through a new port, as the board did.",
-)
-@click.option(
-    "--speed",
-    type=click.FloatRange(0.0, min_open=True),
-    metavar="X",
-    help="Speed of --to-port as a multiple of the recorded one; default 1.",
-)
-@json_option
-@quiet_option
-def command(
-    recording: str,
-    output: str | None,
-    to_port: bool,
-    speed: float | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+@takes(TactileReplayOptions)
+def command(options: TactileReplayOptions) -> None:
     """Summarise a recording: board, frames, seconds, counters, gaps, damage.
 
     With --to-port the frames are sent through a new port, whose name is printed, at
@@ -58,30 +67,36 @@ def command(
     """
     from fuzzytree.tactile.link.recording import RecordingFile, review
 
-    if speed is not None and not to_port:
+    if options.speed is not None and not options.to_port:
         raise click.UsageError("--speed is for --to-port")
-    if to_port and (output or as_json):
+    if options.to_port and (options.output or options.as_json):
         raise click.UsageError("--to-port plays only; -o and --json are for without it")
-    if output is not None:
-        check_place(output)
-        if Path(output).suffix not in _WRITERS:
-            raise click.UsageError(f"-o writes .csv, .npz or .yaml, not {output}")
-    with RecordingFile(recording) as file:
-        if to_port:
-            _play(file, speed or 1.0, quiet=quiet)
+    if options.output is not None:
+        check_place(options.output)
+        if Path(options.output).suffix not in _WRITERS:
+            raise click.UsageError(
+                f"-o writes .csv, .npz or .yaml, not {options.output}"
+            )
+    with RecordingFile(options.recording) as file:
+        if options.to_port:
+            _play(file, options.speed or 1.0, quiet=options.quiet)
             return
         found = review(file)
-        if as_json:
+        if options.as_json:
             answer_json(_facts(file, found))
         else:
-            answer("\n".join(_lines(recording, file, found)))
-        if output is not None:
-            _WRITERS[Path(output).suffix](output, recording, file)
+            answer("\n".join(_lines(options.recording, file, found)))
+        if options.output is not None:
+            _WRITERS[Path(options.output).suffix](
+                options.output, options.recording, file
+            )
             sensor = file.board.sensor
             rests = any(sensor.baseline) or bool(sensor.masked)
-            is_bare = Path(output).suffix == ".npz" and rests
+            is_bare = Path(options.output).suffix == ".npz" and rests
             hint = "without baseline and mask: give its board with --board"
-            say_rows(("wrote", output, hint if is_bare else ""), quiet=quiet)
+            say_rows(
+                ("wrote", options.output, hint if is_bare else ""), quiet=options.quiet
+            )
 
 
 def _facts(file: RecordingFile, found: Review) -> dict[str, object]:

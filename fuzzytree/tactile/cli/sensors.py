@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli import say_rows, wrong_options
+from fuzzytree.cli import option, say_rows, wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.model import Model
@@ -18,33 +17,40 @@ if TYPE_CHECKING:
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
 
 
-def sensor_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that say which sensor it is."""
-    for option in (
-        click.option(
-            "--threshold",
-            metavar="N",
-            type=int,
-            help="Reading above which a cell is pressed; default 0.",
-        ),
-        click.option(
-            "--full",
-            metavar="N",
-            type=int,
-            help="Reading of a saturated cell; default 255.",
-        ),
-        click.option(
-            "--sensor", "size", metavar="16x16", help="Rows and columns of the sensor."
-        ),
-        click.option("--board", metavar="FILE", help="File of the board."),
-    ):
-        command = option(command)
-    return command
+class SensorOptions:
+    """The options that say which sensor it is."""
+
+    board: str | None = option("--board", metavar="FILE", help="File of the board.")
+    size: str | None = option(
+        "--sensor", metavar="16x16", help="Rows and columns of the sensor."
+    )
+    full: int | None = option(
+        "--full",
+        metavar="N",
+        type=int,
+        help="Reading of a saturated cell; default 255.",
+    )
+    threshold: int | None = option(
+        "--threshold",
+        metavar="N",
+        type=int,
+        help="Reading above which a cell is pressed; default 0.",
+    )
 
 
-def sensor_of_options(
-    board: str | None, size: str | None, full: int | None, threshold: int | None
-) -> Sensor:
+class FramesOptions:
+    """The options that say more of a file of frames than it does itself."""
+
+    board: str | None = option(
+        "--board", metavar="FILE", help="File of the board of the frames."
+    )
+    full: int | None = option("--full", type=int, help="Reading of a saturated cell.")
+    threshold: int | None = option(
+        "--threshold", type=int, help="Reading above which a cell is pressed."
+    )
+
+
+def sensor_of_options(options: SensorOptions) -> Sensor:
     """Return the sensor that the options describe.
 
     Raises:
@@ -53,6 +59,8 @@ def sensor_of_options(
     """
     from fuzzytree.tactile.sensor import Sensor
 
+    board, size = options.board, options.size
+    full, threshold = options.full, options.threshold
     if board is not None:
         if size is not None or full is not None or threshold is not None:
             raise click.UsageError(
@@ -73,28 +81,8 @@ def sensor_of_options(
         return Sensor(rows, columns, 255 if full is None else full, threshold or 0)
 
 
-def frames_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that say more of a file of frames than it does itself."""
-    for option in (
-        click.option(
-            "--threshold", type=int, help="Reading above which a cell is pressed."
-        ),
-        click.option("--full", type=int, help="Reading of a saturated cell."),
-        click.option(
-            "--board", metavar="FILE", help="File of the board of the frames."
-        ),
-    ):
-        command = option(command)
-    return command
-
-
 def frames_and_sensor(
-    path: str,
-    board: str | None,
-    full: int | None,
-    threshold: int | None,
-    *,
-    label: str = "label",
+    path: str, options: FramesOptions, *, label: str = "label"
 ) -> SensorFrames:
     """Return the frames of an archive or recording, with the sensor they fit.
 
@@ -104,6 +92,7 @@ def frames_and_sensor(
     """
     from fuzzytree.tactile.presses import read_frames
 
+    board, full, threshold = options.board, options.full, options.threshold
     if board is None:
         return read_frames(path, full=full, threshold=threshold, label=label)
     from fuzzytree.tactile.board_file import load_board

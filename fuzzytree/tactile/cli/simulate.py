@@ -12,9 +12,12 @@ import click
 from fuzzytree.cli import (
     answer,
     answer_json,
+    argument,
     json_option,
+    option,
     quiet_option,
     say_rows,
+    takes,
     wrong_options,
 )
 from fuzzytree.tactile.cli.signals import stop_signal
@@ -28,89 +31,89 @@ ALL = "all"
 _LOOK_S = 0.05
 
 
+class TactileSimulateOptions:
+    """The arguments and options of the verb."""
+
+    board: str = argument(metavar="BOARD.yaml")
+    name: str | None = option(
+        "--object",
+        metavar="NAME",
+        help="Object of the paper to show, or `all` in turn.",
+    )
+    recording: str | None = option(
+        "--recording", metavar="FILE", help="Recording whose frames are repeated."
+    )
+    faults: Sequence[str] = option(
+        "--fault",
+        metavar="NAME=VALUE",
+        multiple=True,
+        help="Fault to simulate, `stall=SECONDS` or `unplug=SECONDS` (repeat).",
+    )
+    link: str | None = option(
+        "--link",
+        metavar="PATH",
+        help="Path of the port; a new one in a folder of its own if none.",
+    )
+    seed: int = option(
+        "--seed",
+        type=click.IntRange(0),
+        default=0,
+        help="Random seed of the simulated object; default 0.",
+    )
+    fast: bool = option("--fast", is_flag=True, help="Send as fast as the host reads.")
+    frames: int | None = option(
+        "--frames",
+        type=click.IntRange(1),
+        metavar="N",
+        help="Number of frames to send.",
+    )
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
 @click.command("simulate", short_help="Simulate a board on a new port.")
-@click.argument("board", metavar="BOARD.yaml")
-@click.option(
-    "--object",
-    "name",
-    metavar="NAME",
-    help="Object of the paper to show, or `all` in turn.",
-)
-@click.option(
-    "--recording", metavar="FILE", help="Recording whose frames are repeated."
-)
-@click.option(
-    "--fault",
-    "faults",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="Fault to simulate, `stall=SECONDS` or `unplug=SECONDS` (repeat).",
-)
-@click.option(
-    "--link",
-    metavar="PATH",
-    help="Path of the port; a new one in a folder of its own if none.",
-)
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    help="Random seed of the simulated object; default 0.",
-)
-@click.option("--fast", is_flag=True, help="Send as fast as the host reads.")
-@click.option(
-    "--frames", type=click.IntRange(1), metavar="N", help="Number of frames to send."
-)
-@json_option
-@quiet_option
-def command(
-    board: str,
-    name: str | None,
-    recording: str | None,
-    faults: Sequence[str],
-    link: str | None,
-    seed: int,
-    fast: bool,
-    frames: int | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+@takes(TactileSimulateOptions)
+def command(options: TactileSimulateOptions) -> None:
     """Simulate the board of BOARD.yaml on a new port, until Ctrl-C.
 
     A disc wanders over the sensor, unless an object or a recording is named. After a
     host has opened the port, the first frames are empty, as many as the baseline of
     the board needs; --frames does not count them.
     """
-    if name is not None and recording is not None:
+    if options.name is not None and options.recording is not None:
         raise click.UsageError("--object and --recording exclude each other")
     from fuzzytree.tactile.board_file import load_board
     from fuzzytree.tactile.recognition.frame_sources import FRAMES_A_SECOND
     from fuzzytree.tactile.simulation.device import Device, faults_of
 
-    known = load_board(board)
-    rest, coming = _frames(known, name, recording, seed, quiet=quiet)
+    known = load_board(options.board)
+    rest, coming = _frames(
+        known, options.name, options.recording, options.seed, quiet=options.quiet
+    )
     with stop_signal() as stop:
         with wrong_options():
             device = Device(
                 known,
-                coming if frames is None else islice(coming, frames),
-                faults_of(faults),
-                None if fast else 1.0,
-                link=link,
+                coming if options.frames is None else islice(coming, options.frames),
+                faults_of(options.faults),
+                None if options.fast else 1.0,
+                link=options.link,
                 first=[rest] * known.start.frames,
-                frames_a_second=0.0 if fast else FRAMES_A_SECOND,
+                frames_a_second=0.0 if options.fast else FRAMES_A_SECOND,
             )
         with device:
-            if not as_json:
+            if not options.as_json:
                 answer(device.port)
             speed = f"{known.port.baud} baud, {FRAMES_A_SECOND} frames a second at most"
-            speed = "as fast as it is read" if fast else speed
-            say_rows(("opened", device.port, f"{known.name}, {speed}"), quiet=quiet)
+            speed = "as fast as it is read" if options.fast else speed
+            say_rows(
+                ("opened", device.port, f"{known.name}, {speed}"), quiet=options.quiet
+            )
             _wait(device, stop)
     facts = device.counts.facts()
     counts = ", ".join(f"{what} {count}" for what, count in facts.items() if count)
-    say_rows(("counted", counts or "nothing", ""), quiet=quiet)
-    if as_json:
+    say_rows(("counted", counts or "nothing", ""), quiet=options.quiet)
+    if options.as_json:
         answer_json({"port": device.port, "board": known.name, "truth": facts})
 
 
