@@ -9,7 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.checking.systems import check_system, coverage_of
+from fuzzytree.checking.representations import check
+from fuzzytree.checking.systems import coverage_of
 from fuzzytree.model.agreement import Coverage
 from fuzzytree.model.contracts import SystemOutcome, SystemRun
 from fuzzytree.model.rulebase import Part
@@ -85,7 +86,7 @@ def test_a_row_is_aimed_at_a_rule_on_a_combination() -> None:
 
 
 def test_every_rule_that_can_fire_fires_in_a_probe_of_a_check() -> None:
-    found = check_system(system_of(*CONDITIONS), limit=10, runtimes=["native"])
+    found = check(system_of(*CONDITIONS), limit=10, runtimes=["native"])
     assert found.ok
     assert found.coverage is not None
     assert found.coverage.unfired == ()

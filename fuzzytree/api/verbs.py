@@ -53,8 +53,7 @@ from fuzzytree.model import (
     printable,
     with_label_type,
 )
-from fuzzytree.runtimes import OnnxModel, chosen_runtimes
-from fuzzytree.semantics import as_rules, as_system
+from fuzzytree.runtimes import chosen_runtimes
 from fuzzytree.tables import (
     Batch,
     Table,
@@ -351,29 +350,15 @@ def check(
         _program(other, chosen.run_code) or opened(other, allow_loss=allow_loss)
         for other in others
     ]
-    values = rows_of(data, first)
-    if isinstance(first, FuzzySystem):
-        from fuzzytree.checking import check_system
-
-        return check_system(
-            first,
-            *(_as_system(one, title) for one, title in zip(rest, titles, strict=True)),
-            data=values,
-            names=titles,
-            runtimes=runtimes,
-            limit=chosen.limit or 2_000,
-            rows_only=chosen.rows_only,
-            progress=progress,
-        )
     from fuzzytree import checking
 
     return checking.check(
         first,
-        *(_as_deciding(one, title) for one, title in zip(rest, titles, strict=True)),
-        data=values,
+        *rest,
+        data=rows_of(data, first),
         names=titles,
         runtimes=runtimes,
-        limit=chosen.limit or 20_000,
+        limit=chosen.limit,
         rows_only=chosen.rows_only,
         progress=progress,
     )
@@ -389,40 +374,6 @@ def _program(source: Carried, may_run: bool) -> ProgramFile | None:
     from fuzzytree.checking import ProgramFile
 
     return ProgramFile(form.name, read_bounded(source), may_run)
-
-
-def _as_system(
-    model: Document | OnnxModel | ProgramFile, title: str
-) -> FuzzySystem | OnnxModel | ProgramFile:
-    """Return what is compared with a system: a rule base as the number of its class.
-
-    Raises:
-        ReadError: If it is a tree.
-    """
-    if isinstance(model, FuzzyTree):
-        raise ReadError(f"{title}: is a tree, and is not compared with a fuzzy system")
-    if isinstance(model, RuleBase):
-        return as_system(model, "winner")
-    return model
-
-
-def _as_deciding(
-    model: Document | OnnxModel | ProgramFile, title: str
-) -> Model | OnnxModel | ProgramFile:
-    """Return what is compared with a tree or rules: rules that a system stands for.
-
-    Raises:
-        ReadError: If it is a system whose outputs are numbers.
-    """
-    if not isinstance(model, FuzzySystem):
-        return model
-    result = as_rules(model, None)
-    if result is None:
-        raise ReadError(
-            f"{title}: is a fuzzy system whose outputs are numbers, and is not "
-            "compared with rules or a tree"
-        )
-    return result
 
 
 def certify(

@@ -31,13 +31,12 @@ from .dependencies import Graph as Graph
 from .dependencies import Needs as Needs
 from .dependencies import needs as needs
 from .dependencies import prove as prove
-from .models import check as check
 from .programs import ProgramFile as ProgramFile
+from .representations import check as check
 from .stability.results import Criterion as Criterion
 from .stability.results import CurveFault as CurveFault
 from .stability.results import OffsetCost as OffsetCost
 from .stability.results import Stability as Stability
 from .stability.results import Stiff as Stiff
 from .stability.suite import examine as examine
-from .systems import check_system as check_system
 from .systems import coverage_of as coverage_of

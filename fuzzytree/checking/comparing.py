@@ -27,6 +27,7 @@ from fuzzytree.numerics import (
     strength_bounds,
     strength_errors,
 )
+from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import Status, probe_values
 
 if TYPE_CHECKING:
@@ -36,6 +37,10 @@ BoolArray = npt.NDArray[np.bool_]
 
 _SHOWN = 5  # differing rows listed for each comparison
 _LISTED = 20  # differences in the content of a file
+_FLOAT32_TREE = "equal answers but within float32 rounding of a cut"
+
+Finding = Comparison | str
+"""A comparison, or a sentence about what was skipped."""
 
 
 class RowSet(msgspec.Struct, frozen=True):
@@ -66,6 +71,29 @@ class RowSet(msgspec.Struct, frozen=True):
             return f"probe {number + 1}"
         return f"row {number - self.probes + 1}"
 
+    def text(self, row: int) -> str:
+        """Return the name of a row with its values, all digits of each."""
+        values = zip(self.inputs, self.values[:, row].tolist(), strict=True)
+        shown = ", ".join(f"{name} {value!r}" for name, value in values)
+        return f"{self.name(row)}: {shown}"
+
+
+def row_set(
+    inputs: tuple[str, ...], probes: FloatArray, data: FloatArray | None
+) -> RowSet:
+    """Return probes of shape (inputs, rows) with the user's rows behind them.
+
+    Raises:
+        ValueError: If `data` has another shape.
+    """
+    values, (width, count) = probes, probes.shape
+    if data is not None:
+        if data.ndim != 2 or data.shape[0] != width:
+            raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
+        values = np.concatenate([probes, data], axis=1)
+    values = np.ascontiguousarray(values)
+    return RowSet(inputs, values, np.arange(values.shape[1]), count)
+
 
 def probed(model: Model, data: FloatArray | None, limit: int) -> RowSet:
     """Return probes of a model with the user's rows behind them.
@@ -78,13 +106,7 @@ def probed(model: Model, data: FloatArray | None, limit: int) -> RowSet:
     Raises:
         ValueError: If `data` has another shape.
     """
-    values = probe_values(model, limit)
-    width, count = values.shape
-    if data is not None:
-        if data.ndim != 2 or data.shape[0] != width:
-            raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
-        values = np.ascontiguousarray(np.concatenate([values, data], axis=1))
-    return RowSet(model.inputs, values, np.arange(values.shape[1]), count)
+    return row_set(model.inputs, probe_values(model, limit), data)
 
 
 class ModelRun(msgspec.Struct, frozen=True):
@@ -121,7 +143,7 @@ def counted(
 
 
 def judged(
-    name: str, against: str, faults: Sequence[str], rows: Sequence[Comparison]
+    name: str, against: str, faults: Sequence[str], results: Sequence[Finding]
 ) -> Comparison:
     """Compare the content of a file, in the light of what its rows gave.
 
@@ -129,8 +151,9 @@ def judged(
         name: What to call the file.
         against: What its content should equal.
         faults: How it differs.
-        rows: The comparisons of the file's rows.
+        results: The comparisons of the file's rows.
     """
+    rows = [one for one in results if isinstance(one, Comparison)]
     more = [f"and {len(faults) - _LISTED} more"] if len(faults) > _LISTED else []
     verdict: Verdict = "DISAGREES" if faults else "agrees"
     if faults and rows and all(one.verdict == "agrees" for one in rows):
@@ -146,17 +169,37 @@ def judged(
     )
 
 
-def compare_bits(found: ModelRun, expected: ModelRun, rows: RowSet) -> Comparison:
+def compare_bits(
+    found: ModelRun,
+    expected: ModelRun,
+    rows: RowSet,
+    *,
+    excused: BoolArray | None = None,
+    origin: str = _FLOAT32_TREE,
+) -> Comparison:
     """Demand equal rules, classes, statuses, and strengths where both have them.
 
-    Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value.
+    Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value. Rows that
+    are excused may differ, for the reason that `origin` states.
     """
     gap = strength_gap(found.outcome, expected.outcome)
-    wrong = _unequal(found, expected) | (gap > 0)
-    one, two = found.outcome.strengths, expected.outcome.strengths
-    if one is not None and two is not None and one.shape == two.shape:
-        wrong |= ~same_bits(one, two).all(axis=0)
-    return _compared(found, expected, rows, wrong, gap)
+    wrong = unequal(found.outcome, expected.outcome)
+    wrong |= labels(found) != labels(expected)
+    if excused is None:
+        return _compared(found, expected, rows, wrong, gap)
+    return _compared(found, expected, rows, wrong & ~excused, gap, origin=origin)
+
+
+def unequal(one: Outcome, two: Outcome) -> BoolArray:
+    """Return the rows in which two outcomes differ, by a single bit if in no more."""
+    wrong: BoolArray = (one.rule != two.rule) | (one.status != two.status)
+    first, second = one.strengths, two.strengths
+    if first is None or second is None:
+        return wrong
+    if first.shape != second.shape:
+        return np.ones_like(wrong)
+    wrong |= ~same_bits(first, second).all(axis=0)
+    return wrong
 
 
 def same_bits(one: FloatArray, two: FloatArray) -> BoolArray:
@@ -233,20 +276,7 @@ def compare_answers(
     )
 
 
-def compare_excused(
-    found: ModelRun,
-    expected: ModelRun,
-    rows: RowSet,
-    *,
-    excused: BoolArray,
-    origin: str,
-) -> Comparison:
-    """Demand equal answers in every row that is not excused."""
-    wrong = _unequal(found, expected) & ~excused
-    return _compared(found, expected, rows, wrong, np.zeros(wrong.shape), 0.0, origin)
-
-
-def without_status(answers: ModelRun) -> ModelRun:
+def _without_status(answers: ModelRun) -> ModelRun:
     """Reduce statuses to whether a rule won."""
     outcome = answers.outcome
     status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
@@ -254,22 +284,59 @@ def without_status(answers: ModelRun) -> ModelRun:
     return msgspec.structs.replace(answers, outcome=kept)
 
 
-def compare_labels(
+class FileAnswers(NamedTuple):
+    """What a file answers to some rows.
+
+    Attributes:
+        outcome: Rules and statuses; None if they are not compared.
+        labels: The texts that it answers; None if it has none.
+        has_status: Whether the statuses are the file's own.
+    """
+
+    outcome: Outcome | None
+    labels: Sequence[str | None] | None
+    has_status: bool
+
+
+def compare_file(
     title: str,
-    found: Sequence[str | None],
+    answers: FileAnswers,
     base: ModelRun,
     rows: RowSet,
-    excused: BoolArray,
-) -> Comparison:
-    """Compare the texts that a file answers with the classes of the model."""
-    classes = base.model.classes
-    right = [classes[n] if n >= 0 else None for n in labels(base).tolist()]
-    faults = [
-        f"{rows.name(row)}: label {given!r} where {label!r} is right"
-        for row, (given, label) in enumerate(zip(found, right, strict=True))
-        if given != label and not excused[row]
-    ]
-    return counted("rows", title, "the model's classes", len(right), faults)
+    *,
+    is_float32: bool,
+    origin: str = _FLOAT32_TREE,
+) -> Iterator[Comparison]:
+    """Compare what a file answers with the native runtime, then its labels.
+
+    Rows of a tree within float32 rounding of a cut are excused if the file computes in
+    that type; `origin` says so.
+    """
+    excused = None
+    if is_float32 and isinstance(base.model, FuzzyTree):
+        excused = open_paths(base.model, "float32", rows.values)
+    if answers.outcome is not None:
+        found, right = ModelRun(title, base.model, answers.outcome), base
+        if not answers.has_status:
+            found, right = _without_status(found), _without_status(base)
+        yield compare_bits(found, right, rows, excused=excused, origin=origin)
+    if answers.labels is not None:
+        classes = [*base.model.classes, None]
+        wanted = [classes[number] for number in labels(base).tolist()]
+        faults = [
+            f"{rows.name(row)}: label {text!r} where {label!r} is right"
+            for row, (text, label) in enumerate(
+                zip(answers.labels, wanted, strict=True)
+            )
+            if text != label and (excused is None or not excused[row])
+        ]
+        yield counted("rows", title, "the model's classes", len(wanted), faults)
+
+
+def native_base(model: Model, dtype: Dtype, rows: RowSet) -> ModelRun:
+    """Return the native answers with which a file of a number type is compared."""
+    native = baseline(dtype if isinstance(model, RuleBase) else "float64")
+    return ModelRun("the model", model, native.load(model)(rows.values))
 
 
 def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
@@ -321,13 +388,6 @@ def margins(answers: ModelRun) -> FloatArray | None:
     return apart
 
 
-def _unequal(found: ModelRun, expected: ModelRun) -> BoolArray:
-    one, two = found.outcome, expected.outcome
-    unequal: BoolArray = (one.rule != two.rule) | (one.status != two.status)
-    unequal |= labels(found) != labels(expected)
-    return unequal
-
-
 def _compared(
     found: ModelRun,
     expected: ModelRun,
@@ -365,16 +425,10 @@ def _compared(
 
 
 def _row_text(found: ModelRun, expected: ModelRun, rows: RowSet, row: int) -> str:
-    values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
-    shown = ", ".join(f"{name} {value!r}" for name, value in values)
     wanted, got = _answer_text(expected, row), _answer_text(found, row)
     if wanted == got:
-        gap = _apart(found, expected, row)
-        return f"{rows.name(row)}: {shown}: both answer {got}{gap}"
-    return (
-        f"{rows.name(row)}: {shown}: {expected.title} answers {wanted}, "
-        f"{found.title} {got}"
-    )
+        return f"{rows.text(row)}: both answer {got}{_apart(found, expected, row)}"
+    return f"{rows.text(row)}: {expected.title} answers {wanted}, {found.title} {got}"
 
 
 def _apart(found: ModelRun, expected: ModelRun, row: int) -> str:
@@ -423,14 +477,13 @@ def compare_exact(
         rows: The rows; those of the data are counted if there are any.
         dtype: The number type in which they were computed.
     """
-    allowed, largest = _errors(found, rows, dtype)
-    flips = labels(found) != truth.label
-    close = allowed >= 1.0
-    if largest is not None:
-        close |= truth.margin <= 2.0 * allowed
+    allowed = np.zeros(len(rows.numbers))
+    if isinstance(found.model, RuleBase):
+        allowed, _ = strength_bounds(found.model, dtype, rows.values)
+    low, flips, close = exact_errors(found, truth, rows.values, dtype, allowed)
     wrong = flips & ~close
-    if largest is not None:
-        wrong |= (largest.low > allowed) & (allowed < 1.0)
+    if low is not None:
+        wrong |= (low > allowed) & (allowed < 1.0)
     is_data = len(rows.numbers) > rows.probes
     own = rows.numbers >= (rows.probes if is_data else 0)
     facts = certify(found.model, dtype, rows.values[:, own] if is_data else None)
@@ -447,37 +500,47 @@ def compare_exact(
         facts.origin,
         "data" if is_data else "probes",
         int(own.sum()),
-        None if largest is None else float(largest.low[bounded].max(initial=0.0)),
+        None if low is None else float(low[bounded].max(initial=0.0)),
         int((own & close).sum()),
         int((own & flips).sum()),
-        float(flipped.max()) if largest is not None and flipped.size else None,
+        float(flipped.max()) if low is not None and flipped.size else None,
         int((lost & own).sum()),
         int((gained & own).sum()),
-        int((own & (allowed >= 1.0)).sum()) if largest is not None else 0,
+        int((own & (allowed >= 1.0)).sum()) if low is not None else 0,
         "DISAGREES" if wrong.any() else "agrees",
-        tuple(_exact_texts(found, truth, rows, wrong, allowed, largest)),
+        tuple(_exact_texts(found, truth, rows, wrong, allowed, low)),
     )
 
 
-class _Ends(NamedTuple):
-    """Between these ends the largest error of a strength lies, in each row."""
+class ExactErrors(NamedTuple):
+    """How far predictions are from the exact ones, in each row.
 
-    low: FloatArray
-    high: FloatArray
+    Attributes:
+        low: By how much a strength is off at least; None without strengths.
+        flips: Whether the class differs.
+        close: Whether it may: the exact margin is at most twice what is allowed, or a
+            value lies within its rounding from a cut of a tree.
+    """
+
+    low: FloatArray | None
+    flips: BoolArray
+    close: BoolArray
 
 
-def _errors(
-    found: ModelRun, rows: RowSet, dtype: Dtype
-) -> tuple[FloatArray, _Ends | None]:
-    """Return what is allowed in each row (1: anything) and what was observed."""
-    if isinstance(found.model, FuzzyTree):
-        is_open = open_paths(found.model, dtype, rows.values)
-        return is_open.astype(np.float64), None
-    allowed, _ = strength_bounds(found.model, dtype, rows.values)
-    strengths = found.outcome.strengths
-    if strengths is None:
-        return allowed, None
-    return allowed, _Ends(*strength_errors(found.model, rows.values, strengths))
+def exact_errors(
+    found: ModelRun,
+    truth: Decisions,
+    values: FloatArray,
+    dtype: Dtype,
+    allowed: FloatArray,
+) -> ExactErrors:
+    """Return the errors of predictions, where a strength may be off by `allowed`."""
+    flips = labels(found) != truth.label
+    model, strengths = found.model, found.outcome.strengths
+    if isinstance(model, FuzzyTree):
+        return ExactErrors(None, flips, open_paths(model, dtype, values))
+    low = None if strengths is None else strength_errors(model, values, strengths)[0]
+    return ExactErrors(low, flips, truth.margin <= 2.0 * allowed)
 
 
 def _cover(found: ModelRun, truth: Decisions) -> tuple[BoolArray, BoolArray]:
@@ -495,20 +558,18 @@ def _exact_texts(
     rows: RowSet,
     wrong: BoolArray,
     allowed: FloatArray,
-    ends: _Ends | None,
+    low: FloatArray | None,
 ) -> Iterator[str]:
     worst = np.flatnonzero(wrong)
-    if ends is not None:
-        worst = worst[np.argsort(-ends.low[worst], kind="stable")]
+    if low is not None:
+        worst = worst[np.argsort(-low[worst], kind="stable")]
     classes = found.model.classes
     for row in worst[:_SHOWN].tolist():
-        values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
-        shown = ", ".join(f"{name} {value!r}" for name, value in values)
         number = int(truth.label[row])
         label = classes[number] if number >= 0 else "no class"
-        text = f"{rows.name(row)}: {shown}: exactly {label} (rule {truth.rule[row]})"
+        text = f"{rows.text(row)}: exactly {label} (rule {truth.rule[row]})"
         text += f", {found.title} {_answer_text(found, row)}"
-        if ends is not None:
-            text += f"; a strength is off by {ends.low[row]:.2g}, and "
+        if low is not None:
+            text += f"; a strength is off by {low[row]:.2g}, and "
             text += f"{allowed[row]:.2g} is allowed"
         yield text

@@ -570,11 +570,11 @@ def _run(system: FuzzySystem, written: Written) -> Proof:
     Raises:
         DisagreementError: If it answers other numbers, though no loss was reported.
     """
-    from fuzzytree.checking.systems import check_system
+    from fuzzytree.checking.representations import check
     from fuzzytree.runtimes import open_onnx
 
     model = open_onnx(written.content, "the file")
-    found = check_system(system, model, runtimes=[], limit=_FEW)
+    found = check(system, model, runtimes=[], limit=_FEW)
     found.raise_if_not_ok()
     text = f"run by onnxruntime, it answers {found.probes} probes like the system"
     if found.coverage is not None and found.coverage.unfired:

@@ -1,59 +1,48 @@
-"""Do all representations of a model give its answers?
-
-No representation is trusted: each is loaded and run. Kinds of evidence are kept
-apart: *file* (two contents are equal), *proof* and *all cells* (statements about every
-input), *rows* (probes aimed at every clause, and the user's data: a sample, however
-well aimed) and *calls* (ways of calling that break programs).
-"""
+"""What a check compares of a tree or a rule base: classes, strengths, and proofs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import msgspec
 import numpy as np
 
 from fuzzytree import semantics
 from fuzzytree.checking.comparing import (
-    BoolArray,
+    FileAnswers,
+    Finding,
     ModelRun,
     RowSet,
     compare_answers,
     compare_bits,
     compare_exact,
-    compare_excused,
-    compare_labels,
+    compare_file,
     compare_within,
     counted,
     judged,
+    native_base,
     probed,
-    same_bits,
-    without_status,
+    unequal,
 )
-from fuzzytree.checking.programs import ProgramFile, check_program
-from fuzzytree.errors import FuzzyTreeError, LossError
+from fuzzytree.checking.converting import kind_of
+from fuzzytree.errors import LossError
 from fuzzytree.model import (
-    Agreement,
     Certified,
     Comparison,
-    Count,
+    Conjunction,
     Dtype,
     FuzzyTree,
     Kind,
     Model,
-    Outcome,
-    Progress,
     RuleBase,
     Run,
     Runtime,
     Use,
-    checkpoint,
-    fingerprint,
 )
 from fuzzytree.numerics import decide, open_paths, strength_bounds
-from fuzzytree.runtimes import baseline, chosen_runtimes, is_installed, needed_by
-from fuzzytree.semantics import Status, forms, proof_faults, pruned, rules_from_tree
+from fuzzytree.runtimes import baseline
+from fuzzytree.semantics import forms, proof_faults, pruned, rules_from_tree
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
@@ -62,7 +51,6 @@ if TYPE_CHECKING:
 GRID_LIMIT = 1 << 21
 """The most points at which all cells are tried one by one; the proof needs no limit."""
 
-_FLOAT32_TREE = "equal answers but within float32 rounding of a cut"
 _SLOW_STEPS = 3_000_000  # degrees that a slow runtime computes in one comparison
 _SERVICES: Mapping[Use, str] = {
     "tree": "path",
@@ -77,77 +65,145 @@ _SERVED: tuple[tuple[Use, ...], ...] = (
 )
 """What a pruned tree may serve, the most first."""
 
-Finding = Comparison | str
-"""A comparison, or a sentence about what was skipped."""
 
+class CheckedModel:
+    """A tree or a rule base in a check, with the native answers of each of its forms.
 
-def check(
-    model: Model,
-    *others: Model | OnnxModel | ProgramFile,
-    data: FloatArray | None = None,
-    names: Sequence[str] = (),
-    runtimes: Sequence[str] | None = None,
-    limit: int = 20_000,
-    rows_only: bool = False,
-    progress: Progress | None = None,
-) -> Agreement:
-    """Compare every representation of a model with the model itself.
-
-    Args:
-        model: A tree or a rule base.
-        others: Files that were made of it: trees, rule bases, opened ONNX files
-            (`fuzzytree.runtimes.onnxruntime.open_onnx`), programs.
-        data: Rows of one's own, shape (inputs, rows), in the order of `model.inputs`.
-        names: What to call each of the others; `file 1`, `file 2` unless given.
-        runtimes: The names of the runtimes to run; all that are installed if None.
-        limit: The most probes.
-        rows_only: Whether files whose rows agree are accepted with other content.
-        progress: Called with what is compared next and the share that is done.
-
-    Returns:
-        What was compared, on what, and with which result.
-
-    Raises:
-        ValueError: If `data` is not of shape (inputs, rows), or a runtime is unknown.
+    Bits are compared, or differences of strengths within a bound.
     """
-    rows = probed(model, data, limit)
-    chosen = chosen_runtimes(runtimes)
-    representations = _representations(model, rows)
-    findings: list[Finding] = []
-    if isinstance(model, FuzzyTree):
-        findings += _equivalence(model, representations, rows)
-    certificates: list[Certified] = []
-    parts = len(representations) + len(others)
-    for number, representation in enumerate(representations):
-        if progress:
-            progress(f"comparing {representation.title}", number / parts)
-        findings += _runtimes(representation, chosen, rows)
-        certificates += _certificates(representation, chosen, rows)
-    for number, other in enumerate(others):
-        title = names[number] if number < len(names) else f"file {number + 1}"
-        if progress:
-            progress(f"comparing {title}", (len(representations) + number) / parts)
-        findings += _shipped(title, other, model, rows)
-    return Agreement(
-        model.name,
-        fingerprint(model),
-        tuple(f for f in findings if isinstance(f, Comparison)),
-        tuple(map(_count, representations)),
-        tuple(dict.fromkeys(f for f in findings if isinstance(f, str))),
-        semantics.cell_count(model) if isinstance(model, FuzzyTree) else None,
-        rows.probes,
-        tuple(certificates),
-        rows_only,
-    )
 
+    noun = base = "the model"
+    coverage = None
 
-def _native(title: str, model: Model, rows: RowSet) -> ModelRun:
-    return ModelRun(title, model, baseline().load(model)(rows.values))
+    def __init__(self, model: Model, data: FloatArray | None, limit: int) -> None:
+        self.model = model
+        self.rows = probed(model, data, limit)
+        native = baseline().load
+        self.forms = {str(title): form for title, form in forms(model).items()}
+        self._runs = {
+            title: ModelRun(title, form, native(form)(self.rows.values))
+            for title, form in self.forms.items()
+        }
+        self.outcomes = {title: run.outcome for title, run in self._runs.items()}
+        self.cells = None
+        if isinstance(model, FuzzyTree):
+            self.cells = semantics.cell_count(model)
+        self._bases: dict[tuple[str, str], ModelRun] = {}
 
+    def title(self, form: str, runtime: Runtime) -> str:
+        """Return what to call a form in a runtime."""
+        return f"{runtime.name}: {form}"
 
-def _representations(model: Model, rows: RowSet) -> tuple[ModelRun, ...]:
-    """Return what can be made of a model, each with the native runtime's answers."""
-    return tuple(_native(title, form, rows) for title, form in forms(model).items())
+    def load(self, form: str, runtime: Runtime) -> Run:
+        """Return a form in a runtime."""
+        return runtime.load(self.forms[form])
+
+    def share(self, form: str) -> slice:
+        """Return the rows that a slow runtime gets, so that it ends in seconds."""
+        model = self.forms[form]
+        if isinstance(model, FuzzyTree):
+            cost = len(model.nodes)
+        else:
+            cost = sum(len(c.terms) + 1 for rule in model.rules for c in rule.when)
+        cost += sum(len(variable.parts) + 1 for variable in model.variables)
+        most = max(_SLOW_STEPS // cost, 50)
+        return slice(None, None, -(-len(self.rows.numbers) // most))
+
+    def own(self) -> Iterator[Finding]:
+        """Compare the forms of a tree: relative rules are the tree, raw rules near."""
+        if isinstance(self.model, FuzzyTree):
+            yield from _equivalence(self.model, [*self._runs.values()], self.rows)
+
+    def compared(
+        self, form: str, runtime: Runtime, run: Run, share: slice
+    ) -> Iterator[Finding]:
+        """Compare a form in a runtime with the native one of its number type."""
+        if runtime.is_baseline and runtime.dtype == "float64":
+            return
+        some, native = self.rows.part(share), self._runs[form]
+        title = self.title(form, runtime)
+        found = ModelRun(title, native.model, run(some.values))
+        base = self._base(form, runtime).part(share)
+        yield _contract(runtime, found, base, some)
+
+    def _base(self, form: str, runtime: Runtime) -> ModelRun:
+        native, key = self._runs[form], (form, runtime.dtype)
+        is_tree = isinstance(native.model, FuzzyTree)
+        if runtime.bound is not None or runtime.is_baseline or is_tree:
+            return native
+        if runtime.dtype != "float64" and key not in self._bases:
+            base = baseline(runtime.dtype)
+            outcome = base.load(native.model)(self.rows.values)
+            self._bases[key] = ModelRun(self.title(form, base), native.model, outcome)
+        return self._bases.get(key, native)
+
+    def faults(self, found: Any, expected: Any, rows: RowSet) -> list[str]:
+        """Return the names of rows that are answered differently."""
+        return [
+            rows.name(row) for row in np.flatnonzero(unequal(found, expected)).tolist()
+        ]
+
+    def certificates(self, runtimes: Sequence[Runtime]) -> Iterator[Certified]:
+        """Compare each number type that was run with exact arithmetic.
+
+        The native runtime of a type stands for all of it: the others equal its bits.
+        """
+        for title, native in self._runs.items():
+            kind = kind_of(native.model)
+            ran = {r.dtype for r in runtimes if kind in r.runs and r.bound is None}
+            truth = decide(native.model, self.rows.values, with_strengths=False)
+            for dtype in get_args(Dtype):
+                if dtype not in ran:
+                    continue
+                try:
+                    run = baseline(dtype).load(native.model)
+                except LossError:  # listed among what was not examined
+                    continue
+                outcome = run(self.rows.values)
+                found = ModelRun(f"{title} in {dtype}", native.model, outcome)
+                yield compare_exact(found, truth, self.rows, dtype=dtype)
+
+    def shipped(self, title: str, other: Any) -> Iterator[Finding]:
+        """Compare a file that is read as a model: its content, then its answers."""
+        yield from _shipped(title, other, self.model, self.rows)
+
+    def foreign(self, file: OnnxModel) -> str | None:
+        """Return why an ONNX file cannot be one of this model; None if it can be."""
+        if file.run_system is not None:
+            return "it answers the numbers of a fuzzy system, and the model a class"
+        if file.inputs != self.model.inputs or file.classes != self.model.classes:
+            return (
+                f"it decides for {', '.join(file.classes)} "
+                f"from {', '.join(file.inputs)}, which are not the model's"
+            )
+        return None
+
+    def counterpart(self, file: OnnxModel) -> Model | str:
+        """Return the form that an ONNX file should hold, or why there is none."""
+        has_raw = isinstance(self.model, FuzzyTree) and self.model.sets
+        kind: Kind = "raw" if file.kind == "raw" and has_raw else "relative"
+        is_tree = file.representation == "tree"
+        conjunction = file.semantics.conjunction
+        found = _counterpart(self.model, conjunction, None if is_tree else kind)
+        return found or _no_counterpart(self.model)
+
+    def file_rows(self, title: str, file: OnnxModel) -> Iterator[Finding]:
+        """Compare the answers of an ONNX file with the native ones.
+
+        Raises:
+            LossError: If onnxruntime cannot run it.
+        """
+        form = self.counterpart(file)
+        model = self.model if isinstance(form, str) else form
+        values = self.rows.values
+        base = native_base(model, file.dtype, self.rows)
+        answers = FileAnswers(
+            None if isinstance(form, str) else file.run(values),
+            None if file.labels is None else file.labels(values),
+            "status" in file.outputs,
+        )
+        is_float32 = file.dtype == "float32"
+        yield from compare_file(title, answers, base, self.rows, is_float32=is_float32)
 
 
 def _equivalence(
@@ -187,77 +243,6 @@ def _all_cells(
     return counted("all cells", representation, against, size, tuple(faults))
 
 
-def _runtimes(
-    representation: ModelRun, runtimes: Sequence[Runtime], rows: RowSet
-) -> Iterator[Finding]:
-    """Run one representation in every runtime that can, against the native one."""
-    kind = "rules" if isinstance(representation.model, RuleBase) else "tree"
-    bases: dict[Dtype, ModelRun] = {"float64": representation}
-    for runtime in runtimes:
-        if kind not in runtime.runs:
-            continue
-        title = f"{runtime.name}: {representation.title}"
-        if not is_installed(runtime):
-            yield f"{runtime.name} is not installed ({needed_by(runtime)})"
-            continue
-        checkpoint()
-        try:
-            run = runtime.load(representation.model)
-        except LossError as error:
-            yield f"{title}: {error}"
-            continue
-        step = _stride(representation.model, rows) if runtime.is_slow else 1
-        share = slice(None, None, step)
-        some = rows.part(share)
-        checkpoint()
-        found = ModelRun(title, representation.model, run(some.values))
-        checkpoint()
-        if not (runtime.is_baseline and runtime.dtype == "float64"):
-            base = _base(runtime, representation, bases, rows)
-            yield _contract(runtime, found, base.part(share), some)
-        yield _calls(title, run, some)
-
-
-def _certificates(
-    representation: ModelRun, runtimes: Sequence[Runtime], rows: RowSet
-) -> Iterator[Certified]:
-    """Compare each number type that was run with exact arithmetic.
-
-    The native runtime of a type stands for all of it, for the others equal its bits.
-    """
-    kind = "rules" if isinstance(representation.model, RuleBase) else "tree"
-    ran = {r.dtype for r in runtimes if kind in r.runs and r.bound is None}
-    truth = decide(representation.model, rows.values, with_strengths=False)
-    for dtype in get_args(Dtype):
-        if dtype not in ran:
-            continue
-        try:
-            run = baseline(dtype).load(representation.model)
-        except LossError:  # listed among what was not examined
-            continue
-        title = f"{representation.title} in {dtype}"
-        found = ModelRun(title, representation.model, run(rows.values))
-        yield compare_exact(found, truth, rows, dtype=dtype)
-
-
-def _base(
-    runtime: Runtime,
-    representation: ModelRun,
-    bases: dict[Dtype, ModelRun],
-    rows: RowSet,
-) -> ModelRun:
-    """Return what a runtime is compared with: the native one of its number type."""
-    is_rules = isinstance(representation.model, RuleBase)
-    if runtime.bound is not None or runtime.is_baseline or not is_rules:
-        return representation
-    if runtime.dtype not in bases:
-        base = baseline(runtime.dtype)
-        run = base.load(representation.model)
-        title = f"{base.name}: {representation.title}"
-        bases[runtime.dtype] = ModelRun(title, representation.model, run(rows.values))
-    return bases[runtime.dtype]
-
-
 def _contract(
     runtime: Runtime, found: ModelRun, base: ModelRun, rows: RowSet
 ) -> Comparison:
@@ -270,9 +255,7 @@ def _contract(
     if isinstance(model, FuzzyTree):
         if runtime.dtype == "float32":
             excused = open_paths(model, runtime.dtype, rows.values)
-            return compare_excused(
-                found, base, rows, excused=excused, origin=_FLOAT32_TREE
-            )
+            return compare_bits(found, base, rows, excused=excused)
     elif runtime.is_baseline:
         allowed, origin = strength_bounds(model, runtime.dtype, rows.values)
         allowed += strength_bounds(model, "float64", rows.values)[0]  # of the base
@@ -280,70 +263,11 @@ def _contract(
     return compare_bits(found, base, rows)
 
 
-def _stride(model: Model, rows: RowSet) -> int:
-    """Return which n-th rows a slow runtime gets, so that it ends in seconds."""
-    if isinstance(model, RuleBase):
-        cost = sum(len(c.terms) + 1 for rule in model.rules for c in rule.when)
-    else:
-        cost = len(model.nodes)
-    cost += sum(len(variable.parts) + 1 for variable in model.variables)
-    return -(-len(rows.numbers) // max(_SLOW_STEPS // cost, 50))
-
-
-def _calls(title: str, run: Run, rows: RowSet) -> Comparison:
-    """Call a runtime in the ways that break: no row, one, other order, wrong width."""
-    width, total = rows.values.shape
-    sample = np.ascontiguousarray(rows.values[:, :: max(total // 24, 1)])
-    whole = run(sample)
-    faults = [
-        f"a row answered alone differs from the same row in a batch, {rows.name(row)}"
-        for row in range(sample.shape[1])
-        if not _is_same(run(sample[:, row : row + 1]), whole, row)
-    ]
-    if not np.array_equal(run(np.asfortranarray(sample)).rule, whole.rule):
-        faults.append("another memory order changes the answers")
-    empty = run(np.empty((width, 0)))
-    if empty.rule.shape != (0,) or empty.status.shape != (0,):
-        faults.append("no rows do not give empty answers")
-    if not _refuses(run, np.zeros((width + 1, 3))):
-        faults.append(f"{width + 1} inputs are accepted where {width} are right")
-    return counted("calls", title, "itself", sample.shape[1] + 3, tuple(faults))
-
-
-def _refuses(run: Run, values: FloatArray) -> bool:
-    try:
-        run(values)
-    except (ValueError, FuzzyTreeError):
-        return True
-    return False
-
-
-def _is_same(one: Outcome, whole: Outcome, row: int) -> bool:
-    if one.rule[0] != whole.rule[row] or one.status[0] != whole.status[row]:
-        return False
-    if one.strengths is None or whole.strengths is None:
-        return one.strengths is whole.strengths
-    return bool(same_bits(one.strengths[:, 0], whole.strengths[:, row]).all())
-
-
-def _shipped(
-    title: str, other: Model | OnnxModel | ProgramFile, model: Model, rows: RowSet
-) -> Iterator[Finding]:
-    """Compare a file that was shipped beside a model: its content, then its answers."""
-    if isinstance(other, ProgramFile):
-        yield from check_program(title, other, model, rows)
-    elif isinstance(other, FuzzyTree | RuleBase):
-        yield from _shipped_model(title, other, model, rows)
-    else:
-        yield from _shipped_onnx(title, other, model, rows)
-
-
-def _shipped_model(
-    title: str, other: Model, model: Model, rows: RowSet
-) -> Iterator[Finding]:
-    if isinstance(other, FuzzyTree) and isinstance(model, RuleBase):
+def _shipped(title: str, other: Model, model: Model, rows: RowSet) -> Iterator[Finding]:
+    if isinstance(other, FuzzyTree) and not isinstance(model, FuzzyTree):
         other = _as_rules(other, model) or other
-    expected = _counterpart(other, model)
+    kind = None if isinstance(other, FuzzyTree) else other.kind or "relative"
+    expected = _counterpart(model, other.semantics.conjunction, kind)
     for what, one, two in (
         ("inputs", other.inputs, model.inputs),
         ("classes", sorted(other.classes), sorted(model.classes)),
@@ -354,16 +278,14 @@ def _shipped_model(
             fault = f"its {what} are {', '.join(one)}"
             yield counted("file", title, f"the model's {what}", 1, (fault,))
             return
-    found = _native(title, other, rows)
-    if expected is None:
-        answers = compare_answers(found, _native("the model", model, rows), rows)
-        yield judged(title, "the model", (_no_counterpart(other, model),), [answers])
-        yield answers
-        return
-    base = _native("the model", expected, rows)
-    is_like = other.classes == model.classes
+    found = ModelRun(title, other, baseline().load(other)(rows.values))
+    base = native_base(expected or model, "float64", rows)
+    is_like = expected is not None and other.classes == model.classes
     answers = (compare_bits if is_like else compare_answers)(found, base, rows)
-    yield _content(title, other, expected, [answers])
+    if expected is None:
+        yield judged(title, "the model", (_no_counterpart(model),), [answers])
+    else:
+        yield _content(title, other, expected, [answers])
     yield answers
 
 
@@ -374,10 +296,24 @@ def _as_rules(tree: FuzzyTree, model: RuleBase) -> RuleBase | None:
     return rules_from_tree(tree, model.kind, conjunction=model.semantics.conjunction)
 
 
-def _no_counterpart(other: Model | OnnxModel, model: Model) -> str:
+def _no_counterpart(model: Model) -> str:
     if isinstance(model, FuzzyTree):
         return "raw rules cannot be made of a tree without fitted sets"
     return "it is a tree, and no tree can be made of rules"
+
+
+def _counterpart(
+    model: Model, conjunction: Conjunction, kind: Kind | None
+) -> Model | None:
+    """Return the tree (kind None) or the rules that a file should hold.
+
+    None if they cannot be made from the model.
+    """
+    if not isinstance(model, FuzzyTree):
+        return model if kind else None
+    if kind == "raw" and not model.sets:
+        return None
+    return rules_from_tree(model, kind, conjunction=conjunction) if kind else model
 
 
 def _content(
@@ -399,89 +335,6 @@ def _content(
                 served = " and ".join(_SERVICES[use] for use in uses)
             return counted("proof", title, f"the model's {served}", 1, faults)
     return judged(title, "the model", (fault,) if fault else (), rows)
-
-
-def _shipped_onnx(
-    title: str, other: OnnxModel, model: Model, rows: RowSet
-) -> Iterator[Finding]:
-    """Compare an ONNX file: what it says of itself, its graph, and its answers."""
-    if other.run_system is not None:
-        fault = "it answers the numbers of a fuzzy system, and the model a class"
-        yield counted("file", title, "the model's facts", 1, (fault,))
-        return
-    if other.inputs != model.inputs or other.classes != model.classes:
-        fault = (
-            f"it decides for {', '.join(other.classes)} "
-            f"from {', '.join(other.inputs)}, which are not the model's"
-        )
-        yield counted("file", title, "the model's facts", 1, (fault,))
-        return
-    from fuzzytree.exporters import Differences, differences
-
-    expected = _onnx_counterpart(other, model)
-    if expected is None:
-        apart = Differences((_no_counterpart(other, model),), ())
-    else:
-        apart = differences(other.content, expected)
-        yield counted("file", title, "the model's metadata", 1, apart.metadata)
-    try:
-        found = [*_onnx_rows(title, other, expected, model, rows)]
-    except LossError as error:  # the file loads, but onnxruntime cannot run it
-        faults = (str(error),)
-        found = [counted("rows", title, "the model", len(rows.numbers), faults)]
-    yield judged(title, "a freshly written graph", apart.graph, found)
-    yield from found
-
-
-def _onnx_counterpart(other: OnnxModel, model: Model) -> Model | None:
-    if other.representation == "tree":
-        return model if isinstance(model, FuzzyTree) else None
-    if isinstance(model, RuleBase):
-        return model
-    kind: Kind = "raw" if other.kind == "raw" and model.sets else "relative"
-    return rules_from_tree(model, kind, conjunction=other.semantics.conjunction)
-
-
-def _onnx_rows(
-    title: str,
-    other: OnnxModel,
-    expected: Model | None,
-    model: Model,
-    rows: RowSet,
-) -> Iterator[Comparison]:
-    """Compare a file's answers with the native ones, then its labels."""
-    compared = expected or model
-    is_rules = isinstance(compared, RuleBase)
-    native = baseline(other.dtype if is_rules else "float64")
-    base = ModelRun("the model", compared, native.load(compared)(rows.values))
-    excused: BoolArray = np.full(rows.numbers.shape, fill_value=False)
-    is_rounded = isinstance(compared, FuzzyTree) and other.dtype == "float32"
-    if isinstance(compared, FuzzyTree) and is_rounded:
-        excused = open_paths(compared, "float32", rows.values)
-    if expected is not None:
-        found, right = ModelRun(title, compared, other.run(rows.values)), base
-        if "status" not in other.outputs:
-            found, right = without_status(found), without_status(base)
-        yield (
-            compare_excused(found, right, rows, excused=excused, origin=_FLOAT32_TREE)
-            if is_rounded
-            else compare_bits(found, right, rows)
-        )
-    if other.labels is not None:
-        texts = other.labels(rows.values)
-        yield compare_labels(title, texts, base, rows, excused)
-
-
-def _counterpart(other: Model, model: Model) -> Model | None:
-    """Return what a shipped file should hold, made from the model; None if unknown."""
-    if isinstance(other, FuzzyTree):
-        return model if isinstance(model, FuzzyTree) else None
-    if isinstance(model, RuleBase):
-        return model
-    kind = other.kind or "relative"
-    if kind == "raw" and not model.sets:
-        return None
-    return rules_from_tree(model, kind, conjunction=other.semantics.conjunction)
 
 
 def first_difference(expected: msgspec.Struct, found: msgspec.Struct) -> str | None:
@@ -516,15 +369,3 @@ def _differ(path: tuple[str, ...], expected: object, found: object) -> str | Non
     if expected == found:
         return None
     return f"{where}: {found!r} where {expected!r} is right"
-
-
-def _count(representation: ModelRun) -> Count:
-    status = representation.outcome.status
-    return Count(
-        representation.title,
-        int(status.size),
-        *(
-            int((status == kind).sum())
-            for kind in (Status.TIE, Status.UNCOVERED, Status.MISSING)
-        ),
-    )

@@ -11,17 +11,15 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Final, NamedTuple, cast
 
 import msgspec
-import numpy as np
 
 from fuzzytree.checking.comparing import (
-    ModelRun,
+    FileAnswers,
+    Finding,
     RowSet,
-    compare_bits,
-    compare_excused,
-    compare_labels,
+    compare_file,
     counted,
     judged,
-    without_status,
+    native_base,
 )
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
@@ -32,11 +30,9 @@ from fuzzytree.model import (
     FuzzySystem,
     FuzzyTree,
     Model,
-    RuleBase,
     Written,
 )
-from fuzzytree.numerics import open_paths
-from fuzzytree.runtimes import ENGINES, Options, baseline
+from fuzzytree.runtimes import ENGINES, Options
 from fuzzytree.semantics import forms, rules_from_tree
 
 _MOST_ROWS: Final = 2_000  # that a program answers
@@ -86,7 +82,7 @@ class _Text(NamedTuple):
 
 def check_program(
     title: str, program: ProgramFile, model: Document, rows: RowSet
-) -> Iterator[Comparison | str]:
+) -> Iterator[Finding]:
     """Compare a program with what is written now; run it if they are equal.
 
     Raises:
@@ -186,9 +182,7 @@ def _run(
     model = cast("Model", text.form)  # no system: see `_why_not`
     some = rows.part(slice(None, None, -(-len(rows.numbers) // _MOST_ROWS)))
     is_single = text.options == _FLOAT32
-    is_rules = isinstance(model, RuleBase)
-    native = baseline("float32" if is_single and is_rules else "float64")
-    base = ModelRun("the model", model, native.load(model)(some.values))
+    base = native_base(model, "float32" if is_single else "float64", some)
     try:
         result = ENGINES[program.format](
             program.content, model, text.options, some.values
@@ -199,17 +193,11 @@ def _run(
         faults = ("; ".join(str(error).splitlines()),)
         yield counted("rows", title, "the model", len(some.numbers), faults)
         return
-    found = ModelRun(title, model, result.outcome)
-    right = base
-    if not result.has_status:
-        found, right = without_status(found), without_status(base)
-    excused = np.full(some.numbers.shape, fill_value=False)
-    if is_single and isinstance(model, FuzzyTree):
-        excused = open_paths(model, "float32", some.values)
-        yield compare_excused(
-            found, right, some, excused=excused, origin="equal but within float32"
-        )
-    else:
-        yield compare_bits(found, right, some)
-    if result.labels is not None:
-        yield compare_labels(title, result.labels, base, some, excused)
+    yield from compare_file(
+        title,
+        FileAnswers(result.outcome, result.labels, result.has_status),
+        base,
+        some,
+        is_float32=is_single,
+        origin="equal but within float32",
+    )

@@ -153,6 +153,10 @@ class Coverage(msgspec.Struct, frozen=True):
         return tuple(result)
 
 
+MOST_PROBES, MOST_SYSTEM_PROBES = 20_000, 2_000
+"""Of a tree or rules, and of a fuzzy system, whose rows cost more."""
+
+
 class CheckSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How far a check goes.
 

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 from onnx import helper, numpy_helper
 
-from fuzzytree.checking.models import check
+from fuzzytree.checking.representations import check
 from fuzzytree.errors import DisagreementError, ReadError
 from fuzzytree.exporters.onnx import Output, write_onnx
 from fuzzytree.model.agreement import Agreement

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.checking import systems as checking_systems
-from fuzzytree.checking.systems import check_system
+from fuzzytree.checking.representations import check
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import Points
@@ -55,7 +55,7 @@ def about(found: Agreement, representation: str, basis: str) -> Comparison:
 
 def test_every_runtime_is_compared_and_called() -> None:
     names = ["reference", "native", "onnxruntime float64"]
-    found = check_system(washer(), limit=100, runtimes=names)
+    found = check(washer(), limit=100, runtimes=names)
     assert found.ok
     assert [(c.representation, c.against, c.basis) for c in found.comparisons] == [
         ("native", "the inference", "rows"),
@@ -73,18 +73,16 @@ def test_every_runtime_is_compared_and_called() -> None:
 
 def test_rows_of_one_s_own_stand_behind_the_probes() -> None:
     data = np.array([[1.0, 2.0, 3.0]])
-    found = check_system(washer(), data=data, limit=10, runtimes=["native"])
+    found = check(washer(), data=data, limit=10, runtimes=["native"])
     assert (found.counts[0].rows, found.probes) == (13, 10)
     with pytest.raises(
         ValueError, match=r"data must have shape \(1, rows\), not \(3,\)"
     ):
-        check_system(washer(), data=np.zeros(3))
+        check(washer(), data=np.zeros(3))
 
 
 def test_files_with_the_system_agree() -> None:
-    found = check_system(
-        washer(), washer(), opened(washer()), names=["a.yaml", "b.onnx"]
-    )
+    found = check(washer(), washer(), opened(washer()), names=["a.yaml", "b.onnx"])
     assert found.ok
     result = [
         (c.representation, c.against)
@@ -99,7 +97,7 @@ def test_files_with_the_system_agree() -> None:
 
 
 def test_a_file_with_other_names_agrees() -> None:
-    found = check_system(washer(), washer(output="t"), limit=50)
+    found = check(washer(), washer(output="t"), limit=50)
     assert found.ok
     result = [
         (c.against, c.basis) for c in found.comparisons if c.representation == "file 1"
@@ -118,14 +116,14 @@ def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
         inputs=(replace(dirt, labels=(*dirt.labels, key)),),
         blocks=(replace(block, rules=rules),),
     )
-    found = check_system(system, other, limit=50)
+    found = check(system, other, limit=50)
     assert about(found, "file 1", "file").verdict == "rows only"
     assert not found.ok
-    assert check_system(system, other, limit=50, rows_only=True).ok
+    assert check(system, other, limit=50, rows_only=True).ok
 
 
 def test_a_file_with_another_number_is_found_in_its_rows() -> None:
-    found = check_system(washer(), washer(61.0), limit=50, data=np.array([[5.0]]))
+    found = check(washer(), washer(61.0), limit=50, data=np.array([[5.0]]))
     assert not found.ok
     one = about(found, "file 1", "rows")
     assert one.largest_difference == 1.0
@@ -134,14 +132,14 @@ def test_a_file_with_another_number_is_found_in_its_rows() -> None:
 
 
 def test_the_worst_row_comes_first_with_its_values() -> None:
-    found = check_system(washer(), washer(61.0), limit=1, data=np.array([[5.0]]))
+    found = check(washer(), washer(61.0), limit=1, data=np.array([[5.0]]))
     text = "row 1: dirt 5.0: output 'time' 30.5 where 30.0 is right"
     assert text in about(found, "file 1", "rows").detail
 
 
 def test_a_file_of_another_system_is_reported_by_its_facts() -> None:
     other = random_system(1, formulas="none")
-    found = check_system(washer(), other, opened(other), limit=20)
+    found = check(washer(), other, opened(other), limit=20)
     assert [c.detail for c in found.comparisons if c.verdict == "DISAGREES"] == [
         ("it computes 2 outputs from 3 inputs, and the system 1 from 1",),
         ("it computes y1, y2 from x1, x2, x3, which are not the system's",),
@@ -150,21 +148,21 @@ def test_a_file_of_another_system_is_reported_by_its_facts() -> None:
 
 def test_a_wrong_fingerprint_and_a_wrong_graph_are_found() -> None:
     other = opened(washer(61.0))
-    found = check_system(washer(), other, limit=20)
+    found = check(washer(), other, limit=20)
     wrong = [c.against for c in found.comparisons if c.verdict == "DISAGREES"]
     assert wrong == ["the system's metadata", "a freshly written graph", "native"]
 
 
 def test_a_file_without_status_is_compared_by_its_numbers() -> None:
     content = write_onnx(washer(), outputs=("outputs",)).content
-    assert check_system(washer(), open_onnx(content, "w.onnx"), limit=60).ok
+    assert check(washer(), open_onnx(content, "w.onnx"), limit=60).ok
 
 
 def test_a_slow_runtime_gets_a_share_of_the_rows(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(checking_systems, "_SLOW_STEPS", 100)
-    found = check_system(washer(), limit=400, runtimes=["native"])
+    found = check(washer(), limit=400, runtimes=["native"])
     assert found.comparisons[0].rows < 50
 
 
@@ -183,7 +181,7 @@ def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> No
     bell = replace(soaked, labels=(SystemTerm("dirty", Gaussian(0.0, 1.5)),))
     system = replace(system, inputs=(bell,))
     data = np.array([[0.3, 1.0, 2.5]])
-    found = check_system(system, shifted(system, 1e-9), limit=50, data=data)
+    found = check(system, shifted(system, 1e-9), limit=50, data=data)
     one = about(found, "file 1", "rows")
     assert one.verdict == "DISAGREES"
     assert one.differing >= 3
@@ -201,7 +199,7 @@ def test_rows_on_an_edge_are_counted_beside_the_table() -> None:
     blocks = (replace(block, activation=only),)
     system = replace(system, inputs=(bell,), blocks=blocks)
     other = shifted(system, 1e-15)
-    found = check_system(
+    found = check(
         system, other, limit=1, data=np.array([[1.0, 0.5]]), runtimes=["native"]
     )
     (result,) = (text for text in found.skipped if text.startswith("file 1"))
@@ -217,7 +215,7 @@ def test_rows_on_an_edge_are_counted_beside_the_table() -> None:
 def test_a_check_reports_what_it_compares_next_and_how_far_it_is() -> None:
     system = random_system(2)
     parts: list[tuple[str, float]] = []
-    check_system(
+    check(
         system,
         system,
         runtimes=["native"],

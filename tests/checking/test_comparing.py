@@ -9,7 +9,6 @@ from fuzzytree.checking.comparing import (
     compare_answers,
     compare_bits,
     compare_exact,
-    compare_excused,
     compare_within,
     labels,
     margins,
@@ -157,14 +156,16 @@ def test_a_difference_by_design_is_reported_and_no_fault() -> None:
 
 
 def test_an_excused_row_may_differ_and_no_other() -> None:
-    other = answers("other", [2, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
+    strengths = BASE.outcome.strengths
+    assert strengths is not None
+    other = answers("other", [2, 2, 0], [0, 0, 2], strengths.tolist())
     first = np.array([True, False, False])
     last = np.array([False, False, True])
     origin = "test"
-    assert compare_excused(other, BASE, ROWS, excused=first, origin=origin).verdict == (
+    assert compare_bits(other, BASE, ROWS, excused=first, origin=origin).verdict == (
         "agrees"
     )
-    assert compare_excused(other, BASE, ROWS, excused=last, origin=origin).verdict == (
+    assert compare_bits(other, BASE, ROWS, excused=last, origin=origin).verdict == (
         "DISAGREES"
     )
 

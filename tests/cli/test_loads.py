@@ -76,7 +76,7 @@ def test_verbs_that_read_a_model_load_neither_learner_nor_check(folder: Path) ->
     lines = [("show", "grip.yaml"), ("run", "grip.yaml", "grasps.csv", "--quiet")]
     names = (
         "fuzzytree.learning",
-        "fuzzytree.checking.models",
+        "fuzzytree.checking.representations",
         "fuzzytree.benchmarking",
     )
     assert loaded(folder, lines, names) == [[0]] * 2

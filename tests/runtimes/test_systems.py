@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fuzzytree.checking.systems import check_system
+from fuzzytree.checking.representations import check
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Runtime, SystemOutcome
 from fuzzytree.model.system import (
@@ -133,7 +133,7 @@ def test_what_onnxruntime_lacks_in_double_is_a_loss() -> None:
         "float32 only"
     )
     names = ["native", "onnxruntime float64"]
-    assert check_system(system, limit=60, runtimes=names).skipped == (
+    assert check(system, limit=60, runtimes=names).skipped == (
         f"onnxruntime float64: {caught.value}",
     )
 
@@ -151,7 +151,7 @@ def test_functions_of_one_number_are_within_their_units(function: str) -> None:
         [chance.normal(size=2000), chance.normal(size=2000) * 300, sizes, -sizes]
     )
     values = np.concatenate([values, [0.5, 1.5, 2.5, -0.5, 0.0, -0.0, 709.8, -745.2]])
-    found = check_system(system, data=values.reshape(1, -1), limit=50)
+    found = check(system, data=values.reshape(1, -1), limit=50)
     assert found.ok, [one.detail for one in found.comparisons]
 
 
@@ -166,5 +166,5 @@ def test_functions_of_two_numbers_are_within_their_units(function: str) -> None:
     chance = np.random.default_rng(8)
     values = chance.normal(size=(2, 3000)) * [[5.0], [3.0]]
     values[:, ::7] = np.round(values[:, ::7])
-    found = check_system(system, data=values, limit=50)
+    found = check(system, data=values, limit=50)
     assert found.ok, [one.detail for one in found.comparisons]

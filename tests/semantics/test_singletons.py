@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.checking.converting import read_content
-from fuzzytree.checking.systems import check_system
+from fuzzytree.checking.representations import check
 from fuzzytree.errors import InvalidModelError, LossError, ReadError
 from fuzzytree.exporters.table import find_format
 from fuzzytree.model.rulebase import Points
@@ -163,7 +163,7 @@ def test_every_runtime_answers_singletons_like_the_inference(
         SystemTerm("wide", Singleton(0.25 * count)),
     )
     output = replace(system.outputs[0], labels=labels)
-    found = check_system(replace(system, outputs=(output,)), limit=100)
+    found = check(replace(system, outputs=(output,)), limit=100)
     assert found.ok
     assert {one.representation for one in found.comparisons} >= {"native"}
 
@@ -293,6 +293,6 @@ def test_an_output_that_no_rule_concludes_answers_its_default_everywhere() -> No
     idle = replace(system.outputs[0], name="idle", default=0.5)
     found = replace(system, outputs=(*system.outputs, idle))
     assert infer(found, {"x": 0.0}).outputs == (0.123, 0.5)
-    assert check_system(found, limit=100).ok
+    assert check(found, limit=100).ok
     assert ft.convert(found, "onnx").proof.verdict == "alike"
     assert np.isfinite(sampled_values(idle)).all()

@@ -20,7 +20,7 @@ from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
-from fuzzytree.checking import check, check_system, probed
+from fuzzytree.checking import check, probed
 from fuzzytree.model import Agreement, Basis, Certified, Comparison, Dtype, Model
 from fuzzytree.numerics import Certificate, certify
 from fuzzytree.runtimes import all_runtimes
@@ -99,7 +99,7 @@ def agreement(
     every = all_runtimes()
     if subject.system is not None:
         names = [one.name for one in every if one.in_audits or one.is_definition]
-        return check_system(subject.system, data=values, runtimes=names, limit=PROBES)
+        return check(subject.system, data=values, runtimes=names, limit=PROBES)
     names = [one.name for one in every if one.in_audits]
     return check(_model(subject), *others, data=values, runtimes=names, limit=PROBES)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.checking.systems import check_system
+from fuzzytree.checking.representations import check
 from fuzzytree.model.system import (
     Conclusion,
     Defuzzifier,
@@ -139,7 +139,7 @@ def survivors(system: FuzzySystem, monkeypatch: pytest.MonkeyPatch) -> list[str]
             return wrong  # noqa: B023 # used before the next one is made
 
         monkeypatch.setattr(runtimes, "from_system", faulty)
-        if check_system(system, runtimes=[], limit=400).ok:
+        if check(system, runtimes=[], limit=400).ok:
             found.append(f"{place} {right.steps[place]} -> {step}")
     assert count > 60
     return found
@@ -158,6 +158,6 @@ def survivors(system: FuzzySystem, monkeypatch: pytest.MonkeyPatch) -> list[str]
 def test_a_fault_in_any_step_is_found(
     system: FuzzySystem, hidden: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert check_system(system, runtimes=[], limit=400).ok
+    assert check(system, runtimes=[], limit=400).ok
     found = survivors(system, monkeypatch)
     assert [one for one in found if not any(text in one for text in hidden)] == []
