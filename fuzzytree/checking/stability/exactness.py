@@ -7,19 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, OffsetCost, judged
+from fuzzytree.checking.stability.results import Criterion, OffsetCost, Trial
 from fuzzytree.checking.stability.runs import (
     ExactCheck,
+    FirstOutcomes,
     exact_check,
     first_line,
     loaded_form,
     loaded_forms,
-    unequal,
+    other_bits,
 )
 from fuzzytree.checking.stability.sensitivity import InputScale, input_scales
 from fuzzytree.checking.stability.transforms import moved
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model import Dtype, Model, Outcome, Runtime
+from fuzzytree.model import Dtype, Model, Runtime
 from fuzzytree.numerics import Decisions, decide
 from fuzzytree.semantics import forms, probe_values
 
@@ -46,39 +47,21 @@ def exactness(
         values: Shape (inputs, rows): each breakpoint with its neighbouring floats, in
             float32 and float64, and rows of data.
     """
-    faults: list[str] = []
-    skipped: list[str] = []
+    trial = Trial("N8", _ADVICE)
     exact: dict[tuple[str, int], Decisions] = {}
-    seen: dict[str, list[ExactCheck]] = {}
-    first: dict[tuple[str, Dtype, bool], tuple[str, Outcome]] = {}
-    cases = 0
-    for one in loaded_forms(model, runtimes, skipped):
+    checks: dict[str, list[ExactCheck]] = {}
+    first: FirstOutcomes = {}
+    for one in loaded_forms(model, runtimes, trial.skipped):
         rows = one.some(values)
         key = (one.representation, rows.shape[1])
         if key not in exact:
             exact[key] = decide(one.model, rows)
         found = exact_check(one, rows, exact[key])
-        cases += found.rows
-        faults += found.faults
-        if one.runtime.bound is None:
-            same = (one.representation, one.runtime.dtype, one.runtime.is_slow)
-            title, other = first.setdefault(same, (one.title, found.outcome))
-            wrong = int(unequal(found.outcome, other).sum())
-            if wrong:
-                faults.append(f"{one.title}: other bits than {title} in {wrong} rows")
+        trial.add(found.rows, *found.faults, worst=found.worst)
+        trial.faults += other_bits(one, rows, found.outcome, first)
         own = f" in {one.runtime.name}" if one.runtime.bound is not None else ""
-        seen.setdefault(f"{one.runtime.dtype}{own}", []).append(found)
-    errors = [one.worst for found in seen.values() for one in found]
-    facts = [_fact(name, found) for name, found in seen.items()]
-    return judged(
-        "N8",
-        cases,
-        faults,
-        worst=max(errors, default=None),
-        facts=facts,
-        advice=_ADVICE,
-        skipped=skipped,
-    )
+        checks.setdefault(f"{one.runtime.dtype}{own}", []).append(found)
+    return trial.result(*(_fact(name, found) for name, found in checks.items()))
 
 
 def _fact(name: str, found: Sequence[ExactCheck]) -> str:
@@ -120,10 +103,8 @@ def offsets(
     Returns:
         The criterion, and what each distance costs in each number type.
     """
-    faults: list[str] = []
-    skipped: list[str] = []
+    trial = Trial("N2", _ADVICE_OFFSETS, worst=0.0)
     costs: list[OffsetCost] = []
-    cases, worst = 0, 0.0
     scales = input_scales(model, data)
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
     for representation, form in forms(model).items():
@@ -132,21 +113,23 @@ def offsets(
             try:
                 far = moved(form, steps)
             except InvalidModelError as error:
-                skipped.append(f"{representation} at {ratio:.0e}: {first_line(error)}")
+                why = f"{representation} at {ratio:.0e}: {first_line(error)}"
+                trial.skipped.append(why)
                 continue
             away = rows + np.array([[steps[name]] for name in model.inputs])
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
-            found = _observed(representation, far, runtimes, values, skipped, ratio)
-            cases += sum(one.rows for one, _ in found)
-            worst = max([worst, *(one.worst for one, _ in found)])
+            found = _observed(
+                representation, far, runtimes, values, trial.skipped, ratio
+            )
             for one, _ in found:
-                faults += [f"spread over distance {ratio:.0e}: {f}" for f in one.faults]
+                trial.add(
+                    one.rows,
+                    *(f"spread over distance {ratio:.0e}: {f}" for f in one.faults),
+                    worst=one.worst,
+                )
             if ratio in _REPORTED and representation != "tree":
                 costs.append(_cost(representation, ratio, found, values.shape[1]))
-    criterion = judged(
-        "N2", cases, faults, worst=worst, advice=_ADVICE_OFFSETS, skipped=skipped
-    )
-    return criterion, tuple(costs)
+    return trial.result(), tuple(costs)
 
 
 def _step(scale: InputScale, ratio: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 import msgspec
@@ -193,44 +192,50 @@ TITLES = {
 """What each criterion demands."""
 
 
-def judged(
-    code: str,
-    cases: int,
-    faults: Sequence[str],
-    *,
-    worst: float | None = None,
-    facts: Sequence[str] = (),
-    advice: str = "",
-    skipped: Sequence[str] = (),
-) -> Criterion:
-    """Return a criterion with the verdict that its faults give.
+class Trial(msgspec.Struct):
+    """What a criterion has tried so far.
 
-    Args:
+    Attributes:
         code: A key of `TITLES`.
-        cases: How many answers were examined; none makes it `not applicable`.
+        advice: What to do about faults.
         faults: What failed, worst first.
-        worst: The largest difference found.
-        facts: What was measured; listed after the faults.
-        advice: What to do about faults; empty if there are none.
         skipped: What was not tried; each sentence is kept once.
-
-    Example:
-        >>> judged("N3", 12, ()).verdict
-        'holds'
+        cases: How many answers were examined; none makes it `not applicable`.
+        worst: The largest difference; None where the criterion measures none.
     """
-    shown = [*faults[:_SHOWN]]
-    if len(faults) > _SHOWN:
-        shown.append(f"and {len(faults) - _SHOWN} more")
-    verdict: Verdict = "holds" if cases else "not applicable"
-    if faults:
-        verdict = "FAILS"
-    return Criterion(
-        code,
-        TITLES[code],
-        verdict,
-        cases,
-        worst,
-        (*shown, *facts),
-        advice if faults else "",
-        tuple(dict.fromkeys(skipped)),
-    )
+
+    code: str
+    advice: str = ""
+    faults: list[str] = []
+    skipped: list[str] = []
+    cases: int = 0
+    worst: float | None = None
+
+    def add(self, cases: int, *faults: str | None, worst: float | None = None) -> None:
+        """Count answers that were examined, with what failed among them."""
+        self.cases += cases
+        self.faults += filter(None, faults)
+        if worst is not None:
+            self.worst = max(self.worst or 0.0, worst)
+
+    def result(self, *facts: str) -> Criterion:
+        """Return the criterion with the verdict of its faults, then what was measured.
+
+        Example:
+            >>> Trial("N3", cases=12).result().verdict
+            'holds'
+        """
+        shown = self.faults[:_SHOWN]
+        if len(self.faults) > _SHOWN:
+            shown.append(f"and {len(self.faults) - _SHOWN} more")
+        verdict: Verdict = "holds" if self.cases else "not applicable"
+        return Criterion(
+            self.code,
+            TITLES[self.code],
+            "FAILS" if shown else verdict,
+            self.cases,
+            self.worst,
+            (*shown, *facts),
+            self.advice if shown else "",
+            tuple(dict.fromkeys(self.skipped)),
+        )

@@ -6,10 +6,10 @@ import inspect
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, cast, get_args
 
-from fuzzytree.checking.comparing import strength_gap
+from fuzzytree.checking.comparing import strength_gap, unequal
 from fuzzytree.checking.equivalence import is_equivalent
-from fuzzytree.checking.stability.results import Criterion, judged
-from fuzzytree.checking.stability.runs import first_line, unequal
+from fuzzytree.checking.stability.results import Criterion, Trial
+from fuzzytree.checking.stability.runs import first_line
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.model import (
     Dtype,
@@ -44,10 +44,7 @@ def roundtrips(
         formats: The formats.
         values: Shape (inputs, rows): what files that run compute.
     """
-    faults: list[str] = []
-    skipped: list[str] = []
-    cases = 0
-    worst = 0.0
+    trial = Trial("N9", _ADVICE, worst=0.0)
     for representation, form in forms(model).items():
         kind = "rules" if isinstance(form, RuleBase) else "tree"
         for one in formats:
@@ -55,14 +52,13 @@ def roundtrips(
                 continue
             try:
                 for count, gap, fault in _tried(
-                    one, representation, form, values, skipped
+                    one, representation, form, values, trial.skipped
                 ):
-                    cases += count
-                    worst = max(worst, gap)
-                    faults += [fault] if fault else []
+                    trial.add(count, fault, worst=gap)
             except (LossError, MissingExtraError) as error:
-                skipped.append(f"{one.name}: {representation}: {first_line(error)}")
-    return judged("N9", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped)
+                why = f"{one.name}: {representation}: {first_line(error)}"
+                trial.skipped.append(why)
+    return trial.result()
 
 
 def _tried(

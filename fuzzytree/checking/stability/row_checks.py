@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, Usable, judged
+from fuzzytree.checking.comparing import unequal
+from fuzzytree.checking.stability.results import Criterion, Trial, Usable
 from fuzzytree.checking.stability.runs import (
+    FirstOutcomes,
     LoadedForm,
     loaded_form,
     loaded_forms,
     missing_rows,
+    other_bits,
     row_text,
     run_with_warning,
-    unequal,
 )
 from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
 from fuzzytree.errors import InvalidModelError, LossError
@@ -47,20 +49,17 @@ def order(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Crit
         runtimes: What to run.
         values: Shape (inputs, rows).
     """
-    faults: list[str] = []
-    skipped: list[str] = []
-    cases = 0
-    for one in loaded_forms(model, runtimes, skipped):
+    trial = Trial("N3", _ADVICE)
+    for one in loaded_forms(model, runtimes, trial.skipped):
         rows = one.some(values)
         whole = one.run(rows)
         for said, wrong in (*_tries(one, rows, whole), *_renumbered(one, rows, whole)):
-            cases += wrong.size
-            if wrong.any():
-                faults.append(
-                    f"{one.title}: {int(wrong.sum())} of {wrong.size} rows are "
-                    f"answered differently {said}"
-                )
-    return judged("N3", cases, faults, advice=_ADVICE, skipped=skipped)
+            fault = (
+                f"{one.title}: {int(wrong.sum())} of {wrong.size} rows are "
+                f"answered differently {said}"
+            )
+            trial.add(wrong.size, fault if wrong.any() else None)
+    return trial.result()
 
 
 def _tries(
@@ -128,16 +127,16 @@ def scaling(
     Returns:
         The criterion, and the range of k for each form and number type.
     """
+    trial = Trial("N1", _ADVICE_SCALING)
     if not model.inputs:
-        return judged("N1", 0, (), skipped=(_NO_INPUT,)), ()
-    faults: list[str] = []
-    skipped: list[str] = []
+        trial.skipped.append(_NO_INPUT)
+        return trial.result(), ()
     usable: dict[tuple[str, Dtype], Usable] = {}
-    cases = 0
-    for one in loaded_forms(model, runtimes, skipped):
+    for one in loaded_forms(model, runtimes, trial.skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
         if low > high:
-            skipped.append(f"{one.title}: its numbers span more than the type does")
+            why = f"{one.title}: its numbers span more than the type does"
+            trial.skipped.append(why)
             continue
         key = (one.representation, one.runtime.dtype)
         usable[key] = Usable(one.representation, one.runtime.dtype, low, high)
@@ -149,17 +148,12 @@ def scaling(
         least, most = max(low, middle - 60), min(high, middle + 60)
         plans.append(_apart(model.inputs, least, most, seed=0))
         for plan in plans:
-            count, fault = _tried(one, plan, values, skipped)
-            cases += count
-            faults += [fault] if fault else []
+            trial.add(*_tried(one, plan, values, trial.skipped))
     facts = [
         f"{name}: inputs times 2**{low} to 2**{high} change nothing"
         for name, low, high in _together(tuple(usable.values()))
     ]
-    criterion = judged(
-        "N1", cases, faults, facts=facts, advice=_ADVICE_SCALING, skipped=skipped
-    )
-    return criterion, tuple(usable.values())
+    return trial.result(*facts), tuple(usable.values())
 
 
 def decades(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Criterion:
@@ -167,26 +161,23 @@ def decades(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Cr
 
     The inputs of one combination are spread as well.
     """
-    faults: list[str] = []
-    skipped: list[str] = []
-    cases = 0
+    trial = Trial("N2b", _ADVICE_SCALING)
     if len(model.inputs) < 2:
-        skipped.append("a model of one input has no features apart")
-        return judged("N2b", 0, (), skipped=skipped)
+        trial.skipped.append("a model of one input has no features apart")
+        return trial.result()
     places = np.linspace(0, _BINARY_DECADES, len(model.inputs))
     order = random.Random(0).sample(range(len(places)), len(places))
-    for one in loaded_forms(model, runtimes, skipped):
+    for one in loaded_forms(model, runtimes, trial.skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
         start = min(max(-_BINARY_DECADES // 2, low), high - _BINARY_DECADES)
         if start < low:
-            skipped.append(f"{one.title}: its own numbers leave no room for 20 decades")
+            why = f"{one.title}: its own numbers leave no room for 20 decades"
+            trial.skipped.append(why)
             continue
         ks = [start + int(places[k]) for k in order]
         plan = dict(zip(model.inputs, ks, strict=True))
-        count, fault = _tried(one, plan, values, skipped)
-        cases += count
-        faults += [fault] if fault else []
-    return judged("N2b", cases, faults, advice=_ADVICE_SCALING, skipped=skipped)
+        trial.add(*_tried(one, plan, values, trial.skipped))
+    return trial.result()
 
 
 def _together(usable: Sequence[Usable]) -> Iterator[tuple[str, int, int]]:
@@ -294,30 +285,25 @@ def specials(
         runtimes: What to run.
         values: Shape (inputs, rows); some of them are changed.
     """
+    trial = Trial("N6", _ADVICE_SPECIALS)
     if not model.inputs:
-        return judged("N6", 0, (), skipped=("the model has no input",))
+        trial.skipped.append(_NO_INPUT)
+        return trial.result()
     rows = _with_specials(values)
-    faults: list[str] = []
-    skipped: list[str] = []
-    cases = 0
-    first: dict[tuple[str, Dtype, bool], tuple[str, Outcome]] = {}
-    for one in loaded_forms(model, runtimes, skipped):
+    first: FirstOutcomes = {}
+    for one in loaded_forms(model, runtimes, trial.skipped):
         tried = one.some(rows)
         found, warning = run_with_warning(one, tried)
-        cases += tried.shape[1]
-        faults += [f"{one.title}: it warns: {warning}"] if warning else []
-        faults += _broken_policy(one, tried, found)
+        trial.add(tried.shape[1], warning and f"{one.title}: it warns: {warning}")
+        trial.faults += _broken_policy(one, tried, found)
         is_zero = tried == 0.0
         if is_zero.any():
             turned = np.where(is_zero, -tried, tried)
             wrong = unequal(one.run(turned), found)
             if wrong.any():
-                faults.append(f"{one.title}: 0.0 and -0.0 are not answered alike")
-        if one.runtime.bound is None:
-            key = (one.representation, one.runtime.dtype, one.runtime.is_slow)
-            title, other = first.setdefault(key, (one.title, found))
-            faults += _disagreement(one, tried, found, title, other)
-    return judged("N6", cases, faults, advice=_ADVICE_SPECIALS, skipped=skipped)
+                trial.add(0, f"{one.title}: 0.0 and -0.0 are not answered alike")
+        trial.faults += other_bits(one, tried, found, first)
+    return trial.result()
 
 
 def _with_specials(values: FloatArray) -> FloatArray:
@@ -355,15 +341,3 @@ def _broken_policy(one: LoadedForm, rows: FloatArray, found: Outcome) -> Iterato
         known = found.strengths[:, ~is_missing]
         if not ((known >= 0.0) & (known <= 1.0)).all():
             yield f"{one.title}: a strength is not between 0 and 1"
-
-
-def _disagreement(
-    one: LoadedForm, rows: FloatArray, found: Outcome, title: str, other: Outcome
-) -> Iterator[str]:
-    wrong = unequal(found, other)
-    if wrong.any():
-        row = int(np.flatnonzero(wrong)[0])
-        yield (
-            f"{one.title}: {int(wrong.sum())} rows are answered differently from "
-            f"{title}, first {row_text(one.model.inputs, rows, row)}"
-        )

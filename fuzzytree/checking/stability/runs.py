@@ -16,16 +16,10 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.checking.comparing import ModelRun, labels, same_bits
+from fuzzytree.checking.comparing import ModelRun, exact_errors, unequal
 from fuzzytree.errors import LossError
 from fuzzytree.model import Dtype, FuzzyTree, Model, Outcome, RuleBase, Run, Runtime
-from fuzzytree.numerics import (
-    Decisions,
-    decide,
-    open_paths,
-    strength_bounds,
-    strength_errors,
-)
+from fuzzytree.numerics import Decisions, decide, strength_bounds
 from fuzzytree.runtimes import is_installed, needed_by
 from fuzzytree.semantics import forms
 
@@ -110,16 +104,23 @@ def run_with_warning(one: LoadedForm, values: FloatArray) -> tuple[Outcome, str 
     return found, str(caught[0].message) if caught else None
 
 
-def unequal(one: Outcome, two: Outcome) -> BoolArray:
-    """Return the rows in which two outcomes differ, by a single bit if in no more."""
-    wrong: BoolArray = (one.rule != two.rule) | (one.status != two.status)
-    first, second = one.strengths, two.strengths
-    if first is None or second is None:
-        return wrong
-    if first.shape != second.shape:
-        return np.ones_like(wrong)
-    wrong |= ~same_bits(first, second).all(axis=0)
-    return wrong
+FirstOutcomes = dict[tuple[str, Dtype, bool], tuple[str, Outcome]]
+"""The first runtime of each form and number type that promises equal bits."""
+
+
+def other_bits(
+    one: LoadedForm, rows: FloatArray, found: Outcome, first: FirstOutcomes
+) -> Iterator[str]:
+    """Yield where a runtime has other bits than the first one that promises them."""
+    if one.runtime.bound is None:
+        key = (one.representation, one.runtime.dtype, one.runtime.is_slow)
+        title, other = first.setdefault(key, (one.title, found))
+        wrong = np.flatnonzero(unequal(found, other))
+        if wrong.size:
+            yield (
+                f"{one.title}: other bits than {title} in {wrong.size} rows, first "
+                f"{row_text(one.model.inputs, rows, int(wrong[0]))}"
+            )
 
 
 def first_line(error: Exception) -> str:
@@ -177,17 +178,11 @@ def exact_check(
     dtype = one.runtime.dtype
     known = ~missing_rows(one.model, values, dtype)
     allowed = allowed_errors(one, values)
-    flips = (labels(ModelRun(one.title, one.model, found)) != truth.label) & known
-    if isinstance(one.model, RuleBase):
-        excused = truth.margin <= 2.0 * allowed
-    else:
-        excused = open_paths(one.model, dtype, values)
-    wrong = flips & ~excused
-    low = np.zeros(values.shape[1])
-    if found.strengths is not None and isinstance(one.model, RuleBase):
-        low = strength_errors(one.model, values, found.strengths)[0]
-        low[~known] = 0.0
-        wrong |= low > allowed
+    run = ModelRun(one.title, one.model, found)
+    errors = exact_errors(run, truth, values, dtype, allowed)
+    flips = errors.flips & known
+    low = np.where(known, 0.0 if errors.low is None else errors.low, 0.0)
+    wrong = flips & ~errors.close | (low > allowed)
     bounded = np.where(allowed < 1.0, low, 0.0)
     faults = [_fault(one, values, found, wrong, low, allowed)] if wrong.any() else []
     worst = int(np.argmax(bounded)) if low.size else 0

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, CurveFault, Stiff, judged
+from fuzzytree.checking.stability.results import Criterion, CurveFault, Stiff, Trial
 from fuzzytree.model import (
     LR,
     Band,
@@ -258,6 +258,10 @@ LARGEST_OVERSHOOT = 0.05
 LARGEST_RISE = 0.05
 """By how much a clipped degree may rise on its way out."""
 
+_ADVICE = (
+    "learn with fewer points on a set (points=2), which gives curves of a lower "
+    "degree, or rewrite the named curves"
+)
 _NEGLIGIBLE = 1e-9  # overshoot and rises below are not reported
 
 
@@ -270,35 +274,23 @@ def curves(model: Model) -> tuple[Criterion, tuple[CurveFault, ...]]:
     Returns:
         The criterion, and what is to be known about curves, worst first.
     """
-    cases = 0
+    trial = Trial("N7", _ADVICE, worst=0.0)
     found: list[CurveFault] = []
     for form, variable, term in _terms(model):
         for side in conduct(term.shape):
-            cases += 1
+            trial.cases += 1
             fault = _fault(form, variable, term, side)
             if fault is not None:
                 found.append(fault)
     found.sort(key=lambda f: (not f.fails, -max(f.overshoot, f.rise), -f.condition))
-    faults = [_sentence(one) for one in found if one.fails]
-    harmless = len(found) - len(faults)
-    facts = (
-        [f"{harmless} of {cases} sides bulge or rise within the limits"]
-        if harmless
-        else []
-    )
-    criterion = judged(
-        "N7",
-        cases,
-        faults,
-        worst=max((max(one.overshoot, one.rise) for one in found), default=0.0),
-        facts=facts,
-        advice=(
-            "learn with fewer points on a set (points=2), which gives curves of a "
-            "lower degree, or rewrite the named curves"
-        ),
-        skipped=() if cases else ("no term of the model has a fitted curve",),
-    )
-    return criterion, tuple(found)
+    for one in found:
+        fault_text = _sentence(one) if one.fails else None
+        trial.add(0, fault_text, worst=max(one.overshoot, one.rise))
+    harmless = len(found) - len(trial.faults)
+    fact = f"{harmless} of {trial.cases} sides bulge or rise within the limits"
+    if not trial.cases:
+        trial.skipped.append("no term of the model has a fitted curve")
+    return trial.result(*[fact] * (harmless > 0)), tuple(found)
 
 
 def _terms(model: Model) -> Iterator[tuple[str, str, Term]]:

@@ -14,8 +14,8 @@ from fuzzytree.checking.stability.results import (
     CurveFault,
     OffsetCost,
     Stability,
+    Trial,
     Usable,
-    judged,
 )
 from fuzzytree.checking.stability.roundtrips import roundtrips
 from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _PROBES = 2_000  # for the comparison with the exact answers
 _SOME = 250  # probes for criteria that load a model anew many times
 _SOME_DATA = 100  # rows of data beside them
+_NOT_MEASURED = "measured by `fuzzytree bench`, for it takes time on a quiet machine"
 _DATA = 20_000  # rows of data for the comparison with the exact answers
 
 
@@ -104,7 +105,7 @@ def examine(
             case "N9":
                 one = roundtrips(model, formats, some)
             case _:
-                one = _work_precision()
+                one = Trial(code, skipped=[_NOT_MEASURED]).result()
         found.append(one)
     has_data = rows.shape[1] > 0
     progress("stiffness of the inputs", len(wanted) / (len(wanted) + 1))
@@ -146,14 +147,3 @@ def _checked(data: FloatArray | None, inputs: int) -> FloatArray:
 def _thinned(rows: FloatArray, limit: int) -> FloatArray:
     step = max(-(-rows.shape[1] // limit), 1)
     return rows[:, ::step]
-
-
-def _work_precision() -> Criterion:
-    return judged(
-        "N10",
-        0,
-        (),
-        skipped=(
-            "measured by `fuzzytree bench`, for it takes time on a quiet machine",
-        ),
-    )

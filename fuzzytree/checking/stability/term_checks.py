@@ -9,21 +9,21 @@ from __future__ import annotations
 import itertools
 import math
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Literal, NamedTuple, assert_never
+from typing import TYPE_CHECKING, Literal, assert_never
 
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, judged
+from fuzzytree.checking.comparing import unequal
+from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import (
     LoadedForm,
     allowed_errors,
     loaded_form,
     loaded_forms,
     run_with_warning,
-    unequal,
 )
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model import (
@@ -33,7 +33,6 @@ from fuzzytree.model import (
     Dtype,
     Flank,
     Model,
-    Outcome,
     Points,
     Rule,
     RuleBase,
@@ -79,32 +78,16 @@ class TermProbes(msgspec.Struct, frozen=True):
     left_out: int
 
 
-class TermResult(NamedTuple):
-    """How the degrees of a runtime compare with what is demanded.
-
-    Attributes:
-        cases: How many degrees.
-        worst: The largest difference from the exact one, where it was computed.
-        faults: What broke.
-    """
-
-    cases: int
-    worst: float
-    faults: list[str]
-
-
 def term_probes(
     rules: RuleBase,
     *,
     shape: Callable[[Shape], Shape] = lambda shape: shape,
-    near: Callable[[float], Iterable[float]] = neighbours,
 ) -> TermProbes | None:
     """Return the terms of a rule base as rules, and their edges as rows.
 
     Args:
         rules: The rule base.
         shape: What to test in place of each membership function.
-        near: Which values to run around a landmark.
 
     Returns:
         The rows and rules; None if no variable has a term.
@@ -133,7 +116,7 @@ def term_probes(
     for number, v in enumerate(variables):
         for term in v.terms:
             start = len(lines[number])
-            lines[number] += _edges(term.shape, near)
+            lines[number] += _edges(term.shape)
             places.append((number, term.shape, slice(start, len(lines[number]))))
     longest = max(map(len, lines))
     values = np.array([(line * longest)[:longest] for line in lines], np.float64)
@@ -141,8 +124,8 @@ def term_probes(
     return TermProbes(whole, values, tuple(places), total - len(found))
 
 
-def _edges(shape: Shape, near: Callable[[float], Iterable[float]]) -> list[float]:
-    found = [value for mark in landmarks(shape) for value in near(mark)]
+def _edges(shape: Shape) -> list[float]:
+    found = [value for mark in landmarks(shape) for value in neighbours(mark)]
     return list(dict.fromkeys(found)) or [0.0]
 
 
@@ -227,58 +210,70 @@ def broken(demand: Demand | None, degree: float) -> bool:
     assert_never(demand)
 
 
-def term_result(
-    one: LoadedForm,
-    question: TermProbes,
-    skipped: list[str],
+def _try_terms(
+    trial: Trial,
+    model: Model,
+    runtimes: Sequence[Runtime],
+    title: str,
+    shape: Callable[[Shape], Shape] = lambda shape: shape,
     *,
-    difference: Callable[[int, float, float], tuple[float, float]] | None = None,
-) -> TermResult:
-    """Compare the degrees that a runtime returns with what is demanded of them.
+    is_exact: bool = False,
+) -> None:
+    """Compare the degrees of all terms in all runtimes with what is demanded of them.
 
     Args:
-        one: The runtime, with the rules of the question.
-        question: The terms and rows.
-        skipped: Gets a sentence if the runtime returns no degrees.
-        difference: For the number of a term, a value and its degree: the difference
-            from the exact degree, and the largest that is allowed.
+        trial: Gets the result.
+        model: Its forms that are rules have the terms.
+        runtimes: What to run.
+        title: What to call the terms of a form, with `{}` for its name.
+        shape: What to test in place of each membership function.
+        is_exact: Whether degrees are also compared with the exact ones.
     """
-    found, warning = run_with_warning(one, question.values)
-    faults = [f"{one.title}: it warns: {warning}"] if warning else []
-    if question.left_out:
-        skipped.append(f"{question.left_out} of the terms: there are too many")
+    for representation, form in forms(model).items():
+        rules = form if isinstance(form, RuleBase) else None
+        terms = None if rules is None else term_probes(rules, shape=shape)
+        if terms is None:
+            continue
+        exact = _Exact(terms) if is_exact else None
+        for runtime in runtimes:
+            name = title.format(representation)
+            one = loaded_form(name, terms.rules, runtime, trial.skipped)
+            if one is not None:
+                _try_degrees(trial, one, terms, exact)
+
+
+def _try_degrees(
+    trial: Trial, one: LoadedForm, terms: TermProbes, exact: _Exact | None
+) -> None:
+    found, warning = run_with_warning(one, terms.values)
+    trial.add(0, warning and f"{one.title}: it warns: {warning}")
+    if terms.left_out:
+        trial.skipped.append(f"{terms.left_out} of the terms: there are too many")
     if found.strengths is None:
-        skipped.append(f"{one.runtime.name} returns no degrees")
-        return TermResult(0, 0.0, faults)
+        trial.skipped.append(f"{one.runtime.name} returns no degrees")
+        return
     if one.runtime.bound is not None:  # it promises nothing at a single value
-        skipped.append(f"{one.runtime.name} promises a bound, and no edge")
-        return TermResult(0, 0.0, faults)
-    cases, worst = 0, 0.0
-    for number, (line, shape, rows) in enumerate(question.places):
-        clause = question.rules.rules[number].when[0]
+        trial.skipped.append(f"{one.runtime.name} promises a bound, and no edge")
+        return
+    limits = allowed_errors(one, terms.values)
+    for number, (line, shape, rows) in enumerate(terms.places):
+        clause = terms.rules.rules[number].when[0]
         name = f"{one.title}: {clause.variable} is {clause.terms[0]}"
-        pairs = zip(
-            question.values[line, rows].tolist(),
-            found.strengths[number, rows].tolist(),
-            strict=True,
-        )
-        for value, degree in pairs:
-            cases += 1
+        columns = (terms.values[line], found.strengths[number], limits)
+        cells = zip(*(column[rows].tolist() for column in columns), strict=True)
+        for value, degree, allowed in cells:
+            trial.cases += 1
             demand = demanded(shape, value, one.runtime.dtype)
+            fault = None
             if broken(demand, degree):
-                faults.append(
-                    f"{name} at {value!r}: degree {degree!r}, not "
-                    f"{demand or 'between 0 and 1'}"
-                )
-            elif difference is not None:
-                gap, allowed = difference(number, value, degree)
-                worst = max(worst, gap) if allowed < 1.0 else worst
+                fault = f"not {demand or 'between 0 and 1'}"
+            elif exact is not None:
+                gap = float(abs(Fraction(degree) - exact.degrees[number][value]))
+                trial.add(0, worst=gap if allowed < 1.0 else None)
                 if not gap <= allowed:
-                    faults.append(
-                        f"{name} at {value!r}: degree {degree!r} is {gap:.3g} from "
-                        f"the exact one, and {allowed:.3g} is allowed"
-                    )
-    return TermResult(cases, worst, faults)
+                    fault = f"{gap:.3g} from the exact one, {allowed:.3g} is allowed"
+            if fault:
+                trial.add(0, f"{name} at {value!r}: degree {degree!r}, {fault}")
 
 
 def _same(value: float) -> float:
@@ -308,27 +303,9 @@ def edges(model: Model, runtimes: Sequence[Runtime]) -> Criterion:
     plateau it is below 1; at an end and beyond exactly 0; elsewhere within the bound
     of the exact one.
     """
-    faults: list[str] = []
-    skipped: list[str] = []
-    cases, worst = 0, 0.0
-    for representation, form in forms(model).items():
-        question = term_probes(form) if isinstance(form, RuleBase) else None
-        if question is None:
-            continue
-        exact = _Exact(question)
-        for runtime in runtimes:
-            one = loaded_form(
-                f"terms of {representation}", question.rules, runtime, skipped
-            )
-            if one is None:
-                continue
-            allowed = allowed_errors(one, question.values)
-            difference_of = exact.difference(allowed, question.values)
-            result = term_result(one, question, skipped, difference=difference_of)
-            cases += result.cases
-            worst = max(worst, result.worst)
-            faults += result.faults
-    return judged("N5", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped)
+    trial = Trial("N5", _ADVICE, worst=0.0)
+    _try_terms(trial, model, runtimes, "terms of {}", is_exact=True)
+    return trial.result()
 
 
 class _Exact:
@@ -342,24 +319,6 @@ class _Exact:
             }
             for line, shape, rows in question.places
         ]
-        self.lines = [line for line, _, _ in question.places]
-
-    def difference(
-        self, allowed: FloatArray, values: FloatArray
-    ) -> Callable[[int, float, float], tuple[float, float]]:
-        """Return a function of the error of a degree and the allowed one in its row."""
-        limits = [
-            dict(zip(reversed(line.tolist()), reversed(allowed.tolist()), strict=True))
-            for line in values
-        ]
-
-        def difference_of(
-            number: int, value: float, degree: float
-        ) -> tuple[float, float]:
-            gap = abs(Fraction(degree) - self.degrees[number][value])
-            return float(gap), limits[self.lines[number]][value]
-
-        return difference_of
 
 
 _COPIES = 50  # rows of a table whose columns are all constant
@@ -380,41 +339,23 @@ def degenerate(
     (its columns have no stride), is answered like one of them; so are tables of two,
     one and no rows.
     """
-    faults: list[str] = []
-    skipped: list[str] = []
-    cases = 0
-    for representation, form in forms(model).items():
-        question = (
-            term_probes(form, shape=collapsed) if isinstance(form, RuleBase) else None
-        )
-        if question is None:
-            continue
-        for runtime in runtimes:
-            one = loaded_form(
-                f"{representation}, collapsed", question.rules, runtime, skipped
-            )
-            if one is not None:
-                result = term_result(one, question, skipped)
-                cases += result.cases
-                faults += result.faults
-    for one in loaded_forms(model, runtimes, skipped):
+    trial = Trial("N4", _ADVICE_DEGENERATE)
+    _try_terms(trial, model, runtimes, "{}, collapsed", collapsed)
+    for one in loaded_forms(model, runtimes, trial.skipped):
         for said, is_wrong in _small_tables(one, one.some(values)):
-            cases += 1
-            faults += [f"{one.title}: {said}"] if is_wrong else []
-    facts = [*_thin_terms(model), *_constant_columns(model)]
-    return judged(
-        "N4", cases, faults, facts=facts, advice=_ADVICE_DEGENERATE, skipped=skipped
-    )
+            trial.add(1, f"{one.title}: {said}" if is_wrong else None)
+    return trial.result(*_thin_terms(model), *_constant_columns(model))
 
 
 def _small_tables(one: LoadedForm, values: FloatArray) -> Iterator[tuple[str, bool]]:
     """Yield what was tried with small tables, and whether it went wrong."""
     width, count = values.shape
+    copies = np.zeros(_COPIES, np.int64)
     for row in range(min(count, 3)):
         column = values[:, row : row + 1]
         alone = one.run(np.ascontiguousarray(column))
         many = one.run(np.broadcast_to(column, (width, _COPIES)))
-        is_other = bool(unequal(many, repeated(alone, _COPIES)).any())
+        is_other = bool(unequal(many, alone.part(copies)).any())
         yield f"{_COPIES} equal rows are not answered like one of them", is_other
     for size in (0, 1, 2):
         try:
@@ -425,16 +366,6 @@ def _small_tables(one: LoadedForm, values: FloatArray) -> Iterator[tuple[str, bo
         shape = (min(size, count),)
         wrong = found.rule.shape != shape or found.status.shape != shape
         yield f"a table of {size} rows gets {found.rule.shape[0]} answers", wrong
-
-
-def repeated(alone: Outcome, count: int) -> Outcome:
-    """Return the answer to one row, so many times."""
-    strengths = alone.strengths
-    return Outcome(
-        np.repeat(alone.rule, count),
-        np.repeat(alone.status, count),
-        None if strengths is None else np.repeat(strengths, count, axis=1),
-    )
 
 
 def _thin_terms(model: Model) -> Iterator[str]:

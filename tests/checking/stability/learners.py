@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.checking.stability.results import Criterion, judged
+from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import first_line
 from fuzzytree.checking.stability.term_checks import broken
 from fuzzytree.checking.stability.transforms import scaled
@@ -70,7 +70,8 @@ def learner_scaling(
         exponents = {f"x{n}": k for n, k in enumerate(ks, 1)}
         if found != scaled(tree, exponents):
             faults.append(f"columns times 2**k, k {ks[:8]}, give another tree")
-    return judged("N1", len(plans), faults, advice="look for fixed thresholds")
+    trial = Trial("N1", "look for fixed thresholds", faults, cases=len(plans))
+    return trial.result()
 
 
 def learner_order(
@@ -85,7 +86,7 @@ def learner_order(
     for order in orders:
         if learn(values[order], labels[order].tolist()) != tree:
             faults.append("the same rows in another order give another tree")
-    return judged("N3", len(orders), faults, advice="make the sums exact")
+    return Trial("N3", "make the sums exact", faults, cases=len(orders)).result()
 
 
 def learner_offsets(
@@ -108,9 +109,9 @@ def learner_offsets(
                 f"columns plus {shift:g}: {wrong} of {len(grid)} training rows are "
                 "answered differently"
             )
-    return judged(
-        "N2", len(_SHIFTS) * len(grid), faults, advice="subtract a value of the column"
-    )
+    cases = len(_SHIFTS) * len(grid)
+    advice = "subtract a value of the column"
+    return Trial("N2", advice, faults, cases=cases).result()
 
 
 def learner_degenerate(learn: Learn) -> Criterion:
@@ -133,7 +134,8 @@ def learner_degenerate(learn: Learn) -> Criterion:
                 continue
         faults += [f"{said}: it warns: {one.message}" for one in caught[:1]]
         faults += [f"{said}: {fault}" for fault in _weak_rows(tree, values)]
-    return judged("N4", cases, faults, facts=refused, advice="ask max == min first")
+    trial = Trial("N4", "ask max == min first", faults, cases=cases)
+    return trial.result(*refused)
 
 
 def small_tables() -> Iterator[tuple[str, FloatArray, list[str]]]:
@@ -173,7 +175,8 @@ def window_counts(count: Count, *, delta: int = 1) -> Criterion:
             found = [int(one) for one in count(values, n)]
             if found != expected:
                 faults.append(f"{said}, n {n}: {found}, and {expected} is right")
-    return judged("N5", 3 * len(tables), faults, advice="compare exactly near an edge")
+    advice = "compare exactly near an edge"
+    return Trial("N5", advice, faults, cases=3 * len(tables)).result()
 
 
 def edge_tables() -> Iterator[tuple[str, FloatArray]]:

@@ -7,7 +7,7 @@ from fuzzytree.checking.stability.results import (
     OffsetCost,
     Stability,
     Stiff,
-    judged,
+    Trial,
 )
 from fuzzytree.report.stability import stability_lines
 
@@ -19,14 +19,14 @@ STUDY = Stability(
     20_000,
     ("native", "native float32"),
     (
-        judged(
+        Trial(
             "N3",
-            40,
+            "use another one",
             [f"native: tree: {k} of 8 rows" for k in (5, 4, 3, 2, 1, 1)],
-            advice="use another one",
-        ),
-        judged("N7", 3, (), worst=0.01, facts=["1 of 3 sides bulges"]),
-        judged("N10", 0, (), skipped=["a", "b", "b", "c", "d"]),
+            cases=40,
+        ).result(),
+        Trial("N7", cases=3, worst=0.01).result("1 of 3 sides bulges"),
+        Trial("N10", skipped=["a", "b", "b", "c", "d"]).result(),
     ),
     (
         Stiff("force", 0.5, 1e6, 5e-7, 0.12, 0.1, 3, 80, 1e6, "use mixed"),
