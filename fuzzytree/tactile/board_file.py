@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Final, Literal, assert_never
+from typing import Annotated, Any, ClassVar, Final, Literal
 
-from msgspec import Meta, field
+from msgspec import Meta, field, structs
 
 from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.exporters import Entry, Noted, Short, joined
@@ -28,42 +28,34 @@ from fuzzytree.formats import (
 )
 from fuzzytree.model import Mistake
 from fuzzytree.tactile.boards import (
-    HEXADECIMAL,
-    LARGEST_BAUD,
-    LONGEST_TIMEOUT_S,
-    MOST_BANNER_LINES,
-    MOST_SKIPPED,
-    MOST_START_FRAMES,
+    ABOUT_PREFIX,
     PREFIX,
+    Baud,
     Board,
+    Byte,
     ByteOrder,
     Checksum,
+    Hexadecimal,
+    Lines,
     Marker,
     Order,
     Port,
     Pressure,
     Protocol,
     Request,
+    Seconds,
     Sentinel,
+    Share,
+    Skip,
     Start,
+    StartFrames,
     Text,
 )
-from fuzzytree.tactile.sensor import LARGEST_SIDE, Sensor
+from fuzzytree.tactile.sensor import LARGEST_SIDE, Full, Sensor, Side
 
 BOARD_FORMAT: Final = "fuzzytree-board/1"
 
-Side = Annotated[int, Meta(ge=1, le=LARGEST_SIDE)]
 Reading = Annotated[int, Meta(ge=0, le=65535)]
-Byte = Annotated[int, Meta(ge=0, le=255)]
-Skip = Annotated[int, Meta(ge=0, le=MOST_SKIPPED)]
-Hexadecimal = Annotated[
-    str,
-    Meta(
-        pattern=rf"^{HEXADECIMAL}$(?!\n)",
-        description="1 to 64 bytes in hexadecimal, such as 'AA 55'",
-        examples=["AA 55", "0D 0A"],
-    ),
-]
 
 
 class SensorOfBoard(FileRecord, frozen=True, kw_only=True):
@@ -77,7 +69,7 @@ class SensorOfBoard(FileRecord, frozen=True, kw_only=True):
     noun: ClassVar[str] = "a sensor"
     rows: Side
     columns: Side
-    full: Annotated[int, Meta(ge=1, le=65535)] = 255
+    full: Full = 255
     threshold: Annotated[int, Meta(ge=0, le=65534)] = 0
     baseline: Annotated[tuple[Reading, ...], Meta(max_length=LARGEST_SIDE**2)] = ()
     masked: Annotated[
@@ -94,7 +86,7 @@ class MarkerOfBoard(FileRecord, frozen=True, kw_only=True):
     """
 
     noun: ClassVar[str] = "a marker"
-    bytes: Hexadecimal
+    marker: Hexadecimal = field(name="bytes")
     bits: Literal[8, 16] = 8
     byte_order: ByteOrder = field(name="byte order", default="little")
     sizes: Literal["none", "rows and columns"] = "none"
@@ -127,7 +119,7 @@ class RequestOfBoard(FileRecord, frozen=True, kw_only=True):
     byte_order: ByteOrder = field(name="byte order", default="little")
     skip: Skip = 0
     checksum: Checksum = "none"
-    timeout: Annotated[float, Meta(ge=0.001, le=LONGEST_TIMEOUT_S)] = 0.5
+    timeout_s: Seconds = field(name="timeout", default=0.5)
 
 
 class TextOfBoard(FileRecord, frozen=True, kw_only=True):
@@ -146,8 +138,7 @@ class TextOfBoard(FileRecord, frozen=True, kw_only=True):
             str,
             Meta(
                 pattern=rf"^{PREFIX}$(?!\n)",
-                description="a word of 1 to 32 signs of ASCII, without , and ;, that "
-                "begins with no digit, sign or point",
+                description=ABOUT_PREFIX,
                 examples=["F"],
             ),
         ]
@@ -160,7 +151,7 @@ class PortOfBoard(FileRecord, frozen=True, kw_only=True):
     """How the serial port is set."""
 
     noun: ClassVar[str] = "a port"
-    baud: Annotated[int, Meta(ge=1, le=LARGEST_BAUD)] = 115200
+    baud: Baud = 115200
     data_bits: Literal[7, 8] = field(name="data bits", default=8)
     parity: Literal["none", "even", "odd"] = "none"
     stop_bits: Literal[1, 2] = field(name="stop bits", default=1)
@@ -174,8 +165,8 @@ class StartOfBoard(FileRecord, frozen=True, kw_only=True):
     """
 
     noun: ClassVar[str] = "a start"
-    frames: Annotated[int, Meta(ge=0, le=MOST_START_FRAMES)] = 30
-    hot: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5
+    frames: StartFrames = 30
+    hot: Share = 0.5
 
 
 class BoardFile(FileRecord, frozen=True, kw_only=True):
@@ -186,11 +177,8 @@ class BoardFile(FileRecord, frozen=True, kw_only=True):
     """
 
     noun: ClassVar[str] = "a board"
-    forms: ClassVar[tuple[KeyForm, ...]] = (
-        KeyForm(("marker",)),
-        KeyForm(("sentinel",)),
-        KeyForm(("request",)),
-        KeyForm(("text",)),
+    forms: ClassVar[tuple[KeyForm, ...]] = tuple(
+        KeyForm((key,)) for key in ("marker", "sentinel", "request", "text")
     )
     format: Literal["fuzzytree-board/1"]
     name: Name
@@ -203,13 +191,19 @@ class BoardFile(FileRecord, frozen=True, kw_only=True):
     pressure: Pressure = "rises"
     port: PortOfBoard = PortOfBoard()
     start: StartOfBoard = StartOfBoard()
-    banner: Annotated[int, Meta(ge=0, le=MOST_BANNER_LINES)] = 0
+    banner: Lines = 0
 
 
 MOST_BYTES: Final = 4 * 2**20
 """The largest file of a board; one of 65536 cells with a baseline is a tenth of it."""
 
-_FAMILIES: Final = ("marker", "sentinel", "request", "text")
+_FAMILIES: Final[dict[str, tuple[type[Protocol], type[FileRecord], str]]] = {
+    "marker": (Marker, MarkerOfBoard, "marker"),
+    "sentinel": (Sentinel, SentinelOfBoard, "end zero"),
+    "request": (Request, RequestOfBoard, "ask"),
+    "text": (Text, TextOfBoard, "frame"),
+}
+"""Of each family: the record, its layout in the file, and what is always written."""
 
 
 def load_board(path: PathLike) -> Board:
@@ -253,15 +247,38 @@ checksum='none', tail='')
     file = record(entries(root, BoardFile, found), BoardFile, found)
     if file is None or found:
         raise report(name, found)
-    sensor, mistakes = _sensor(file.sensor)
+    family = next(key for key in _FAMILIES if getattr(file, key) is not None)
+    mistakes: list[Mistake] = []
     try:
-        board = _board(file, sensor)
+        sensor = Sensor(**_fields(file.sensor))
+    except InvalidModelError as error:
+        mistakes += ((("sensor", *path), text) for path, text in error.mistakes)
+        sensor = Sensor(file.sensor.rows, file.sensor.columns, file.sensor.full)
+    try:
+        board = Board(
+            name=file.name,
+            sensor=sensor,
+            protocol=_FAMILIES[family][0](**_fields(getattr(file, family))),
+            order=file.order,
+            pressure=file.pressure,
+            port=Port(**_fields(file.port)),
+            start=Start(**_fields(file.start)),
+            banner=file.banner,
+        )
     except InvalidModelError as error:
         mistakes += error.mistakes
     else:
         if not mistakes:
             return board
-    raise report(name, [*located(root, _renamed(file, mistakes))])
+    raise report(name, [*located(root, _renamed(family, mistakes))])
+
+
+def _fields(part: FileRecord) -> dict[str, Any]:
+    """Return a part of the file as the fields of the record that it stands for."""
+    found = {name: getattr(part, name) for name in part.__struct_fields__}
+    if "sizes" in found:
+        found["sizes"] = found["sizes"] != "none"
+    return {name: "" if one is None else one for name, one in found.items()}
 
 
 def _format_mistakes(root: MappingNode) -> Iterator[FileMistake]:
@@ -284,73 +301,12 @@ def _format_mistakes(root: MappingNode) -> Iterator[FileMistake]:
     yield node.line, node.column, text
 
 
-def _sensor(file: SensorOfBoard) -> tuple[Sensor, list[Mistake]]:
-    """Return the sensor, or the part that cannot be wrong and what is wrong."""
-    try:
-        sensor = Sensor(
-            rows=file.rows,
-            columns=file.columns,
-            full=file.full,
-            threshold=file.threshold,
-            baseline=file.baseline,
-            masked=tuple((row, column) for row, column in file.masked),
-        )
-    except InvalidModelError as error:
-        mistakes = [(("sensor", *path), text) for path, text in error.mistakes]
-        return Sensor(file.rows, file.columns, file.full), mistakes
-    return sensor, []
-
-
-def _board(file: BoardFile, sensor: Sensor) -> Board:
-    port, start = file.port, file.start
-    return Board(
-        name=file.name,
-        sensor=sensor,
-        protocol=_protocol(file),
-        order=file.order,
-        pressure=file.pressure,
-        port=Port(port.baud, port.data_bits, port.parity, port.stop_bits),
-        start=Start(start.frames, start.hot),
-        banner=file.banner,
-    )
-
-
-def _protocol(file: BoardFile) -> Protocol:
-    match file.marker or file.sentinel or file.request or file.text:
-        case MarkerOfBoard() as marker:
-            return Marker(
-                marker=marker.bytes,
-                bits=marker.bits,
-                byte_order=marker.byte_order,
-                sizes=marker.sizes == "rows and columns",
-                skip=marker.skip,
-                checksum=marker.checksum,
-                tail=marker.tail or "",
-            )
-        case SentinelOfBoard() as sentinel:
-            return Sentinel(sentinel.end, sentinel.zero)
-        case RequestOfBoard() as request:
-            return Request(
-                ask=request.ask,
-                bits=request.bits,
-                byte_order=request.byte_order,
-                skip=request.skip,
-                checksum=request.checksum,
-                timeout_s=request.timeout,
-            )
-        case TextOfBoard() as text:
-            return Text(text.frame, text.separator, text.prefix or "", text.skip)
-        case None:
-            raise AssertionError("a form of the file has one of the four")
-
-
-def _renamed(file: BoardFile, mistakes: list[Mistake]) -> Iterator[Mistake]:
+def _renamed(family: str, mistakes: list[Mistake]) -> Iterator[Mistake]:
     """Yield mistakes with the keys of the file on their paths.
 
-    Markers, prefixes and limits were checked with the form of the file: what is left
-    bears the same words there, but for the family and for blanks.
+    Limits were checked with the form of the file: the keys of all that is left differ
+    only by the family and by blanks.
     """
-    family = next(key for key in _FAMILIES if getattr(file, key) is not None)
     for path, text in mistakes:
         keys = [family if step == "protocol" else step for step in path]
         yield (
@@ -381,18 +337,23 @@ def board_text(board: Board) -> str:
         order: rows
         port: {baud: 115200}
     """
+    family, kind, always = next(
+        (key, kind, always)
+        for key, (own, kind, always) in _FAMILIES.items()
+        if isinstance(board.protocol, own)
+    )
     entries: dict[str, Entry] = {
         "format": BOARD_FORMAT,
         "name": board.name,
         "sensor": _sensor_entry(board.sensor),
-        **_protocol_entry(board),
+        family: _changed(kind, board.protocol, always),
         "order": board.order,
     }
     if board.pressure != "rises":
         entries["pressure"] = board.pressure
-    entries["port"] = _changed(board.port, Port(), always=("baud",))
+    entries["port"] = _changed(PortOfBoard, board.port, "baud")
     if board.start != Start():
-        entries["start"] = _changed(board.start, Start())
+        entries["start"] = _changed(StartOfBoard, board.start)
     if board.banner:
         entries["banner"] = Noted(board.banner, "lines")
     return joined(board.name, _TITLE, entries).decode()
@@ -415,40 +376,14 @@ def _sensor_entry(sensor: Sensor) -> Entry:
     return Short(entries) if is_short else entries
 
 
-def _protocol_entry(board: Board) -> dict[str, Entry]:
-    protocol = board.protocol
-    match protocol:
-        case Marker():
-            changed = _changed(protocol, Marker(protocol.marker), always=("marker",))
-            return {"marker": changed}
-        case Sentinel():
-            return {"sentinel": _changed(protocol, Sentinel(), always=("end", "zero"))}
-        case Request():
-            changed = _changed(protocol, Request(protocol.ask), always=("ask",))
-            return {"request": changed}
-        case Text():
-            return {"text": _changed(protocol, Text(), always=("frame",))}
-        case _:
-            assert_never(protocol)
-
-
 def _changed(
-    value: Marker | Sentinel | Request | Text | Port | Start,
-    usual: Marker | Sentinel | Request | Text | Port | Start,
-    always: tuple[str, ...] = (),
+    kind: type[FileRecord], value: Protocol | Port | Start, always: str = ""
 ) -> Short:
     """Return the fields that are not as usual, by their keys."""
     entries: dict[str, Entry] = {}
-    for name in value.__struct_fields__:
-        one = getattr(value, name)
-        if one == getattr(usual, name) and name not in always:
-            continue
-        match name:
-            case "marker":
-                key = "bytes"
-            case "timeout_s":
-                key = "timeout"
-            case _:
-                key = name.replace("_", " ")
-        entries[key] = "rows and columns" if name == "sizes" else one
+    for one in structs.fields(kind):
+        own = getattr(value, one.name)
+        is_usual = own == one.default or own is False or own == ""
+        if not is_usual or one.name in always.split():
+            entries[one.encode_name] = "rows and columns" if own is True else own
     return Short(entries)

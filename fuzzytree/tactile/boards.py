@@ -2,28 +2,44 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Iterator
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
+
+from msgspec import Meta
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import Mistake, Value
-from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 
-LONGEST_NAME: Final = 1000
-MOST_BYTES: Final = 64
-"""The longest marker, tail or question."""
-MOST_SKIPPED: Final = 1024
-"""The most bytes or numbers that are ignored before the cells."""
-MOST_BANNER_LINES: Final = 1000
-LARGEST_BAUD: Final = 100_000_000
-LONGEST_TIMEOUT_S: Final = 3600.0
-MOST_START_FRAMES: Final = 10_000
 HEXADECIMAL: Final = "[0-9A-Fa-f]{2}( ?[0-9A-Fa-f]{2}){0,63}"
 """The pattern of a marker, tail or question: two digits a byte, blanks allowed."""
 PREFIX: Final = r"[!-*/:<-~][!-+\--:<-~]{0,31}"
 """The pattern of a prefix: a word of ASCII that no number begins like."""
+ABOUT_HEXADECIMAL: Final = "1 to 64 bytes in hexadecimal, such as 'AA 55'"
+ABOUT_PREFIX: Final = (
+    "a word of 1 to 32 signs of ASCII, without , and ;, that begins with no digit, "
+    "sign or point"
+)
+
+Byte = Annotated[int, Meta(ge=0, le=255)]
+Skip = Annotated[int, Meta(ge=0, le=1024)]
+Hexadecimal = Annotated[
+    str,
+    Meta(
+        pattern=rf"^{HEXADECIMAL}$(?!\n)",
+        description=ABOUT_HEXADECIMAL,
+        examples=["AA 55", "0D 0A"],
+    ),
+]
+Tail = Annotated[
+    str, Meta(pattern=rf"^({HEXADECIMAL})?$(?!\n)", description=ABOUT_HEXADECIMAL)
+]
+Prefix = Annotated[str, Meta(pattern=rf"^({PREFIX})?$(?!\n)", description=ABOUT_PREFIX)]
+Seconds = Annotated[float, Meta(ge=0.001, le=3600.0)]
+Baud = Annotated[int, Meta(ge=1, le=100_000_000)]
+StartFrames = Annotated[int, Meta(ge=0, le=10_000)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Lines = Annotated[int, Meta(ge=0, le=1000)]
 
 Checksum = Literal["none", "sum8", "xor8", "crc16"]
 Order = Literal["rows", "columns"]
@@ -49,13 +65,13 @@ class Marker(Value, frozen=True, tag="marker"):
         tail: Bytes at the end, in hexadecimal.
     """
 
-    marker: str
+    marker: Hexadecimal
     bits: Literal[8, 16] = 8
     byte_order: ByteOrder = "little"
     sizes: bool = False
-    skip: int = 0
+    skip: Skip = 0
     checksum: Checksum = "none"
-    tail: str = ""
+    tail: Tail = ""
 
 
 class Sentinel(Value, frozen=True, tag="sentinel"):
@@ -67,8 +83,8 @@ class Sentinel(Value, frozen=True, tag="sentinel"):
             No cell has this value, unless it is 0.
     """
 
-    end: int = 255
-    zero: int = 0
+    end: Byte = 255
+    zero: Byte = 0
 
 
 class Request(Value, frozen=True, tag="request"):
@@ -83,12 +99,12 @@ class Request(Value, frozen=True, tag="request"):
         timeout_s: Seconds before the host repeats a request without a response.
     """
 
-    ask: str
+    ask: Hexadecimal
     bits: Literal[8, 16] = 8
     byte_order: ByteOrder = "little"
-    skip: int = 0
+    skip: Skip = 0
     checksum: Checksum = "none"
-    timeout_s: float = 0.5
+    timeout_s: Seconds = 0.5
 
 
 class Text(Value, frozen=True, tag="text"):
@@ -107,8 +123,8 @@ class Text(Value, frozen=True, tag="text"):
 
     frame: Literal["line", "block"] = "line"
     separator: Literal["space", "comma", "semicolon"] = "space"
-    prefix: str = ""
-    skip: int = 0
+    prefix: Prefix = ""
+    skip: Skip = 0
 
 
 Protocol = Marker | Sentinel | Request | Text
@@ -124,7 +140,7 @@ class Port(Value, frozen=True):
         stop_bits: 1 or 2.
     """
 
-    baud: int = 115200
+    baud: Baud = 115200
     data_bits: Literal[7, 8] = 8
     parity: Literal["none", "even", "odd"] = "none"
     stop_bits: Literal[1, 2] = 1
@@ -149,8 +165,8 @@ class Start(Value, frozen=True):
         hot: A cell whose baseline is above this share of full is masked.
     """
 
-    frames: int = 30
-    hot: float = 0.5
+    frames: StartFrames = 30
+    hot: Share = 0.5
 
 
 class Board(Value, frozen=True):
@@ -173,14 +189,14 @@ class Board(Value, frozen=True):
         InvalidModelError: If the parts contradict each other; it lists everything.
     """
 
-    name: str
+    name: Annotated[str, Meta(min_length=1, max_length=1000)]
     sensor: Sensor
     protocol: Protocol
     order: Order = "rows"
     pressure: Pressure = "rises"
     port: Port = Port()
     start: Start = Start()
-    banner: int = 0
+    banner: Lines = 0
 
     def __post_init__(self) -> None:
         """Refuse a board that contradicts itself."""
@@ -190,69 +206,24 @@ class Board(Value, frozen=True):
 
 
 def _mistakes(board: Board) -> Iterator[Mistake]:
-    if not board.name:
-        yield ("name",), "a board needs a name"
-    if len(board.name) > LONGEST_NAME:
-        yield ("name",), f"a name has at most {LONGEST_NAME} characters"
+    yield from limit_mistakes(board)
     if board.name != board.name.encode("utf-8", "ignore").decode():
         text = f"the name {board.name[:40]!r} cannot be written as UTF-8"
         yield ("name",), text
-    if not 0 <= board.banner <= MOST_BANNER_LINES:
-        text = f"a banner has 0 to {MOST_BANNER_LINES} lines, not {board.banner}"
-        yield ("banner",), text
-    for field, text in _protocol_mistakes(board):
-        yield ("protocol", *field), text
-    port, start = board.port, board.start
-    if not 1 <= port.baud <= LARGEST_BAUD:
-        text = f"baud lies in 1 to {LARGEST_BAUD}, not {port.baud}"
-        yield ("port", "baud"), text
-    if port.data_bits == 7 and not isinstance(board.protocol, Text):
-        text = "with 7 data bits only text comes through, no bytes above 127"
-        yield ("port", "data_bits"), text
-    if not 0 <= start.frames <= MOST_START_FRAMES:
-        text = f"a baseline is made of 0 to {MOST_START_FRAMES} frames"
-        yield ("start", "frames"), f"{text}, not {start.frames}"
-    if not 0 <= start.hot <= 1:
-        yield ("start", "hot"), f"hot is a share, in 0 to 1, not {start.hot!r}"
-
-
-def _protocol_mistakes(board: Board) -> Iterator[Mistake]:
+    parts = {"protocol": board.protocol, "port": board.port, "start": board.start}
+    for name, part in parts.items():
+        yield from (((name, *path), text) for path, text in limit_mistakes(part))
     protocol, full = board.protocol, board.sensor.full
-    match protocol:
-        case Marker():
-            yield from _hexadecimal_mistakes("marker", protocol.marker)
-            if protocol.tail:
-                yield from _hexadecimal_mistakes("tail", protocol.tail)
-        case Sentinel():
-            for field, value in (("end", protocol.end), ("zero", protocol.zero)):
-                if not 0 <= value <= 255:
-                    yield (field,), f"{field} is a byte, in 0 to 255, not {value}"
-            if protocol.end == protocol.zero:
-                text = f"{protocol.end} cannot both end a frame and begin a run"
-                yield ("zero",), text
-        case Request():
-            yield from _hexadecimal_mistakes("ask", protocol.ask)
-            seconds = protocol.timeout_s
-            if not (math.isfinite(seconds) and 0.001 <= seconds <= LONGEST_TIMEOUT_S):
-                text = f"a time-out lies in 0.001 to {LONGEST_TIMEOUT_S:g} seconds"
-                yield ("timeout_s",), f"{text}, not {seconds!r}"
-        case Text():
-            if protocol.prefix and not re.fullmatch(PREFIX, protocol.prefix):
-                text = "a prefix is a word of 1 to 32 signs of ASCII, without , and ;"
-                text = f"{text}, and begins with no digit, sign or point"
-                yield ("prefix",), f"{text}; not {protocol.prefix[:40]!r}"
     if isinstance(protocol, Sentinel):
+        if protocol.end == protocol.zero:
+            text = f"{protocol.end} cannot both end a frame and begin a run"
+            yield ("protocol", "zero"), text
         if full > 255:
-            yield (), f"a cell of one byte never reads the sensor's full, {full}"
-    elif not 0 <= protocol.skip <= MOST_SKIPPED:
-        text = f"skip lies in 0 to {MOST_SKIPPED}, not {protocol.skip}"
-        yield ("skip",), text
+            text = f"a cell of one byte never reads the sensor's full, {full}"
+            yield ("protocol",), text
     if isinstance(protocol, Marker | Request) and protocol.bits == 8 and full > 255:
         text = f"a cell of 8 bits never reads the sensor's full, {full}"
-        yield ("bits",), text
-
-
-def _hexadecimal_mistakes(field: str, text: str) -> Iterator[Mistake]:
-    if not re.fullmatch(HEXADECIMAL, text):
-        what = f"1 to {MOST_BYTES} bytes in hexadecimal, such as 'AA 55'"
-        yield (field,), f"{field} is {what}, not {text[:40]!r}"
+        yield ("protocol", "bits"), text
+    if board.port.data_bits == 7 and not isinstance(protocol, Text):
+        text = "with 7 data bits only text comes through, no bytes above 127"
+        yield ("port", "data_bits"), text

@@ -6,12 +6,16 @@ top, the first column at the left.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Literal
+from functools import cache
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Meta, inspect
 
 from fuzzytree.errors import InvalidModelError, TableError
 from fuzzytree.model import Mistake, Value
@@ -21,6 +25,9 @@ Cells = npt.NDArray[np.integer]
 
 LARGEST_SIDE = 256
 """The most rows or columns that a sensor may have."""
+
+Side = Annotated[int, Meta(ge=1, le=LARGEST_SIDE)]
+Full = Annotated[int, Meta(ge=1, le=65535)]
 
 
 class Sensor(Value, frozen=True):
@@ -38,9 +45,9 @@ class Sensor(Value, frozen=True):
         InvalidModelError: If the parts contradict each other; it lists everything.
     """
 
-    rows: int
-    columns: int
-    full: int = 255
+    rows: Side
+    columns: Side
+    full: Full = 255
     threshold: int = 0
     baseline: tuple[int, ...] = ()
     masked: tuple[tuple[int, int], ...] = ()
@@ -57,13 +64,54 @@ class Sensor(Value, frozen=True):
         return 8 if self.full <= 255 else 16
 
 
+def limit_mistakes(value: Value) -> Iterator[Mistake]:
+    """Yield each field of a record that is outside the limits of its type.
+
+    Example:
+        >>> from fuzzytree.tactile.boards import Port
+        >>> list(limit_mistakes(Port(baud=0)))
+        [(('baud',), 'baud lies in 1 to 100000000, not 0')]
+    """
+    for name, kind, about in _limits(type(value)):
+        found = getattr(value, name)
+        if isinstance(kind, inspect.StrType):
+            low, high = kind.min_length, kind.max_length
+            if kind.pattern and not re.search(kind.pattern, found):
+                yield (name,), f"{name} is {about}, not {found[:40]!r}"
+            elif high and not (low or 0) <= len(found) <= high:
+                text = f"{name} has {low} to {high} characters, not {len(found)}"
+                yield (name,), text
+        elif kind.ge is not None:
+            most = math.inf if kind.le is None else kind.le
+            if not kind.ge <= found <= most:
+                text = f"{_number(kind.ge)} to {_number(most)}, not {_number(found)}"
+                yield (name,), f"{name} lies in {text}"
+
+
+@cache
+def _limits(record: type[Value]) -> list[tuple[str, Any, str]]:
+    """Return the name, type and description of each field that may have limits."""
+    info = inspect.type_info(record)
+    found: list[tuple[str, Any, str]] = []
+    for field in info.fields if isinstance(info, inspect.StructType) else ():
+        kind, about = field.type, ""
+        if isinstance(kind, inspect.Metadata):
+            about = str((kind.extra_json_schema or {}).get("description", ""))
+            kind = kind.type
+        if isinstance(kind, inspect.StrType | inspect.IntType | inspect.FloatType):
+            found.append((field.name, kind, about))
+    return found
+
+
+def _number(value: float) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
 def _mistakes(sensor: Sensor) -> Iterator[Mistake]:
-    for side, size in (("rows", sensor.rows), ("columns", sensor.columns)):
-        if not 1 <= size <= LARGEST_SIDE:
-            yield (side,), f"a sensor has 1 to {LARGEST_SIDE} {side}, not {size}"
-            return
-    if not 1 <= sensor.full <= 65535:
-        yield ("full",), f"full lies in 1 to 65535, not {sensor.full}"
+    wrong = [*limit_mistakes(sensor)]
+    yield from wrong
+    if any(path[0] in ("rows", "columns") for path, _ in wrong):
+        return
     if not 0 <= sensor.threshold < max(sensor.full, 1):
         text = f"the threshold lies in 0 to full - 1, not {sensor.threshold}"
         yield ("threshold",), text

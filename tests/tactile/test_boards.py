@@ -20,8 +20,8 @@ from fuzzytree.tactile.sensor import Sensor
 SENSOR = Sensor(16, 16)
 HEX = "is 1 to 64 bytes in hexadecimal, such as 'AA 55', not"
 PREFIX = (
-    "a prefix is a word of 1 to 32 signs of ASCII, without , and ;, and begins with "
-    "no digit, sign or point; not"
+    "prefix is a word of 1 to 32 signs of ASCII, without , and ;, that begins with no "
+    "digit, sign or point, not"
 )
 
 
@@ -35,13 +35,13 @@ PREFIX = (
         (Marker("AA" * 65), [f"marker {HEX} '{'AA' * 20}'"]),
         (
             Marker("AA", tail="X", skip=-1),
-            [f"tail {HEX} 'X'", "skip lies in 0 to 1024, not -1"],
+            ["skip lies in 0 to 1024, not -1", f"tail {HEX} 'X'"],
         ),
         (
             Sentinel(end=256, zero=-1),
             [
-                "end is a byte, in 0 to 255, not 256",
-                "zero is a byte, in 0 to 255, not -1",
+                "end lies in 0 to 255, not 256",
+                "zero lies in 0 to 255, not -1",
             ],
         ),
         (Sentinel(end=7, zero=7), ["7 cannot both end a frame and begin a run"]),
@@ -49,8 +49,8 @@ PREFIX = (
             Request("", skip=9999, timeout_s=float("nan")),
             [
                 f"ask {HEX} ''",
-                "a time-out lies in 0.001 to 3600 seconds, not nan",
                 "skip lies in 0 to 1024, not 9999",
+                "timeout_s lies in 0.001 to 3600, not nan",
             ],
         ),
         (Text(prefix="a b"), [f"{PREFIX} 'a b'"]),
@@ -76,29 +76,26 @@ def test_all_mistakes_of_a_board_are_reported_at_once() -> None:
             banner=-2,
         )
     assert caught.value.mistakes == (
-        (("name",), "a board needs a name"),
-        (("banner",), "a banner has 0 to 1000 lines, not -2"),
+        (("name",), "name has 1 to 1000 characters, not 0"),
+        (("banner",), "banner lies in 0 to 1000, not -2"),
+        (("port", "baud"), "baud lies in 1 to 100000000, not 0"),
+        (("start", "frames"), "frames lies in 0 to 10000, not -1"),
+        (("start", "hot"), "hot lies in 0 to 1, not 1.5"),
         (
             ("protocol", "bits"),
             "a cell of 8 bits never reads the sensor's full, 1023",
         ),
-        (("port", "baud"), "baud lies in 1 to 100000000, not 0"),
         (
             ("port", "data_bits"),
             "with 7 data bits only text comes through, no bytes above 127",
         ),
-        (
-            ("start", "frames"),
-            "a baseline is made of 0 to 10000 frames, not -1",
-        ),
-        (("start", "hot"), "hot is a share, in 0 to 1, not 1.5"),
     )
 
 
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("n" * 1001, "a name has at most 1000 characters"),
+        ("n" * 1001, "name has 1 to 1000 characters, not 1001"),
         ("a\ud800", "the name 'a\\ud800' cannot be written as UTF-8"),
     ],
     ids=["long", "surrogate"],

@@ -66,7 +66,10 @@ def test_all_mistakes_of_a_sensor_are_reported_at_once() -> None:
     ]
     with pytest.raises(InvalidModelError) as caught:
         Sensor(0, 300)
-    assert str(caught.value) == "a sensor has 1 to 256 rows, not 0"
+    assert str(caught.value).splitlines() == [
+        "rows lies in 1 to 256, not 0",
+        "columns lies in 1 to 256, not 300",
+    ]
 
 
 def test_a_number_of_any_size_is_clipped_at_full() -> None:

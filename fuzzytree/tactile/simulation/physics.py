@@ -11,14 +11,15 @@ import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
-from typing import Literal, assert_never, get_args
+from typing import Annotated, Literal, assert_never, get_args
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Meta
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import Mistake, Value
-from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 from fuzzytree.tactile.simulation.objects import (
     OBJECTS,
     FloatArray,
@@ -151,25 +152,25 @@ class PhysicsSettings(Value, frozen=True, kw_only=True):
         InvalidModelError: If a number is out of its range; it lists everything.
     """
 
-    force: float = 1.0
-    force_spread: float = 0.24
-    tilt: float = 0.05
-    roam: float = 1.0
-    turn_deg: float = 1.0
-    aperture: float = 0.61
-    break_n: float = 0.024
-    slope_us: float = 400.0
-    bend_n: float = 1.2
-    row_spread: float = 0.05
-    column_spread: float = 0.05
-    board: int = 0
+    force: Annotated[float, Meta(ge=0.0, le=1e3)] = 1.0
+    force_spread: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.24
+    tilt: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.05
+    roam: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+    turn_deg: Annotated[float, Meta(ge=0.0, le=180.0)] = 1.0
+    aperture: Annotated[float, Meta(ge=1e-3, le=1.0)] = 0.61
+    break_n: Annotated[float, Meta(ge=0.0, le=1e3)] = 0.024
+    slope_us: Annotated[float, Meta(ge=1e-3, le=1e6)] = 400.0
+    bend_n: Annotated[float, Meta(ge=1e-3)] = 1.2
+    row_spread: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.05
+    column_spread: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.05
+    board: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 0
     wiring: Wiring = "grounded"
-    drive_ohm: float = 1500.0
-    load_ohm: float = 0.0
-    rest_us: float = 0.1
-    full_us: float = 175.0
-    noise: float = 0.5
-    threshold: int = 6
+    drive_ohm: Annotated[float, Meta(ge=0.0, le=1e9)] = 1500.0
+    load_ohm: Annotated[float, Meta(ge=0.0, le=1e9)] = 0.0
+    rest_us: Annotated[float, Meta(ge=1e-3, le=1e3)] = 0.1
+    full_us: Annotated[float, Meta(ge=1e-3, le=1e6)] = 175.0
+    noise: Annotated[float, Meta(ge=0.0, le=float(FULL))] = 0.5
+    threshold: Annotated[int, Meta(ge=0, le=FULL - 1)] = 6
 
     def __post_init__(self) -> None:
         """Refuse a number out of its range."""
@@ -179,29 +180,7 @@ class PhysicsSettings(Value, frozen=True, kw_only=True):
 
 
 def _mistakes(settings: PhysicsSettings) -> Iterator[Mistake]:
-    for name, low, high in (
-        ("force", 0.0, 1e3),
-        ("force_spread", 0.0, 3.0),
-        ("tilt", 0.0, 10.0),
-        ("roam", 0.0, 1.0),
-        ("turn_deg", 0.0, 180.0),
-        ("aperture", 1e-3, 1.0),
-        ("break_n", 0.0, 1e3),
-        ("slope_us", 1e-3, 1e6),
-        ("bend_n", 1e-3, math.inf),
-        ("row_spread", 0.0, 3.0),
-        ("column_spread", 0.0, 3.0),
-        ("board", 0, 2**32 - 1),
-        ("drive_ohm", 0.0, 1e9),
-        ("load_ohm", 0.0, 1e9),
-        ("rest_us", 1e-3, 1e3),
-        ("full_us", 1e-3, 1e6),
-        ("noise", 0.0, FULL),
-        ("threshold", 0, FULL - 1),
-    ):
-        value = getattr(settings, name)
-        if not low <= value <= high:
-            yield (name,), f"{name} lies in {low:g} to {high:g}, not {value:g}"
+    yield from limit_mistakes(settings)
     if settings.wiring not in get_args(Wiring):
         known = ", ".join(get_args(Wiring))
         yield ("wiring",), f"wiring is one of {known}, not {settings.wiring!r}"

@@ -225,7 +225,7 @@ def _header(text: bytes, **changes: int) -> bytes:
         (_header(b"[" * 100_000), "its board cannot be read: "),
         (
             _header(msgspec.json.encode(BOARD).replace(b'"rows":3', b'"rows":0')),
-            "its board cannot be read: a sensor has 1 to 256 rows, not 0",
+            "its board cannot be read: Expected `int` >= 1 - at `$.sensor.rows`",
         ),
         (_header(msgspec.json.encode(BOARD), rows=4), "its header contradicts its bo"),
         (_header(msgspec.json.encode(BOARD), record_bytes=1), "its header contradic"),
