@@ -184,7 +184,7 @@ def ways() -> Mapping[str, Callable[[Floats, int], Floats]]:
     """Return the ways to interpolate; all give the same points."""
     found: dict[str, Callable[[Floats, int], Floats]] = {
         "nearest": lambda cells, n: np.repeat(np.repeat(cells, n, 0), n, 1),
-        "fuzzy": interpolated,
+        "fuzzy": lambda cells, n: interpolated(_whole(cells), n) / _UNIT,
         "bilinear": bilinear,
     }
     if importlib.util.find_spec("scipy"):
@@ -198,6 +198,14 @@ def ways() -> Mapping[str, Callable[[Floats, int], Floats]]:
 
         found["cubic spline"] = spline
     return found
+
+
+_UNIT = 2.0**40
+
+
+def _whole(cells: Floats) -> npt.NDArray[np.int64]:
+    """Return pressures as the whole numbers that `interpolated` takes."""
+    return np.rint(cells * _UNIT).astype(np.int64)
 
 
 def print_errors() -> None:

@@ -37,9 +37,6 @@ MOST_POINTS = 2**24
 
 _BLOCK = 2**15  # points that are computed at once: they stay in the cache
 
-Real = npt.NDArray[np.integer | np.floating]
-"""What frames may hold."""
-
 
 class Weights(NamedTuple):
     """How much the four cells around a point weigh, for each phase.
@@ -77,7 +74,7 @@ def weights(times: int) -> Weights:
 
 
 def interpolated(
-    cells: Real,
+    cells: npt.NDArray[np.integer],
     times: int,
     *,
     dtype: npt.DTypeLike = np.float64,
@@ -90,11 +87,10 @@ def interpolated(
     hold bit for bit.
 
     Whole numbers are weighted by whole numbers and divided once: a value is the float
-    nearest to the exact one. Other numbers are weighted by shares, which rounds a few
-    times, and are kept between the cells that weigh anything.
+    nearest to the exact one.
 
     Args:
-        cells: Whole or finite numbers of shape (..., rows, columns).
+        cells: Whole numbers of shape (..., rows, columns).
         times: Points for a cell on each side, at least 1.
         dtype: float64 or float32, of the result.
 
@@ -104,8 +100,8 @@ def interpolated(
     Raises:
         TypeError: If `times` is no whole number.
         ValueError: If `times` or `dtype` is out of range.
-        TableError: If there is no cell, a number is not finite, or a frame would have
-            more than `MOST_POINTS` points.
+        TableError: If there is no cell, a number is no whole one or too large for exact
+            sums, or a frame would have more than `MOST_POINTS` points.
 
     Example:
         >>> found = interpolated(np.array([[100, 50], [20, 10]]), 3)
@@ -120,8 +116,7 @@ def interpolated(
     whole = np.empty((*many, times * rows, times * columns), kind)
     frames = found.reshape(-1, rows, columns)
     if frames.size:
-        is_whole = _is_exact(frames, 4 * times, kind)
-        plan = _plan(rows, columns, times, kind.name, is_whole)
+        plan = _plan(rows, columns, times, kind.name)
         points = whole.reshape(-1, rows, times, columns * times)
         block = max(1, _BLOCK // points[0].size)
         for first in range(0, len(frames), block):
@@ -138,46 +133,29 @@ def _interpolate(cells: Any, plan: _Plan, points: Any) -> None:
     right = bordered.take(plan.right, axis=2)[:, :, None]
     corners = left[:, :-1], right[:, :-1], left[:, 1:], right[:, 1:]
     total = _weighted(corners, plan.cells)
-    if plan.sums is None:
-        _confine(total, corners)
     skip = slice(plan.skip, plan.skip + rows * times)
     inner = total.reshape(count, -1, width)[:, skip].reshape(points.shape)
-    if plan.sums is None:
-        points[...] = inner
-    else:
-        np.divide(inner, plan.sums, out=points)
+    np.divide(inner, plan.sums, out=points)
 
 
 def _weighted(corners: Sequence[Any], cells: npt.NDArray[Any]) -> Any:
     """Return weighted sums, diagonals first: the same for turned or mirrored frames."""
-    with np.errstate(over="ignore"):  # by a rounding, of the largest floats alone
-        total = corners[0] * cells[0]
-        term = corners[3] * cells[3]
-        total += term
-        other = corners[1] * cells[1]
-        np.multiply(corners[2], cells[2], out=term)
-        other += term
-        total += other
+    total = corners[0] * cells[0]
+    term = corners[3] * cells[3]
+    total += term
+    other = corners[1] * cells[1]
+    np.multiply(corners[2], cells[2], out=term)
+    other += term
+    total += other
     return total
 
 
-def _confine(total: Any, corners: Sequence[Any]) -> None:
-    """Keep rounded values within the cells that weigh anything."""
-    upper_low, upper_high = np.minimum(*corners[:2]), np.maximum(*corners[:2])
-    low = np.minimum(upper_low, np.minimum(*corners[2:]))
-    high = np.maximum(upper_high, np.maximum(*corners[2:]))
-    if total.shape[2] % 2:  # the first phase lies on the centres of the upper cells
-        on_centres = total[:, :, :1]
-        np.clip(on_centres, upper_low, upper_high, out=on_centres)
-    np.clip(total, low, high, out=total)
-
-
-def _checked(cells: Real, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
+def _checked(cells: Any, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
     found: npt.NDArray[Any] = np.asarray(cells)
     if operator.index(times) < 1:
         raise ValueError(f"times is a whole number of at least 1, not {times}")
-    if found.dtype.kind not in "iuf":
-        raise TableError(f"frames hold numbers, not {found.dtype}")
+    if found.dtype.kind not in "iu":
+        raise TableError(f"frames hold whole numbers, not {found.dtype}")
     if found.ndim < 2 or 0 in found.shape[-2:]:
         raise TableError(f"an array of shape {found.shape} holds no frame")
     rows, columns = found.shape[-2:]
@@ -186,23 +164,10 @@ def _checked(cells: Real, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
             f"{rows} x {columns} cells, {times} times on each side, are more than "
             f"{MOST_POINTS} points"
         )
-    if found.dtype.kind == "f":
-        with np.errstate(over="ignore"):
-            found = found.astype(kind)
-        if not np.isfinite(found).all():
-            raise TableError(f"frames hold numbers that are finite in {kind}")
+    most = (1 << (np.finfo(kind).nmant + 1)) // (4 * times)  # sums of weights are exact
+    if found.size and not -most <= int(found.min()) <= int(found.max()) <= most:
+        raise TableError(f"cells lie in {-most} to {most}, for {times} times as {kind}")
     return found
-
-
-def _is_exact(cells: npt.NDArray[Any], most: int, kind: np.dtype[Any]) -> bool:
-    """Return whether sums of whole cells by weights, `most` in all, are exact."""
-    if cells.dtype.kind == "f":
-        return False
-    bound = int(np.iinfo(cells.dtype).max) + 1
-    limit = 1 << (np.finfo(kind).nmant + 1)
-    if bound * most > limit:  # the type leaves it open, the cells decide
-        bound = max(abs(int(cells.min())), abs(int(cells.max())))
-    return bound * most <= limit
 
 
 class _Plan(NamedTuple):
@@ -213,8 +178,7 @@ class _Plan(NamedTuple):
         left: The column of cells left of each column of points.
         right: The one right of it, or the same on a centre.
         cells: The weights, by phase downwards and column of points.
-        sums: What to divide by, for each phase of a cell; None for weights that are
-            shares already.
+        sums: What to divide by, for each phase of a cell.
         skip: Rows of points that lie before the first cell.
     """
 
@@ -222,23 +186,22 @@ class _Plan(NamedTuple):
     left: npt.NDArray[np.intp]
     right: npt.NDArray[np.intp]
     cells: npt.NDArray[Any]
-    sums: npt.NDArray[Any] | None
+    sums: npt.NDArray[Any]
     skip: int
 
 
 @functools.lru_cache(maxsize=16)
-def _plan(rows: int, columns: int, times: int, kind: str, is_whole: bool) -> _Plan:
+def _plan(rows: int, columns: int, times: int, kind: str) -> _Plan:
     skip = (times + 1) // 2  # from the centre of the border to the first point
     points = np.arange(columns * times) + skip
     before, phases = points // times - 1, points % times
     is_centre = (phases == 0) & (times % 2 == 1)
     cells, sums = weights(times)
-    shares = cells if is_whole else cells / sums
     return _Plan(
         np.clip(np.arange(-1, rows + 1), 0, rows - 1),
         np.clip(before, 0, columns - 1),
         np.clip(np.where(is_centre, before, before + 1), 0, columns - 1),
-        shares[:, :, phases].astype(kind),
-        np.roll(sums, -skip, axis=0)[:, phases].astype(kind) if is_whole else None,
+        cells[:, :, phases].astype(kind),
+        np.roll(sums, -skip, axis=0)[:, phases].astype(kind),
         skip,
     )

@@ -24,12 +24,6 @@ SIDES = st.integers(1, 6)
 WHOLE = st.tuples(SIDES, SIDES).flatmap(
     lambda shape: arrays.arrays(np.uint16, shape, elements=st.integers(0, 65535))
 )
-BROKEN = st.tuples(SIDES, SIDES).flatmap(
-    lambda shape: arrays.arrays(
-        np.float64, shape, elements=st.floats(allow_nan=False, allow_infinity=False)
-    )
-)
-
 Turn = Any
 
 
@@ -102,9 +96,9 @@ def test_single_precision_is_rounded_once_as_well() -> None:
 
 
 @settings(max_examples=30)
-@given(cells=BROKEN, times=st.sampled_from(TIMES))
+@given(cells=WHOLE, times=st.sampled_from(TIMES))
 def test_a_value_lies_between_its_four_cells(
-    cells: npt.NDArray[np.float64], times: int
+    cells: npt.NDArray[np.uint16], times: int
 ) -> None:
     found = interpolated(cells, times)
     around = corners(cells, times)
@@ -113,7 +107,7 @@ def test_a_value_lies_between_its_four_cells(
 
 
 @settings(max_examples=20)
-@given(cells=st.one_of(WHOLE, BROKEN), times=st.sampled_from(TIMES[::2]))
+@given(cells=WHOLE, times=st.sampled_from(TIMES[::2]))
 def test_the_middle_of_a_cell_has_its_value(
     cells: npt.NDArray[Any], times: int
 ) -> None:
@@ -122,13 +116,13 @@ def test_the_middle_of_a_cell_has_its_value(
 
 
 @settings(max_examples=20)
-@given(value=st.floats(allow_nan=False, allow_infinity=False))
-def test_a_frame_of_one_value_has_it_everywhere(value: float) -> None:
+@given(value=st.integers(-(2**40), 2**40))
+def test_a_frame_of_one_value_has_it_everywhere(value: int) -> None:
     assert (interpolated(np.full((3, 2), value), 6) == value).all()
 
 
 @settings(max_examples=20)
-@given(cells=st.one_of(WHOLE, BROKEN), times=st.sampled_from(TIMES))
+@given(cells=WHOLE, times=st.sampled_from(TIMES))
 @pytest.mark.parametrize(
     "turn", [np.flipud, np.fliplr, np.rot90, np.transpose], ids=lambda f: f.__name__
 )
@@ -137,12 +131,6 @@ def test_a_turned_frame_gives_turned_values_bit_for_bit(
 ) -> None:
     found = interpolated(turn(cells), times)
     assert np.array_equal(found, turn(interpolated(cells, times)))
-
-
-def test_a_cell_that_weighs_nothing_confines_nothing() -> None:
-    mirrored = interpolated(np.array([[0.0, 511.0]]), 3)
-    assert np.array_equal(interpolated(np.array([[511.0, 0.0]]), 3), mirrored[:, ::-1])
-    assert mirrored[0, 4] == 511.0
 
 
 @settings(max_examples=20)
@@ -181,7 +169,7 @@ def test_the_largest_difference_from_bilinear_values_is_the_one_that_was_derived
     assert root * (root + 1.0) ** 2 == pytest.approx(1.0, abs=1e-3)
     t = root / 2.0
     derived = t * (1.0 - t) - 2.0 * t**2 / (1.0 + 2.0 * t)
-    single = np.eye(1, 16, 5).reshape(4, 4)
+    single = np.eye(1, 16, 5, dtype=int).reshape(4, 4)
     found = np.abs(interpolated(single, 301) - bilinear(single, 301)).max()
     assert found == pytest.approx(derived, abs=1e-5)
     assert found < LARGEST_DIFFERENCE
@@ -217,7 +205,7 @@ def test_degrees_add_up_to_one_on_a_line_of_centres_and_to_two_in_the_middle() -
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("kind", [np.uint8, np.int64, np.float32])
+@pytest.mark.parametrize("kind", [np.uint8, np.int64, np.int16])
 def test_many_frames_give_what_each_gives_alone(dtype: type, kind: type) -> None:
     chance = np.random.default_rng(5)
     frames: npt.NDArray[Any] = chance.integers(0, 256, (2, 40, 9, 7)).astype(kind)
@@ -227,19 +215,12 @@ def test_many_frames_give_what_each_gives_alone(dtype: type, kind: type) -> None
     assert np.array_equal(found[1, 39], interpolated(frames[1, 39], 5, dtype=dtype))
 
 
-def test_whole_cells_too_large_for_exact_sums_stay_between_their_neighbours() -> None:
-    cells = np.array([[2**62, 2**62], [2**62, 2**62 + 2**20]])
-    found = interpolated(cells, 7)
-    assert found.min() == 2.0**62
-    assert found.max() == 2.0**62 + 2.0**20
-
-
 def test_no_frames_are_no_values() -> None:
-    assert interpolated(np.empty((0, 2, 3)), 4).shape == (0, 8, 12)
+    assert interpolated(np.empty((0, 2, 3), int), 4).shape == (0, 8, 12)
 
 
 def test_nothing_given_is_changed() -> None:
-    cells = PAPER.astype(np.float64)
+    cells = PAPER.copy()
     interpolated(cells, 1)[:] = 7.0
     assert cells.tolist() == PAPER.tolist()
 
@@ -265,7 +246,7 @@ def test_nothing_given_is_changed() -> None:
             ValueError,
             "interpolated values are float64 or float32, not int64",
         ),
-        (PAPER == 10, {"times": 2}, TableError, "frames hold numbers, not bool"),
+        (PAPER == 10, {"times": 2}, TableError, "frames hold whole numbers, not bool"),
         (
             PAPER[0],
             {"times": 2},
@@ -273,22 +254,22 @@ def test_nothing_given_is_changed() -> None:
             "an array of shape (2,) holds no frame",
         ),
         (
-            np.empty((3, 0, 2)),
+            np.empty((3, 0, 2), int),
             {"times": 2},
             TableError,
             "an array of shape (3, 0, 2) holds no frame",
         ),
         (
-            PAPER * np.inf,
+            PAPER * 1.0,
             {"times": 2},
             TableError,
-            "frames hold numbers that are finite in float64",
+            "frames hold whole numbers, not float64",
         ),
         (
-            PAPER * 1e300,
+            PAPER * 2**20,
             {"times": 2, "dtype": "float32"},
             TableError,
-            "frames hold numbers that are finite in float32",
+            "cells lie in -2097152 to 2097152, for 2 times as float32",
         ),
         (
             np.zeros((256, 256), np.uint8),
