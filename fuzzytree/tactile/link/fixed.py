@@ -93,48 +93,22 @@ def layout_of(board: Board, protocol: Marker | Request) -> Layout:
     )
 
 
-def blocks_of(layout: Layout, data: bytearray, count: int) -> Blocks:
-    """Return the first frames' bytes, a copy of shape (count, size)."""
-    copy = bytes(data[: count * layout.size])
-    return np.frombuffer(copy, np.uint8).reshape(count, layout.size)
-
-
 def cells_of(layout: Layout, blocks: Blocks) -> Cells:
     """Return the cells of frames in the order of the board: (frames, cells)."""
     inner = blocks[:, layout.cells_from : layout.cells_from + layout.cell_bytes]
     return np.ascontiguousarray(inner).view(layout.dtype)
 
 
-def are_whole(layout: Layout, blocks: Blocks) -> Truths:
-    """Return which frames have their head, tail, checksum and possible cells."""
-    head = np.frombuffer(layout.head, np.uint8)
-    good: Truths = (blocks[:, : len(head)] == head).all(axis=1)
-    if layout.tail:
-        tail = np.frombuffer(layout.tail, np.uint8)
-        good &= (blocks[:, -len(tail) :] == tail).all(axis=1)
-    if layout.largest < (255 if layout.dtype == "u1" else 65535):
-        good &= (cells_of(layout, blocks) <= layout.largest).all(axis=1)
-    end = layout.cells_from + layout.cell_bytes
-    checked = blocks[:, layout.checked_from : end]
-    match layout.checksum:
-        case "none":
-            pass
-        case "sum8":
-            good &= checked.sum(axis=1, dtype=np.uint8) == blocks[:, end]
-        case "xor8":
-            good &= np.bitwise_xor.reduce(checked, axis=1) == blocks[:, end]
-        case "crc16":
-            given = np.ascontiguousarray(blocks[:, end : end + 2]).view("<u2")[:, 0]
-            good &= crc16(checked) == given
-        case _:
-            assert_never(layout.checksum)
-    return good
+def whole_blocks(layout: Layout, content: bytes) -> tuple[Blocks, Truths]:
+    """Return the frames of some bytes, (frames, size), and which of them are whole."""
+    count = len(content) // layout.size
+    data = np.frombuffer(content, np.uint8, count * layout.size)
+    good = are_whole(layout, data, np.arange(count) * layout.size)
+    return data.reshape(count, layout.size), good
 
 
-def are_whole_at(
-    layout: Layout, data: npt.NDArray[np.uint8], places: npt.NDArray[np.int64]
-) -> Truths:
-    """Return at which places a whole frame stands, with the result of `are_whole`.
+def are_whole(layout: Layout, data: Blocks, places: npt.NDArray[np.int64]) -> Truths:
+    """Return at which places a frame has its head, tail, checksum and possible cells.
 
     The time grows with the bytes plus the places, not with their product: what a
     frame sums up to is the difference of two running totals.
@@ -142,14 +116,15 @@ def are_whole_at(
     Args:
         layout: How a frame lies in its bytes.
         data: Bytes of shape (bytes,), in which a frame's length fits at each place.
-        places: Where heads stand, of shape (places,); heads are not looked at again.
+        places: Where frames may begin, of shape (places,).
     """
     good: Truths = np.ones(len(places), np.bool_)
     begin = places + layout.cells_from
     end = begin + layout.cell_bytes
-    tail_from = places + (layout.size - len(layout.tail))
-    for place, byte in enumerate(layout.tail):
-        good &= data[tail_from + place] == byte
+    tail_from = layout.size - len(layout.tail)
+    for part, start in ((layout.head, 0), (layout.tail, tail_from)):
+        for place, byte in enumerate(part, start):
+            good &= data[places + place] == byte
     if layout.largest < (255 if layout.dtype == "u1" else 65535):
         large = _large_cells(layout, data)
         good &= large[end] == large[begin]
@@ -175,52 +150,32 @@ def are_whole_at(
     return good
 
 
-def crc16(rows: Blocks) -> npt.NDArray[np.uint16]:
-    """Return the CRC-16 of Modbus of each row.
-
-    The polynomial is 0x8005, reflected, and the start 0xFFFF. A CRC is linear over
-    GF(2): that of a row is the XOR of what each half of each byte gives by itself at
-    its place, and of what the start gives.
-
-    Example:
-        >>> message = np.frombuffer(b"123456789", np.uint8)
-        >>> hex(crc16(message[np.newaxis])[0])
-        '0x4b37'
-    """
-    start, table = _crc_table(rows.shape[1])
-    places = np.arange(rows.shape[1]) * 32
-    low = table.take(places + (rows & 15))
-    high = table.take(places + 16 + (rows >> 4))
-    found: npt.NDArray[np.uint16] = np.bitwise_xor.reduce(low ^ high, axis=1) ^ start
-    return found
-
-
 def _crc_parts(data: Blocks, at: npt.ArrayLike) -> npt.NDArray[np.uint16]:
-    """Return what bytes at places give to a CRC that a number of zeros ends."""
-    _, table = _crc_table(_CRC_PERIOD)
+    """Return what bytes at places give to a CRC that a number of zeros ends.
+
+    The CRC-16 is that of Modbus: the polynomial is 0x8005, reflected, and the start
+    0xFFFF. A CRC is linear over GF(2): that of a message is the XOR of what each half
+    of each byte gives by itself at its place, and of what the start gives.
+    """
+    table = _crc_table()
     places = np.asarray(at) % _CRC_PERIOD * 32
     low, high = table.take(places + (data & 15)), table.take(places + 16 + (data >> 4))
     found: npt.NDArray[np.uint16] = low ^ high
     return found
 
 
-@functools.lru_cache(maxsize=8)
-def _crc_table(length: int) -> tuple[np.uint16, npt.NDArray[np.uint16]]:
-    """Return what 0xFFFF at the start gives, and half bytes (0-15) at each place."""
+@functools.cache
+def _crc_table() -> npt.NDArray[np.uint16]:
+    """Return what half bytes (0-15) at each place give, low and high one."""
     bits = np.arange(256)
     for _ in range(8):
         bits = (bits >> 1) ^ (bits & 1) * 0xA001
     low, high = bits.astype(np.uint16), np.arange(256, dtype=np.uint16)
     rows = low[np.newaxis, [*range(16), *range(0, 256, 16)]]
-    start, zeros = np.uint16(0xFFFF), 1
-    while zeros <= length:  # behind a value, which `low` and `high` give half by half
-        if length & zeros:
-            start = low[start & 255] ^ high[start >> 8]
-        if len(rows) < length:
-            rows = np.concatenate([low[rows & 255] ^ high[rows >> 8], rows])
+    while len(rows) < _CRC_PERIOD:  # behind them stand zeros: `low` and `high` halves
+        rows = np.concatenate([low[rows & 255] ^ high[rows >> 8], rows])
         low, high = (low[half & 255] ^ high[half >> 8] for half in (low, high))
-        zeros *= 2
-    return start, rows[len(rows) - length :].ravel()
+    return rows[len(rows) - _CRC_PERIOD :].ravel()
 
 
 def _running_xor(
@@ -278,10 +233,8 @@ class RequestDecoder(Decoder):
             self._skip(taken)
             if self._banner:
                 return []
-        count = len(self._buffer) // self._layout.size
-        blocks = blocks_of(self._layout, self._buffer, count)
-        good = are_whole(self._layout, blocks)
-        whole = int(good.sum())
+        blocks, good = whole_blocks(self._layout, bytes(self._buffer))
+        count, whole = len(good), int(good.sum())
         if whole:
             self._is_given = self._layout.proof_bytes < 2
         self.counters.damaged += count - whole

@@ -27,10 +27,9 @@ from fuzzytree.tactile.link.decoder import Decoder
 from fuzzytree.tactile.link.fixed import (
     Truths,
     are_whole,
-    are_whole_at,
-    blocks_of,
     cells_of,
     layout_of,
+    whole_blocks,
 )
 from fuzzytree.tactile.sensor import Cells
 
@@ -89,9 +88,8 @@ class MarkerDecoder(Decoder):
 
     def _run(self, *, is_final: bool) -> list[Cells]:
         """Give out the frames at the front; lose the lock where there is none."""
-        count = len(self._buffer) // self._size
-        blocks = blocks_of(self._layout, self._buffer, count)
-        good = are_whole(self._layout, blocks)
+        blocks, good = whole_blocks(self._layout, bytes(self._buffer))
+        count = len(good)
         whole = count if good.all() else int(good.argmin())
         frames = self._frames(cells_of(self._layout, blocks[:whole]))
         self.framed += whole * self._size
@@ -166,7 +164,7 @@ class MarkerDecoder(Decoder):
             places.append(place)
             place = self._buffer.find(self._layout.head, place + 1)
         data = np.frombuffer(bytes(self._buffer[: places[-1] + self._size]), np.uint8)
-        good = are_whole_at(self._layout, data, np.array(places))
+        good = are_whole(self._layout, data, np.array(places))
         found = bool(good.any())
         self._drop(places[int(good.argmax())] if found else places[-1] + 1)
         return found
@@ -208,10 +206,8 @@ class MarkerDecoder(Decoder):
         return next(begin for begin in begins if self._is_whole(begin))  # at last 0
 
     def _is_whole(self, place: int) -> bool:
-        block = self._buffer[place : place + self._size]
-        return len(block) == self._size and bool(
-            are_whole(self._layout, blocks_of(self._layout, block, 1))[0]
-        )
+        block = bytes(self._buffer[place : place + self._size])
+        return bool(whole_blocks(self._layout, block)[1].any())
 
     def _marks(self, start: int) -> Truths:
         """Return where the marker stands within a frame's length, or may stand."""
