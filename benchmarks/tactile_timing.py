@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 
@@ -15,21 +14,37 @@ import numpy as np
 from fuzzytree.benchmarking.clock import Call, time_calls
 from fuzzytree.benchmarking.machine import after, machine
 from fuzzytree.benchmarking.records import Machine, Timing
+from fuzzytree.exporters import open_bare
 from fuzzytree.model.contracts import Model, Progress
 from fuzzytree.model.rulebase import RuleBase, fingerprint
+from fuzzytree.runtimes import compiled, load
+from fuzzytree.tactile.exporters.c_frames import write_frames_c
+from fuzzytree.tactile.exporters.onnx_frames import (
+    USUAL,
+    frames_at_once,
+    write_frames,
+)
+from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.exact import exact_features
-from fuzzytree.tactile.features.plain import plain_answer
+from fuzzytree.tactile.features.plain import plain_answer, plain_shown
 from fuzzytree.tactile.recognition.agreement import errors
 from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
+    LOOP,
+    NUMPY,
+    ONNX,
     PLAIN,
+    C,
     Runner,
     RunnerResult,
     as_sent,
     runners,
 )
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
+
+Step = Callable[[Cells], object]
+"""Recognises frames; this is timed."""
 
 STRENGTHS = "numpy with strengths"
 COPY = "floor: the frames copied"
@@ -130,14 +145,14 @@ def time_frames(
         raise ValueError("there is no frame to measure with")
     before = machine(["onnx", "onnxruntime"])
     ways, omissions = runners(model, sensor, reject)
-    if not isinstance(model, RuleBase):  # rules have no prediction without strengths
-        whole = Recogniser(model, sensor, reject)
-        ways.insert(1, replace(ways[0], name=STRENGTHS, call=whole))
+    steps, sizes = _steps(model, sensor, reject, ways)
     judged = _judged(model, sensor, given, ways, reject)
+    if STRENGTHS in steps:
+        judged[STRENGTHS] = judged[NUMPY]
     timings: dict[str, list[Timing]] = {}
     is_complete = True
     for place, count in enumerate(rows):
-        calls, left_out = _calls(ways, given, count)
+        calls, left_out = _calls(steps, given, count)
         omissions += left_out
         share = (seconds - (time.perf_counter() - begin)) / (len(rows) - place)
         found = time_calls(
@@ -153,7 +168,6 @@ def time_frames(
         is_complete = is_complete and found.is_complete
         for name, one in found.timings.items():
             timings.setdefault(name, []).append(one)
-    sizes = {way.name: way.bytes for way in ways}
     points = tuple(
         Point(name, tuple(own), sizes.get(name, 0), *judged.get(name, (None, 0)))
         for name, own in timings.items()
@@ -174,20 +188,61 @@ def time_frames(
     )
 
 
+def _steps(
+    model: Model, sensor: Sensor, reject: float, ways: Iterable[str]
+) -> tuple[dict[str, Step], dict[str, int]]:
+    """Return what is timed of each way, without its features, and the size of its file.
+
+    A step takes frames as they are sent (`as_sent`), and does not look at them.
+    """
+    recogniser, decide = Recogniser(model, sensor, reject), load(model)
+    made = frame_program(sensor, model.inputs)
+    found: dict[str, Step] = {
+        NUMPY: lambda frames: decide(recogniser.plan(frames).values)
+    }
+    sizes: dict[str, int] = {}
+    if not isinstance(model, RuleBase):  # rules have no prediction without strengths
+        found[STRENGTHS] = recogniser
+    if ONNX in ways:
+        content = write_frames(model, sensor, reject=reject, verify=False).content
+        bare, size = open_bare(content), frames_at_once(sensor)
+        sizes[ONNX] = len(content)
+
+        def graph(frames: Cells) -> None:
+            for start in range(0, len(frames), size):
+                bare([*USUAL], {"frames": frames[start : start + size]})
+
+        found[ONNX] = graph
+    if C in ways:
+        content = write_frames_c(model, sensor, name="model", reject=reject).content
+        many = compiled(content, LOOP, 4)
+        sizes[C] = len(content)
+
+        def loop(frames: Cells) -> None:
+            ends = [array.ctypes.data for array in np.empty((3, len(frames)), np.int64)]
+            many(frames.ctypes.data, len(frames), None, *ends)
+
+        found[C] = loop
+    found[PLAIN] = lambda frames: [
+        plain_shown(made, model, frame, reject) for frame in frames
+    ]
+    return found, sizes
+
+
 def _calls(
-    ways: Sequence[Runner], frames: Cells, count: int
+    steps: Mapping[str, Step], frames: Cells, count: int
 ) -> tuple[dict[str, Call], list[str]]:
     """Return what is timed for so many frames in a call, and what is left out."""
     many = np.ascontiguousarray(frames.take(np.arange(count) % len(frames), axis=0))
     calls: dict[str, Call] = {}
     omissions: list[str] = []
-    for way in ways:
-        if way.name == PLAIN and count > _MOST_PLAIN:
+    for name, step in steps.items():
+        if name == PLAIN and count > _MOST_PLAIN:
             omissions.append(
                 f"{PLAIN}: {count:,} frames in a call; it takes them one by one"
             )
         else:
-            calls[way.name] = partial(way.call, many)
+            calls[name] = partial(step, many)
     calls[COPY] = many.copy
     if all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
         calls[SESSION] = _empty_session(many)
@@ -197,8 +252,6 @@ def _calls(
 def _empty_session(frames: Cells) -> Callable[[], object]:
     """Return the call of a session that hands the same frames back."""
     from onnx import helper
-
-    from fuzzytree.exporters.onnx_session import open_bare
 
     kind = helper.np_dtype_to_tensor_dtype(frames.dtype)
     shapes = [
@@ -217,7 +270,7 @@ def _judged(
     model: Model,
     sensor: Sensor,
     frames: Cells,
-    ways: Sequence[Runner],
+    ways: Mapping[str, Runner],
     reject: float,
 ) -> dict[str, tuple[float, int]]:
     """Return the largest error and the flips of each way, on some of the frames."""
@@ -233,10 +286,10 @@ def _judged(
         for frame, values in zip(some, exact, strict=True)
     ]
     found: dict[str, tuple[float, int]] = {}
-    for way in ways:
-        answers = way.answer(some)
+    for name, run in ways.items():
+        answers = run(some)
         largest = _largest(model, sensor, some, answers, exact)
-        found[way.name] = largest, int((answers.codes != np.array(codes)).sum())
+        found[name] = largest, int((answers.codes != np.array(codes)).sum())
     return found
 
 

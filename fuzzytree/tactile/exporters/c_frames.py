@@ -25,7 +25,7 @@ from fuzzytree.exporters import (
 from fuzzytree.model import Model, Written
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
-from fuzzytree.tactile.features.plain import check_reject, plain_answer, plain_features
+from fuzzytree.tactile.features.plain import check_reject, plain_shown
 from fuzzytree.tactile.sensor import Cells, Sensor, offsets
 
 _PRESSES = 6  # in the self-test, beside aimed frames
@@ -372,8 +372,8 @@ def _selftest(
 def _example(
     made: FrameProgram, model: Model, frame: Cells, reject: float
 ) -> Iterator[str]:
-    values, is_pressed = plain_features(made, frame)
-    shown = plain_answer(model, values, is_pressed=is_pressed, reject=reject)
+    shown = plain_shown(made, model, frame, reject)
+    values = shown.features
     bits = struct.unpack(f"<{len(values)}Q", struct.pack(f"<{len(values)}d", *values))
     words = ", ".join(f"UINT64_C({one:#018x})" for one in (*bits, 0))
     yield f"    /* {', '.join(map(repr, values)) or 'no features'} */\n"

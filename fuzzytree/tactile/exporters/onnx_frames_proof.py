@@ -12,7 +12,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters import RUNTIME_ERRORS, first_line, open_bare
 from fuzzytree.model import Model
 from fuzzytree.tactile.features import FrameProgram
-from fuzzytree.tactile.features.plain import Shown, plain_answer, plain_features
+from fuzzytree.tactile.features.plain import Shown, plain_shown
 from fuzzytree.tactile.sensor import Cells
 
 if TYPE_CHECKING:
@@ -57,8 +57,7 @@ def apart(
         reject: As `fuzzytree.tactile.exporters.onnx_frames.write_frames`.
     """
     for number, frame in enumerate(frames):
-        values, is_pressed = plain_features(made, frame)
-        right = plain_answer(model, values, is_pressed=is_pressed, reject=reject)
+        right = plain_shown(made, model, frame, reject)
         for name, answers in found.items():
             given = np.asarray(answers[number]).tolist()
             wanted = np.asarray(_expected(model, right, name)).tolist()

@@ -77,6 +77,14 @@ def plain_features(made: FrameProgram, frame: Cells) -> tuple[tuple[float, ...],
     return tuple(features), is_pressed > 0.0
 
 
+def plain_shown(
+    made: FrameProgram, model: Model, frame: Cells, reject: float = 0.0
+) -> Shown:
+    """Return what one frame shows, by `plain_features` and `plain_answer`."""
+    values, is_pressed = plain_features(made, frame)
+    return plain_answer(model, values, is_pressed=is_pressed, reject=reject)
+
+
 def check_reject(model: Model, reject: float) -> None:
     """Refuse a floor that a model has no strengths for.
 

@@ -214,11 +214,12 @@ def check_frames_agree(
     every = [aimed] if frames is None else [aimed, as_sent(sensor, frames)]
     rows = np.concatenate(every)
     ways, skipped = runners(model, sensor, reject)
-    found = {way.name: way.answer(rows) for way in ways if way.name != PLAIN}
+    run_plain = ways.pop(PLAIN)
+    found = {name: run(rows) for name, run in ways.items()}
     cells = sensor.rows * sensor.columns
     some = rows[: max(_PLAIN_CELLS // cells, _FEWEST)]
     few = rows[: max(_EXACT_CELLS // cells, _FEWEST)]
-    plain = next(way for way in ways if way.name == PLAIN).answer(some)
+    plain = run_plain(some)
     if len(some) < len(rows):
         skipped.append(f"{PLAIN}: {len(rows) - len(some)} frames, to save time")
     comparisons = [_compared(NUMPY, found[NUMPY], PLAIN, plain, model)]
@@ -226,9 +227,7 @@ def check_frames_agree(
         if name != NUMPY:
             one = _compared(name, found[name], NUMPY, found[NUMPY], model)
             comparisons += [one, _compared(name, found[name], PLAIN, plain, model)]
-    comparisons += [
-        _singly(way, rows, found[way.name]) for way in ways if way.name != PLAIN
-    ]
+    comparisons += [_singly(n, run, rows, found[n]) for n, run in ways.items()]
     exact = _against_exact(model, sensor, few, plain, reject)
     if len(few) < len(rows):
         skipped.append(f"{EXACT}: {len(rows) - len(few)} frames, to save time")
@@ -306,27 +305,27 @@ def _label(found: RunnerResult, frame: int, model: Model) -> str:
     return model.classes[code] if code >= 0 else State(found.states[frame]).name.lower()
 
 
-def _singly(way: Runner, frames: Cells, found: RunnerResult) -> Comparison:
+def _singly(name: str, run: Runner, frames: Cells, found: RunnerResult) -> Comparison:
     """Ask with no frame, one at a time, some, another memory order, a wrong width."""
     wrong: list[str] = []
     step = max(len(frames) // 8, 1)
     part = slice(None, None, step)
-    if way.answer(frames[:0]).features.shape[1]:
+    if run(frames[:0]).features.shape[1]:
         wrong.append("no frames get an answer")
     for place in range(0, len(frames), step):
-        own = way.answer(frames[place : place + 1])
+        own = run(frames[place : place + 1])
         if not _is_same(own, found, slice(place, place + 1)):
             wrong.append(f"frame {place} alone gets another answer")
     for given in (frames[part], np.asfortranarray(frames[part])):
-        if not _is_same(way.answer(given), found, part):
+        if not _is_same(run(given), found, part):
             wrong.append("some of the frames get other answers")
     try:
-        way.answer(frames[:, :, :-1])
+        run(frames[:, :, :-1])
         wrong.append("frames of another size get an answer")
     except TableError:
         pass
     return Comparison(
-        way.name,
+        name,
         "itself",
         "calls",
         len(range(0, len(frames), step)) + 4,
