@@ -25,6 +25,7 @@ from fuzzytree.auditing.recheck.polynomials import (
     Root,
     at,
     derivative,
+    enclosed,
     is_same,
     piece_at,
     pieces,
@@ -94,12 +95,12 @@ class Levels:
         poly, end = self.known[number]
         if isinstance(end, Fraction):
             return poly[0], poly[0]
-        low, high = end.value(poly)
+        low, high = enclosed(poly, end.low, end.high)
         width = end.high - end.low
         while high - low > FINE:
             width = min(width, end.high - end.low) / 2**16
             end.narrow(width)
-            low, high = end.value(poly)
+            low, high = enclosed(poly, end.low, end.high)
         return low, high
 
 

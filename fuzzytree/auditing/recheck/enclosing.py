@@ -1,21 +1,23 @@
 """Degrees of curves that are no polynomials, between two fractions.
 
-Everything is rounded outwards at 2**-160, so the two ends hold for certain.
+Both ends are rounded outwards, to 2**-160 or 60 decimal digits, so they are certain.
 """
 
 from __future__ import annotations
 
-import math
+import contextlib
 from collections.abc import Callable
+from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Any
 
 from fuzzytree.auditing.recheck.model_records import Curve, Scaled, Shape
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
-from fuzzytree.auditing.recheck.polynomials import ONE, ZERO, degree, is_exact
+from fuzzytree.auditing.recheck.polynomials import ONE, ZERO, degree
 
 BITS, TERMS = 160, 48
 UNIT = 1 << BITS
+DIGITS = Context(prec=60)
 Between = tuple[Fraction, Fraction]
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751, 10**49)
@@ -37,25 +39,23 @@ def falling(x: Fraction) -> Between:
 
     Example:
         >>> low, high = falling(Fraction(1))
-        >>> float(low) == float(high) == math.exp(-1)
+        >>> float(low) == float(high) == 0.36787944117144233
         True
     """
     if not x:
         return ONE, ONE
-    if x > BITS:
-        return ZERO, Fraction(1, 2**BITS)
-    halvings = math.ceil(x).bit_length() + 1
-    part = x / 2**halvings  # at most 1/2
-    ends = part.numerator * UNIT // part.denominator, 0
-    ends = ends[0], ends[0] + 1
-    low, high = UNIT, UNIT + (UNIT >> (TERMS - 1)) + 1
-    for place in range(TERMS, 0, -1):
-        low = UNIT + ends[0] * low // (place * UNIT)
-        high = UNIT - (-ends[1] * high // (place * UNIT))
-    low, high = UNIT * UNIT // high, -(-UNIT * UNIT // low)
-    for _ in range(halvings):
-        low, high = low * low // UNIT, -(-high * high // UNIT)
-    return Fraction(low, UNIT), Fraction(high, UNIT)
+    return _rising(DIGITS.exp, -x) if x <= BITS else (ZERO, Fraction(1, UNIT))
+
+
+def _rising(function: Callable[[Decimal], Decimal], x: Fraction) -> Between:
+    """Return between which numbers a rising function of x lies.
+
+    Decimals round its values to the nearest one, so its neighbours are beyond.
+    """
+    parts = Decimal(x.numerator), Decimal(x.denominator)
+    near = DIGITS.divide(*parts)  # the nearest decimal; x is between its neighbours
+    ends = function(DIGITS.next_minus(near)), function(DIGITS.next_plus(near))
+    return Fraction(DIGITS.next_minus(ends[0])), Fraction(DIGITS.next_plus(ends[1]))
 
 
 def logistic(low: Fraction, high: Fraction) -> Between:
@@ -70,27 +70,7 @@ def logistic(low: Fraction, high: Fraction) -> Between:
 
 def logarithm(x: Fraction) -> Between:
     """Return between which numbers the natural logarithm of x > 0 lies."""
-    power = x.numerator.bit_length() - x.denominator.bit_length()
-    rest = x / Fraction(2) ** power  # above 1/2, below 2
-    low, high = _atanh((rest - 1) / (rest + 1))
-    two = _atanh(Fraction(1, 3))
-    ends = sorted((power * two[0], power * two[1]))
-    return 2 * (low + ends[0]), 2 * (high + ends[1])
-
-
-def _atanh(z: Fraction) -> Between:
-    """Return between which numbers atanh(z) lies, |z| at most 1/3."""
-    if z < 0:
-        low, high = _atanh(-z)
-        return -high, -low
-    count = 2 * TERMS
-    low = high = ZERO
-    square = down(z * z), up(z * z)
-    high = Fraction(9, 8)  # what is left is at most 1 / (1 - z**2)
-    for place in range(count, -1, -1):
-        low = down(Fraction(1, 2 * place + 1) + square[0] * low)
-        high = up(Fraction(1, 2 * place + 1) + square[1] * high)
-    return down(z * low), up(z * high)
+    return _rising(DIGITS.ln, x)
 
 
 def cosine(turns: Fraction) -> Between:
@@ -129,7 +109,7 @@ def bounds(shape: Shape, x: Fraction) -> Between:
     Raises:
         UndecidedError: If a curve is not known here.
     """
-    if is_exact(shape):
+    with contextlib.suppress(UndecidedError):
         return _certain(degree(shape, x))
     if isinstance(shape, Scaled):
         height = Fraction(shape.height)

@@ -372,9 +372,9 @@ def matches_facts(case: Case, answer: Answer) -> bool | None:
         ways = [facts | {"clause": _Shown(text)} for text in _clauses(case, answer)]
     is_known = False
     for form in forms():
-        loose = _pattern(form.sentence, None)
-        is_one = answer.code == form.code or answer.code[:3] == form.code
-        if not is_one or not re.fullmatch(loose, answer.sentence, re.DOTALL):
+        if form.code not in (answer.code, answer.code[:3]):
+            continue
+        if not re.fullmatch(_pattern(form.sentence, None), answer.sentence, re.DOTALL):
             continue
         is_known = True
         for known in ways:

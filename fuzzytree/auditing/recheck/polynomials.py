@@ -1,16 +1,17 @@
 """Polynomials in fractions, their roots, and the membership functions made of them.
 
-The lowest power comes first; `()` is 0. Roots are isolated by Descartes' rule.
+The lowest power comes first; `()` is 0. Where the slope keeps its sign is one root, or
+none.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fuzzytree.auditing.recheck.model_records import (
     LR,
@@ -20,6 +21,7 @@ from fuzzytree.auditing.recheck.model_records import (
     Points,
     Scaled,
     Shape,
+    Side,
 )
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
 
@@ -66,18 +68,21 @@ def within(curve: Iterable[float | Fraction], inner: Poly) -> Poly:
     return total
 
 
+def divided(poly: Poly, divisor: Poly) -> tuple[Poly, Poly]:
+    """Return the quotient of two polynomials, and the remainder."""
+    rest, out = list(poly), [ZERO] * max(len(poly) - len(divisor) + 1, 0)
+    for place in range(len(out) - 1, -1, -1):
+        out[place] = rest[place + len(divisor) - 1] / divisor[-1]
+        for k, c in enumerate(divisor):
+            rest[place + k] -= out[place] * c
+    return tuple(out), trimmed(rest)
+
+
 def common(one: Poly, other: Poly) -> Poly:
     """Return the greatest common divisor of two polynomials."""
     while other:
-        scale = other[-1]
-        other = tuple(c / scale for c in other)
-        rest = list(one)
-        while len(rest) >= len(other):
-            top, shift = rest[-1], len(rest) - len(other)
-            for place, c in enumerate(other):
-                rest[shift + place] -= top * c
-            rest = list(trimmed(rest[:-1]))
-        one, other = other, tuple(rest)
+        other = tuple(c / other[-1] for c in other)
+        one, other = other, divided(one, other)[1]
     return one
 
 
@@ -86,14 +91,13 @@ def derivative(poly: Poly) -> Poly:
     return tuple(n * c for n, c in enumerate(poly))[1:]
 
 
-def quotient(poly: Poly, divisor: Poly) -> Poly:
-    """Return a polynomial divided by one that divides it."""
-    rest, out = list(poly), [ZERO] * (len(poly) - len(divisor) + 1)
-    for place in range(len(out) - 1, -1, -1):
-        out[place] = rest[place + len(divisor) - 1] / divisor[-1]
-        for k, c in enumerate(divisor):
-            rest[place + k] -= out[place] * c
-    return tuple(out)
+def enclosed(poly: Poly, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
+    """Return between which two numbers a polynomial's values on an interval lie."""
+    least = most = ZERO
+    for coefficient in reversed(poly):
+        ends = [a * b for a in (least, most) for b in (low, high)]
+        least, most = min(ends) + coefficient, max(ends) + coefficient
+    return least, most
 
 
 # --- roots
@@ -130,107 +134,41 @@ class Root:
             self.high = middle
 
     def narrow(self, width: Fraction) -> None:
-        """Make the interval no wider than this, by a guess in doubles if it is one."""
-        if self.high - self.low > 256 * width:
-            self._guess(width / 4)
+        """Make the interval no wider than this."""
         while self.high - self.low > width:
             self.halve()
 
-    def _guess(self, away: Fraction) -> None:
-        try:
-            low, high = float(self.low), float(self.high)
-            near = [float(c) for c in reversed(self.poly)]
-        except OverflowError:
-            return
-        for _ in range(64):
-            middle, value = (low + high) / 2, 0.0
-            for c in near:
-                value = value * middle + c
-            if (value > 0) == self.sign:
-                low = middle
-            else:
-                high = middle
-        if not math.isfinite(low):
-            return
-        ends = Fraction(low) - away, Fraction(low) + away
-        while self.low < ends[0] and ends[1] < self.high:
-            signs = [self._sign(end) for end in ends]
-            if all(signs) and (signs[0] > 0) == self.sign != (signs[1] > 0):
-                self.low, self.high = ends
-                return
-            away *= 2**8
-            ends = Fraction(low) - away, Fraction(low) + away
-
-    def value(self, poly: Poly) -> tuple[Fraction, Fraction]:
-        """Return between which two numbers another polynomial's value here lies."""
-        low = high = ZERO
-        for coefficient in reversed(poly):
-            ends = [a * b for a in (low, high) for b in (self.low, self.high)]
-            low, high = min(ends) + coefficient, max(ends) + coefficient
-        return low, high
-
 
 def roots(poly: Poly, low: Fraction, high: Fraction) -> list[Root]:
-    """Return the roots in an open interval, by Descartes' rule on ever smaller parts.
+    """Return the roots in an open interval, on ever smaller parts with one or none.
 
     Example:
         >>> poly = (Fraction(-4), ZERO, Fraction(1))  # x**2 - 4
         >>> [root.low < 2 < root.high for root in roots(poly, ZERO, Fraction(5))]
         [True]
     """
-    if len(poly) < 2:
-        return []
     if len(poly) == 2:
         x = -poly[0] / poly[1]
         return [Root(poly, x, x)] if low < x < high else []
-    heights = _bernstein(poly, low, high)
-    if _changes(heights) > 1:
-        shared = common(poly, derivative(poly))
-        if len(shared) > 1:  # several times the same root: once is enough
-            return roots(quotient(poly, shared), low, high)
     result: list[Root] = []
-    todo = [(low, high, heights)]
+    todo = [(low, high)] if len(poly) > 2 else []
+    if todo:  # several times the same root: once is enough
+        poly = divided(poly, common(poly, derivative(poly)))[0]
     while todo:
-        a, b, heights = todo.pop()
-        changes = _changes(heights)
-        if changes == 1 and heights[0] and heights[-1]:
-            result.append(Root(poly, a, b))
-        elif changes:
-            middle, size = (a + b) / 2, len(heights) - 1
-            left, right = [heights[0] << size], [heights[-1] << size]
-            for left_over in range(size - 1, -1, -1):
-                heights = [x + y for x, y in itertools.pairwise(heights)]
-                left.append(heights[0] << left_over)
-                right.append(heights[-1] << left_over)
-            if not left[-1]:
-                result.append(Root(poly, middle, middle))
-            todo += [(a, middle, left), (middle, b, right[::-1])]
+        a, b = todo.pop()
+        middle, half = (a + b) / 2, (b - a) / 2
+        around = within(poly, (middle, ONE))  # of the distance from the middle
+        most = [abs(c) * half**place for place, c in enumerate(around)]
+        if 2 * most[0] > sum(most):  # it keeps its sign
+            continue
+        if 2 * most[1] > sum(place * one for place, one in enumerate(most)):
+            if at(poly, a) * at(poly, b) < 0:  # it rises, or falls
+                result.append(Root(poly, a, b))
+            continue
+        if around[0] == 0:
+            result.append(Root(poly, middle, middle))
+        todo += [(a, middle), (middle, b)]
     return result
-
-
-def _changes(heights: Sequence[int]) -> int:
-    """Return how often the sign changes: at least as often as there are roots."""
-    signs = [height > 0 for height in heights if height]
-    return sum(x != y for x, y in itertools.pairwise(signs))
-
-
-def _bernstein(poly: Poly, low: Fraction, high: Fraction) -> list[int]:
-    """Return the heights of the control points on an interval, times a number."""
-    n, bottom = len(poly) - 1, math.lcm(*(c.denominator for c in poly))
-    q = math.lcm(low.denominator, high.denominator)
-    start, width = int(low * q), int((high - low) * q)
-    whole, power = [0] * (n + 1), 1
-    # Horner in t, with x = (start + width t) / q; every power of q is kept a factor
-    for place, c in enumerate(reversed(poly)):
-        for k in range(min(place, n), 0, -1):
-            whole[k] = whole[k] * start + whole[k - 1] * width
-        whole[0] = whole[0] * start + int(c * bottom) * power
-        power *= q
-    # The k-th weight, binom(j, k) / binom(n, k), times n!
-    return [
-        sum(whole[k] * math.perm(j, k) * math.factorial(n - k) for k in range(j + 1))
-        for j in range(n + 1)
-    ]
 
 
 def is_same(one: Root, other: Root) -> bool:
@@ -272,157 +210,141 @@ def pieces(shape: Shape) -> tuple[Piece, ...]:
     Raises:
         UndecidedError: If it is none.
     """
-    if isinstance(shape, Scaled):
-        if shape.hedges:
+    match shape:
+        case Scaled(inner, height, ()):
+            scale = Fraction(height)
+            return tuple(
+                one._replace(poly=times(one.poly, (scale,)), cap=one.cap * scale)
+                for one in pieces(inner)
+            )
+        case Points(values, degrees):
+            corners = [*zip(map(Fraction, values), map(Fraction, degrees), strict=True)]
+            lines = [_line(*ends) for ends in itertools.pairwise(corners)]
+            ends = [(degree,) for _, degree in (corners[0], corners[-1])]
+            cuts = [x for x, _ in corners]
+            return _between(cuts, [ends[0], *lines, ends[1]])
+        case LR(mean, left, right):
+            cuts, polys = _side(mean, left, -1)
+            more = _side(mean, right, 1)
+            every = [*polys[::-1], *more[1]]
+            return _between([*cuts[::-1], Fraction(mean), *more[0]], every)
+        case Band(low, high, left, right):
+            below, above = _flank(low, left, min), _flank(high, right, max)
+            return (*below, Piece(_end(low), _end(high), (ONE,), ONE), *above)
+        case Curve(kind, facts):
+            return _between(*_curve(kind, dict(facts)))
+        case Scaled():
             raise UndecidedError("a hedged curve is not cut into pieces here")
-        height = Fraction(shape.height)
-        return tuple(
-            one._replace(poly=times(one.poly, (height,)), cap=one.cap * height)
-            for one in pieces(shape.shape)
-        )
-    if isinstance(shape, Curve):
-        return _curve_pieces(shape)
-    if isinstance(shape, Points):
-        values, degrees = (
-            [*map(Fraction, shape.values)],
-            [*map(Fraction, shape.degrees)],
-        )
-        result = [Piece(None, values[0], (degrees[0],), ONE)]
-        for (a, b), (p, r) in zip(
-            itertools.pairwise(values), itertools.pairwise(degrees), strict=True
-        ):
-            slope = (r - p) / (b - a) if a < b else ZERO
-            result += [Piece(a, b, (p - a * slope, slope), ONE)] if a < b else []
-        return (*result, Piece(values[-1], None, (degrees[-1],), ONE))
-    if isinstance(shape, LR):
-        left, right = _side_pieces(shape, -1), _side_pieces(shape, 1)
-        return (*left[::-1], *right)
-    return _band_pieces(shape)
 
 
-def _band_pieces(shape: Band) -> tuple[Piece, ...]:
-    low, high = (None if e is None else Fraction(e) for e in (shape.low, shape.high))
-    result: list[Piece] = []
-    for piece in _flank_pieces(shape.left):
-        if low is not None and (piece.low is None or piece.low < low):
-            end = low if piece.high is None else min(piece.high, low)
-            result.append(piece._replace(high=end))
-    result.append(Piece(low, high, (ONE,), ONE))
-    for piece in _flank_pieces(shape.right):
-        if high is not None and (piece.high is None or piece.high > high):
-            end = high if piece.low is None else max(piece.low, high)
-            result.append(piece._replace(low=end))
-    return tuple(result)
+def _between(
+    cuts: Sequence[Fraction], polys: Sequence[Poly], cap: Fraction = ONE
+) -> tuple[Piece, ...]:
+    """Return a polynomial below the first cut, between two and above the last one."""
+    ends = zip((None, *cuts), (*cuts, None), polys, strict=True)
+    return tuple(
+        Piece(low, high, trimmed(poly), cap)
+        for low, high, poly in ends
+        if low is None or high is None or low < high
+    )
 
 
-def _flank_pieces(flank: Flank | None) -> list[Piece]:
-    if flank is None:
-        return [Piece(None, None, (), ONE)]
-    start, end = Fraction(flank.start), Fraction(flank.end)
-    q = (-end / (start - end), 1 / (start - end))
-    fall = times(q, within(flank.curve, q))
-    top, bottom = (at(fall, start),), ()
-    ends = [bottom, top] if end < start else [top, bottom]
-    a, b = min(start, end), max(start, end)
-    three = [(None, a, ends[0]), (a, b, fall), (b, None, ends[1])]
-    return [Piece(low, high, trimmed(poly), CAP) for low, high, poly in three]
+def _line(one: tuple[Fraction, Fraction], other: tuple[Fraction, Fraction]) -> Poly:
+    """Return the line through two points; 0 if they stand above each other."""
+    (a, p), (b, r) = one, other
+    slope = (r - p) / (b - a) if a != b else ZERO
+    return p - a * slope, slope
 
 
-def _side_pieces(shape: LR, sign: int) -> list[Piece]:
-    """Return one side's pieces, from the mean outwards."""
-    side = shape.right if sign > 0 else shape.left
-    mean, spread, reach = map(Fraction, (shape.mean, side.spread, side.reach))
-    u = (-sign * mean / spread, sign / spread)
+def _end(value: float | None) -> Fraction | None:
+    return None if value is None else Fraction(value)
+
+
+def _flank(
+    cut: float | None, flank: Flank | None, outer: Callable[..., Fraction]
+) -> tuple[Piece, ...]:
+    """Return the pieces outside of an end of a band: below it, or above."""
+    if cut is None:
+        return ()
+    side, cuts, polys, cap = Fraction(cut), [Fraction(cut)], [Poly()], ONE
+    if flank is not None:
+        start, end = Fraction(flank.start), Fraction(flank.end)
+        q = _line((end, ZERO), (start, ONE))
+        fall = times(q, within(flank.curve, q))
+        cap = CAP
+        polys = [(), fall, (at(fall, start),)][:: 1 if end < start else -1]
+        cuts = sorted([side, *(outer(one, side) for one in (start, end))])
+    result = _between(cuts, [*polys, ()] if outer is min else [(), *polys], cap)
+    return result[:-1] if outer is min else result[1:]
+
+
+def _side(mean: float, side: Side, sign: int) -> tuple[list[Fraction], list[Poly]]:
+    """Return one side's cuts and polynomials, from the mean outwards."""
+    start, spread, reach = map(Fraction, (mean, side.spread, side.reach))
+    one, end = start + sign * spread, start + sign * spread * reach
+    u, rest = _line((start, ZERO), (one, ONE)), _line((end, ZERO), (one, ONE))
     body = plus((ONE,), times(u, within(side.curve, (2 * u[0] - 1, 2 * u[1]))), -1)
-    one, end = mean + sign * spread, mean + sign * spread * reach
     height = min(max(at(body, one), ZERO), ONE)
-    w = (((reach - u[0]) / (reach - 1)), -u[1] / (reach - 1))
-    tail = times((height,), times(times(w, w), times(w, w)))
-    three = [(mean, one, body), (one, end, tail), (end, None, ())]
-    if sign > 0:
-        return [Piece(a, b, poly, ONE) for a, b, poly in three]
-    return [Piece(b, a, poly, ONE) for a, b, poly in three]
+    square = times(rest, rest)
+    return [one, end], [body, times((height,), times(square, square)), ()]
 
 
-def is_exact(shape: Shape) -> bool:
-    """Return whether a shape is made of polynomials."""
-    if isinstance(shape, Scaled):
-        return not shape.hedges and is_exact(shape.shape)
-    exact = ("trapezoid", "singleton", "binary", "s", "pi")
-    return not isinstance(shape, Curve) or shape.kind in exact
-
-
-def _curve_pieces(curve: Curve) -> tuple[Piece, ...]:
-    """Return the pieces of a system's curve; a step up stands one double below."""
-    data = dict(curve.facts)
-    match curve.kind:
+def _curve(kind: str, data: dict[str, Any]) -> tuple[list[Fraction], list[Poly]]:
+    """Return the cuts and polynomials of a system's curve."""
+    match kind:
         case "trapezoid":
             return _trapezoid(data["a"], data["b"], data["c"], data["d"])
         case "singleton":
             return _trapezoid(*[data["value"]] * 4)
         case "binary":
-            start: float = data["start"]
-            is_above = bool(data["is_above"])
+            start, is_above = data["start"], data["is_above"]
             ends = (start, None) if is_above else (None, start)
             return _trapezoid(ends[0], start, start, ends[1])
         case "s":
-            return tuple(_s(Fraction(data["start"]), Fraction(data["end"])))
+            return _s(data["start"], data["end"])
         case "pi":
-            a, b, c, d = (Fraction(data[name]) for name in "abcd")
-            rise = [p for p in _s(a, b) if p.high is not None]
-            fall = [
-                p._replace(high=c) if p.high == c else p for p in _s(d, c, is_down=True)
-            ]
-            top = [Piece(b, c, (ONE,), ONE)] if b < c else []
-            return (*rise, *top, *(p for p in fall if p.low is not None))
+            rise = _s(data["a"], data["b"])
+            fall = _s(data["d"], data["c"], is_down=True)
+            return rise[0] + fall[0], rise[1] + fall[1][1:]
         case _:
-            raise UndecidedError(f"a curve ({curve.kind}) has no pieces")
+            raise UndecidedError(f"a curve ({kind}) has no pieces")
 
 
 def _trapezoid(
     a: float | None, b: float, c: float, d: float | None
-) -> tuple[Piece, ...]:
-    """Return the pieces of a trapezoid; ends that are None are open."""
-    start, end = Fraction(b), Fraction(c)
-    result: list[Piece] = []
-    low: Fraction | None = None
-    if a is not None and a == b:
+) -> tuple[list[Fraction], list[Poly]]:
+    """Return a trapezoid; ends that are None are open, a step up is one double below.
+
+    So a value equal to the start of a step has degree 1.
+    """
+    cuts: list[Fraction] = []
+    polys: list[Poly] = [(ONE,)]
+    if a is not None:
         below = math.nextafter(b, -math.inf)
-        low = start if math.isinf(below) else Fraction(below)
-        result.append(Piece(None, low, (), ONE))
-    elif a is not None:
-        foot, slope = Fraction(a), 1 / (start - Fraction(a))
-        result.append(Piece(None, foot, (), ONE))
-        result.append(Piece(foot, start, (-foot * slope, slope), ONE))
-        low = start
-    high = end if d is not None else None
-    if low is None or high is None or low < high:
-        result.append(Piece(low, high, (ONE,), ONE))
-    if d is not None and c < d:
-        foot, slope = Fraction(d), 1 / (end - Fraction(d))
-        result.append(Piece(end, foot, (-foot * slope, slope), ONE))
-        end = foot
+        start = Fraction(a if a < b else b if math.isinf(below) else below)
+        cuts, polys = [start, Fraction(b)], [(), (ONE,), (ONE,)]
+        if a < b:
+            polys[1] = _line((start, ZERO), (cuts[1], ONE))
     if d is not None:
-        result.append(Piece(end, None, (), ONE))
-    return tuple(result)
+        top, end = Fraction(c), Fraction(d)
+        cuts += [top, end]
+        polys += [_line((top, ONE), (end, ZERO)), ()]
+    return cuts, polys
 
 
-def _s(start: Fraction, end: Fraction, *, is_down: bool = False) -> list[Piece]:
+def _s(
+    low: float, high: float, *, is_down: bool = False
+) -> tuple[list[Fraction], list[Poly]]:
     """Return an S curve, which falls if it ends before it starts, or with `is_down`."""
+    start, end = Fraction(low), Fraction(high)
     if start == end:
-        steps = [(ONE,), ()] if is_down else [(), (ONE,)]
-        return [
-            Piece(None, start, steps[0], ONE), Piece(start, None, steps[1], ONE)
-        ]  # fmt: skip
-    middle, width = (start + end) / 2, end - start
-    t, rest = (-start / width, 1 / width), (-end / width, 1 / width)
+        return [start], [(ONE,), ()] if is_down else [(), (ONE,)]
+    t, rest = _line((start, ZERO), (end, ONE)), _line((end, ZERO), (start, ONE))
     first = times((Fraction(2),), times(t, t))
     second = plus((ONE,), times((Fraction(2),), times(rest, rest)), -1)
-    if start < end:
-        cuts = [(None, start, ()), (start, middle, first), (middle, end, second)]
-        return [*(Piece(*cut, ONE) for cut in cuts), Piece(end, None, (ONE,), ONE)]
-    cuts = [(None, end, (ONE,)), (end, middle, second), (middle, start, first)]
-    return [*(Piece(*cut, ONE) for cut in cuts), Piece(start, None, (), ONE)]
+    polys: list[Poly] = [(), first, second, (ONE,)]
+    cuts = [start, (start + end) / 2, end]
+    return (cuts, polys) if start < end else (cuts[::-1], polys[::-1])
 
 
 def degree(shape: Shape, x: Fraction) -> Fraction:
