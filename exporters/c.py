@@ -429,8 +429,8 @@ def axes_code(
     ends: list[int] = []
     for variable in mixed:
         ends.append((ends[-1] if ends else 0) + len(variable.parts))
-    weights = numbers.nearest([part.weight for part in parts], is_divisor=True)
-    centres = numbers.nearest([part.centre for part in parts])
+    weights = numbers.rounded([part.weight for part in parts], is_divisor=True)
+    centres = numbers.rounded([part.centre for part in parts])
     yield from real_table(f"{prefix}_weight", weights, "Of combinations.", numbers)
     yield from real_table(f"{prefix}_centre", centres, "Of combinations.", numbers)
     inputs = [line[part.input] for part in parts]

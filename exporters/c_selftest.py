@@ -20,8 +20,9 @@ from fuzzytree.exporters.c_tables import (
 )
 from fuzzytree.exporters.c_text import CNumbers, fill
 from fuzzytree.exporters.c_tree import CTreeTest
+from fuzzytree.exporters.program_text import answer_of, digest_of
 from fuzzytree.model import FuzzyTree, Model, Variable
-from fuzzytree.semantics import Answer, Row, Status, descend, evaluate, few_probes
+from fuzzytree.semantics import Answer, Row, Status, few_probes
 
 _MOST_ROWS = 160
 _FEWEST_ROWS = 8
@@ -59,12 +60,12 @@ def examples_of(
     for row in rows:
         if numbers.kind is np.float64:
             row_values = row
-            prediction = _reference(model, row_values)
+            prediction = answer_of(model, row_values)
         else:
             row_values = {name: _as_float(value) for name, value in row.items()}
             prediction = _computed(model, tests, tables, line, numbers, row_values)
         label = number_of(prediction.label, model)
-        digest = digest_of(prediction.strengths, numbers)
+        digest = digest_of(words_of(prediction.strengths, numbers))
         values = tuple(row_values[name] for name in model.inputs)
         result.append(
             Example(values, label, prediction.rule, int(prediction.status), digest)
@@ -80,10 +81,6 @@ def _as_float(value: float) -> float:
 def number_of(label: str | None, model: Model) -> int:
     """Return the number of a class, -1 for none."""
     return -1 if label is None else model.classes.index(label)
-
-
-def _reference(model: Model, row: Row) -> Answer:
-    return descend(model, row) if isinstance(model, FuzzyTree) else evaluate(model, row)
 
 
 def _computed(
@@ -122,18 +119,13 @@ def rows_of(model: Model, rules: int) -> list[Row]:
     return few_probes(model, limit)
 
 
-def digest_of(strengths: Sequence[float], numbers: CNumbers) -> int:
-    """Return 32 bits that change if any bit of any strength does.
-
-    No number is counted as one, and -0 as 0.
-    """
+def words_of(strengths: Sequence[float], numbers: CNumbers) -> list[int]:
+    """Return the words of 32 bits of strengths; -0 counts as 0, all NaN as one."""
     kind = np.dtype(numbers.kind)
     array = np.array(strengths, kind) + kind.type(0)
     array[np.isnan(array)] = np.nan
-    digest = 2166136261
-    for word in np.abs(array).astype(kind.newbyteorder("<")).view("<u4").tolist():
-        digest = (digest ^ word) * 16777619 & 0xFFFFFFFF
-    return digest
+    words = np.abs(array).astype(kind.newbyteorder("<")).view("<u4")
+    return [int(word) for word in words]
 
 
 _DIGEST = """
@@ -258,8 +250,8 @@ def axis_values(
     for variable in variables:
         total: Real | None = None
         for part in variable.parts:
-            (weight,) = numbers.nearest([part.weight], is_divisor=True)
-            (centre,) = numbers.nearest([part.centre])
+            (weight,) = numbers.rounded([part.weight], is_divisor=True)
+            (centre,) = numbers.rounded([part.centre])
             one = numbers.kind(weight) * (
                 row_values[line[part.input]] - numbers.kind(centre)
             )
@@ -274,7 +266,7 @@ def leaf(tests: Sequence[CTreeTest], values: Sequence[Real], numbers: CNumbers) 
     place = 0
     while place < len(tests):
         one = tests[place]
-        (cut,) = numbers.nearest([one.cut])
+        (cut,) = numbers.rounded([one.cut])
         place = one.yes if values[one.line] > numbers.kind(cut) else one.no
     return place - len(tests) + 1
 

@@ -6,32 +6,10 @@ import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
 from fuzzytree.exporters.c_text import DOUBLE, fill, real_lines, remark
+from fuzzytree.exporters.program_text import StepText, SystemExample, system_examples
 from fuzzytree.model import FuzzySystem, SystemInput, SystemOutput, fingerprint
-from fuzzytree.semantics import (
-    Program,
-    Row,
-    Step,
-    error_bounds,
-    from_system,
-    infer,
-    still_results,
-    system_probes,
-)
-
-_SIGNS = {
-    "add": "+",
-    "subtract": "-",
-    "multiply": "*",
-    "divide": "/",
-    "less": "<",
-    "at_most": "<=",
-    "equal": "==",
-    "and": "&&",
-    "or": "||",
-}
+from fuzzytree.semantics import Program, Step, from_system, system_probes
 
 LIBRARY: Mapping[str, str] = {
     "absolute": "fabs",
@@ -160,7 +138,7 @@ def number_text(value: float) -> str:
     return f"name_bits(UINT64_C({bits:#018x}))"
 
 
-class CSteps:
+class CSteps(StepText):
     """Writes the steps of one program.
 
     What no input enters is computed here, once: single numbers stand in expressions,
@@ -174,9 +152,8 @@ class CSteps:
     """
 
     def __init__(self, program: Program, library: Mapping[str, str] = LIBRARY) -> None:
-        self.program, self.library = program, library
-        self.still = still_results(program)
-        self.needs: set[str] = set()
+        super().__init__(program)
+        self.library = library
         self.tables: list[tuple[str, Sequence[float]]] = []
         self._table_names: dict[tuple[float, ...], str] = {}
         self.round = self._rounds()
@@ -283,7 +260,7 @@ class CSteps:
 
     def _declared(self, place: int) -> str:
         step = self.program.steps[place]
-        return f"const {self._type(place)} v{place} = {self._expression(step)}"
+        return f"const {self._type(place)} v{place} = {self.expression(step)}"
 
     def _type(self, place: int) -> str:
         return "int" if self.program.steps[place].kind == "truth" else "name_real"
@@ -312,10 +289,9 @@ class CSteps:
                 term = self.value(argument)
                 yield f"        r{place} = i == 0 ? {term} : r{place} + {term};\n"
             if place in self.kept:
-                text_of_step = (
-                    f"r{place}" if place in running else self._step_text(place)
-                )
-                yield f"        s{place}[i] = {text_of_step};\n"
+                step = self.program.steps[place]
+                text = f"r{place}" if place in running else self.expression(step)
+                yield f"        s{place}[i] = {text};\n"
             elif place in running:
                 yield f"        const name_real v{place} = r{place};\n"
             else:
@@ -323,9 +299,6 @@ class CSteps:
         for place in carried:
             yield f"        {self._carried(place)};\n"
         yield "    }\n"
-
-    def _step_text(self, place: int) -> str:
-        return self._expression(self.program.steps[place])
 
     def _carried(self, place: int) -> str:
         step = self.program.steps[place]
@@ -346,24 +319,14 @@ class CSteps:
         yield f"    const name_real v{place} = name_total("
         yield f"s{source}, {count}u, h{place}, {half}u);\n"
 
-    def _expression(self, step: Step) -> str:
-        operation = step.operation
-        operands = [self.value(argument) for argument in step.arguments]
-        if operation == "input":
-            return f"x[{self.program.inputs.index(step.name)}]"
-        if operation in _SIGNS:
-            return f"{operands[0]} {_SIGNS[operation]} {operands[1]}"
-        if operation == "where":
-            return f"{operands[0]} ? {operands[1]} : {operands[2]}"
-        if operation in ("not", "negate"):
-            return f"{'!' if operation == 'not' else '-'}{operands[0]}"
-        self.needs.add(operation)
-        if operation in self.library:
-            return f"{self.library[operation]}({', '.join(operands)})"
+    def called(self, step: Step, operands: Sequence[str]) -> str:
+        """Return a step as the call of a function of math.h, or of a helper."""
+        self.needs.add(step.operation)
+        if step.operation in self.library:
+            return f"{self.library[step.operation]}({', '.join(operands)})"
         if step.table:
-            table = self._table(step.table)
-            return f"name_{operation}({table}, {len(step.table)}u, {operands[0]})"
-        return f"name_{operation}({', '.join(operands)})"
+            operands = [self._table(step.table), f"{len(step.table)}u", *operands]
+        return f"name_{step.operation}({', '.join(operands)})"
 
 
 _ROWS = 100
@@ -508,41 +471,25 @@ def system_selftest(
     yield fill(_MAIN, prefix)
 
 
-Example = tuple[Sequence[float], Sequence[float], Sequence[float], int]
-
-
-def _examples(system: FuzzySystem, *, activations: bool) -> list[Example]:
-    """Return inputs, numbers, their largest errors and a status; small errors first.
+def _examples(system: FuzzySystem, *, activations: bool) -> list[SystemExample]:
+    """Return examples, those with small errors first.
 
     Where no bound of an error is known, a share of the number stands in its place.
     """
     limit = max(_FEWEST, min(_PROBES, _RULES // max(len(system.rules), 1)))
     rows = system_probes(system, limit=limit)
-    every: list[Example] = []
-    bounds = _bounds(system, rows, activations=activations)
-    for row, bound in zip(rows, bounds, strict=True):
-        answer = infer(system, row)
-        result = answer.outputs + (answer.activations if activations else ())
+    every: list[SystemExample] = []
+    for operands, result, bound, status in system_examples(
+        system, rows, activations=activations
+    ):
         most = [
             0.0 if math.isnan(number) else min(one, _SHARE * max(abs(number), 1.0))
             for one, number in zip(bound, result, strict=True)
         ]
-        operands = [row[name] for name in system.columns]
-        every.append((operands, result, most, int(answer.status)))
+        every.append((operands, result, most, status))
     every.sort(key=lambda one: max(one[2]))
     step = max(len(every) // (2 * _ROWS), 1)
     return every[: _ROWS * step : step]
-
-
-def _bounds(
-    system: FuzzySystem, rows: Sequence[Row], *, activations: bool
-) -> list[list[float]]:
-    """Return how far each number may be off, for each row."""
-    program = from_system(system, activations=activations)
-    table = np.array([[row[name] for row in rows] for name in program.inputs])
-    values = table.reshape(len(program.inputs), len(rows)).astype(np.float64)
-    result: list[list[float]] = error_bounds(program, values)[:-1].T.tolist()
-    return result
 
 
 def _bits(values: Sequence[float]) -> str:

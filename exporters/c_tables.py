@@ -173,22 +173,22 @@ def _add(result: Tables, kind: int, count: int, own: list[float]) -> None:
 def _edge(bound: float, flank: Flank | None, numbers: CNumbers) -> list[float]:
     """Return the bound; with a flank also its end, its width and its curve."""
     if flank is None:
-        return numbers.nearest([bound])
+        return numbers.rounded([bound])
     return [
-        *numbers.nearest([bound, flank.end]),
-        *numbers.nearest([flank.start - flank.end], is_divisor=True),
-        *numbers.nearest(flank.curve),
+        *numbers.rounded([bound, flank.end]),
+        *numbers.rounded([flank.start - flank.end], is_divisor=True),
+        *numbers.rounded(flank.curve),
     ]
 
 
 def _side(mean: float, sign: float, side: Side, numbers: CNumbers) -> list[float]:
     """Return mean, signed spread, reach, length of the tail, and the curve."""
     return [
-        *numbers.nearest([mean]),
-        *numbers.nearest([sign * side.spread], is_divisor=True),
-        *numbers.nearest([side.reach]),
-        *numbers.nearest([side.reach - 1.0], is_divisor=True),
-        *numbers.nearest(side.curve),
+        *numbers.rounded([mean]),
+        *numbers.rounded([sign * side.spread], is_divisor=True),
+        *numbers.rounded([side.reach]),
+        *numbers.rounded([side.reach - 1.0], is_divisor=True),
+        *numbers.rounded(side.curve),
     ]
 
 
@@ -197,7 +197,7 @@ def _points(points: Points, numbers: CNumbers) -> list[float]:
     degrees = [
         min(near, numbers.below_one) if exact < 1.0 else near
         for exact, near in zip(
-            points.degrees, numbers.nearest(points.degrees), strict=True
+            points.degrees, numbers.rounded(points.degrees), strict=True
         )
     ]
-    return [*numbers.nearest(points.values), *degrees]
+    return [*numbers.rounded(points.values), *degrees]

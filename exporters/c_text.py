@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fuzzytree.exporters.program_text import NumberType, one_line
 from fuzzytree.model import DIGITS, LETTERS, NameMap
-from fuzzytree.numerics import rounded
 
 _WIDTH = 88
 _LONGEST_PREFIX = 20  # C99 promises that 31 letters of a global name count
@@ -22,27 +22,10 @@ _LONGEST_CONSTANT = 63  # and 63 of others
 
 
 @dataclass(frozen=True, slots=True)
-class CNumbers:
-    """A number type of C.
+class CNumbers(NumberType):
+    """A number type of C, with what stands behind a constant."""
 
-    Attributes:
-        name: In C.
-        kind: In numpy.
-        suffix: Behind a constant.
-        below_one: The largest number below 1.
-        largest: The largest number.
-    """
-
-    name: str
-    kind: type[np.float64] | type[np.float32]
     suffix: str
-    below_one: float
-    largest: float
-
-    def nearest(self, values: Sequence[float], *, is_divisor: bool = False) -> Reals:
-        """Return numbers of the type, never infinite; a divisor is never 0."""
-        result: Reals = rounded(values, self.kind, is_divisor=is_divisor).tolist()
-        return result
 
     def text(self, value: float) -> str:
         """Return a number of the type as a constant; for infinite ones see math.h.
@@ -64,10 +47,8 @@ class CNumbers:
         return str(self.kind(value))
 
 
-Reals = list[float]
-
-DOUBLE = CNumbers("double", np.float64, "", 1.0 - 2.0**-53, float(np.finfo("d").max))
-SINGLE = CNumbers("float", np.float32, "f", 1.0 - 2.0**-24, float(np.finfo("f").max))
+DOUBLE = CNumbers("double", np.float64, "")
+SINGLE = CNumbers("float", np.float32, "f")
 
 
 def fill(template: str, prefix: str) -> str:
@@ -112,11 +93,7 @@ def remark(text: str) -> str:
         >>> remark("a */ b ??/ é\n")
         'a * / b ? ?/ \\xe9\\n'
     """
-    plain = text.encode("unicode_escape").decode("ascii")
-    for pair in ("*/", "/*", "??"):
-        while pair in plain:
-            plain = plain.replace(pair, f"{pair[0]} {pair[1]}")
-    return plain
+    return one_line(text, ("*/", "/*", "??"))
 
 
 def integer_type(largest: int) -> str:

@@ -118,7 +118,7 @@ def tree_code(
         return
     ends = [place for test in tests for place in (test.no, test.yes)]
     lines = [test.line for test in tests]
-    cuts = numbers.nearest([test.cut for test in tests])
+    cuts = numbers.rounded([test.cut for test in tests])
     yield fill(f"#define NAME_QUESTIONS {len(tests)}u\n\n", prefix)
     yield fill(_TABLES, prefix)
     for name, values in (("line", lines), ("next", ends), ("label", labels)):

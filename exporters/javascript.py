@@ -32,6 +32,7 @@ from fuzzytree.exporters.js_text import (
     table,
     text_of,
 )
+from fuzzytree.exporters.program_text import answer_of, digest_of
 from fuzzytree.exporters.reference_tables import (
     RuleRows,
     combination_row,
@@ -50,7 +51,7 @@ from fuzzytree.model import (
     fingerprint,
     sentence,
 )
-from fuzzytree.semantics import descend, evaluate, few_probes
+from fuzzytree.semantics import few_probes
 
 _MOST_EXAMPLES = 64
 _FEWEST_EXAMPLES = 8
@@ -206,27 +207,18 @@ def _examples(model: Model) -> Iterator[str]:
     most = min(_MOST_EXAMPLES, _STRENGTHS // rules)
     for row in few_probes(model, max(most, _FEWEST_EXAMPLES)):
         values = [row[name] for name in model.inputs]
+        prediction = answer_of(model, row)
+        expected = [prediction.label, prediction.rule, int(prediction.status)]
         if isinstance(model, RuleBase):
-            prediction = evaluate(model, row)
-            more = [digest_of(prediction.strengths)]
-        else:
-            prediction = descend(model, row)
-            more = []
-        expected = [prediction.label, prediction.rule, int(prediction.status), *more]
+            expected.append(digest_of(words_of(prediction.strengths)))
         yield f"{literal([values, *expected])},"
 
 
-def digest_of(strengths: Sequence[float]) -> int:
-    """Return 32 bits that change if any bit of any strength does; NaN counts as -1."""
+def words_of(strengths: Sequence[float]) -> tuple[int, ...]:
+    """Return the words of 32 bits of strengths; NaN counts as -1."""
     numbers = [-1.0 if math.isnan(value) else value for value in strengths]
-    digest = 2166136261
-    for word in struct.unpack(f"<{2 * len(numbers)}I", _doubles(numbers)):
-        digest = (digest ^ word) * 16777619 & 0xFFFFFFFF
-    return digest
-
-
-def _doubles(numbers: Sequence[float]) -> bytes:
-    return struct.pack(f"<{len(numbers)}d", *numbers)
+    content = struct.pack(f"<{len(numbers)}d", *numbers)
+    return struct.unpack(f"<{2 * len(numbers)}I", content)
 
 
 FORMAT = Format(

@@ -3,22 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-
-import numpy as np
+from typing import ClassVar
 
 from fuzzytree.exporters.js_text import literal, number_text, table, text_of
+from fuzzytree.exporters.program_text import StepText, system_examples
 from fuzzytree.model import FuzzySystem, SystemInput, SystemOutput
-from fuzzytree.semantics import (
-    OVER_SAMPLES,
-    Program,
-    Row,
-    Step,
-    error_bounds,
-    from_system,
-    infer,
-    still_results,
-    system_probes,
-)
+from fuzzytree.semantics import OVER_SAMPLES, Program, Step, from_system, system_probes
 
 _EXAMPLES = 64
 
@@ -84,33 +74,8 @@ def _named(one: SystemInput | SystemOutput) -> str:
 
 def _examples(system: FuzzySystem) -> Iterator[str]:
     rows = system_probes(system, limit=_EXAMPLES)
-    for row, bounds in zip(rows, _bounds(system, rows), strict=True):
-        result = infer(system, row)
-        operands = [row[name] for name in system.columns]
-        yield f"{literal((operands, result.outputs, bounds, int(result.status)))},"
+    yield from (f"{literal(example)}," for example in system_examples(system, rows))
 
-
-def _bounds(system: FuzzySystem, rows: Sequence[Row]) -> list[list[float]]:
-    """Return how far each output may be off, for each row."""
-    program = from_system(system)
-    lines = np.array([[row[name] for row in rows] for name in program.inputs])
-    values = lines.reshape(len(program.inputs), len(rows)).astype(np.float64)
-    result: list[list[float]] = error_bounds(program, values).T.tolist()
-    return [bounds[: len(system.outputs)] for bounds in result]
-
-
-_SIGNS: Mapping[str, str] = {
-    "add": "+",
-    "subtract": "-",
-    "multiply": "*",
-    "divide": "/",
-    "remainder": "%",
-    "less": "<",
-    "at_most": "<=",
-    "equal": "===",
-    "and": "&&",
-    "or": "||",
-}
 
 _LIBRARY: Mapping[str, str] = {
     "absolute": "Math.abs",
@@ -242,18 +207,21 @@ function lowest(numbers) {
 _USES = {"highest": "maximum", "lowest": "minimum"}
 
 
-class JsSteps:
+class JsSteps(StepText):
     """A program as text: first `body`, then `tables` and `needs` are known.
 
     Attributes:
-        needs: The names of the helpers.
         tables: The name of each table, by its numbers as text.
     """
 
+    signs: ClassVar[Mapping[str, str]] = {
+        **StepText.signs,
+        "equal": "===",
+        "remainder": "%",
+    }
+
     def __init__(self, program: Program) -> None:
-        self.program = program
-        self.still = still_results(program)
-        self.needs: set[str] = set()
+        super().__init__(program)
         self.tables: dict[str, str] = {}
 
     def body(self) -> Iterator[str]:
@@ -289,28 +257,18 @@ class JsSteps:
             (argument,) = step.arguments
             self.needs.add(step.operation)
             return f"{step.operation}(v{argument})"
-        text = self._expression(step)
+        text = self.expression(step)
         if not step.samples:
             return text
         self.needs.add("samples")
         return f"samples({step.samples}, (i) => {text})"
 
-    def _expression(self, step: Step) -> str:
+    def called(self, step: Step, operands: Sequence[str]) -> str:
+        """Return a step as the call of a function of Math, or of a helper."""
         operation = step.operation
-        operands = [self.value(argument) for argument in step.arguments]
-        if operation == "input":
-            return f"x[{self.program.inputs.index(step.name)}]"
-        if operation in _SIGNS:
-            return f"{operands[0]} {_SIGNS[operation]} {operands[1]}"
-        if operation == "where":
-            return f"{operands[0]} ? {operands[1]} : {operands[2]}"
-        if operation in ("not", "negate"):
-            return f"{'!' if operation == 'not' else '-'}{operands[0]}"
         if operation in _LIBRARY:
-            return f"{_LIBRARY[operation]}({operands[0]}" + (
-                f", {operands[1]})" if len(operands) > 1 else ")"
-            )
+            return f"{_LIBRARY[operation]}({', '.join(operands)})"
         self.needs.add(operation)
         if step.table:
-            return f"{operation}({self._table(list(step.table))}, {operands[0]})"
+            operands = [self._table(list(step.table)), *operands]
         return f"{operation}({', '.join(operands)})"

@@ -12,9 +12,9 @@ import numpy.typing as npt
 import onnxruntime
 
 from fuzzytree.errors import DisagreementError, LossError
+from fuzzytree.exporters.program_text import answer_of
 from fuzzytree.model import LR, Band, Model, Points, RuleBase, Term
 from fuzzytree.numerics import RealKind
-from fuzzytree.semantics import descend, evaluate
 
 _STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
 
@@ -179,10 +179,7 @@ def _landmarks(terms: Sequence[Term]) -> set[float]:
 
 
 def _compare(model: Model, row: dict[str, float], outputs: dict[str, object]) -> None:
-    if isinstance(model, RuleBase):
-        answer = evaluate(model, row)
-    else:
-        answer = descend(model, row)
+    answer = answer_of(model, row)
     expected: dict[str, object] = {
         "rule": answer.rule,
         "label": answer.label or "",

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from fuzzytree.exporters.program_text import answer_of
 from fuzzytree.exporters.reference_tables import (
     RuleRows,
     combination_row,
@@ -29,7 +30,7 @@ from fuzzytree.model import (
     fingerprint,
     sentence,
 )
-from fuzzytree.semantics import descend, evaluate, probes
+from fuzzytree.semantics import probes
 
 _EXAMPLES = 6
 
@@ -349,10 +350,7 @@ def _examples(model: Model) -> Iterator[str]:
     if model.inputs:
         rows.append(dict.fromkeys(model.inputs, math.nan))
     for row in rows:
-        if isinstance(model, RuleBase):
-            prediction = evaluate(model, row)
-        else:
-            prediction = descend(model, row)
+        prediction = answer_of(model, row)
         values = tuple(row[name] for name in model.inputs)
         expected = (prediction.label, prediction.rule, int(prediction.status))
         yield f"({_literal(values)}, {_literal(expected)}),"

@@ -7,28 +7,20 @@ has a truth beside it (`o` and its number): whether it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from msgspec.structs import replace
 
+from fuzzytree.exporters.program_text import StepText
 from fuzzytree.exporters.st_text import StNumbers, remark, table
 from fuzzytree.model import RuleBase, sentence
 from fuzzytree.semantics import BELOW_ONE, Program, Step, from_rules, still_results
 
-_SIGNS: Mapping[str, str] = {
-    "add": "+",
-    "subtract": "-",
-    "multiply": "*",
-    "divide": "/",
-    "less": "<",
-    "at_most": "<=",
-    "equal": "=",
-    "and": "AND",
-    "or": "OR",
-}
+_SIGNS: Mapping[str, str] = {**StepText.signs, "equal": "=", "and": "AND", "or": "OR"}
 _COMPARED = {"minimum": "<", "maximum": ">", "lowest": "<", "highest": ">"}
 _FUNCTIONS: Mapping[str, str] = {
     "absolute": "ABS",
+    "square_root": "SQRT",
     "exponential": "EXP",
     "sine": "SIN",
     "cosine": "COS",
@@ -39,31 +31,98 @@ _FUNCTIONS: Mapping[str, str] = {
 _REDUCED = ("total", "last", "highest", "lowest")
 KNOWN = frozenset(
     {*_SIGNS, *_COMPARED, *_FUNCTIONS, *_REDUCED, "input", "where", "not"}
-    | {"negate", "square_root", "running", "is_finite"}
+    | {"negate", "running", "is_finite"}
 )
 """Operations that have statements."""
 
 
-class SystemSteps:
-    """Statements of a program, where all inputs are finite.
+class StSteps:
+    """Statements of a program.
 
     Attributes:
         declared: The type of each variable that they set, by name.
         tables: The lines of the tables that they look into.
     """
 
+    about = "a value for each sample"  # of its tables
+
     def __init__(
         self, program: Program, inputs: Mapping[str, str], numbers: StNumbers
     ) -> None:
         """Prepare the statements."""
-        self.program = program
-        self.inputs = inputs
-        self.numbers = numbers
+        self.program, self.inputs, self.numbers = program, inputs, numbers
         self.still = still_results(program)
-        self.odd = self._odd_steps()
         self.declared: dict[str, str] = {}
         self.tables: list[str] = []
         self._tables: dict[str, str] = {}
+
+    def value(self, place: int) -> str:
+        """Return a step's result; of samples, the one of number k."""
+        result, step = self.still[place], self.program.steps[place]
+        if isinstance(result, list):
+            return f"{self.table(result)}[k]"
+        if isinstance(result, bool):
+            return "TRUE" if result else "FALSE"
+        if result is not None:
+            return self.numbers.literal(self.rounded(result))
+        if step.operation == "input":
+            return self.inputs[step.name]
+        return self.variable(place, step)
+
+    def variable(self, place: int, step: Step) -> str:
+        """Return the variable of a step's result."""
+        letter = "b" if step.kind == "truth" else "v"
+        return f"{letter}{place}[k]" if step.samples else f"{letter}{place}"
+
+    def rounded(self, value: float) -> float:
+        """Return a constant in the type of the file; 0 where it is NaN."""
+        return 0.0 if math.isnan(value) else self.numbers.nearest(value)
+
+    def computed(
+        self, name: str, operation: str, operands: Sequence[str]
+    ) -> Iterator[str]:
+        """Yield what sets a variable to the result of an operation without samples."""
+        if operation in _COMPARED:
+            a, b = operands
+            test = f"{a} {_COMPARED[operation]} {b}"
+            yield f"IF {test} THEN {name} := {a}; ELSE {name} := {b}; END_IF;"
+        elif operation == "where":
+            test, a, b = operands
+            yield f"IF {test} THEN {name} := {a}; ELSE {name} := {b}; END_IF;"
+        elif operation in _FUNCTIONS:
+            yield f"{name} := {_FUNCTIONS[operation]}({', '.join(operands)});"
+        elif operation == "negate":
+            yield f"{name} := -{operands[0]};"
+        elif operation == "not":
+            yield f"{name} := NOT {operands[0]};"
+        elif operation == "is_finite":
+            largest = self.numbers.literal(self.numbers.largest)
+            yield f"{name} := ABS({operands[0]}) <= {largest};"
+        else:
+            yield f"{name} := {operands[0]} {_SIGNS[operation]} {operands[1]};"
+
+    def table(self, values: Sequence[float] | Sequence[bool]) -> str:
+        """Return the name of a table."""
+        kind, entries = "BOOL", ["TRUE" if one else "FALSE" for one in values]
+        if not isinstance(values[0], bool):
+            kind = self.numbers.name
+            entries = [self.numbers.digits(self.rounded(value)) for value in values]
+        key = f"{kind} {' '.join(entries)}"
+        if key not in self._tables:
+            self._tables[key] = f"t{len(self._tables)}"
+            self.tables += table(self._tables[key], kind, entries, self.about)
+        return self._tables[key]
+
+
+class SystemSteps(StSteps):
+    """Statements of a system, where all inputs are finite."""
+
+    def __init__(
+        self, program: Program, inputs: Mapping[str, str], numbers: StNumbers
+    ) -> None:
+        """Prepare the statements."""
+        super().__init__(program, inputs, numbers)
+        self.odd = self._odd_steps()
 
     def lacking(self) -> list[str]:
         """Return what the program needs and the language has not."""
@@ -108,22 +167,6 @@ class SystemSteps:
             if self.still[place] is None and step.operation != "input":
                 for line in self._statement(place, step):
                     yield f"    {line}\n"
-
-    def value(self, place: int) -> str:
-        """Return a step's result; of samples, the one of number k."""
-        result = self.still[place]
-        if isinstance(result, list):
-            return f"{self._table(result)}[k]"
-        if isinstance(result, bool):
-            return "TRUE" if result else "FALSE"
-        if result is not None:
-            number = 0.0 if math.isnan(result) else self.numbers.nearest(result)
-            return self.numbers.literal(number)
-        step = self.program.steps[place]
-        if step.operation == "input":
-            return self.inputs[step.name]
-        letter = "b" if step.kind == "truth" else "v"
-        return f"{letter}{place}[k]" if step.samples else f"{letter}{place}"
 
     def is_odd(self, place: int) -> str:
         """Return whether a step's result is NaN, as an expression."""
@@ -192,21 +235,20 @@ class SystemSteps:
         operands = [self.value(argument) for argument in step.arguments]
         odd = self.is_odd(place)
         if operation == "where":
-            test, one, two = operands
-            yield f"IF {test} THEN {name} := {one}; ELSE {name} := {two}; END_IF;"
+            yield from self.computed(name, operation, operands)
             if place in self.odd:
-                one, two = map(self.is_odd, step.arguments[1:])
-                yield f"IF {test} THEN {odd} := {one}; ELSE {odd} := {two}; END_IF;"
+                odds = [operands[0], *map(self.is_odd, step.arguments[1:])]
+                yield from self.computed(odd, operation, odds)
             return
         flags = [self.is_odd(a) for a in step.arguments if a in self.odd]
         odds = list(dict.fromkeys(flags))
         if step.kind == "truth":
-            yield f"{name} := {self._truth(step, operands)};"
+            yield from self.computed(name, operation, operands)
             for one in odds:  # NaN is neither less than a number nor equal to one
                 yield f"IF {one} THEN {name} := FALSE; END_IF;"
             return
         if place not in self.odd:
-            yield from self._number(name, operation, operands)
+            yield from self.computed(name, operation, operands)
             return
         tests = list(odds)
         if operation == "divide" and not self._is_safe(step.arguments[1]):
@@ -217,31 +259,9 @@ class SystemSteps:
         yield f"IF {odd} THEN"
         yield f"    {name} := {self.numbers.literal(0.0)};"
         yield "ELSE"
-        for line in self._number(name, operation, operands):
+        for line in self.computed(name, operation, operands):
             yield f"    {line}"
         yield "END_IF;"
-
-    def _truth(self, step: Step, operands: list[str]) -> str:
-        if step.operation == "not":
-            return f"NOT {operands[0]}"
-        if step.operation == "is_finite":
-            return f"ABS({operands[0]}) <= {self.numbers.literal(self.numbers.largest)}"
-        return f"{operands[0]} {_SIGNS[step.operation]} {operands[1]}"
-
-    def _number(self, name: str, operation: str, operands: list[str]) -> Iterator[str]:
-        """Yield what computes a number of numbers."""
-        if operation in _COMPARED:
-            a, b = operands
-            test = f"{a} {_COMPARED[operation]} {b}"
-            yield f"IF {test} THEN {name} := {a}; ELSE {name} := {b}; END_IF;"
-        elif operation in _FUNCTIONS:
-            yield f"{name} := {_FUNCTIONS[operation]}({', '.join(operands)});"
-        elif operation == "square_root":
-            yield f"{name} := SQRT({operands[0]});"
-        elif operation == "negate":
-            yield f"{name} := -{operands[0]};"
-        else:
-            yield f"{name} := {operands[0]} {_SIGNS[operation]} {operands[1]};"
 
     def _over_samples(self, place: int, step: Step) -> Iterator[str]:
         """Yield what makes one number of many samples, or sums up to each."""
@@ -303,43 +323,21 @@ class SystemSteps:
             yield "END_FOR;"
         yield f"{plain} := halves[0];"
 
-    def _table(self, values: list[float] | list[bool]) -> str:
-        """Return the name of a table."""
-        kind, entries = "BOOL", ["TRUE" if one else "FALSE" for one in values]
-        if not isinstance(values[0], bool):
-            kind = self.numbers.name
-            nearest = map(self.numbers.nearest, values)
-            entries = [self.numbers.digits(value) for value in nearest]
-        key = f"{kind} {' '.join(entries)}"
-        if key not in self._tables:
-            self._tables[key] = f"t{len(self._tables)}"
-            about = "a value for each sample"
-            self.tables += table(self._tables[key], kind, entries, about)
-        return self._tables[key]
 
+class RuleSteps(StSteps):
+    """Statements that compute `strengths`, where all values are finite."""
 
-class RuleSteps:
-    """Statements that compute `strengths`, where all values are finite.
-
-    Attributes:
-        declared: The type of each variable that they set, by name.
-        tables: The lines of the tables that they look into.
-    """
+    about = "points of a shape, or their degrees"
 
     def __init__(
         self, rules: RuleBase, values: Mapping[str, str], numbers: StNumbers
     ) -> None:
         """Prepare the statements."""
-        self.rules = rules
-        self.values = values
-        self.numbers = numbers
         # Combinations are computed before, where it is known what is missing.
         plain = tuple(replace(variable, parts=()) for variable in rules.variables)
-        self.program = from_rules(replace(rules, variables=plain, columns=()))
-        self.still = still_results(self.program)
-        self.declared: dict[str, str] = {}
-        self.tables: list[str] = []
-        self._names: dict[tuple[float, ...], str] = {}
+        program = from_rules(replace(rules, variables=plain, columns=()))
+        super().__init__(program, values, numbers)
+        self.rules = rules
         self._numbers: dict[int, int] = {}
 
     def statements(self) -> Iterator[str]:
@@ -353,7 +351,7 @@ class RuleSteps:
             for step in self._needed(place, done):
                 for line in self._statement(step):
                     yield f"    {line}\n"
-            yield f"    strengths[{number}] := {self._value(place)};\n"
+            yield f"    strengths[{number}] := {self.value(place)};\n"
 
     def _needed(self, place: int, done: set[int]) -> list[int]:
         """Return the steps that a step needs and that are not done, in order."""
@@ -367,68 +365,38 @@ class RuleSteps:
                 todo += self.program.steps[one].arguments
         return sorted(result)
 
-    def _value(self, place: int) -> str:
-        result = self.still[place]
-        step = self.program.steps[place]
-        if isinstance(result, bool):
-            return "TRUE" if result else "FALSE"
-        if isinstance(result, float):
-            return self.numbers.literal(self._number(result))
-        if step.operation == "input":
-            return self.values[step.name]
+    def rounded(self, value: float) -> float:
+        """Return a constant in the type of the file; what is below 1 stays so."""
+        return self.numbers.below_one if value == BELOW_ONE else super().rounded(value)
+
+    def variable(self, place: int, step: Step) -> str:
+        """Return the variable of a step's result: v, b of truths, n of places."""
         number = self._numbers.setdefault(place, len(self._numbers) + 1)
-        return f"{self._letter(step)}{number}"
-
-    def _number(self, value: float) -> float:
-        if value == BELOW_ONE:
-            return self.numbers.below_one
-        return self.numbers.nearest(value)
-
-    def _letter(self, step: Step) -> str:
-        """Return the first letter of a step's variable: v, b of truths, n of places."""
         if step.operation == "below":
-            return "n"
-        return "b" if step.kind == "truth" else "v"
+            return f"n{number}"
+        return f"{'b' if step.kind == 'truth' else 'v'}{number}"
 
     def _statement(self, place: int) -> Iterator[str]:
         step = self.program.steps[place]
-        operation = step.operation
-        if operation == "input":
+        if step.operation == "input":
             return
-        name = self._value(place)
+        name = self.value(place)
         kinds = {"n": "DINT", "b": "BOOL", "v": self.numbers.name}
         self.declared[name] = kinds[name[0]]
-        operands = [self._value(argument) for argument in step.arguments]
-        if operation in _SIGNS:
-            yield f"{name} := {operands[0]} {_SIGNS[operation]} {operands[1]};"
-        elif operation in _COMPARED:
-            a, b = operands  # a if they are equal, as in the reference: -0 or 0
-            test = f"{b} {_COMPARED[operation]} {a}"
-            yield f"IF {test} THEN {name} := {b}; ELSE {name} := {a}; END_IF;"
-        elif operation == "where":
-            test, a, b = operands
-            yield f"IF {test} THEN {name} := {a}; ELSE {name} := {b}; END_IF;"
-        elif operation == "negate":
-            yield f"{name} := -{operands[0]};"
-        elif operation == "below":
-            places, last = self._table(step), len(step.table) - 1
+        operands = [self.value(argument) for argument in step.arguments]
+        if step.operation == "below":
+            places, last = self.table(step.table), len(step.table) - 1
             yield f"{name} := 0;"
             yield f"FOR k := 0 TO {last} DO"
             yield f"    IF {places}[k] < {operands[0]} THEN {name} := k + 1; END_IF;"
             yield "END_FOR;"
-        elif operation == "pick" and operands[0].startswith("n"):
-            yield f"{name} := {self._table(step)}[{operands[0]}];"
-        else:  # what else there is answers which rule wins, and that is done below
-            raise AssertionError(operation)
-
-    def _table(self, step: Step) -> str:
-        if step.table not in self._names:
-            name = f"t{len(self._names)}"
-            self._names[step.table] = name
-            digits = [self.numbers.digits(self._number(x)) for x in step.table]
-            about = "points of a shape, or their degrees"
-            self.tables += table(name, self.numbers.name, digits, about)
-        return self._names[step.table]
+        elif step.operation == "pick":
+            yield f"{name} := {self.table(step.table)}[{operands[0]}];"
+        elif step.operation in _COMPARED:
+            # The first one if they are equal, as in the reference: -0 or 0.
+            yield from self.computed(name, step.operation, operands[::-1])
+        else:
+            yield from self.computed(name, step.operation, operands)
 
 
 def decision(rules: RuleBase, numbers: StNumbers) -> Iterator[str]:

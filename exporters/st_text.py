@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from fuzzytree.exporters.program_text import NumberType, one_line
 from fuzzytree.model import NameMap
-from fuzzytree.numerics import rounded
 
 _WIDTH = 88
 _LONGEST_NAME = 30
@@ -39,27 +38,16 @@ RESERVED = tuple(_WORDS.split())
 instructions and addresses in old ones."""
 
 
-@dataclass(frozen=True, slots=True)
-class StNumbers:
-    """A number type of Structured Text.
+class StNumbers(NumberType):
+    """A number type of Structured Text."""
 
-    Attributes:
-        name: In the language.
-        kind: In numpy.
-        below_one: The largest number below 1.
-        largest: The largest number.
-    """
-
-    name: str
-    kind: type[np.float64] | type[np.float32]
-    below_one: float
-    largest: float
+    __slots__ = ()
 
     def nearest(self, value: float) -> float:
         """Return the nearest number of the type: finite, and 0 only for 0."""
         clamped = max(-self.largest, min(value, self.largest))
-        (result,) = rounded([clamped], self.kind, is_divisor=value != 0.0).tolist()
-        return float(result)
+        (result,) = self.rounded([clamped], is_divisor=value != 0.0)
+        return result
 
     def at_most(self, value: float) -> float:
         """Return the largest finite number of the type up to a value.
@@ -98,8 +86,8 @@ class StNumbers:
         return f"{self.name}#{text}"
 
 
-LONG = StNumbers("LREAL", np.float64, 1.0 - 2.0**-53, float(np.finfo("d").max))
-SINGLE = StNumbers("REAL", np.float32, 1.0 - 2.0**-24, float(np.finfo("f").max))
+LONG = StNumbers("LREAL", np.float64)
+SINGLE = StNumbers("REAL", np.float32)
 
 
 def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> NameMap:
@@ -130,11 +118,7 @@ def remark(text: str) -> str:
         >>> print(remark("a *) (* é\n"))
         a * ) ( * \xe9\n
     """
-    plain = text.encode("unicode_escape").decode("ascii")
-    for pair in ("(*", "*)", "/*", "*/"):
-        while pair in plain:
-            plain = plain.replace(pair, f"{pair[0]} {pair[1]}")
-    return plain
+    return one_line(text, ("(*", "*)", "/*", "*/"))
 
 
 def table(name: str, kind: str, entries: Sequence[str], about: str) -> Iterator[str]:

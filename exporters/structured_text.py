@@ -13,6 +13,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
+from msgspec.structs import replace
+
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.reference_tables import targets_of
 from fuzzytree.exporters.st_steps import RuleSteps, SystemSteps, decision
@@ -83,9 +85,10 @@ def write(
         >>> print(write(random_tree(0)).content.decode("ascii").splitlines()[2])
         FUNCTION_BLOCK random_7
     """
+    del allow_loss
     numbers = LONG if dtype == "float64" else SINGLE
     if isinstance(model, FuzzySystem):
-        return written_system(model, numbers, name, allow_loss=allow_loss)
+        return _written_system(model, numbers, name)
     mixed = [variable for variable in model.variables if variable.parts]
     combined = {variable.name: f"mix_{k}" for k, variable in enumerate(mixed, 1)}
     taken = _taken(model, combined)
@@ -97,24 +100,34 @@ def write(
         constants, local, body = _rules(model, values, numbers)
     else:
         constants, local, body = _tree(model, values, numbers)
+    lines = [
+        *_interface(model, names, numbers),
+        *block_of("VAR CONSTANT", constants),
+        *block_of("VAR", [*_mixed_lines(mixed, combined, numbers), *local]),
+        "\n",
+        *_guard(model, names, mixed, combined, numbers),
+        *body,
+    ]
+    return _written(model, (given, block), names, lines)
+
+
+def _written(
+    model: Document, block: tuple[str, str], names: NameMap, lines: Sequence[str]
+) -> Written:
+    """Return a function block; its name may differ from the one it should have."""
+    given, name = block
     text = "".join(
         [
             f"(* Written by fuzzytree: {remark(model.name)} *)\n",
             f"(* Fingerprint: {fingerprint(model)} *)\n",
-            f"FUNCTION_BLOCK {block}\n",
-            *_interface(model, names, numbers),
-            *block_of("VAR CONSTANT", constants),
-            *block_of("VAR", [*_mixed_lines(mixed, combined, numbers), *local]),
-            "\n",
-            *_guard(model, names, mixed, combined, numbers),
-            *body,
-            "END_IF;\n",
-            "END_FUNCTION_BLOCK\n",
+            f"FUNCTION_BLOCK {name}\n",
+            *lines,
+            "END_IF;\nEND_FUNCTION_BLOCK\n",
         ]
     )
     changed = [f"{old!r} is called {new}" for old, new in names.changed.items()]
-    if block != given:
-        changed.insert(0, f"{given!r} is called {block}")
+    if name != given:
+        changed.insert(0, f"{given!r} is called {name}")
     return Written(text.encode("ascii"), (), tuple(changed))
 
 
@@ -129,11 +142,7 @@ def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
 
 def _interface(model: Model, names: NameMap, numbers: StNumbers) -> Iterator[str]:
     inputs = [variable for variable in model.variables if not variable.parts]
-    lines = [
-        f"    {names[v.name]} : {numbers.name}; (* {remark(_described(v))} *)\n"
-        for v in inputs
-    ]
-    yield from block_of("VAR_INPUT", lines)
+    yield from block_of("VAR_INPUT", list(_declared(inputs, names, numbers)))
     yield "VAR_OUTPUT\n"
     yield "    class_number : INT; (* -1: no class *)\n"
     for place, label in enumerate(model.classes):
@@ -144,10 +153,6 @@ def _interface(model: Model, names: NameMap, numbers: StNumbers) -> Iterator[str
     if isinstance(model, RuleBase):
         yield f"    strengths : ARRAY [1..{len(model.rules)}] OF {numbers.name};\n"
     yield "END_VAR\n"
-
-
-def _described(variable: Variable) -> str:
-    return f"{variable.name} ({variable.unit})" if variable.unit else variable.name
 
 
 def _mixed_lines(
@@ -271,15 +276,12 @@ def _depth(tree: FuzzyTree) -> int:
 _FIXED = ("is_number", "status", "is_known", "k", "halves")
 
 
-def written_system(
-    system: FuzzySystem, numbers: StNumbers, name: str, *, allow_loss: bool
-) -> Written:
+def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Written:
     """Return a system as a function block, in ASCII.
 
     Raises:
         LossError: If it needs what the language has not.
     """
-    del allow_loss
     program = from_system(system)
     taken = [f"{c}{k}" for c in "vbot" for k in range(len(program.steps))]
     given = name or system.name
@@ -299,28 +301,20 @@ def written_system(
     body = [*steps.statements(), *_results(system, steps, names)]
     local = ["    is_known : BOOL;\n    k : DINT;\n"]
     local += [f"    {one} : {kind};\n" for one, kind in steps.declared.items()]
-    text = "".join(
-        [
-            f"(* Written by fuzzytree: {remark(system.name)} *)\n",
-            f"(* Fingerprint: {fingerprint(system)} *)\n",
-            f"FUNCTION_BLOCK {block}\n",
-            *_system_interface(system, names, numbers),
-            *block_of("VAR CONSTANT", steps.tables),
-            *block_of("VAR", local),
-            "\n",
-            *known_inputs(inputs, numbers),
-            "IF NOT is_known THEN\n    status := 3;\n",
-            *_nothing(system, names, numbers),
-            "ELSE\n",
-            *body,
-            "END_IF;\nEND_FUNCTION_BLOCK\n",
-        ]
-    )
-    changed = [f"{old!r} is called {new}" for old, new in names.changed.items()]
-    if block != given:
-        changed.insert(0, f"{given!r} is called {block}")
-    changed.append("an output without a number is 0 and its `is_number` is FALSE")
-    return Written(text.encode("ascii"), (), tuple(changed))
+    lines = [
+        *_system_interface(system, names, numbers),
+        *block_of("VAR CONSTANT", steps.tables),
+        *block_of("VAR", local),
+        "\n",
+        *known_inputs(inputs, numbers),
+        "IF NOT is_known THEN\n    status := 3;\n",
+        *_nothing(system, names, numbers),
+        "ELSE\n",
+        *body,
+    ]
+    written = _written(system, (given, block), names, lines)
+    note = "an output without a number is 0 and its `is_number` is FALSE"
+    return replace(written, remarks=(*written.remarks, note))
 
 
 def _formulas(system: FuzzySystem) -> Iterator[str]:
@@ -346,7 +340,9 @@ def _system_interface(
 
 
 def _declared(
-    variables: Sequence[SystemInput | SystemOutput], names: NameMap, numbers: StNumbers
+    variables: Sequence[Variable | SystemInput | SystemOutput],
+    names: NameMap,
+    numbers: StNumbers,
 ) -> Iterator[str]:
     for one in variables:
         about = f"{one.name} ({one.unit})" if one.unit else one.name

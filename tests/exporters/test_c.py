@@ -9,11 +9,12 @@ import pytest
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c import FORMAT, write_c
-from fuzzytree.exporters.c_selftest import axis_values, digest_of, leaf, strengths
+from fuzzytree.exporters.c_selftest import axis_values, leaf, strengths, words_of
 from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
 from fuzzytree.exporters.c_tree import cut_tests
+from fuzzytree.exporters.program_text import digest_of
 from fuzzytree.exporters.reference_tables import places_of
 from fuzzytree.model.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
@@ -169,8 +170,8 @@ def test_a_digest_changes_with_the_last_bit_of_any_strength(place: int) -> None:
     given = [0.25, 1.0, 0.5]
     changed = given.copy()
     changed[place] = float(np.nextafter(given[place], 0.0))
-    assert digest_of(given, DOUBLE) != digest_of(changed, DOUBLE)
-    assert digest_of([0.0], DOUBLE) == digest_of([-0.0], DOUBLE)
+    assert digest_of(words_of(given, DOUBLE)) != digest_of(words_of(changed, DOUBLE))
+    assert digest_of(words_of([0.0], DOUBLE)) == digest_of(words_of([-0.0], DOUBLE))
 
 
 def test_what_float_cannot_hold_is_refused_with_every_loss() -> None:

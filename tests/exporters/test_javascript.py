@@ -6,8 +6,9 @@ import re
 
 import pytest
 
-from fuzzytree.exporters.javascript import FORMAT, digest_of, write
+from fuzzytree.exporters.javascript import FORMAT, words_of, write
 from fuzzytree.exporters.js_text import literal, number_text, text_of
+from fuzzytree.exporters.program_text import digest_of
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
@@ -96,8 +97,8 @@ def test_what_is_no_literal_is_refused() -> None:
 
 
 def test_a_digest_reports_every_bit() -> None:
-    assert digest_of([0.5, 1.0]) != digest_of([0.5, 1.0 - 2.0**-53])
-    assert digest_of([0.0]) != digest_of([-0.0])
+    assert digest_of(words_of([0.5, 1.0])) != digest_of(words_of([0.5, 1.0 - 2.0**-53]))
+    assert digest_of(words_of([0.0])) != digest_of(words_of([-0.0]))
 
 
 @pytest.mark.parametrize(
