@@ -19,6 +19,7 @@ from fuzzytree.report.markup import (
     table,
     tag,
     text,
+    text_lines,
 )
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, class_mark, tree_picture
@@ -76,7 +77,7 @@ def _word(said: str) -> Markup:
 def tree_section(tree: FuzzyTree, passed: Passing | None) -> Markup:
     """Return a tree as a picture and as an outline."""
     lines = [*itertools.islice(tree_lines(tree), _MOST_LINES)]
-    outline = tag("pre", joined((text(line) for line in lines), "\n"), tabindex="0")
+    outline = tag("pre", text_lines(lines), tabindex="0")
     parts: list[Content] = []
     if len(tree.leaves) <= MOST_LEAVES:
         parts.append(legend(tree.classes))

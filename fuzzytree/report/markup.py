@@ -38,6 +38,11 @@ def text(words: str) -> Markup:
     return Markup(html.escape(printable(words)))
 
 
+def text_lines(lines: Iterable[str]) -> Markup:
+    """Return lines as markup, each ended by a line break but the last."""
+    return Markup("\n".join(map(text, lines)))
+
+
 def joined(parts: Iterable[Content], between: str = "") -> Markup:
     """Return parts one after another, with escaped words between them."""
     kept = [part if isinstance(part, Markup) else text(part) for part in parts if part]

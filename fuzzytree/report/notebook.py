@@ -9,7 +9,7 @@ from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.report.audit_model import sentence_of
 from fuzzytree.report.audit_page import agreement_section
-from fuzzytree.report.markup import Markup, folded, joined, table, tag, text
+from fuzzytree.report.markup import Markup, folded, joined, table, tag, text_lines
 from fuzzytree.report.systems import system_lines
 from fuzzytree.report.text import head_lines, model_lines, term_lines
 
@@ -58,4 +58,4 @@ def audit_html(found: Audit) -> Markup:
 
 
 def _lines(lines: Iterable[str]) -> Markup:
-    return tag("pre", joined(map(text, lines), "\n"))
+    return tag("pre", text_lines(lines))

@@ -36,6 +36,8 @@ def test_no_name_becomes_markup(value: Any) -> None:
 def test_a_tree_shows_its_outline_and_its_terms() -> None:
     shown = TREE._repr_html_()
     assert shown.startswith("<pre>")
+    assert len(shown.splitlines()) > len(TREE.nodes) + len(TREE.leaves)
+    assert "\\n" not in shown
     for variable in TREE.variables:
         assert variable.name in shown
         assert all(term.name in shown for term in variable.terms)
