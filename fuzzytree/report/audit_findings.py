@@ -12,26 +12,18 @@ from fuzzytree.auditing import (
     Answer,
     AuditView,
     Bracket,
-    FileLocation,
-    Measure,
     Severity,
     Span,
     Witness,
     point_of,
 )
 from fuzzytree.model import RuleBase
-from fuzzytree.report.audit_model import MOST_RULES, sentence_of
-from fuzzytree.report.audit_states import (
-    SEVERITIES,
-    evidence,
-    severity_badge,
-    state_badge,
-    state_word,
-)
+from fuzzytree.report.audit_states import SEVERITIES
 from fuzzytree.report.drawing import Axis
-from fuzzytree.report.markup import Content, Markup, folded, joined, listed, tag, text
+from fuzzytree.report.markup import Markup
+from fuzzytree.report.parts import part
 from fuzzytree.report.svg_terms import bar_picture, map_picture, span_text, windows
-from fuzzytree.report.text import counted, number
+from fuzzytree.report.text import counted
 
 MOST_FINDINGS = 300
 """The most that are listed one by one."""
@@ -48,7 +40,6 @@ MOST_WHOLE = 3
 MOST_FACTS = 8
 """The most facts of a code, beside its findings."""
 
-_SHORT = 16  # characters of a fraction that a reader may want to see
 _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
 
 
@@ -71,32 +62,72 @@ def findings_section(
     findings: Sequence[Answer], scene: Scene, accepted: Collection[str] = ()
 ) -> Markup:
     """Return all findings, the gravest first, those of one code together."""
-    if not findings:
-        return tag("p", "There is no finding.")
     names = anchors(findings)
     shown = [*zip(findings, names, strict=True)][:MOST_FINDINGS]
-    groups: dict[tuple[Severity, str], list[Markup]] = {}
+    groups: dict[tuple[Severity, str], list[ShownFinding]] = {}
     for place, (answer, name) in enumerate(shown):
-        known = answer.id in accepted
         drawn: Drawn = "nothing" if place >= MOST_PICTURED else "bars"
         if place < MOST_MAPPED:
             drawn = "maps"
         group = groups.setdefault((answer.severity, answer.code), [])
-        is_whole = answer.severity == "error" or len(group) < MOST_WHOLE
         group.append(
-            _finding(answer, name, scene, drawn, is_known=known, is_whole=is_whole)
+            ShownFinding(
+                answer,
+                name,
+                answer.id in accepted,
+                answer.severity == "error" or len(group) < MOST_WHOLE,
+                _concerned(answer, scene),
+                _region_text(answer.region, scene),
+                None if drawn == "nothing" else pictures(answer, name, scene, drawn),
+            )
         )
-    parts = [_group(code, shown) for (_, code), shown in groups.items()]
-    more = len(findings) - len(shown)
-    if more > 0:
-        said = f"{counted(more, 'more finding')}: the JSON has all of them"
-        parts.append(tag("p", said, class_="left-out"))
+    notes: list[str] = []
+    if len(findings) > len(shown):
+        more = counted(len(findings) - len(shown), "more finding")
+        notes.append(f"{more}: the JSON has all of them")
     if len(shown) > MOST_MAPPED:
         said = f"Only the first {MOST_MAPPED} findings have maps"
         if len(shown) > MOST_PICTURED:
             said += f", and the first {MOST_PICTURED} pictures of variables"
-        parts.append(tag("p", said, class_="left-out"))
-    return joined(parts)
+        notes.append(said)
+    known = [(code, _explanations(code), some) for (_, code), some in groups.items()]
+    return part("findings", known, notes)
+
+
+class ShownFinding(NamedTuple):
+    """A finding as the page shows it.
+
+    Attributes:
+        answer: The finding.
+        name: By which links find it.
+        is_accepted: Whether the baseline has it.
+        is_whole: Whether all of it is shown, and nothing folded.
+        concerned: The rules and terms that it is about, in words.
+        where: Its region in words.
+        pictures: Of its region.
+    """
+
+    answer: Answer
+    name: str
+    is_accepted: bool
+    is_whole: bool
+    concerned: list[str]
+    where: str
+    pictures: Markup | None
+
+
+def _explanations(code: str) -> list[tuple[str, str]]:
+    """Return what a code means, with the title of each text."""
+    if code not in CODES:
+        return []
+    known = CODES[code]
+    texts = (
+        ("What it means", known.what),
+        ("Why it matters", known.why),
+        ("Example", known.example),
+        ("What to do", known.remedy),
+    )
+    return [(title, words) for title, words in texts if words]
 
 
 def facts_section(answers: Sequence[Answer]) -> Markup | None:
@@ -110,102 +141,11 @@ def facts_section(answers: Sequence[Answer]) -> Markup | None:
         is_of_rule = answer.code == "FT701" and answer.rules
         if has_numbers and not answer.is_finding and not is_of_rule:
             groups.setdefault(answer.code, []).append(answer)
-    parts: list[Markup] = []
-    for code, known in groups.items():
-        parts += [_fact(answer) for answer in known[:MOST_FACTS]]
-        if len(known) > MOST_FACTS:
-            more = f"{code}: {counted(len(known) - MOST_FACTS, 'more answer')} below"
-            parts.append(tag("p", more, class_="left-out"))
-    return tag("div", *parts, class_="facts-of") if parts else None
-
-
-def _fact(answer: Answer) -> Markup:
-    code = tag("span", answer.code, class_="code", title=_title(answer.code))
-    said = tag("p", answer.sentence, " ", code)
-    badge = state_badge(state_word(answer.state))
-    return tag(
-        "div", badge, tag("div", said, _measures(answer.measures)), class_="fact"
-    )
-
-
-def _title(code: str) -> str:
-    return CODES[code].title if code in CODES else "a finding"
-
-
-def _group(code: str, shown: Sequence[Markup]) -> Markup:
-    known = CODES.get(code)
-    head = tag("h3", tag("span", code, class_="code"), f" {_title(code)}")
-    parts: list[Content] = [head]
-    if known and (known.what or known.why or known.example or known.remedy):
-        named = (
-            ("What it means", known.what),
-            ("Why it matters", known.why),
-            ("Example", known.example),
-            ("What to do", known.remedy),
-        )
-        pairs: list[Markup] = []
-        for name, said in named:
-            if said:
-                lines = (
-                    tag("span", _with_code(line), class_="line")
-                    for line in said.splitlines()
-                )
-                pairs += [tag("dt", name), tag("dd", *lines)]
-        parts.append(folded("What this means and what to do", tag("dl", *pairs)))
-    return tag("section", *parts, *shown, class_="group")
-
-
-def _with_code(line: str) -> Markup:
-    """Return a line in which what stands between backticks is code."""
-    parts = line.split("`")
-    return joined(
-        tag("code", part) if place % 2 else part for place, part in enumerate(parts)
-    )
-
-
-def _finding(
-    answer: Answer,
-    name: str,
-    scene: Scene,
-    drawn: Drawn,
-    *,
-    is_known: bool,
-    is_whole: bool,
-) -> Markup:
-    places = joined((tag("code", _place(one)) for one in answer.places[:6]), ", ")
-    facts: list[Content] = [
-        severity_badge(answer.severity),
-        state_badge(state_word(answer.state)),
-        tag("span", answer.subject, class_="subject"),
+    shown = [
+        (code, known[:MOST_FACTS], len(known) - MOST_FACTS)
+        for code, known in groups.items()
     ]
-    if is_known:
-        facts.append(tag("span", "accepted", class_="accepted"))
-    if places:
-        facts.append(tag("span", places, class_="places"))
-    head: list[Content] = [
-        tag("h4", answer.sentence),
-        tag("p", *facts, class_="facts"),
-        _concerned(answer, scene),
-    ]
-    parts: list[Content] = []
-    if answer.region:
-        where = _region_text(answer.region, scene)
-        parts.append(tag("p", f"Where {where}", class_="how"))
-    if drawn != "nothing":
-        parts.append(pictures(answer, name, scene, drawn))
-    parts += [evidence(answer.state), _measures(answer.measures)]
-    named = tag("code", answer.id) if answer.id else None
-    repeat = tag("code", answer.repeat, class_="copied") if answer.repeat else None
-    if named or repeat:
-        parts.append(tag("p", named, repeat, class_="repeat"))
-    if not is_whole:
-        whole = tag("div", *parts, class_="rest")
-        parts = [folded("Where it is, and how it is known", whole)]
-    return tag("article", *head, *parts, id=name, class_=f"finding {answer.severity}")
-
-
-def _place(place: FileLocation) -> str:
-    return f"{place.file}:{place.line}:{place.column}"
+    return part("facts", shown) if shown else None
 
 
 def _region_text(region: Sequence[Span], scene: Scene) -> str:
@@ -216,44 +156,23 @@ def _region_text(region: Sequence[Span], scene: Scene) -> str:
     )
 
 
-def _concerned(answer: Answer, scene: Scene) -> Markup | None:
+def _concerned(answer: Answer, scene: Scene) -> list[str]:
     """Return the rules and terms that a finding is about, in words."""
     viewed = scene.viewed
-    whole = viewed.rules
-    items: list[Content] = []
-    rules: list[int] = []
-    if whole is not None:
-        rules = [k for k in answer.rules if 0 < k <= len(whole.rules)]
-        items += [_named(k, viewed, whole) for k in rules[:6]]
-    if len(rules) > 6:
-        items.append(f"and {counted(len(rules) - 6, 'more rule')}")
-    if not rules:
+    rules = viewed.rules.rules if viewed.rules else ()
+    classes = viewed.rules.classes if viewed.rules else ()
+    numbers = [k for k in answer.rules if 0 < k <= len(rules)]
+    items: list[str] = []
+    for k in numbers[:6]:
+        name = viewed.rule_names[k - 1] if viewed.rule_names else f"rule {k}"
+        items.append(part("concerned_rule", k, name, rules[k - 1], classes))
+    if len(numbers) > 6:
+        items.append(f"and {counted(len(numbers) - 6, 'more rule')}")
+    if not numbers:
         items += [f"{one.variable} is {one.term}" for one in answer.terms[:6]]
         if len(answer.terms) > 6:
             items.append(f"and {counted(len(answer.terms) - 6, 'more term')}")
-    return listed(items, class_="concerned") if items else None
-
-
-def _named(number: int, viewed: AuditView, rules: RuleBase) -> Markup:
-    name = viewed.rule_names[number - 1] if viewed.rule_names else f"rule {number}"
-    href = f"#rule-{number}" if number <= MOST_RULES else None
-    said = sentence_of(rules.rules[number - 1], rules)
-    return joined([tag("a", name, href=href), text(": "), said])
-
-
-def _measures(measures: Sequence[Measure]) -> Markup | None:
-    if not measures:
-        return None
-    pairs: list[Markup] = []
-    for one in measures:
-        exact = one.exact if one.exact and len(one.exact) <= _SHORT else None
-        unit = f" {one.unit}" if one.unit else ""
-        is_told = exact is not None and exact != number(one.value)
-        note = tag("span", f" = {exact}", class_="exact") if is_told else None
-        pairs.append(
-            tag("div", tag("dt", one.name), tag("dd", number(one.value), unit, note))
-        )
-    return tag("dl", *pairs, class_="measures")
+    return items
 
 
 _MOST_BARS = 6  # of one finding
@@ -281,7 +200,7 @@ class Scene(NamedTuple):
         return self.viewed.rules if is_strongest else None
 
 
-def pictures(answer: Answer, name: str, scene: Scene, drawn: Drawn) -> Markup | None:
+def pictures(answer: Answer, name: str, scene: Scene, drawn: Drawn) -> Markup:
     """Return the region as pictures: a bar for each variable, a map of two."""
     point: dict[str, Fraction] = {}
     if isinstance(answer.state, (Witness, Bracket)):
@@ -292,7 +211,7 @@ def pictures(answer: Answer, name: str, scene: Scene, drawn: Drawn) -> Markup | 
     region = {span.variable: span for span in spans}
     values = _values(point, scene)
     shown = _concerning(answer, region, values, scene)
-    parts = [
+    bars = [
         bar_picture(
             axis,
             region.get(axis.name),
@@ -302,27 +221,12 @@ def pictures(answer: Answer, name: str, scene: Scene, drawn: Drawn) -> Markup | 
         )
         for k, axis in enumerate(shown[:_MOST_BARS])
     ]
-    if len(shown) > _MOST_BARS:
-        others = ", ".join(axis.name for axis in shown[_MOST_BARS:])
-        parts.append(tag("p", f"not drawn: {others}", class_="left-out"))
-    maps: list[Markup] = []
+    undrawn = ", ".join(axis.name for axis in shown[_MOST_BARS:])
+    maps: list[tuple[Markup | None, str]] = []
     for whose, rules in _deciding(answer, scene) if drawn == "maps" else ():
-        maps += _maps(
-            _mapped(shown, rules, whose, scene),
-            region,
-            values,
-            f"{name}-{len(maps)}",
-            whose,
-            rules,
-        )
-    if not parts and not maps:
-        return None
-    return tag(
-        "div",
-        tag("div", *parts, class_="bars") if parts else None,
-        *maps,
-        class_="pictures",
-    )
+        mapped = _mapped(shown, rules, whose, scene)
+        maps += _maps(mapped, region, values, f"{name}-{len(maps)}", whose, rules)
+    return part("pictures", bars, undrawn, maps)
 
 
 def _values(point: Mapping[str, Fraction], scene: Scene) -> dict[str, Fraction]:
@@ -352,8 +256,8 @@ def exact_axes(
         if variable.parts:
             axes[variable.name] = sum(
                 (
-                    Fraction(part.weight) * (point[part.input] - Fraction(part.centre))
-                    for part in variable.parts
+                    Fraction(one.weight) * (point[one.input] - Fraction(one.centre))
+                    for one in variable.parts
                 ),
                 start=Fraction(0),
             )
@@ -412,15 +316,14 @@ def _maps(
     name: str,
     whose: str,
     rules: RuleBase,
-) -> Iterator[Markup]:
+) -> Iterator[tuple[Markup | None, str]]:
     """Yield maps of the decision on the two variables that a region limits most."""
     tested = {clause.variable for rule in rules.rules for clause in rule.when}
     drawn = sorted(shown, key=lambda axis: _share(axis, region.get(axis.name)))
     if len(drawn) < 2 or tested - values.keys():
         return
     if len(rules.rules) > _MOST_MAP_RULES:
-        said = f"not drawn: a map of more than {_MOST_MAP_RULES} rules"
-        yield tag("p", said, class_="left-out")
+        yield None, f"not drawn: a map of more than {_MOST_MAP_RULES} rules"
         return
     across, down = drawn[:2]
     for k, (where, window) in enumerate(windows(across, down, region)):
@@ -434,7 +337,7 @@ def _maps(
             said += f", with {counted(others, 'other variable')} as at the witness"
         if across.parts or down.parts:
             said += "; a combination is drawn as if it were free"
-        yield tag("figure", picture, tag("figcaption", said))
+        yield picture, said
 
 
 def _share(axis: Axis, span: Span | None) -> float:

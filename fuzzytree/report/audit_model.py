@@ -6,93 +6,30 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.auditing import Answer, AuditView, Sampled
-from fuzzytree.model import FuzzySystem, FuzzyTree, Rule, RuleBase
+from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
 from fuzzytree.report.drawing import Axis
-from fuzzytree.report.markup import (
-    Content,
-    Markup,
-    folded,
-    joined,
-    listed,
-    table,
-    tag,
-    text,
-    text_lines,
-)
+from fuzzytree.report.markup import Markup
+from fuzzytree.report.parts import MOST_LINES, MOST_RULES, part
 from fuzzytree.report.svg_terms import terms_picture
-from fuzzytree.report.svg_tree import MOST_LEAVES, class_mark, tree_picture
+from fuzzytree.report.svg_tree import MOST_LEAVES, tree_picture
 from fuzzytree.report.systems import curve_text, rule_text, sum_text
 from fuzzytree.report.text import counted, number, shape_text, tree_lines
 
 Audited = FuzzyTree | RuleBase | FuzzySystem
 
-MOST_RULES = 1000
 MOST_VARIABLES = 60
-_MOST_LINES = 400  # of a tree as an outline
 _MOST_TERMS = 40  # of a variable that are described in words
 _MOST_PARTS = 12  # of a combination that are written
 
 
-def class_name(label: str, code: int) -> Markup:
-    """Return a class with the mark of its colour."""
-    mark = tag("span", class_=f"chip {class_mark(code)}", aria_hidden="true")
-    return tag("span", mark, label, class_="class")
-
-
-def legend(classes: Sequence[str]) -> Markup:
-    """Return the classes with their colours."""
-    shown = [class_name(label, code) for code, label in enumerate(classes[:40])]
-    if len(classes) > len(shown):
-        shown.append(text(f"and {len(classes) - len(shown)} more"))
-    return tag("p", "Classes: ", joined(shown, " "), class_="legend")
-
-
-def sentence_of(rule: Rule, rules: RuleBase) -> Markup:
-    """Return a rule of a rule base as a person reads it."""
-    then = class_name(rule.then, rules.classes.index(rule.then))
-    if not rule.when:
-        return joined([_word("ALWAYS"), then], " ")
-    clauses = [
-        joined(
-            [
-                tag("b", one.variable),
-                " is not " if one.negated else " is ",
-                joined((tag("i", term) for term in one.terms), " or "),
-            ]
-        )
-        for one in rule.when
-    ]
-    parts = [_word("IF"), clauses[0]]
-    for clause in clauses[1:]:
-        parts += [_word("AND"), clause]
-    return joined([*parts, _word("THEN"), then], " ")
-
-
-def _word(said: str) -> Markup:
-    return tag("span", said, class_="word")
-
-
 def tree_section(tree: FuzzyTree, passed: Passing | None) -> Markup:
     """Return a tree as a picture and as an outline."""
-    lines = [*itertools.islice(tree_lines(tree), _MOST_LINES)]
-    outline = tag("pre", text_lines(lines), tabindex="0")
-    parts: list[Content] = []
-    if len(tree.leaves) <= MOST_LEAVES:
-        parts.append(legend(tree.classes))
-        picture = tree_picture(tree, passed)
-        frame = {"role": "region", "aria_label": "The tree"}
-        parts.append(tag("div", picture, class_="scrolls tree", tabindex="0", **frame))
-        parts.append(tag("p", _bars_mean(tree, passed), class_="caption"))
-        parts.append(folded("The tree as an outline", outline))
-    else:
-        said = f"A picture shows at most {MOST_LEAVES} leaves, and this tree has "
-        parts += [tag("p", f"{said}{len(tree.leaves)}; here is its outline"), outline]
-    if len(lines) == _MOST_LINES:
-        said = f"Only the first {_MOST_LINES} lines are shown"
-        parts.append(tag("p", said, class_="left-out"))
-    return joined(parts)
+    lines = [*itertools.islice(tree_lines(tree), MOST_LINES)]
+    is_small = len(tree.leaves) <= MOST_LEAVES
+    picture = tree_picture(tree, passed) if is_small else None
+    return part("tree", tree, picture, _bars_mean(tree, passed), lines, MOST_LEAVES)
 
 
 def _bars_mean(tree: FuzzyTree, passed: Passing | None) -> str:
@@ -114,53 +51,39 @@ def terms_section(
     """Return a picture of each variable; those without terms folded away."""
     with_terms = [a for a in axes.values() if a.curves or a.undrawn]
     others = [axis for axis in axes.values() if not (axis.curves or axis.undrawn)]
-    parts: list[Content] = [_lines_mean(data)]
-    parts.append(_grid(with_terms[:MOST_VARIABLES], model, data, "v"))
-    more = len(with_terms) - MOST_VARIABLES
-    if more > 0:
-        said = f"{counted(more, 'more variable')} not drawn"
-        parts.append(tag("p", said, class_="left-out"))
-    if others:
-        said = f"{counted(len(others), 'input')} without terms of "
-        said += "its own" if len(others) == 1 else "their own"
-        inner: list[Content] = [_grid(others[:MOST_VARIABLES], model, data, "i")]
-        if len(others) > MOST_VARIABLES:
-            said += f", {MOST_VARIABLES} drawn"
-        parts.append(folded(said, *inner))
-    return joined(parts)
-
-
-def _lines_mean(data: Data | None) -> Markup:
-    said = "Lines are degrees, from 0 to 1; hatched is what lies outside of the domain"
+    caption = (
+        "Lines are degrees, from 0 to 1; hatched is what lies outside of the domain"
+    )
     if data is not None:
-        rows = counted(len(data.codes), "row")
         by = " by class" if data.classes else ""
-        said += f"; bars count the {rows} of the table{by}"
-    return tag("p", said, class_="caption")
+        caption += (
+            f"; bars count the {counted(len(data.codes), 'row')} of the table{by}"
+        )
+    title = f"{counted(len(others), 'input')} without terms of "
+    title += "its own" if len(others) == 1 else "their own"
+    if len(others) > MOST_VARIABLES:
+        title += f", {MOST_VARIABLES} drawn"
+    return part(
+        "terms",
+        caption,
+        [*_cards(with_terms, model, data, "v")],
+        len(with_terms) - MOST_VARIABLES,
+        title,
+        [*_cards(others, model, data, "i")],
+    )
 
 
-def _grid(axes: Sequence[Axis], model: Audited, data: Data | None, name: str) -> Markup:
-    cards: list[Markup] = []
-    for place, axis in enumerate(axes):
-        lines: list[Content] = [*_in_words(model, axis.name)]
+def _cards(
+    axes: Sequence[Axis], model: Audited, data: Data | None, name: str
+) -> Iterator[tuple[Axis, Markup, list[str]]]:
+    """Yield variables with their pictures and their terms in words."""
+    for place, axis in enumerate(axes[:MOST_VARIABLES]):
+        lines = _in_words(model, axis.name)
         if axis.parts:
             lines.append(_sum(axis))
         if axis.undrawn:
             lines.append(f"not drawn: {', '.join(axis.undrawn)}")
-        words = [tag("p", line) for line in lines]
-        cards.append(
-            tag(
-                "figure",
-                tag("figcaption", tag("b", axis.name), _unit(axis.unit)),
-                terms_picture(axis, data, f"{name}{place}"),
-                folded("In words", *words) if words else None,
-            )
-        )
-    return tag("div", *cards, class_="cards")
-
-
-def _unit(unit: str) -> str:
-    return f" in {unit}" if unit else ""
+        yield axis, terms_picture(axis, data, f"{name}{place}"), lines
 
 
 def _sum(axis: Axis) -> str:
@@ -185,68 +108,69 @@ def _in_words(model: Audited, name: str) -> list[str]:
 
 
 def rules_section(
-    viewed: AuditView, answers: Sequence[Answer], links: Mapping[int, Sequence[Markup]]
+    viewed: AuditView, answers: Sequence[Answer], links: Mapping[int, Markup]
 ) -> Markup:
     """Return the rules as a table, with what the rows say of each."""
-    notes = [*_notes(viewed)]
-    if viewed.rules is None:
-        return joined(notes)
-    rules = viewed.rules.rules
+    rules = viewed.rules.rules if viewed.rules else ()
+    classes = viewed.rules.classes if viewed.rules else ()
     is_supported = any(rule.support is not None for rule in rules)
     supported = {k: answer for answer in answers for k in _of_rows(answer)}
     names = [*dict.fromkeys(m.name for one in supported.values() for m in one.measures)]
     is_shared = any(isinstance(one.state, Sampled) for one in supported.values())
     head = ["rule", "sentence", *(["training rows"] if is_supported else []), *names]
     head += [*(["confidence"] if is_shared else []), "findings"]
-    rows: list[list[Content]] = []
+    rows: list[list[str]] = []
     for k, rule in enumerate(rules[:MOST_RULES], 1):
-        said = sentence_of(rule, viewed.rules)
         answer = supported.get(k)
         name = viewed.rule_names[k - 1] if viewed.rule_names else str(k)
-        row: list[Content] = [tag("span", name, id=f"rule-{k}"), said]
+        row: list[str] = [part("rule_id", name, k), part("rule", rule, classes)]
         if is_supported:
             row.append("-" if rule.support is None else str(rule.support))
         row += _measured(answer, names)
         if is_shared:
             row.append(_confidence(answer))
-        row.append(joined(links.get(k, ()), " ") or "-")
-        rows.append(row)
-    right = tuple(range(2, len(head) - 1))
-    caption = f"{counted(len(rules), 'rule')}, in the order of the model"
-    return joined([table(head, rows, caption=caption, right=right, sorts=True), *notes])
+        rows.append([*row, links.get(k, "-")])
+    system, known = viewed.system, set(viewed.numbers)
+    unaudited: list[tuple[int, str]] = []
+    if system is not None and (viewed.rules is None or viewed.rule_names):
+        unaudited = [
+            (k, rule_text(rule))
+            for k, rule in enumerate(system.rules, 1)
+            if k not in known
+        ]
+    return part(
+        "rules",
+        head,
+        None if viewed.rules is None else rows,
+        len(rules),
+        [*_notes(viewed)],
+        unaudited,
+        len(system.rules) if system else 0,
+    )
 
 
-def _notes(viewed: AuditView) -> Iterator[Markup]:
-    """Yield what a reader must know of rules that are not in the table."""
+def _notes(viewed: AuditView) -> Iterator[tuple[str, str]]:
+    """Yield what a reader must know of the rules, each with its look."""
     system, rules = viewed.system, viewed.rules
     if rules is None:
         said = "None of the rules has an exact counterpart; the reasons are below"
-        yield tag("p", said, class_="left-out")
+        yield "left-out", said
     elif len(rules.rules) > MOST_RULES:
         more = counted(len(rules.rules) - MOST_RULES, "more rule")
-        yield tag("p", f"{more} not shown", class_="left-out")
+        yield "left-out", f"{more} not shown"
     if system is None or (rules is not None and not viewed.rule_names):
         return
     if rules is not None:
         said = "These are the system's conditions as they are audited: one that says "
-        yield tag("p", f"{said}'or' is examined as several rules", class_="caption")
-    known = set(viewed.numbers)
+        yield "caption", f"{said}'or' is examined as several rules"
     weights = [
         f"rule {k} by {rule.weight!r}"
         for k, rule in enumerate(system.rules, 1)
-        if k in known and rule.weight != 1.0
+        if k in viewed.numbers and rule.weight != 1.0
     ]
     if weights:
         said = "The strengths of these are multiplied by their weights: "
-        yield tag("p", said + ", ".join(weights[:MOST_RULES]), class_="caption")
-    others = [
-        joined([text(f"rule {k}: "), text(rule_text(rule))])
-        for k, rule in enumerate(system.rules, 1)
-        if k not in known
-    ]
-    if others:
-        some = f"{counted(len(others), 'rule')} of {len(system.rules)} not audited"
-        yield folded(some, listed(others[:MOST_RULES]))
+        yield "caption", said + ", ".join(weights[:MOST_RULES])
 
 
 def _of_rows(answer: Answer) -> Iterator[int]:
@@ -255,15 +179,14 @@ def _of_rows(answer: Answer) -> Iterator[int]:
         yield answer.rules[0]
 
 
-def _measured(answer: Answer | None, names: Sequence[str]) -> list[Content]:
+def _measured(answer: Answer | None, names: Sequence[str]) -> list[str]:
     known = {one.name: one.value for one in answer.measures} if answer else {}
     return [number(known[name]) if name in known else "-" for name in names]
 
 
-def _confidence(answer: Answer | None) -> Content:
+def _confidence(answer: Answer | None) -> str:
     state = answer.state if answer else None
     if not isinstance(state, Sampled) or "its class" not in state.of:
         return "-"  # a share of something else, such as of the rows that it wins
-    ends = f"{percent(state.low)} to {percent(state.high)}"
-    sure = tag("span", f" ({ends})", class_="interval", title="95 % sure")
-    return joined([f"{percent(state.hits / state.rows)} %", sure])
+    shares = (state.hits / state.rows, state.low, state.high)
+    return part("confidence", *map(percent, shares))

@@ -1,23 +1,18 @@
 """An audit as one HTML page: it needs no network, and can be read without its script.
 
-The page is `audit.html` with its style and script, filled with what is made here. The
-same audit gives the same bytes. What a policy of content allows is the page's own style
-and script, named by their digests, and nothing else.
+The page is `templates/page.html` with its style and script, filled with the parts that
+are made here. The same audit gives the same bytes. What a policy of content allows is
+the page's own style and script, named by their digests, and nothing else.
 """
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from importlib import resources
-from string import Template
 from typing import TYPE_CHECKING
 
 from fuzzytree.auditing import CODES, Answer, Audit, AuditRows, Declined, view
-from fuzzytree.model import Agreement, Comparison, FuzzySystem, FuzzyTree, RuleBase
+from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import ORIGINS, gathered
 from fuzzytree.report.audit_findings import (
     Scene,
@@ -26,46 +21,24 @@ from fuzzytree.report.audit_findings import (
     findings_section,
     gravest_first,
 )
-from fuzzytree.report.audit_model import (
-    class_name,
-    rules_section,
-    terms_section,
-    tree_section,
-)
+from fuzzytree.report.audit_model import rules_section, terms_section, tree_section
 from fuzzytree.report.audit_rows import data_of, passing
 from fuzzytree.report.audit_states import (
     SEVERITIES,
     STATES,
     as_in_file,
-    icon,
     known_as,
     result_text,
-    state_badge,
     state_note,
     state_word,
 )
 from fuzzytree.report.drawing import axes_of
-from fuzzytree.report.markup import (
-    Content,
-    Markup,
-    folded,
-    joined,
-    listed,
-    table,
-    tag,
-    text,
-)
-from fuzzytree.report.stability import CRITERION, advice, criterion_row
+from fuzzytree.report.markup import Markup, joined
+from fuzzytree.report.parts import part, whole_page
+from fuzzytree.report.stability import advice, criterion_row
 from fuzzytree.report.stability import stability_verdict as stability_text
-from fuzzytree.report.text import (
-    CERTIFIED,
-    COMPARISON,
-    certified_row,
-    comparison_row,
-    counted,
-    number,
-)
 from fuzzytree.report.text import agreement_verdict as agreement_text
+from fuzzytree.report.text import certified_row, comparison_row, counted, number
 
 if TYPE_CHECKING:
     from fuzzytree.checking import Stability
@@ -76,7 +49,6 @@ MOST_QUESTIONS = 1000
 _MOST_DECLINED = 100  # reasons that are listed
 
 _Section = tuple[str, str, Markup]  # its anchor, its title, its content
-
 _FORMS = {"tree": "a tree", "rules": "a rule base", "system": "a fuzzy system"}
 
 
@@ -109,40 +81,13 @@ def page(
     """
     audit = as_in_file(audit)
     sections = [*_sections(audit, model, rows, agreement, stability)]
-    links = [tag("li", tag("a", title, href=f"#{name}")) for name, title, _ in sections]
-    shown = [
-        tag(
-            "section",
-            tag("h2", title, id=f"{name}-title"),
-            content,
-            id=name,
-            aria_labelledby=f"{name}-title",
-        )
-        for name, title, content in sections
-    ]
-    whole = (
-        resources.files("fuzzytree.report").joinpath("audit.html").read_text("utf-8")
-    )
-    return Template(whole).substitute(
-        policy=_policy(whole),
-        title=text(f"{audit.model}: audit"),
+    return whole_page(
+        title=f"{audit.model}: audit",
         head=_head(audit, model),
         verdict=verdict(audit),
-        links=joined(links),
-        body=joined(shown),
+        sections=sections,
+        body=joined(part("section", *section) for section in sections),
     )
-
-
-def _policy(whole: str) -> str:
-    """Return what the page may do: run its own style and script."""
-    allowed: list[str] = []
-    for kind in ("script", "style"):
-        found = re.search(f"<{kind}>(.*?)</{kind}>", whole, re.DOTALL)
-        content = found[1] if found else ""
-        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
-        allowed.append(f"{kind}-src 'sha256-{digest}'")
-    others = "base-uri 'none'; form-action 'none'"
-    return f"default-src 'none'; {'; '.join(allowed)}; {others}"
 
 
 def _sections(
@@ -160,8 +105,8 @@ def _sections(
         passed = passing(model, data) if data is not None else None
         yield "tree", "The tree", tree_section(model, passed)
     yield "terms", "Variables and terms", terms_section(model, axes, data)
-    linked = _links(findings)
-    yield "rules", "Rules", rules_section(viewed, audit.answers, linked)
+    links = _links(findings)
+    yield "rules", "Rules", rules_section(viewed, audit.answers, links)
     scene = Scene(axes, viewed)
     shown = findings_section(findings, scene, audit.accepted)
     yield "findings", "Findings", shown
@@ -173,37 +118,23 @@ def _sections(
         yield "agreement", "Agreement", agreement_section(agreement)
     if stability is not None:
         yield "stability", "Numerical stability", stability_section(stability)
-    yield "limits", "What this audit does not establish", _limits(audit)
+    yield "limits", "What this audit does not establish", part("limits", audit)
     yield "repeat", "How to repeat it", _repeat(audit)
 
 
 def _head(audit: Audit, model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
-    said = f"fuzzytree audit of {_FORMS.get(audit.form, audit.form)}"
-    file = audit.file.name if audit.file else "a model in memory"
-    facts: list[tuple[str, Content]] = [("read from", tag("code", file))]
-    if not isinstance(model, FuzzySystem):
-        names = [class_name(label, k) for k, label in enumerate(model.classes[:12])]
-        more = len(model.classes) - len(names)
-        names += [text(f"and {more} more")] if more > 0 else []
-        facts.append(("classes", joined(names, " ")))
-    facts.append(("decides", _policy_text(audit)))
     data = "no table was given"
     if audit.data is not None:
         data = f"{audit.data.name}, {counted(audit.rows, 'row')}"
     elif audit.rows:
         data = counted(audit.rows, "row")
-    facts.append(("rows", data))
-    for result in audit.results:
-        section = "agreement" if result.verb == "check" else result.verb
-        facts.append((section, tag("a", result_text(result), href=f"#{section}")))
-    pairs = [tag("div", tag("dt", name), tag("dd", said)) for name, said in facts]
-    return joined(
-        [
-            tag("p", said, class_="kicker"),
-            tag("h1", audit.model),
-            tag("dl", *pairs, class_="about"),
-        ]
-    )
+    results = [
+        ("agreement" if one.verb == "check" else one.verb, result_text(one))
+        for one in audit.results
+    ]
+    classes = None if isinstance(model, FuzzySystem) else model.classes
+    kind = _FORMS.get(audit.form, audit.form)
+    return part("head", audit, kind, classes, _policy_text(audit), data, results)
 
 
 def _policy_text(audit: Audit) -> str:
@@ -221,110 +152,72 @@ def _policy_text(audit: Audit) -> str:
     return f"AND is {policy.conjunction}; {'; '.join([who, *none])}"
 
 
-def _links(findings: Sequence[Answer]) -> dict[int, list[Markup]]:
+def _links(findings: Sequence[Answer]) -> dict[int, Markup]:
     """Return links to the findings about each rule, by its number: one for a code."""
     about: dict[int, dict[str, list[str]]] = {}
     for answer, name in zip(findings, anchors(findings), strict=True):
         for k in dict.fromkeys(answer.rules):
             about.setdefault(k, {}).setdefault(answer.code, []).append(name)
-    return {
-        k: [
-            joined(
-                [
-                    tag("a", code, href=f"#{names[0]}"),
-                    text(f" ({len(names)})") if len(names) > 1 else None,
-                ]
-            )
-            for code, names in codes.items()
-        ]
-        for k, codes in about.items()
-    }
+    return {k: part("links", codes) for k, codes in about.items()}
 
 
 def _questions(audit: Audit) -> Markup:
     groups: dict[str, list[Answer]] = {}
     for answer in audit.answers:
         groups.setdefault(answer.code, []).append(answer)
-    rows: list[Sequence[Content]] = []
+    summary: list[Sequence[str]] = []
     for code, answers in groups.items():
         title = CODES[code].title if code in CODES else ""
-        found = sum(answer.is_finding for answer in answers)
+        findings = sum(answer.is_finding for answer in answers)
         states = [str(n) if n else "·" for n in known_as(answers).values()]
-        rows.append((code, title, str(len(answers)), str(found), *states))
+        summary.append((code, title, str(len(answers)), str(findings), *states))
     head = ("code", "question", "count", "findings", *map(str.lower, STATES))
-    right = tuple(range(2, len(head)))
-    summary = table(head, rows, caption="Questions by code", right=right, sorts=True)
-    parts: list[Content] = [summary]
-    if audit.unasked:
-        parts += [tag("h3", "Not examined"), listed(gathered(audit.unasked))]
-    declined = [one for one in audit.answers if isinstance(one.state, Declined)]
-    if declined:
-        lines = (f"{one.subject}: {state_note(one.state)}" for one in declined)
-        listing: list[Content] = [*dict.fromkeys(lines)]
-        if len(listing) > _MOST_DECLINED:
-            more = len(listing) - _MOST_DECLINED
-            listing[_MOST_DECLINED:] = [f"and {more} more in the JSON"]
-        parts += [tag("h3", "Declined"), listed(listing)]
-    each: list[Sequence[Content]] = [
+    declined = [
+        *dict.fromkeys(
+            f"{one.subject}: {state_note(one.state)}"
+            for one in audit.answers
+            if isinstance(one.state, Declined)
+        )
+    ]
+    if len(declined) > _MOST_DECLINED:
+        more = len(declined) - _MOST_DECLINED
+        declined[_MOST_DECLINED:] = [f"and {more} more in the JSON"]
+    each = [
         (
             answer.code,
             answer.subject,
-            state_badge(state_word(answer.state)),
+            part("state", state_word(answer.state)),
             "yes" if answer.is_finding else "no",
-            joined([answer.sentence, tag("small", state_note(answer.state))]),
+            part("answer", answer.sentence, state_note(answer.state)),
         )
         for answer in audit.answers[:MOST_QUESTIONS]
     ]
-    head = ("code", "about", "known as", "finding", "answer")
-    said = f"Every question, {len(audit.answers)} in all"
+    title = f"Every question, {len(audit.answers)} in all"
     if len(audit.answers) > MOST_QUESTIONS:
-        said += f"; the first {MOST_QUESTIONS} are here, the JSON has all"
-    whole = table(head, each, caption="Every question with its answer", sorts=True)
-    parts.append(folded(said, whole))
-    return joined(parts)
-
-
-def _limits(audit: Audit) -> Markup:
-    return tag("div", listed(audit.limits), class_="panel")
+        title += f"; the first {MOST_QUESTIONS} are here, the JSON has all"
+    unasked = [*gathered(audit.unasked)]
+    return part("questions", head, summary, unasked, declined, title, each)
 
 
 def _repeat(audit: Audit) -> Markup:
-    facts: list[tuple[str, Content]] = [("fuzzytree", audit.version)]
-    command = _command(audit.answers)
-    if command:
-        facts.insert(0, ("command", tag("code", command, class_="copied")))
-    facts.append(("the model", audit.model))
-    facts.append(("its content, SHA-256", tag("code", audit.fingerprint)))
     sources = [("model", audit.file), ("table", audit.data)]
     names = {"check": "check", "stability": "study of stability"}
     sources += [(names[one.verb], one.file) for one in audit.results]
-    for what, source in sources:
-        if source is not None:
-            facts.append((f"the {what}'s file", tag("code", source.name)))
-            facts.append(("its bytes, SHA-256", tag("code", source.sha256)))
-    facts.append(("this audit, SHA-256", tag("code", audit.digest or "not taken")))
+    settings: list[tuple[str, str]] = []
     for name in audit.settings.__struct_fields__:
         value: float = getattr(audit.settings, name)
         unit = " s" if name.endswith("_s") else ""
-        facts.append((name.removesuffix("_s"), f"{number(value)}{unit}"))
-    pairs = [tag("div", tag("dt", name), tag("dd", said)) for name, said in facts]
-    head = ("variable", "from", "to", "where that comes from")
+        settings.append((name.removesuffix("_s"), f"{number(value)}{unit}"))
     sides = [
         (
             side.variable,
-            tag("code", f"{'above ' if side.is_open else ''}{side.low!r}"),
-            tag("code", repr(side.high)),
+            f"{'above ' if side.is_open else ''}{side.low!r}",
+            repr(side.high),
             ORIGINS[side.origin],
         )
         for side in audit.domain.sides[:MOST_QUESTIONS]
     ]
-    caption = "The domain: the audit covers these ranges and no others"
-    return joined(
-        [
-            tag("dl", *pairs, class_="facts-list"),
-            table(head, sides, caption=caption, right=(1, 2), is_compact=True),
-        ]
-    )
+    return part("repeat", audit, _command(audit.answers), sources, settings, sides)
 
 
 def _command(answers: Sequence[Answer]) -> str:
@@ -354,18 +247,8 @@ def verdict(audit: Audit) -> Markup:
     if not audit.is_complete:
         by = "by hand" if audit.was_interrupted else "by its budget"
         whole = f"The audit was cut short {by}: {questions} examined, others were not"
-    shown = [
-        tag("li", state_badge(word), tag("b", str(states[word])), f" {meaning}")
-        for word, meaning in STATES.items()
-    ]
-    return joined(
-        [
-            tag("p", icon(sign), said, class_=f"said {sign}"),
-            tag("p", whole, class_="whole" if audit.is_complete else "whole cut"),
-            _urgent(findings, gravest_first(audit.findings)),
-            tag("ul", *shown, class_="known"),
-        ]
-    )
+    urgent = _urgent(findings, gravest_first(audit.findings))
+    return part("verdict", sign, said, whole, audit.is_complete, *urgent, states)
 
 
 def _result(
@@ -390,39 +273,29 @@ def _result(
     return "calm" if is_complete and not declined else "info", said
 
 
-def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | None:
-    """Return links to the errors and warnings among findings."""
+def _urgent(
+    findings: Sequence[Answer], named: Sequence[Answer]
+) -> tuple[list[tuple[Answer, str, int]], int]:
+    """Return errors and warnings, each with its link and how often it stands.
+
+    Those that say the same are one. Behind them stands how many more there are.
+    """
     listing = {id(one) for one in findings if one.severity != "info"}
     urgent: dict[tuple[str, str], list[tuple[Answer, str]]] = {}
     for one, name in zip(named, anchors(named), strict=True):
         if id(one) in listing:
             urgent.setdefault((one.code, one.sentence), []).append((one, name))
-    if not urgent:
-        return None
-    items: list[Content] = []
+    shown: list[tuple[Answer, str, int]] = []
     kinds: Counter[tuple[str, str]] = Counter()
     for alike in urgent.values():
         one, name = alike[0]
         kinds[one.code, one.severity] += 1
-        if kinds[one.code, one.severity] > _MOST_ALIKE or len(items) == _MOST_URGENT:
-            continue
-        times = f" {len(alike)} times" if len(alike) > 1 else ""
-        parts = [
-            tag("span", icon(one.severity), class_=one.severity),
-            tag("a", one.sentence, href=f"#{name}"),
-            text(times) if times else None,
-            " ",
-            tag("span", one.code, class_="code"),
-        ]
-        items.append(joined(parts))
-    more = len(urgent) - len(items)
-    if more > 0:
-        items.append(tag("a", f"and {more} more", href="#findings"))
-    return listed(items, class_="urgent")
+        if kinds[one.code, one.severity] <= _MOST_ALIKE and len(shown) < _MOST_URGENT:
+            shown.append((one, name, len(alike)))
+    return shown, len(urgent) - len(shown)
 
 
 _MOST_CALM = 12  # comparisons that agree and are not folded
-_MOST_LISTED = 200  # sentences
 
 
 def agreement_section(found: Agreement) -> Markup:
@@ -430,48 +303,28 @@ def agreement_section(found: Agreement) -> Markup:
     calm = [one for one in found.comparisons if one.verdict == "agrees"]
     if len(calm) <= _MOST_CALM:
         calm = []
-    shown = [one for one in found.comparisons if one not in calm]
-    parts: list[Content] = [tag("p", agreement_text(found), class_="lead")]
-    if shown:
-        parts.append(_compared(shown, "Comparisons"))
-    if calm:
-        said = f"{counted(len(calm), 'comparison')} agree"
-        parts.append(folded(said, _compared(calm, "Comparisons that agree")))
-    if found.certificates:
-        bounds = map(certified_row, found.certificates)
-        parts.append(table(CERTIFIED, bounds, caption="What rounding can change"))
+    wrong = [one for one in found.comparisons if one not in calm]
     details = [line for one in found.comparisons for line in one.detail]
     details += [line for one in found.certificates for line in one.detail]
-    parts += [_folded("Differences", details), _folded("Not examined", found.skipped)]
-    return joined(parts)
-
-
-def _compared(found: Sequence[Comparison], caption: str) -> Markup:
-    rows = map(comparison_row, found)
-    return table(COMPARISON, rows, caption=caption, right=(3, 4, 5), sorts=True)
+    return part(
+        "agreement",
+        agreement_text(found),
+        [*map(comparison_row, wrong)],
+        [*map(comparison_row, calm)],
+        [*map(certified_row, found.certificates)],
+        details,
+        found.skipped,
+    )
 
 
 def stability_section(found: Stability) -> Markup:
     """Return the result of a study as a table of its stability checks."""
-    rows = map(criterion_row, found.criteria)
-    details = [f"{one.code}: {line}" for one in found.criteria for line in one.detail]
-    missed = [f"{one.code}: {line}" for one in found.criteria for line in one.skipped]
     probes, tried = counted(found.probes, "probe"), counted(found.tried, "row")
-    return joined(
-        [
-            tag("p", f"{stability_text(found)} ({probes}, {tried})", class_="lead"),
-            table(CRITERION, rows, caption="Stability checks", right=(2, 3)),
-            _folded("What to do", [*advice(found)]),
-            _folded("What was measured", details),
-            _folded("Not tried", missed),
-        ]
+    return part(
+        "stability",
+        f"{stability_text(found)} ({probes}, {tried})",
+        [*map(criterion_row, found.criteria)],
+        [*advice(found)],
+        [f"{one.code}: {line}" for one in found.criteria for line in one.detail],
+        [f"{one.code}: {line}" for one in found.criteria for line in one.skipped],
     )
-
-
-def _folded(name: str, listing: list[str] | tuple[str, ...]) -> Markup | None:
-    if not listing:
-        return None
-    shown: list[Content] = [*listing[:_MOST_LISTED]]
-    if len(listing) > _MOST_LISTED:
-        shown.append(f"and {len(listing) - _MOST_LISTED} more")
-    return folded(f"{name} ({len(listing)})", listed(shown))

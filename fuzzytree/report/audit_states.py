@@ -1,4 +1,4 @@
-"""How an answer is known, as badges and sentences of the page."""
+"""How an answer is known, in words."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from fuzzytree.auditing import (
     Audit,
     Bracket,
     Claim,
-    Coordinate,
     Declined,
     Proved,
     Sampled,
@@ -21,10 +20,8 @@ from fuzzytree.auditing import (
     VerbResult,
     Witness,
 )
-from fuzzytree.report.markup import Markup, folded, joined, table, tag
 from fuzzytree.report.text import counted, number
 
-_MOST_UNFOLDED = 6  # inputs of a witness that are shown at once
 _SOME = 4  # inputs of a witness that a table has room for
 
 STATES: dict[str, str] = {
@@ -43,9 +40,6 @@ SEVERITIES: dict[Severity, str] = {
 }
 """What a reader calls each severity, the gravest first."""
 
-MOST_INPUTS = 60
-"""Of a witness that are shown; beyond, only those that the JSON has."""
-
 
 def state_word(state: State) -> str:
     """Return the name of a state.
@@ -55,38 +49,6 @@ def state_word(state: State) -> str:
         'PROVED'
     """
     return str(type(state).__struct_config__.tag)
-
-
-def icon(name: str) -> Markup:
-    """Return a sign of the page; the word beside it says the same."""
-    used = tag("use", href=f"#i-{name}")
-    return tag("svg", used, class_="icon", aria_hidden="true", viewBox="0 0 16 16")
-
-
-def state_badge(word: str) -> Markup:
-    """Return the badge of a state: a sign, a frame of its own, and the word."""
-    name = word.lower()
-    return tag("span", icon(name), word, class_=f"state {name}")
-
-
-def severity_badge(severity: Severity) -> Markup:
-    """Return the badge of a severity."""
-    shown = SEVERITIES[severity]
-    return tag("span", icon(severity), shown, class_=f"severity {severity}")
-
-
-def evidence(state: State) -> Markup:
-    """Return how an answer is known: in a sentence, with the point if there is one."""
-    if isinstance(state, Witness | Bracket):
-        said = None if isinstance(state, Witness) else state_text(state)
-        return joined(
-            [
-                tag("p", said, class_="how") if said else None,
-                _claims(state.claims),
-                point_table(state.point),
-            ]
-        )
-    return tag("p", state_text(state, has_title=True), class_="how")
 
 
 def state_note(state: State) -> str:
@@ -123,37 +85,9 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.3g}"
 
 
-def point_table(point: Sequence[Coordinate]) -> Markup:
-    """Return a point with all digits of its values, also as the command takes it."""
-    if not point:
-        return Markup("")
-    shown = point[:MOST_INPUTS]
-    rows = [
-        (
-            one.input,
-            tag("code", one.decimal),
-            tag("code", one.hex) if one.hex else tag("code", one.exact),
-        )
-        for one in shown
-    ]
-    more = len(point) - len(shown)
-    caption = "The witness" + (f", and {counted(more, 'more input')}" if more else "")
-    head = ("input", "decimal", "hex, or p/q where it is no double")
-    row = ",".join(f"{one.input}={one.decimal}" for one in shown)
-    copied = tag("code", row, class_="copied")
-    line = tag("p", "As a row: ", copied, class_="as-row") if not more else None
-    listing = table(head, rows, caption=caption, is_compact=True)
-    if len(rows) > _MOST_UNFOLDED:
-        folds = folded(f"{caption}: {counted(len(point), 'input')}", listing)
-        return joined([folds, line])
-    return joined([listing, line])
-
-
-def _claims(claims: Sequence[Claim]) -> Markup | None:
-    if not claims:
-        return None
-    said = "; ".join(map(claim_text, claims))
-    return tag("p", f"Here, in fractions: {said}", class_="how")
+def claims_text(claims: Sequence[Claim]) -> str:
+    """Return claims in words."""
+    return "; ".join(map(claim_text, claims))
 
 
 def claim_text(claim: Claim) -> str:
@@ -272,7 +206,7 @@ def state_text(state: State, *, has_title: bool = False) -> str:
         case Proved(how=how):
             return how
         case Witness(claims=claims):
-            return "; ".join(map(claim_text, claims)) or "it happens here"
+            return claims_text(claims) or "it happens here"
         case Bracket(of=of, low=low, high=high, why=why):
             return f"{of} lies between {number(low)} and {number(high)}; {why}"
         case Sampled():

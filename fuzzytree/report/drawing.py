@@ -246,8 +246,8 @@ def path_of(dots: Sequence[tuple[float, float]]) -> Markup:
     """Return dots joined by lines, as the path of a picture.
 
     Example:
-        >>> path_of([(0.0, 1.5), (2.0, 3.0)])
-        'M0 1.5L2 3'
+        >>> print(path_of([(0.0, 1.5), (2.0, 3.0)]))
+        M0 1.5L2 3
     """
     return Markup("M" + "L".join(f"{trimmed(a)} {trimmed(b)}" for a, b in dots))
 

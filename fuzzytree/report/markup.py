@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+
+from markupsafe import Markup as Markup
 
 from fuzzytree.model import printable
 
@@ -12,12 +14,6 @@ MOST_LETTERS = 400
 
 _VOID = frozenset({"br", "meta"})
 _DRAWN = frozenset({"circle", "line", "path", "rect", "use"})
-
-
-class Markup(str):
-    """Text that a browser may read as HTML: names in it are escaped already."""
-
-    __slots__ = ()
 
 
 Content = str | None
@@ -30,8 +26,8 @@ def text(words: str) -> Markup:
     r"""Return words as markup: invisible characters escaped, long texts cut.
 
     Example:
-        >>> text("soft <b>" + chr(27))
-        'soft &lt;b&gt;\\x1b'
+        >>> print(text("soft <b>" + chr(27)))
+        soft &lt;b&gt;\x1b
     """
     if len(words) > MOST_LETTERS:
         words = f"{words[:MOST_LETTERS]}… ({len(words)} characters)"
@@ -59,8 +55,8 @@ def tag(name: str, *children: Content, **attributes: Attribute) -> Markup:
             attribute out, True gives it no value.
 
     Example:
-        >>> tag("a", "R & D", href="#one", class_="link")
-        '<a href="#one" class="link">R &amp; D</a>'
+        >>> print(tag("a", "R & D", href="#one", class_="link"))
+        <a href="#one" class="link">R &amp; D</a>
     """
     shown = "".join(_attribute(key, value) for key, value in attributes.items())
     if name in _VOID:
@@ -92,60 +88,3 @@ def trimmed(value: float) -> str:
     """
     shown = f"{value:.1f}".removesuffix(".0")
     return "0" if shown == "-0" else shown
-
-
-def table(
-    head: Sequence[str],
-    rows: Iterable[Sequence[Content]],
-    *,
-    caption: str,
-    right: Sequence[int] = (),
-    sorts: bool = False,
-    is_compact: bool = False,
-) -> Markup:
-    """Return a table that scrolls inside its own frame.
-
-    Args:
-        head: The names of the columns.
-        rows: The cells; the first of a row names the row.
-        caption: What the table shows.
-        right: The columns of numbers, from 0.
-        sorts: Whether a reader may sort it, where scripts run.
-        is_compact: Whether it is as narrow as its cells allow.
-    """
-    lines: list[Markup] = []
-    for row in rows:
-        cells = [
-            tag(
-                "td" if place else "th",
-                cell,
-                scope=None if place else "row",
-                class_="number" if place in right else None,
-            )
-            for place, cell in enumerate(row)
-        ]
-        lines.append(tag("tr", *cells))
-    names = [
-        tag("th", name, scope="col", class_="number" if place in right else None)
-        for place, name in enumerate(head)
-    ]
-    whole = tag(
-        "table",
-        tag("caption", caption),
-        tag("thead", tag("tr", *names)),
-        tag("tbody", *lines),
-        class_="sorts" if sorts else "compact" if is_compact else None,
-    )
-    return tag(
-        "div", whole, class_="scrolls", tabindex="0", role="region", aria_label=caption
-    )
-
-
-def folded(summary: Content, *children: Content, is_open: bool = False) -> Markup:
-    """Return something to unfold; on paper it is unfolded."""
-    return tag("details", tag("summary", summary), *children, open=is_open)
-
-
-def listed(items: Iterable[Content], **attributes: Attribute) -> Markup:
-    """Return a list of points."""
-    return tag("ul", *(tag("li", item) for item in items), **attributes)

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from fuzzytree.auditing import Audit
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import audit_lines
-from fuzzytree.report.audit_model import sentence_of
 from fuzzytree.report.audit_page import agreement_section
-from fuzzytree.report.markup import Markup, folded, joined, table, tag, text_lines
+from fuzzytree.report.markup import Markup, joined, tag, text_lines
+from fuzzytree.report.parts import part
 from fuzzytree.report.systems import system_lines
 from fuzzytree.report.text import head_lines, model_lines, term_lines
 
@@ -28,22 +28,8 @@ def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
         case FuzzyTree():
             return _lines(model_lines(model))
         case RuleBase():
-            rows = [
-                (
-                    str(number),
-                    sentence_of(rule, model),
-                    "" if rule.support is None else str(rule.support),
-                )
-                for number, rule in enumerate(model.rules, 1)
-            ]
-            names = ("", "rule", "rows")
-            return joined(
-                [
-                    _lines(head_lines(model)),
-                    table(names, rows, caption=f"Rules of {model.name}", right=(2,)),
-                    folded("Terms", _lines(term_lines(model.variables))),
-                ]
-            )
+            terms = _lines(term_lines(model.variables))
+            return part("rule_base", _lines(head_lines(model)), model, terms)
 
 
 def agreement_html(found: Agreement) -> Markup:

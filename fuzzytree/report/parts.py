@@ -1,0 +1,127 @@
+"""The macros of `templates/parts.html` as functions: each returns a part of a page."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import hashlib
+import re
+from collections.abc import Callable, Iterator, Sequence
+from importlib import resources
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+from fuzzytree.auditing import CODES, Coordinate, Measure, State, Witness
+from fuzzytree.report.audit_states import (
+    SEVERITIES,
+    STATES,
+    claims_text,
+    state_text,
+    state_word,
+)
+from fuzzytree.report.markup import Markup, text, text_lines
+from fuzzytree.report.stability import CRITERION
+from fuzzytree.report.svg_tree import class_mark
+from fuzzytree.report.text import CERTIFIED, COMPARISON, counted, number
+
+MOST_RULES = 1000
+MOST_LINES = 400
+"""Of a tree as an outline."""
+
+_MOST_INPUTS = 60  # of a witness that are shown; beyond, only those that the JSON has
+_MOST_LISTED = 200  # sentences
+_SHORT = 16  # characters of a fraction that a reader may want to see
+
+
+def part(name: str, *values: object, **options: object) -> Markup:
+    """Return what a macro makes; a text among its values is escaped."""
+    macro: Callable[..., Markup] = getattr(_macros(), name)
+    return macro(*values, **options)
+
+
+def whole_page(**parts: object) -> str:
+    """Return the page with its parts."""
+    source = _source("page.html")
+    template = _environment().from_string(source)
+    return template.render(policy=_policy(source), **parts)
+
+
+def _policy(source: str) -> str:
+    """Return what the page may do: run its own style and script."""
+    allowed: list[str] = []
+    for kind in ("script", "style"):
+        match = re.search(f"<{kind}>(.*?)</{kind}>", source, re.DOTALL)
+        content = match[1] if match else ""
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        allowed.append(f"{kind}-src 'sha256-{digest}'")
+    others = "base-uri 'none'; form-action 'none'"
+    return Markup(f"default-src 'none'; {'; '.join(allowed)}; {others}")
+
+
+def title_of(code: str) -> str:
+    """Return the title of a finding's code."""
+    return CODES[code].title if code in CODES else "a finding"
+
+
+@functools.cache
+def _macros() -> object:
+    functions = (
+        *(as_row, claims_text, class_mark, coordinates, counted, how_known),
+        *(measure_texts, state_word, text_lines, title_of),
+    )
+    known: dict[str, object] = {one.__name__: one for one in functions}
+    known |= {"CERTIFIED": CERTIFIED, "COMPARISON": COMPARISON, "CRITERION": CRITERION}
+    known |= {"MOST_INPUTS": _MOST_INPUTS, "MOST_LISTED": _MOST_LISTED}
+    known |= {"MOST_LINES": MOST_LINES, "MOST_RULES": MOST_RULES}
+    known |= {"SEVERITIES": SEVERITIES, "STATES": STATES}
+    return _environment().get_template("parts.html", globals=known).module
+
+
+@functools.cache
+def _environment() -> Environment:
+    return Environment(
+        loader=FunctionLoader(lambda name: re.sub(r"\n *", "", _source(name))),
+        autoescape=True,
+        finalize=_content,
+        keep_trailing_newline=True,
+        undefined=StrictUndefined,
+    )
+
+
+def _source(name: str) -> str:
+    folder = resources.files("fuzzytree.report").joinpath("templates")
+    return folder.joinpath(name).read_text("utf-8")
+
+
+def _content(value: object) -> Markup:
+    """Return a value of a template as markup."""
+    if isinstance(value, Markup):
+        return value
+    return Markup("") if value is None else text(str(value))
+
+
+def how_known(state: State) -> str | None:
+    """Return how an answer is known; a witness is its own evidence."""
+    is_witness = isinstance(state, Witness)
+    return None if is_witness else state_text(state, has_title=True)
+
+
+def coordinates(point: Sequence[Coordinate]) -> Iterator[tuple[str, str, str]]:
+    """Yield the values of a point with all digits."""
+    return ((one.input, one.decimal, one.hex or one.exact) for one in point)
+
+
+def as_row(point: Sequence[Coordinate]) -> str:
+    """Return a point as the command takes it."""
+    return ",".join(f"{one.input}={one.decimal}" for one in point)
+
+
+def measure_texts(measures: Sequence[Measure]) -> list[tuple[str, str, str]]:
+    """Return the name and value of each measure, and its fraction if that says more."""
+    texts: list[tuple[str, str, str]] = []
+    for one in measures:
+        unit = f" {one.unit}" if one.unit else ""
+        is_shown = len(one.exact or "") <= _SHORT and one.exact != number(one.value)
+        exact = one.exact if one.exact and is_shown else ""
+        texts.append((one.name, f"{number(one.value)}{unit}", exact))
+    return texts
