@@ -33,8 +33,7 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree.benchmarking.clock import measure
 from fuzzytree.benchmarking.machine import load_averages, machine
-from fuzzytree.model.rulebase import Band, Flank, RuleBase, Term
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -52,6 +51,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
+from fuzzytree.model.rulebase import Band, Flank, RuleBase, Term
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -11,10 +11,7 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree.checking.representations import check
 from fuzzytree.checking.systems import coverage_of
-from fuzzytree.model.agreement import Coverage
-from fuzzytree.model.contracts import SystemOutcome, SystemRun
-from fuzzytree.model.rulebase import Part
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -31,6 +28,9 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
+from fuzzytree.model.agreement import Coverage
+from fuzzytree.model.contracts import SystemOutcome, SystemRun
+from fuzzytree.model.rulebase import Part
 from fuzzytree.runtimes.programs import run_system
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import Aim, range_rows

@@ -90,7 +90,6 @@ from .system import Defuzzifier as Defuzzifier
 from .system import DefuzzifierMethod as DefuzzifierMethod
 from .system import FuzzySystem as FuzzySystem
 from .system import Grid as Grid
-from .system import SystemCurve as SystemCurve
 from .system import SystemInput as SystemInput
 from .system import SystemOutput as SystemOutput
 from .system import SystemTerm as SystemTerm
@@ -119,6 +118,7 @@ from .system.curves import SigmoidDifference as SigmoidDifference
 from .system.curves import SigmoidProduct as SigmoidProduct
 from .system.curves import Singleton as Singleton
 from .system.curves import Spike as Spike
+from .system.curves import SystemCurve as SystemCurve
 from .system.curves import Trapezoid as Trapezoid
 from .system.curves import TwoGaussians as TwoGaussians
 from .system.curves import curve_mistakes as curve_mistakes

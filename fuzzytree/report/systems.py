@@ -285,7 +285,7 @@ def curve_text(curve: Curve, columns: Sequence[str] = ()) -> str:
     Example:
         >>> curve_text(Trapezoid(0.0, 1.0, 1.0, 3.0))
         '1 at 1, rises from 0 at 0, falls to 0 at 3'
-        >>> from fuzzytree.model.system import Gaussian
+        >>> from fuzzytree.model import Gaussian
         >>> curve_text(Gaussian(mean=2.0, deviation=0.5))
         'gaussian: mean 2, deviation 0.5'
     """

@@ -337,7 +337,7 @@ def numbers_of(curve: Curve) -> list[float]:
     """Return the values at which a system's curve may change its formula.
 
     Example:
-        >>> from fuzzytree.model.system import Gaussian, Trapezoid
+        >>> from fuzzytree.model import Gaussian, Trapezoid
         >>> numbers_of(Trapezoid(None, 1.0, 2.0, 4.0)), numbers_of(Gaussian(5.0, 2.0))
         ([1.0, 2.0, 4.0], [5.0, 3.0, 7.0])
     """

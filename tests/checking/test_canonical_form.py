@@ -6,9 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.checking.equivalence import canonical_form
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,
@@ -21,6 +19,8 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
 )
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.random_systems import random_system
 from fuzzytree.testing import random_tree

@@ -9,9 +9,7 @@ from msgspec.structs import replace
 from fuzzytree.checking import systems as checking_systems
 from fuzzytree.checking.representations import check
 from fuzzytree.exporters.onnx import write_onnx
-from fuzzytree.model.agreement import Agreement, Comparison
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     Conclusion,
     Defuzzifier,
@@ -25,6 +23,8 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
 )
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.rulebase import Points
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.testing import random_system
 

@@ -8,6 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.checking.equivalence import equivalence, is_equivalent
+from fuzzytree.model import FuzzySystem, Is, SystemTerm, Trapezoid
 from fuzzytree.model.contracts import Document, Reading, Written
 from fuzzytree.model.rulebase import (
     Band,
@@ -20,7 +21,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import FuzzySystem, Is, SystemTerm, Trapezoid
 from fuzzytree.semantics.conversion import as_system
 from fuzzytree.semantics.conversion.points import straightened
 from fuzzytree.semantics.samples import all_samples

@@ -15,9 +15,9 @@ from fuzzytree.cli.program import main
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, yaml
 from fuzzytree.formats.yaml.yaml_reader import yaml_reading
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Loss, Reading, Written
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.random_systems import random_system
 from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree

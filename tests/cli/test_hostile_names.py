@@ -13,8 +13,8 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.exporters.table import TABLE
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
-from fuzzytree.model.system import FuzzySystem
 from tests.cli.conftest import GRASPS, Call
 
 EVIL = "a\x1b[2J\x07\x7f\x9b1m\u202e"

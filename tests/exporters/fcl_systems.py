@@ -6,8 +6,7 @@ from msgspec.structs import replace
 
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
 from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Arc,
@@ -25,6 +24,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     questions,
 )
+from fuzzytree.model.rulebase import Points
 
 PLAIN = Trapezoid(-1.0, 0.0, 1.0, 2.0)
 

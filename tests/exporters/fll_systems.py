@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fuzzytree.model.rulebase import LR, Band
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     Defuzzifier,
@@ -19,6 +18,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
+from fuzzytree.model.rulebase import LR, Band
 from fuzzytree.testing import random_system
 
 _KNOWN: tuple[Hedge, ...] = ("any", "not", "very", "somewhat", "extremely", "seldom")

@@ -17,8 +17,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import check_list, write
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
 from fuzzytree.formats.fcl.fcl_reader import read_fcl
-from fuzzytree.model.rulebase import Points, RuleBase
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     Defuzzifier,
@@ -28,6 +27,7 @@ from fuzzytree.model.system import (
     Or,
     RuleBlock,
 )
+from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.semantics.conversion import as_system, flattened, winner
 from fuzzytree.semantics.inference import infer, input_values
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -22,9 +22,7 @@ from fuzzytree.formats.fis.fis_words import (
     FIS_HEDGES,
     Dialect,
 )
-from fuzzytree.model.contracts import Written
-from fuzzytree.model.rulebase import Points, RuleBase
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Bell,
     Binary,
@@ -53,6 +51,8 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.model.contracts import Written
+from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.semantics.conversion import as_system, flattened, pointed
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -14,8 +14,7 @@ from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read_fll
-from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Arc,
@@ -45,6 +44,7 @@ from fuzzytree.model.system import (
     TNorm,
     Trapezoid,
 )
+from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
 from fuzzytree.semantics.conversion import FACTS, Scores, as_system, pointed
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree

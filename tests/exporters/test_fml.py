@@ -14,8 +14,7 @@ from fuzzytree.exporters.fml import write
 from fuzzytree.exporters.table import find_format
 from fuzzytree.formats.fml.fml_reader import read_fml
 from fuzzytree.formats.fml.fml_words import FML_FAR, MODIFIERS, USUAL
-from fuzzytree.model.rulebase import Clause, Kind, Points, Rule
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -39,6 +38,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.model.rulebase import Clause, Kind, Points, Rule
 from fuzzytree.semantics.conversion import pointed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree

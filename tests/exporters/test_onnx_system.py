@@ -15,8 +15,7 @@ from fuzzytree.exporters import onnx_steps
 from fuzzytree.exporters.onnx import OPSETS, Output, write_onnx
 from fuzzytree.exporters.onnx_compare import contents, differences
 from fuzzytree.exporters.onnx_steps import is_wide
-from fuzzytree.model.rulebase import fingerprint
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Defuzzifier,
@@ -31,6 +30,7 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
 )
+from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.reference import infer_rows
 from fuzzytree.semantics.programs.system_program import from_system

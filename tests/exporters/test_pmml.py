@@ -14,17 +14,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml import write
-from fuzzytree.model.rulebase import (
-    Clause,
-    Kind,
-    Points,
-    Rule,
-    RuleBase,
-    Semantics,
-    Term,
-    Variable,
-)
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Call,
     Conclusion,
     Defuzzifier,
@@ -40,6 +30,16 @@ from fuzzytree.model.system import (
     SystemOutput,
     SystemRule,
     SystemTerm,
+)
+from fuzzytree.model.rulebase import (
+    Clause,
+    Kind,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
 )
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.inference import infer

@@ -15,7 +15,7 @@ from fuzzytree.formats.yaml.conditions import (
     parse_conclusions,
     parse_condition,
 )
-from fuzzytree.model.system import MOST_LEVELS, And, Conclusion, Condition, Is, Not, Or
+from fuzzytree.model import MOST_LEVELS, And, Conclusion, Condition, Is, Not, Or
 from fuzzytree.testing import random_system
 
 A, B, C = Is("a", "b"), Is("c", "d"), Is("e", "f")

@@ -9,9 +9,7 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.fcl.fcl_reader import read_fcl
-from fuzzytree.model.contracts import Reading
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Bell,
     Call,
@@ -32,6 +30,8 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.model.contracts import Reading
+from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import infer
 
 STANDARD = """\

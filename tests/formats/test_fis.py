@@ -10,7 +10,7 @@ import pytest
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.fis.fis_reader import read_fis
 from fuzzytree.formats.fis.fis_words import FIS_FAR, KINDS, Dialect, curve_of
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Bell,
     Binary,

@@ -9,8 +9,7 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.fll.fll_reader import read_fll
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Arc,
@@ -45,6 +44,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import curve_degree, infer
 
 TIPPER = """\

@@ -12,7 +12,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.exporters.fml import write
 from fuzzytree.formats.fml.fml_reader import read_fml
 from fuzzytree.formats.fml.fml_words import FML_FAR, USUAL
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Condition,
     Curve,

@@ -23,9 +23,9 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.table import TABLE, all_formats, find_format
 from fuzzytree.learning import learn_arrays
 from fuzzytree.learning.units import FloatArray
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Loss, Written
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.formats import SIGNS, ability_table
 from fuzzytree.semantics.conversion import as_system, flattened

@@ -15,7 +15,7 @@ from fuzzytree.formats.formulas import (
     parse,
     text_of,
 )
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FUNCTIONS,
     MOST_LEVELS,
     Call,

@@ -19,9 +19,9 @@ from fuzzytree.auditing.findings.locations import model_file, rule_path, term_pa
 from fuzzytree.auditing.findings.records import TermName
 from fuzzytree.checking.converting import format_of, load_content
 from fuzzytree.errors import LossError
+from fuzzytree.model import FuzzySystem, SystemRule, questions
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.model.system import FuzzySystem, SystemRule, questions
 from fuzzytree.semantics.conversion import as_system
 from fuzzytree.testing import random_tree
 from tests.interop.corpus import ALL

@@ -14,7 +14,7 @@ from sklearn.datasets import load_iris
 
 import fuzzytree as ft
 from fuzzytree.errors import LossError
-from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model import FuzzySystem
 from fuzzytree.tables import FloatArray
 
 simpful: Any = pytest.importorskip("simpful")

@@ -11,8 +11,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.errors import InvalidModelError, LossError
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,
@@ -23,6 +22,7 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
 )
+from fuzzytree.model.rulebase import Points
 from fuzzytree.tables import FloatArray
 
 pytest.importorskip("skfuzzy")

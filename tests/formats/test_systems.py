@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.yaml import write
 from fuzzytree.formats.yaml.yaml_reader import read_yaml
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     MOST_LEVELS,
     Call,
     Conclusion,

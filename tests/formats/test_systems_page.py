@@ -11,7 +11,7 @@ import msgspec
 from fuzzytree.exporters.yaml import write
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.yaml_reader import read_yaml
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FUNCTIONS,
     ActivationMethod,
     DefuzzifierMethod,

@@ -18,9 +18,9 @@ from fuzzytree.exporters.onnx_session import open_session
 from fuzzytree.exporters.table import find_format
 from fuzzytree.formats.fll.fll_reader import read_fll as read_fll
 from fuzzytree.formats.fll.fll_words import SAMPLES as SAMPLED
+from fuzzytree.model import FuzzySystem, SystemOutput
 from fuzzytree.model.contracts import Reading, Written
 from fuzzytree.model.options import options_of
-from fuzzytree.model.system import FuzzySystem, SystemOutput
 from fuzzytree.semantics.inference import infer
 from tests.interop.fuzzylite_engine import Answers, largest_difference
 from tests.interop.fuzzylite_exact import USUAL, exact_answers

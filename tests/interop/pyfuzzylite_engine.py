@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec.structs import replace
 
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Arc,
@@ -48,6 +47,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.model.rulebase import Points
 
 if TYPE_CHECKING:
     import fuzzylite as fl

@@ -9,7 +9,7 @@ import pytest
 
 from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read_fll
-from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model import FuzzySystem
 from tests.interop import corpus
 from tests.interop.corpus_fll import FLL
 from tests.interop.corpus_rows import EXACT, Row, Tools

@@ -17,8 +17,8 @@ from fuzzytree.exporters.fcl import write
 from fuzzytree.exporters.fcl_dialects import Dialect
 from fuzzytree.exporters.fll import write as write_fll
 from fuzzytree.formats.fcl.fcl_reader import read_fcl
+from fuzzytree.model import And, Condition, Defuzzifier, FuzzySystem, Or
 from fuzzytree.model.rulebase import Kind, Points
-from fuzzytree.model.system import And, Condition, Defuzzifier, FuzzySystem, Or
 from fuzzytree.semantics.conversion import as_system, pointed, winner
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from fuzzytree import LearningSettings, learn
 from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read_fll
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import (
     Clause,
     Kind,
@@ -23,7 +24,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.conversion import Scores, pointed, winner
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -17,7 +17,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.exporters.fll import write
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     Arc,
     Curve,

@@ -16,6 +16,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c import write_c
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
@@ -28,7 +29,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.c import load_system
 from fuzzytree.runtimes.table import find_runtime

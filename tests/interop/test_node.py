@@ -17,6 +17,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.exporters.javascript import write
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
@@ -29,7 +30,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.runtimes.written import numbers_of
 from fuzzytree.semantics.inference import infer

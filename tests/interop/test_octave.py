@@ -15,8 +15,8 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis import write
 from fuzzytree.formats.fis.fis_reader import read_fis
 from fuzzytree.learning import learn_arrays
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import Kind, RuleBase
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.conversion import as_system, flattened, winner
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import fuzzytree as ft
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Dtype
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.probing import probes, system_probes
 from fuzzytree.semantics.samples import all_samples
 from fuzzytree.testing import random_tree, with_points

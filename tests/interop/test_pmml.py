@@ -14,8 +14,8 @@ import pytest
 
 from fuzzytree import LearningSettings, learn
 from fuzzytree.exporters.pmml import write
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import Kind, RuleBase, Semantics
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree

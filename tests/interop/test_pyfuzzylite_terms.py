@@ -18,8 +18,7 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.fll.fll_reader import read_fll
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FUNCTIONS,
     Arc,
     Bell,
@@ -55,6 +54,7 @@ from fuzzytree.model.system import (
     TwoGaussians,
     sampled_values,
 )
+from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import (
     curve_degree,
     hedged,

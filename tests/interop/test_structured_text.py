@@ -18,6 +18,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.structured_text import write
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
@@ -30,7 +31,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree

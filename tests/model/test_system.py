@@ -8,8 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model.rulebase import Part, Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     FUNCTIONS,
     MOST_LEVELS,
     MOST_SAMPLES,
@@ -49,6 +48,7 @@ from fuzzytree.model.system import (
     names_in,
     questions,
 )
+from fuzzytree.model.rulebase import Part, Points
 from fuzzytree.semantics.inference import value_of
 
 LOW = SystemTerm("low", Trapezoid(None, 0.0, 1.0, 2.0))

@@ -8,8 +8,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Arc,
     Bell,
     Binary,
@@ -31,6 +30,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.model.rulebase import Points
 from fuzzytree.numerics.curve_values import degree_between, powered, root
 from fuzzytree.semantics.inference import curve_degree
 

@@ -11,7 +11,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.api.answering import prepare_answering
 from fuzzytree.errors import LossError
-from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model import FuzzySystem
 from fuzzytree.report.systems import system_lines, system_reasons
 from fuzzytree.runtimes.predictions import Outputs, joined_outputs
 from fuzzytree.semantics.inference import infer

@@ -7,8 +7,7 @@ import pytest
 
 from fuzzytree.checking.representations import check
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Runtime, SystemOutcome
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Call,
     Conclusion,
     Defuzzifier,
@@ -22,6 +21,7 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
 )
+from fuzzytree.model.contracts import Runtime, SystemOutcome
 from fuzzytree.runtimes.programs import run_system
 from fuzzytree.runtimes.reference import infer_rows
 from fuzzytree.runtimes.table import all_runtimes, find_runtime, is_installed

@@ -15,6 +15,17 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
+from fuzzytree.model import (
+    And,
+    Binary,
+    Condition,
+    FuzzySystem,
+    Is,
+    Not,
+    Or,
+    Singleton,
+    Trapezoid,
+)
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
@@ -26,17 +37,6 @@ from fuzzytree.model.rulebase import (
     Semantics,
     Term,
     Variable,
-)
-from fuzzytree.model.system import (
-    And,
-    Binary,
-    Condition,
-    FuzzySystem,
-    Is,
-    Not,
-    Or,
-    Singleton,
-    Trapezoid,
 )
 from fuzzytree.semantics.conversion import (
     Always,

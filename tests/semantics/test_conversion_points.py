@@ -10,8 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import Band, Flank, Points, Variable
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Arc,
     Bell,
     Concave,
@@ -40,6 +39,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.model.rulebase import Band, Flank, Points, Variable
 from fuzzytree.numerics.approximation import by_points
 from fuzzytree.semantics.conversion import pointed
 from fuzzytree.semantics.conversion.points import points_for

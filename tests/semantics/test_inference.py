@@ -13,8 +13,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.formats.formulas import parse
-from fuzzytree.model.rulebase import Part, Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Arc,
@@ -57,6 +56,7 @@ from fuzzytree.model.system import (
     TwoGaussians,
     sampled_values,
 )
+from fuzzytree.model.rulebase import Part, Points
 from fuzzytree.semantics.inference import (
     FUNCTIONS,
     curve_degree,

@@ -7,7 +7,7 @@ import random
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,

@@ -13,8 +13,7 @@ from fuzzytree.checking.converting import read_content
 from fuzzytree.checking.representations import check
 from fuzzytree.errors import InvalidModelError, LossError, ReadError
 from fuzzytree.exporters.table import find_format
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     DefuzzifierMethod,
@@ -29,6 +28,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     sampled_values,
 )
+from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.system_program import from_system

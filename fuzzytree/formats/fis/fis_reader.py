@@ -424,7 +424,7 @@ def always_concluded(rules: Iterable[SystemRule]) -> set[str]:
     """Return the outputs that a rule without a condition concludes in every row.
 
     Example:
-        >>> from fuzzytree.model.system import Conclusion
+        >>> from fuzzytree.model import Conclusion
         >>> always_concluded([SystemRule(None, (Conclusion("tip", "small"),))])
         {'tip'}
     """

@@ -239,7 +239,7 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
     """Yield where fuzzylite 6 finds other numbers for an output of its own dialects.
 
     Example:
-        >>> from fuzzytree.model.system import Defuzzifier, SystemTerm
+        >>> from fuzzytree.model import Defuzzifier, SystemTerm
         >>> how = Defuzzifier("weighted average")
         >>> falling = SystemTerm("little", Concave(0.5, 0.4))
         >>> output = SystemOutput("tip", (falling,), 0.0, 1.0, how)
@@ -266,7 +266,7 @@ def constant_degrees(output: SystemOutput) -> Iterator[str]:
     """Yield a remark on each number that is a degree because a curve is sampled.
 
     Example:
-        >>> from fuzzytree.model.system import Defuzzifier, SystemTerm
+        >>> from fuzzytree.model import Defuzzifier, SystemTerm
         >>> low = SystemTerm("low", Formula(Number(0.3)))
         >>> how = Defuzzifier("centroid")
         >>> len([*constant_degrees(SystemOutput("tip", (low,), 0.0, 1.0, how))])

@@ -283,7 +283,7 @@ def joined(join: type[And] | type[Or], left: Condition, right: Condition) -> Con
     """Return two conditions joined, without parentheses that change only rounding.
 
     Example:
-        >>> from fuzzytree.model.system import Is
+        >>> from fuzzytree.model import Is
         >>> a, b, c = (Is("force", term) for term in "abc")
         >>> joined(Or, a, joined(Or, b, c)) == Or((a, b, c))
         True

@@ -186,7 +186,7 @@ def points_for(curve: Curve, tolerance: float) -> PlacedPoints:
         LossError: If no points are that close, or a curve has no degrees of its own.
 
     Example:
-        >>> from fuzzytree.model.system import Gaussian
+        >>> from fuzzytree.model import Gaussian
         >>> found = points_for(Gaussian(0.0, 1.0), 0.01)
         >>> len(found.points.values), found.bound <= 0.01
         (15, True)

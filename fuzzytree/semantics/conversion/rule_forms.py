@@ -133,7 +133,7 @@ def split(
         if they would not say the same to the last bit.
 
     Example:
-        >>> from fuzzytree.model.system import Conclusion
+        >>> from fuzzytree.model import Conclusion
         >>> both = And((Is("a", "x"), Or((Is("b", "y"), Is("c", "z")))))
         >>> [len(one.parts) for one in alternatives(both)]
         [2, 2]

@@ -94,7 +94,7 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
-        >>> from fuzzytree.model.system import Defuzzifier, SystemRule
+        >>> from fuzzytree.model import Defuzzifier, SystemRule
         >>> dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
         >>> long = SystemTerm("long", Singleton(60.0))
         >>> system = FuzzySystem(

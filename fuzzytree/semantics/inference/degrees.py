@@ -36,7 +36,7 @@ def curve_degree(
         KeyError: If a formula needs a name that has no value.
 
     Example:
-        >>> from fuzzytree.model.system import Arc, Trapezoid
+        >>> from fuzzytree.model import Arc, Trapezoid
         >>> curve_degree(Trapezoid(0.0, 2.0, 3.0, 4.0), 0.5)
         0.25
         >>> curve_degree(Arc(0.0, 1.0), 0.0), curve_degree(Arc(0.0, 1.0), 2.0)
@@ -61,7 +61,7 @@ def value_at(curve: Curve, degree: float) -> float | None:
         (1 of a sigmoid), an infinity.
 
     Example:
-        >>> from fuzzytree.model.system import Concave, Gaussian, SCurve
+        >>> from fuzzytree.model import Concave, Gaussian, SCurve
         >>> value_at(SCurve(0.0, 4.0), 0.125), value_at(Concave(0.0, 1.0), 0.5)
         (1.0, 0.0)
         >>> value_at(Gaussian(0.0, 1.0), 0.5) is None
@@ -77,7 +77,7 @@ def value_of(expression: Expression, names: Mapping[str, float]) -> float:
         KeyError: If a name has no value, or a function is unknown.
 
     Example:
-        >>> from fuzzytree.model.system import Call, Name, Number
+        >>> from fuzzytree.model import Call, Name, Number
         >>> twice = Call("*", (Number(2.0), Name("dirt")))
         >>> value_of(Call("+", (twice, Number(1.0))), {"dirt": 0.25})
         1.5

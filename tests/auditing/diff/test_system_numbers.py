@@ -26,8 +26,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import AuditSettings
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Conclusion,
@@ -50,6 +49,7 @@ from fuzzytree.model.system import (
     TNorm,
     Trapezoid,
 )
+from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import infer
 from fuzzytree.testing import random_system
 

@@ -20,18 +20,7 @@ from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.auditing.findings.rule_bounds import bounded_rules
 from fuzzytree.auditing.findings.views import view
-from fuzzytree.model.rulebase import (
-    LR,
-    Clause,
-    Points,
-    Rule,
-    RuleBase,
-    Term,
-    Variable,
-    sentence,
-)
-from fuzzytree.model.rulebase import Side as Flank
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Bell,
     Conclusion,
@@ -54,6 +43,17 @@ from fuzzytree.model.system import (
     SystemTerm,
     TNorm,
 )
+from fuzzytree.model.rulebase import (
+    LR,
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Term,
+    Variable,
+    sentence,
+)
+from fuzzytree.model.rulebase import Side as Flank
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.semantics.inference import infer
 from tests.auditing.findings.grids import check_on_grid

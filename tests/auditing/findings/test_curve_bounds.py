@@ -15,8 +15,7 @@ from fuzzytree.auditing.findings.curve_bounds import (
     gap,
     scale,
 )
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Side
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Arc,
     Bell,
     Concave,
@@ -34,6 +33,7 @@ from fuzzytree.model.system import (
     Spike,
     TwoGaussians,
 )
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Side
 from fuzzytree.numerics.curve_values import degree_between
 from fuzzytree.numerics.exact import exact_degree
 

@@ -8,6 +8,34 @@ import pytest
 from fuzzytree.auditing.engine.domain import DomainSide, limited
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.model import (
+    Arc,
+    Bell,
+    Binary,
+    Concave,
+    Conclusion,
+    Cosine,
+    Curve,
+    Defuzzifier,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Is,
+    Name,
+    PiCurve,
+    RuleBlock,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    Singleton,
+    Spike,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    SystemTerm,
+    TwoGaussians,
+)
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     LR,
@@ -23,36 +51,6 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.model.rulebase import Side as SideOfSet
-from fuzzytree.model.system import (
-    Conclusion,
-    Defuzzifier,
-    FuzzySystem,
-    Gaussian,
-    Is,
-    RuleBlock,
-    Singleton,
-    SystemInput,
-    SystemOutput,
-    SystemRule,
-    SystemTerm,
-)
-from fuzzytree.model.system.curves import (
-    Arc,
-    Bell,
-    Binary,
-    Concave,
-    Cosine,
-    Curve,
-    Formula,
-    Name,
-    PiCurve,
-    SCurve,
-    SemiEllipse,
-    Sigmoid,
-    SigmoidDifference,
-    Spike,
-    TwoGaussians,
-)
 from tests.cli.conftest import grip
 
 SET = LR(5.0, SideOfSet(1.0, (0.5,), 4.0), SideOfSet(2.0, (0.5,), 4.0))

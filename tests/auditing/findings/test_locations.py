@@ -19,9 +19,9 @@ from fuzzytree.auditing.findings.locations import (
 )
 from fuzzytree.auditing.findings.records import Answer, FileLocation, TermName
 from fuzzytree.checking.converting import format_of, read_content
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.testing import random_system, random_tree

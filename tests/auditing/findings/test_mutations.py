@@ -19,19 +19,7 @@ import fuzzytree as ft
 from fuzzytree.auditing.engine.states import Bracket, Proved, Sampled, State, Witness
 from fuzzytree.auditing.findings.codes import AUDITED
 from fuzzytree.auditing.findings.records import Answer, Severity
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import (
-    LR,
-    Clause,
-    Points,
-    Rule,
-    RuleBase,
-    Semantics,
-    Side,
-    Term,
-    Variable,
-)
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,
@@ -43,6 +31,18 @@ from fuzzytree.model.system import (
     SystemRule,
     SystemTerm,
     Trapezoid,
+)
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import (
+    LR,
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Side,
+    Term,
+    Variable,
 )
 from fuzzytree.model.tree import FuzzyTree
 from tests.auditing.findings.small_trees import one_cut, two_cuts

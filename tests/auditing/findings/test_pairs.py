@@ -21,6 +21,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.pairs import level_reached
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.model import Conclusion, Is, Or, RuleBlock, SystemRule
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
@@ -34,7 +35,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import Conclusion, Is, Or, RuleBlock, SystemRule
 from fuzzytree.numerics.exact import exact_answer
 from tests.auditing.engine.bases import random_base
 from tests.auditing.findings.test_views import A_LOW, block_of, system_of

@@ -23,6 +23,7 @@ from fuzzytree.auditing.findings.support import (
     wilson,
 )
 from fuzzytree.auditing.findings.views import view
+from fuzzytree.model import Is, SCurve
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     Clause,
@@ -33,7 +34,6 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.model.system import Is, SCurve
 from fuzzytree.numerics.exact import MISSING, TIE, UNCOVERED, exact_answer
 from tests.auditing.engine.bases import random_base
 from tests.auditing.findings.test_views import A_LOW, block_of, system_of

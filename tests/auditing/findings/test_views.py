@@ -12,8 +12,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.system_conditions import MOST_QUESTIONS, MOST_WAYS
 from fuzzytree.auditing.findings.views import AuditView, view
-from fuzzytree.model.rulebase import sentence
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Activation,
     And,
     Conclusion,
@@ -36,6 +35,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
+from fuzzytree.model.rulebase import sentence
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.semantics.conversion import as_system
 from fuzzytree.semantics.inference import infer

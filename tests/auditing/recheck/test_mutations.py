@@ -19,7 +19,7 @@ from fuzzytree.auditing.findings.records import SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.head import digest_of
-from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from tests.auditing.findings.test_mutations import PLANTED, ROWS, Planted
 from tests.auditing.recheck.audits import audited

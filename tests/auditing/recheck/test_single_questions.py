@@ -21,19 +21,7 @@ from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import Answer, Audit
 from fuzzytree.auditing.recheck import recheck
 from fuzzytree.exporters import yaml
-from fuzzytree.model.rulebase import (
-    Clause,
-    Conjunction,
-    Points,
-    Rule,
-    RuleBase,
-    Semantics,
-    Term,
-    Variable,
-    clause_text,
-    shapes_of,
-)
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
@@ -48,6 +36,18 @@ from fuzzytree.model.system import (
     SystemOutput,
     SystemRule,
     SystemTerm,
+)
+from fuzzytree.model.rulebase import (
+    Clause,
+    Conjunction,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+    clause_text,
+    shapes_of,
 )
 from fuzzytree.numerics.exact import exact_degree
 

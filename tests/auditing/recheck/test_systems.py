@@ -24,8 +24,7 @@ from fuzzytree.auditing.recheck.systems import HEDGES, read_condition
 from fuzzytree.auditing.recheck.views import View
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import yaml
-from fuzzytree.model.rulebase import fingerprint as our_fingerprint
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     And,
     Conclusion,
     Defuzzifier,
@@ -42,6 +41,7 @@ from fuzzytree.model.system import (
     TNorm,
     Trapezoid,
 )
+from fuzzytree.model.rulebase import fingerprint as our_fingerprint
 from fuzzytree.semantics.inference import hedged as hedged_degree
 from fuzzytree.semantics.inference import infer, s_norm, t_norm
 from fuzzytree.semantics.inference.degrees import curve_degree

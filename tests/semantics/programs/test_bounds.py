@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     DefuzzifierMethod,

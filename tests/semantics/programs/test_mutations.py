@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.checking.representations import check
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,

@@ -5,8 +5,7 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.model.rulebase import Points
-from fuzzytree.model.system import (
+from fuzzytree.model import (
     Call,
     Conclusion,
     Defuzzifier,
@@ -23,6 +22,7 @@ from fuzzytree.model.system import (
     SystemTerm,
     Trapezoid,
 )
+from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import SPECIAL
 from fuzzytree.semantics.programs.evaluate import evaluate_program
