@@ -15,6 +15,8 @@ WINE = Path(__file__).resolve().parents[2] / "examples" / "wine" / "wine.csv"
 SCREEN = 30
 """Lines that a verb prints at most by default."""
 
+HEAVY = pytest.mark.heavy  # half a minute
+
 FIRST_LINES = {
     "learn t.csv --target cultivar --entry 25 -o t.yaml": "accuracy 0.955",
     "show wine.yaml": "wine: fuzzy tree, 2 nodes, 3 leaves, depth 2",
@@ -59,7 +61,13 @@ def wine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("command", FIRST_LINES)
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(one, marks=[HEAVY] * one.startswith("stability"))
+        for one in FIRST_LINES
+    ],
+)
 def test_a_verb_prints_its_conclusion_first_and_at_most_a_screen(
     command: str,
     wine: Path,
@@ -78,7 +86,10 @@ def test_every_verb_has_a_command_here() -> None:
     assert {command.split()[0] for command in FIRST_LINES} == set(VERBS)
 
 
-@pytest.mark.parametrize("verb", ["check", "diff", "stability", "audit", "needs"])
+@pytest.mark.parametrize(
+    "verb",
+    ["check", "diff", "audit", "needs", pytest.param("stability", marks=HEAVY)],
+)
 def test_verbose_adds_lines_and_changes_no_fact(
     verb: str,
     wine: Path,

@@ -188,6 +188,7 @@ def test_any_tests_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
     ]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("seed", range(25))
 def test_a_system_is_read_back_alike(seed: int, dialect: Dialect) -> None:

@@ -357,6 +357,7 @@ MIXED: list[Curve] = [
 ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("curve", MIXED)
 @pytest.mark.parametrize("height", [1.0, 0.75])
 @pytest.mark.parametrize("is_mixed", [False, True])
@@ -391,6 +392,7 @@ def test_bands_and_lr_sets_as_numbers_become_points_of_their_own() -> None:
     assert [loss.where for loss in written.losses] == ["term 't' of 'rate'"]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", range(60))
 def test_a_random_system_without_losses_answers_alike_when_it_is_read(
     seed: int,

@@ -101,6 +101,7 @@ def named(names: list[str], *, kind: str = "rules") -> Model:
     )
 
 
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("kind", ["rules", "tree"])
 @pytest.mark.parametrize("name", AWKWARD, ids=ascii)
 def test_an_awkward_name_comes_back(name: str, kind: str) -> None:

@@ -138,6 +138,7 @@ def test_a_point_that_moved_breaks_the_bound(name: str) -> None:
         assert largest_error(moved, shape, at) > Fraction(bound)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("tolerance", TOLERANCES)
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_doubles_of_degree_zero_and_one_stay(name: str, tolerance: float) -> None:

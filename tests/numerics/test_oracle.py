@@ -263,6 +263,7 @@ def holes(shape: Shape, *, slack: float = 0.0) -> int:
     return count
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_an_interval_holds_the_exact_degree(shape: Shape) -> None:
     assert holes(shape) == 0

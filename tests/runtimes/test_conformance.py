@@ -232,6 +232,7 @@ def test_a_runtime_has_the_bits_of_numpy_in_the_same_type(
     assert_same_answers(found, expected)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("position", range(len(MODELS)), ids=map(name_of, MODELS))
 @pytest.mark.parametrize("dtype", ["mixed", "float32"])
 def test_a_strength_keeps_the_derived_bound_of_its_type(
@@ -252,6 +253,7 @@ def test_a_strength_keeps_the_derived_bound_of_its_type(
     assert np.all(error <= allowed[known]), origin
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("position", range(len(MODELS)), ids=map(name_of, MODELS))
 @pytest.mark.parametrize(
     "runtime",

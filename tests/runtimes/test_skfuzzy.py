@@ -36,6 +36,7 @@ SHAPES: list[Shape] = [
 ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("points", [4, 16, 128])
 @pytest.mark.parametrize("shape", SHAPES, ids=repr)
 def test_lines_between_points_keep_their_certified_error(

@@ -133,6 +133,7 @@ def test_the_number_of_the_winner_is_that_of_the_rule_base(rules: RuleBase) -> N
             assert abs(number - expected) < 1e-12
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("rules", MANY, ids=lambda rules: rules.name)
 def test_the_score_of_a_rule_is_made_of_its_strength(rules: RuleBase) -> None:
     system = as_system(rules, "rule")
@@ -148,6 +149,7 @@ def test_the_score_of_a_rule_is_made_of_its_strength(rules: RuleBase) -> None:
             assert winner(rules, scores) == answer.label
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("rules", MANY, ids=lambda rules: rules.name)
 def test_the_score_of_a_class_is_that_of_its_strongest_rule(rules: RuleBase) -> None:
     system = as_system(rules, "class")

@@ -720,6 +720,7 @@ def test_a_degree_that_is_nan_activates_nothing() -> None:
     assert found.outputs == (0.5,)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("seed", range(30))
 def test_nothing_fails_on_any_system_and_any_row(seed: int) -> None:
     subject = random_system(seed, formulas="wild")

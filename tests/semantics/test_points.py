@@ -205,6 +205,7 @@ def test_the_bounds_of_a_cell_hold_in_it(shape: Points) -> None:
     assert (found <= envelope.upper[cells]).all()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("count", [1, 2, 3, MOST_CHAINED, MOST_CHAINED + 1, 64, 4096])
 def test_a_graph_has_the_bits_of_numpy_whatever_the_number_of_points(

@@ -42,6 +42,7 @@ def cut(data: bytes, places: list[int]) -> list[bytes]:
     return [data[start:end] for start, end in pairwise(ends)]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", FAMILIES)
 @pytest.mark.parametrize("size", [1, 100_000])
 def test_frames_come_back_whole_and_nothing_else_is_counted(
