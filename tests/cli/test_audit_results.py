@@ -13,7 +13,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.auditing.findings.records import digest_of
 from fuzzytree.auditing.findings.results import read_results
-from fuzzytree.checking.stability.results import Stability, judged
+from fuzzytree.checking.stability.results import Stability, Trial
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import fingerprint
 from tests.cli.conftest import Call, grip
@@ -30,7 +30,7 @@ def _results(folder: Path) -> None:
         Comparison("x.onnx", "tree", "rows", 9, "DISAGREES", 2, float("inf"), 0.0),
         Comparison("native", "tree", "rows", 9, "agrees"),
     )
-    criteria = (judged("N3", 12, ()), judged("N7", 3, ()))
+    criteria = (Trial("N3", cases=12).result(), Trial("N7", cases=3).result())
     agreement = Agreement("grip", model, compared, skipped=("no C compiler",))
     stability = Stability("grip", model, 40, 0, 0, ("native",), criteria)
     (folder / "check.json").write_text(agreement.to_json(), "utf-8")

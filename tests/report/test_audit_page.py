@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.states import Declined, Proved
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.checking.stability.results import Stability, judged
+from fuzzytree.checking.stability.results import Stability, Trial
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report import audit_findings, audit_page
@@ -318,7 +318,7 @@ def test_agreement_and_stability_are_on_the_page_where_they_are_given() -> None:
     rules = rule_base()
     compared = Comparison("onnx", "rules", "rows", 40, "DISAGREES", 1, 0.25, 1e-12)
     agreement = Agreement("grip", "", (compared,), skipped=("no C compiler",))
-    criteria = (judged("N3", 12, ["row 3 differs"], advice="sort"),)
+    criteria = (Trial("N3", "sort", ["row 3 differs"], cases=12).result(),)
     stability = Stability("grip", "", 40, 0, 0, (), criteria)
     found = page(
         audit_of(rules), rules, rows=None, agreement=agreement, stability=stability
