@@ -17,6 +17,7 @@ from fuzzytree.auditing.recheck.model_records import (
     Band,
     Curve,
     Is,
+    Label,
     Model,
     Not,
     Or,
@@ -28,7 +29,6 @@ from fuzzytree.auditing.recheck.model_records import (
     Tree,
 )
 from fuzzytree.auditing.recheck.outcomes import Report, UndecidedError
-from fuzzytree.auditing.recheck.systems import has_formula
 
 LIMITS = (
     "that the rules are right: an audit finds what a rule base says, not whether it is "
@@ -180,7 +180,12 @@ def check_head(case: Case, report: Report) -> None:
 def _content(case: Case, report: Report) -> None:
     """Check the hash of what the model holds, if all of it is known here."""
     whole = case.model if case.view is None else case.view.system
-    if isinstance(whole, System) and has_formula(whole):
+    labels: list[Label] = []
+    if isinstance(whole, System):
+        labels += [label for one in whole.inputs for label in one.labels]
+        labels += [label for one in whole.outputs for label in one.labels]
+    curves = [one.curve for one in labels if isinstance(one.curve, Curve)]
+    if any(curve.kind == "formula" for curve in curves):
         report.undecided["FACT", "the hash of a system with formulas"].append("head")
         return
     print_ = fingerprint(whole)

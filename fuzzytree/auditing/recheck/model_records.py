@@ -10,15 +10,15 @@ from typing import Any, Literal, NamedTuple
 class Flank(NamedTuple):
     start: float
     end: float
-    curve: tuple[float, ...]
-    error: float | None
+    curve: tuple[float, ...] = (1.0,)
+    error: float | None = None
 
 
 class Band(NamedTuple):
-    low: float | None
-    high: float | None
-    left: Flank | None
-    right: Flank | None
+    low: float | None = None
+    high: float | None = None
+    left: Flank | None = None
+    right: Flank | None = None
 
 
 class Side(NamedTuple):
@@ -64,16 +64,16 @@ class Term(NamedTuple):
 class Part(NamedTuple):
     input: str
     weight: float
-    centre: float
+    centre: float = 0.0
 
 
 class Variable(NamedTuple):
     name: str
-    terms: tuple[Term, ...]
-    unit: str
-    low: float | None
-    high: float | None
-    parts: tuple[Part, ...]
+    terms: tuple[Term, ...] = ()
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    parts: tuple[Part, ...] = ()
 
 
 class Clause(NamedTuple):
@@ -85,7 +85,7 @@ class Clause(NamedTuple):
 class Rule(NamedTuple):
     when: tuple[Clause, ...]
     then: str
-    support: int | None
+    support: int | None = None
 
 
 class Semantics(NamedTuple):
@@ -101,14 +101,14 @@ class Rules(NamedTuple):
     variables: tuple[Variable, ...]
     rules: tuple[Rule, ...]
     semantics: Semantics
-    kind: str | None
-    columns: tuple[str, ...]
+    kind: str | None = None
+    columns: tuple[str, ...] = ()
 
 
 class Leaf(NamedTuple):
     label: str
-    pattern: str
-    support: int | None
+    pattern: str = ""
+    support: int | None = None
 
 
 class Branch(NamedTuple):
@@ -138,7 +138,7 @@ class Tree(NamedTuple):
     leaves: tuple[Leaf, ...]
     sets: tuple[Sets, ...]
     semantics: Semantics
-    columns: tuple[str, ...]
+    columns: tuple[str, ...] = ()
 
 
 class Label(NamedTuple):
@@ -149,12 +149,12 @@ class Label(NamedTuple):
 
 class Input(NamedTuple):
     name: str
-    labels: tuple[Label, ...]
-    low: float | None
-    high: float | None
-    clips: bool
-    unit: str
-    parts: tuple[Part, ...]
+    labels: tuple[Label, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    clips: bool = False
+    unit: str = ""
+    parts: tuple[Part, ...] = ()
 
 
 class Defuzzifier(NamedTuple):
@@ -171,8 +171,8 @@ class Output(NamedTuple):
     defuzzifier: Defuzzifier
     aggregation: str | None
     default: float | None
-    clips: bool
-    unit: str
+    clips: bool = False
+    unit: str = ""
 
 
 class Is(NamedTuple):
@@ -205,15 +205,15 @@ class Conclusion(NamedTuple):
 class SystemRule(NamedTuple):
     when: Condition | None
     then: tuple[Conclusion, ...]
-    weight: float
-    name: str
+    weight: float = 1.0
+    name: str = ""
 
 
 class Activation(NamedTuple):
     method: str
-    count_: int  # `count` is a method of tuples
-    threshold: float
-    relation: str
+    count_: int = 1  # `count` is a method of tuples
+    threshold: float = 0.0
+    relation: str = ">="
 
 
 class Block(NamedTuple):
@@ -222,7 +222,7 @@ class Block(NamedTuple):
     disjunction: str | None
     implication: str | None
     activation: Activation
-    name: str
+    name: str = ""
 
 
 class System(NamedTuple):
@@ -230,7 +230,7 @@ class System(NamedTuple):
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
     blocks: tuple[Block, ...]
-    note: str
+    note: str = ""
 
 
 Model = Rules | Tree

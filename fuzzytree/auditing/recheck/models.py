@@ -8,10 +8,17 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from fuzzytree.auditing.recheck.audit_records import Label
-from fuzzytree.auditing.recheck.facts import built, keys_of, term_facts, variable_facts
-from fuzzytree.auditing.recheck.model_records import Clause, Model, Rules, System, Tree
+from fuzzytree.auditing.recheck.facts import built
+from fuzzytree.auditing.recheck.model_records import (
+    Clause,
+    Input,
+    Model,
+    Output,
+    Rules,
+    System,
+    Tree,
+)
 from fuzzytree.auditing.recheck.outcomes import CannotRunError
-from fuzzytree.auditing.recheck.systems import read_system
 from fuzzytree.auditing.recheck.yaml import Items, read_yaml
 
 Place = tuple[int, int]  # line and column, from 1
@@ -46,7 +53,23 @@ def _of(items: Any) -> Iterator[Place]:
 
 # --- models
 
-_HEAD = "format, kind, name, classes, semantics"
+MEANINGS = {
+    "rule base": {
+        "or": "max",
+        "not": "1 - degree",
+        "answer": "the class of the first of the strongest rules",
+    },
+    "tree": {
+        "cuts": "a value equal to a cut lies below it",
+        "answer": "the class of the leaf that the nodes lead to",
+    },
+    "system": {
+        "not": "1 - degree",
+        "activated": "rules whose weighted degree is above 0",
+        "missing": "a value that is missing or infinite makes every output nan",
+    },
+}
+"""What models of each kind always mean."""
 
 
 def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
@@ -66,18 +89,8 @@ def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
     if not isinstance(top, dict) or kind not in ("rule base", "tree", "system"):
         text = f"{name}: rule bases, trees and systems are checked, not {kind!r:.60}"
         raise CannotRunError(text)
-    result: Model | System
     try:
-        if kind == "system":
-            result = read_system(top, name)
-        elif kind == "tree":
-            result = built(Tree, _tree_facts(top), name)
-        else:
-            result = built(Rules, _rule_facts(top), name)
-        if isinstance(result, Tree):
-            _check_numbers(result, name)
-        if not isinstance(result, System):
-            _check_names(result, name)
+        result = _read(top, str(kind), name)
         return result, Places(top)
     except CannotRunError as error:
         if str(error).startswith(name):
@@ -87,67 +100,62 @@ def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
         raise CannotRunError(f"{name}: not a {kind} that fuzzytree writes") from error
 
 
-def _rule_facts(result: Any) -> dict[str, Any]:
-    top = keys_of(result, f"{_HEAD}, rules", "columns, variables, terms")
-    facts = _head(
-        top, {"or": "max", "not": "1 - degree"}, "first of the strongest rules"
-    )
-    known = {v["name"]: [t["name"] for t in v["terms"]] for v in facts["variables"]}
-    rules = [keys_of(one, "if, then", "support") for one in top["rules"]]
-    facts["rules"] = [
-        {
-            "when": [_clause(one, known) for one in rule["if"]],
-            "then": rule["then"],
-            "support": rule.get("support"),
-        }
-        for rule in rules
-    ]
-    return facts | {"kind": top.get("terms")}
-
-
-def _tree_facts(result: Any) -> dict[str, Any]:
-    top = keys_of(result, f"{_HEAD}, leaves", "columns, variables, nodes, sets")
-    cuts = {"cuts": "a value equal to a cut lies below it"}
-    facts = _head(top, cuts, "leaf that the nodes lead to")
-    facts["nodes"] = [_node(n, one) for n, one in enumerate(top.get("nodes", []), 1)]
-    facts["leaves"] = [_leaf(n, one) for n, one in enumerate(top["leaves"], 1)]
-    groups = [keys_of(one, "variable, terms") for one in top.get("sets", [])]
-    facts["sets"] = [
-        {"variable": one["variable"], "terms": [*map(term_facts, one["terms"])]}
-        for one in groups
-    ]
-    return facts
-
-
-def _head(top: dict[str, Any], fixed: dict[str, str], decides: str) -> dict[str, Any]:
-    needed = f"and, uncovered, missing, answer, {', '.join(fixed)}"
-    meant = keys_of(top["semantics"], needed, "label type")
-    fixed["answer"] = f"the class of the {decides}"
-    wrong = [key for key, text in fixed.items() if meant[key] != text]
-    if wrong or top["format"] != "fuzzytree/1":
-        raise CannotRunError(
-            f"its meaning is not known: {', '.join(wrong or ['format'])}"
-        )
-    answers: list[str | None] = []
-    for text in (meant["uncovered"], meant["missing"]):
+def _read(top: dict[str, Any], kind: str, name: str) -> Model | System:
+    facts = {key: one for key, one in top.items() if key not in ("format", "kind")}
+    meant = MEANINGS[kind]
+    if top["format"] != "fuzzytree/1" or not meant.items() <= top["semantics"].items():
+        raise CannotRunError(f"{name}: its meaning is not known")
+    rest = {key: one for key, one in facts.pop("semantics").items() if key not in meant}
+    if kind == "system":
+        if rest:
+            raise CannotRunError(f"{name}: its meaning is not known")
+        system: System = built(System, {"inputs": [], **facts}, name)
+        variables: list[Input | Output] = [*system.inputs, *system.outputs]
+        groups = [[one.name for one in variables]]
+        _check_once(groups + [[t.name for t in v.labels] for v in variables], name)
+        return system
+    for key in ("uncovered", "missing"):
+        text = rest[key]
         if text != "no class" and not text.startswith("class "):
             raise CannotRunError(f"not an answer: {text!r:.60}")
-        answers.append(None if text == "no class" else text.removeprefix("class "))
-    semantics = {"conjunction": meant["and"], "label_type": meant.get("label type")}
-    return {
-        "name": top["name"],
-        "classes": top["classes"],
-        "columns": top.get("columns", []),
-        "variables": [*map(variable_facts, top.get("variables", []))],
-        "semantics": semantics | {"uncovered": answers[0], "missing": answers[1]},
-    }
+        rest[key] = None if text == "no class" else text.removeprefix("class ")
+    facts = {"variables": [], **facts, "semantics": rest}
+    result: Model
+    if kind == "tree":
+        facts["nodes"] = [*_numbered(top.get("nodes", []), "node")]
+        facts["leaves"] = [*_numbered(top["leaves"], "leaf")]
+        facts.setdefault("sets", [])
+        tree: Tree = built(Tree, facts, name)
+        _check_numbers(tree, name)
+        result = tree
+    else:
+        known = {
+            v["name"]: [t["name"] for t in v.get("terms", [])]
+            for v in facts["variables"]
+        }
+        facts["rules"] = [
+            one | {"if": [_clause(text, known) for text in one["if"]]}
+            for one in facts["rules"]
+        ]
+        result = built(Rules, facts, name)
+    _check_names(result, name)
+    return result
+
+
+def _numbered(items: list[dict[str, Any]], kind: str) -> Iterator[dict[str, Any]]:
+    """Yield nodes or leaves without their numbers, which are those of their order."""
+    for number, one in enumerate(items, 1):
+        if one[kind] != number:
+            raise CannotRunError(f"{kind} {number} has another number")
+        yield {key: value for key, value in one.items() if key != kind}
 
 
 def _clause(result: Any, known: Mapping[str, Collection[str]]) -> dict[str, Any]:
     if isinstance(result, dict):
         verb = "is not" if "is not" in result else "is"
-        one = keys_of(result, f"variable, {verb}")
-        return Clause(one["variable"], one[verb], verb == "is not")._asdict()
+        if result.keys() != {"variable", verb}:
+            raise CannotRunError(f"not a clause: {result!r:.200}")
+        return Clause(result["variable"], result[verb], verb == "is not")._asdict()
     read = [*itertools.islice(readings(result, known), 2)]
     if len(read) != 1:
         raise CannotRunError(f"{len(read)} readings of {result!r:.200}")
@@ -188,41 +196,15 @@ def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
                 todo.append((end + 4, (*terms, name)))
 
 
-def _node(number: int, result: Any) -> dict[str, Any]:
-    one = keys_of(result, "node, ask, cuts, branches", "interval owners")
-    ways = [keys_of(way, "is, go to", "sets") for way in one["branches"]]
-    owners = [owner - 1 for owner in one.get("interval owners", [])]
-    if one["node"] != number:
-        raise CannotRunError(f"node {number} has another number")
-    branches = [
-        {"terms": way["is"], "sets": way.get("sets", []), **_target(way["go to"])}
-        for way in ways
-    ]
-    whole = {"variable": one["ask"], "cuts": one["cuts"], "branches": branches}
-    return whole | {"owners": owners or [*range(len(ways))]}
-
-
-def _target(text: str) -> dict[str, int | None]:
-    kind, _, number = text.partition(" ")
-    if kind not in ("node", "leaf") or not re.fullmatch("[1-9][0-9]{0,8}", number):
-        raise CannotRunError(f"a branch cannot lead to {text!r:.60}")
-    return {"node": None, "leaf": None, kind: int(number)}
-
-
-def _leaf(number: int, result: Any) -> dict[str, Any]:
-    one = keys_of(result, "leaf, class", "pattern, support")
-    if one["leaf"] != number:
-        raise CannotRunError(f"leaf {number} has another number")
-    rest = {"pattern": one.get("pattern", ""), "support": one.get("support")}
-    return {"label": one["class"], **rest}
+def _check_once(groups: list[list[str]], name: str) -> None:
+    if any(len(set(group)) < len(group) for group in groups):
+        raise CannotRunError(f"{name}: a name stands twice")
 
 
 def _check_names(model: Model, name: str) -> None:
     """Refuse a model that uses what it does not declare, or declares it twice."""
-    groups = [model.classes, [v.name for v in model.variables]]
-    groups += [[t.name for t in v.terms] for v in model.variables]
-    if any(len(set(group)) < len(group) for group in groups):
-        raise CannotRunError(f"{name}: a name stands twice")
+    groups = [[*model.classes], [v.name for v in model.variables]]
+    _check_once(groups + [[t.name for t in v.terms] for v in model.variables], name)
     known = {(v.name, t.name) for v in model.variables for t in v.terms}
     used, labels = set[tuple[str, str]](), set[str]()
     if isinstance(model, Rules):
