@@ -22,7 +22,7 @@ from fuzzytree.errors import FuzzyTreeError, install_hint
 
 CORE = (
     *("numpy", "pyarrow", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark"),
-    "lazy-loader",
+    *("lazy-loader", "jinja2", "markupsafe"),
 )
 
 EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
@@ -134,7 +134,7 @@ def self_test(has_onnx: bool) -> list[str]:
     try:
         tree = api.learn(table, target=classes)
         content = api.export(tree, "yaml").content
-        again = read_yaml(content, "self-test")
+        again = read_yaml(content, "self-test").model
         answers = api.run(again, table)
         found = answers.classes if isinstance(answers, Predictions) else []
         faults = [] if again == tree else ["YAML does not give the tree back"]
