@@ -30,7 +30,7 @@ from fuzzytree.exporters.fcl_terms import (
 )
 from fuzzytree.exporters.fll_text import speakable
 from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
-from fuzzytree.formats import FACTS, MARK, fcl_places, read_fcl
+from fuzzytree.formats import FACTS, MARK, read_fcl
 from fuzzytree.model import (
     Format,
     FuzzySystem,
@@ -320,7 +320,6 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=read_fcl,
-    places=fcl_places,
     cannot=(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",

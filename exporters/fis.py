@@ -32,7 +32,6 @@ from fuzzytree.formats import (
     PRIVATE,
     Dialect,
     always_concluded,
-    fis_places,
     fuzzylite_losses,
     middle,
     read_fis,
@@ -409,7 +408,6 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=read_fis,
-    places=fis_places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
         "maximum; a rule that tests an output",

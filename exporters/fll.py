@@ -33,7 +33,6 @@ from fuzzytree.formats import (
     S_NORMS,
     T_NORMS,
     differences,
-    fll_places,
     read_fll,
 )
 from fuzzytree.model import (
@@ -352,7 +351,6 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=read_fll,
-    places=fll_places,
     cannot=(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",

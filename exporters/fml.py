@@ -22,7 +22,6 @@ from fuzzytree.formats import (
     FML_TNORMS,
     NAMESPACE,
     USUAL,
-    fml_places,
     read_fml,
 )
 from fuzzytree.model import (
@@ -441,7 +440,6 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=read_fml,
-    places=fml_places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
         "maximum; a rule that tests an output",

@@ -28,10 +28,9 @@ from fuzzytree.formats import (
     LARGEST_COUNT,
     LONGEST_SENTENCE,
     Vocabulary,
+    read_yaml,
     readings,
     vocabulary_of,
-    yaml_places,
-    yaml_reading,
 )
 from fuzzytree.model import (
     Branch,
@@ -260,6 +259,5 @@ FORMAT = Format(
     suffixes=(".yaml", ".yml"),
     carries=("tree", "rules", "system"),
     write=write,
-    read=yaml_reading,
-    places=yaml_places,
+    read=read_yaml,
 )

@@ -6,13 +6,11 @@ from .fcl.fcl_dialects import PAIRS as PAIRS
 from .fcl.fcl_dialects import S_WORDS as S_WORDS
 from .fcl.fcl_dialects import T_WORDS as T_WORDS
 from .fcl.fcl_reader import FACTS as FACTS
-from .fcl.fcl_reader import fcl_places as fcl_places
 from .fcl.fcl_reader import read_fcl as read_fcl
 from .fcl.fcl_rules import ALWAYS as ALWAYS
 from .fis.fis_reader import DEFAULTS as DEFAULTS
 from .fis.fis_reader import DIALECT as DIALECT
 from .fis.fis_reader import always_concluded as always_concluded
-from .fis.fis_reader import fis_places as fis_places
 from .fis.fis_reader import middle as middle
 from .fis.fis_reader import read_fis as read_fis
 from .fis.fis_words import CONCLUDING_HEDGES as CONCLUDING_HEDGES
@@ -27,7 +25,6 @@ from .fis.fis_words import Dialect as Dialect
 from .fis.fis_words import curve_of as curve_of
 from .fll.fll_differences import differences as differences
 from .fll.fll_differences import fuzzylite_losses as fuzzylite_losses
-from .fll.fll_reader import fll_places as fll_places
 from .fll.fll_reader import read_fll as read_fll
 from .fll.fll_rules import FLL_HEDGES as FLL_HEDGES
 from .fll.fll_rules import RULE_WORDS as RULE_WORDS
@@ -35,7 +32,6 @@ from .fll.fll_words import ACTIVATIONS as ACTIVATIONS
 from .fll.fll_words import FLL_METHODS as FLL_METHODS
 from .fll.fll_words import S_NORMS as S_NORMS
 from .fll.fll_words import T_NORMS as T_NORMS
-from .fml.fml_reader import fml_places as fml_places
 from .fml.fml_reader import read_fml as read_fml
 from .fml.fml_words import FML_FAR as FML_FAR
 from .fml.fml_words import FML_METHODS as FML_METHODS
@@ -80,5 +76,3 @@ from .yaml.nodes import MappingNode as MappingNode
 from .yaml.nodes import Scalar as Scalar
 from .yaml.nodes import compose as compose
 from .yaml.yaml_reader import read_yaml as read_yaml
-from .yaml.yaml_reader import yaml_places as yaml_places
-from .yaml.yaml_reader import yaml_reading as yaml_reading

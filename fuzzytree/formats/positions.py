@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import functools
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import msgspec
 
 from fuzzytree.formats.text_files import FileMistake, Position
-from fuzzytree.model import Mistake, Path
+from fuzzytree.model import Locate, Mistake, Path
 from fuzzytree.semantics import numbers_of, places_of
 
 
@@ -72,12 +73,23 @@ class Positions(msgspec.Struct, frozen=True, gc=False):
             line, column = self.find(path) or (1, 1)
             yield line, column, sentence
 
-    def of_facts(self, facts: str | None) -> Positions:
-        """Return the same for a file that stands for the rule base of its facts."""
+
+def locating(positions: Callable[[], Positions], facts: str | None) -> Locate:
+    """Return where parts stand in a file; its positions are gathered when needed.
+
+    Args:
+        positions: Returns the positions.
+        facts: Those of the rule base that the file stands for, if it does.
+    """
+
+    @functools.cache
+    def known() -> Positions:
         if facts is None:
-            return self
+            return positions()
         rules, variables = numbers_of(facts), places_of(facts)
-        return msgspec.structs.replace(self, rules=rules, variables=variables)
+        return msgspec.structs.replace(positions(), rules=rules, variables=variables)
+
+    return lambda path: known().find(path)
 
 
 def in_system(path: Path) -> Path:

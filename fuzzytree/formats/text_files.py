@@ -13,7 +13,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.model import Document, Loss, Reading, name_choice
+from fuzzytree.model import Document, Locate, Loss, Reading, name_choice
 
 MOST_BYTES: Final = 4 * 2**20
 MOST_SHOWN: Final = 100
@@ -66,9 +66,9 @@ class ReaderNotes(msgspec.Struct, frozen=True):
         """Whether there are so many mistakes that the reader looks for no more."""
         return len(self.mistakes) >= MOST_SHOWN
 
-    def reading(self, model: Document) -> Reading:
+    def reading(self, model: Document, locate: Locate) -> Reading:
         """Return a model with the losses and remarks."""
-        return Reading(model, tuple(self.losses), tuple(self.remarks))
+        return Reading(model, tuple(self.losses), tuple(self.remarks), locate)
 
 
 def report(name: str, mistakes: Sequence[FileMistake]) -> ReadError:

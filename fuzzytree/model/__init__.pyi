@@ -31,6 +31,7 @@ from .contracts import SystemRun as SystemRun
 from .contracts import Written as Written
 from .contracts import loss_text as loss_text
 from .contracts import narrowing_refusal as narrowing_refusal
+from .contracts import nowhere as nowhere
 from .contracts import refusal as refusal
 from .interrupts import checkpoint as checkpoint
 from .interrupts import noticed as noticed

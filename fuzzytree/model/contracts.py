@@ -82,6 +82,14 @@ class Written(msgspec.Struct, frozen=True):
         )
 
 
+Locate = Callable[[Path], tuple[int, int] | None]
+"""Where a part of a model stands in its file: line and column from 1, if known."""
+
+
+def nowhere(_: Path) -> None:
+    """Locate nothing: the parts of a model that has no lines."""
+
+
 class Reading(msgspec.Struct, frozen=True):
     """What a reader made of a file.
 
@@ -90,11 +98,13 @@ class Reading(msgspec.Struct, frozen=True):
         losses: What the file says that the model cannot hold, and what stands in its
             place.
         remarks: What else is worth knowing, such as the dialect that was detected.
+        locate: Where the parts of the model stand in the file.
     """
 
     model: Document
     losses: tuple[Loss, ...] = ()
     remarks: tuple[str, ...] = ()
+    locate: Locate = nowhere
 
 
 class Writer(Protocol):
@@ -106,10 +116,6 @@ class Writer(Protocol):
     def __call__(self, model: Any, /, *, allow_loss: bool = False) -> Written:
         """Write a model, or raise LossError when something would be lost."""
         ...
-
-
-Locate = Callable[[Path], tuple[int, int] | None]
-"""Where a part of a model stands in its file: line and column from 1, if known."""
 
 
 class Format(msgspec.Struct, frozen=True):
@@ -126,8 +132,6 @@ class Format(msgspec.Struct, frozen=True):
         extra: The optional packages it needs, if any.
         dtype: The number type in which a file of it computes, unless the writer's
             option of that name says another; None if it only holds the model.
-        places: Bytes and a name to where the parts of their model stand; None if a
-            file of it has no lines.
     """
 
     name: str
@@ -138,7 +142,6 @@ class Format(msgspec.Struct, frozen=True):
     cannot: tuple[str, ...] = ()
     extra: str | None = None
     dtype: Dtype | None = None
-    places: Callable[[bytes, str], Locate] | None = None
 
 
 class Outcome(msgspec.Struct, frozen=True):

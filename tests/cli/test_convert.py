@@ -14,7 +14,7 @@ import fuzzytree as ft
 from fuzzytree.cli.program import main
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, yaml
-from fuzzytree.formats.yaml.yaml_reader import yaml_reading
+from fuzzytree.formats.yaml.yaml_reader import read_yaml
 from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Loss, Reading, Written
 from fuzzytree.model.rulebase import RuleBase
@@ -320,7 +320,7 @@ def _lossy(monkeypatch: pytest.MonkeyPatch, *, on_read: bool, on_write: bool) ->
         return replace(written, losses=losses)
 
     def read(content: bytes, name: str) -> Reading:
-        model = yaml_reading(content, name).model
+        model = read_yaml(content, name).model
         return Reading(model, losses if on_read else (), ("the dialect is northern",))
 
     monkeypatch.setattr(yaml, "FORMAT", replace(yaml.FORMAT, read=read, write=write))

@@ -31,7 +31,7 @@ def items(block: str, key: str = "") -> tuple[Node, ...]:
 
 
 def test_the_first_example_is_a_whole_file() -> None:
-    rules = read_yaml(BLOCKS[0].encode(), "page")
+    rules = read_yaml(BLOCKS[0].encode(), "page").model
     assert isinstance(rules, RuleBase)
     assert len(rules.rules) == 3
 

@@ -236,9 +236,9 @@ def test_each_rule_and_term_stands_where_it_is_said_to(
 def test_a_part_stands_at_its_line_and_column(
     name: str, text: str, path: tuple[str | int, ...], place: tuple[int, int] | None
 ) -> None:
-    found = format_of(name).places
-    assert found is not None
-    assert found(text.encode(), name)(path) == place
+    read = format_of(name).read
+    assert read is not None
+    assert read(text.encode(), name).locate(path) == place
 
 
 @pytest.mark.one_in(3)

@@ -39,7 +39,7 @@ TIPPER = (EXAMPLES / "system-tipper.yaml").read_text("utf-8")
 
 
 def system_of(text: str) -> FuzzySystem:
-    found = read_yaml(text.encode(), "x.yaml")
+    found = read_yaml(text.encode(), "x.yaml").model
     assert isinstance(found, FuzzySystem)
     return found
 
@@ -62,7 +62,7 @@ def test_what_was_written_is_read_as_the_equal_system(
 ) -> None:
     system = random_system(seed, formulas="wild", has_odd_names=has_odd_names)
     written = write(system)
-    again = read_yaml(written.content, "x.yaml")
+    again = read_yaml(written.content, "x.yaml").model
     assert again == system
     assert all_of(again) == all_of(system)  # 0.0 and -0.0 differ
     assert not written.losses
@@ -73,7 +73,7 @@ def test_what_was_written_is_read_as_the_equal_system(
 def test_numbers_keep_all_their_digits_and_the_sign_of_zero() -> None:
     text = TIPPER.replace("[0, 5, 10]", "[-0.0, 5e-324, 1.7976931348623157e+308]")
     system = system_of(text.replace("default: 15", "default: 0.1"))
-    assert all_of(read_yaml(write(system).content, "x.yaml")) == all_of(system)
+    assert all_of(read_yaml(write(system).content, "x.yaml").model) == all_of(system)
     assert "-0.0" in repr(system.outputs[0].labels[0].curve)
 
 
@@ -103,7 +103,7 @@ def test_a_file_cut_short_is_never_a_smaller_system() -> None:
     content = write(system).content
     for end in range(0, len(content) - 1, 7):
         error_of(content[:end].decode())
-    assert read_yaml(content[:-1], "x.yaml") == system
+    assert read_yaml(content[:-1], "x.yaml").model == system
 
 
 def test_every_line_that_is_left_out_matters_or_is_refused() -> None:
@@ -273,13 +273,13 @@ def test_a_damaged_system_gives_a_read_error_or_a_system(seed: int) -> None:
             new = chance.choice((*words, text[end : end + 9], ""))
             text = text[:start] + new + text[end:]
         try:
-            system = read_yaml(text.encode(), "x.yaml")
+            system = read_yaml(text.encode(), "x.yaml").model
         except ReadError as error:
             lines = str(error).splitlines()
             assert all(line.startswith("x.yaml:") for line in lines)
             continue
         assert isinstance(system, FuzzySystem)
-        assert read_yaml(write(system).content, "x.yaml") == system
+        assert read_yaml(write(system).content, "x.yaml").model == system
         for row in random_rows(system, seed, 2):
             infer(system, row)
 

@@ -30,10 +30,10 @@ TEXT = (Path(__file__).parents[2] / "docs" / "reference" / "systems.md").read_te
 
 
 def test_the_example_is_a_whole_file_that_comes_back() -> None:
-    system = read_yaml(EXAMPLE.encode(), "page")
+    system = read_yaml(EXAMPLE.encode(), "page").model
     assert isinstance(system, FuzzySystem)
     assert len(system.rules) == 3
-    assert read_yaml(write(system).content, "page") == system
+    assert read_yaml(write(system).content, "page").model == system
     found = infer(system, {"dirt": 90.0, "load size": 7.0})
     # The second rule holds with 0.8 and soap has 2 * 90 + (minutes - 30) of it,
     # against 0.1 of none.

@@ -270,7 +270,7 @@ def test_every_runtime_of_doubles_answers_hostile_points_alike(
 def test_points_come_back_from_a_file(shapes: list[Points]) -> None:
     rules = rules_of(*shapes)
     content = write(rules).content
-    back = read_yaml(content, "points.yaml")
+    back = read_yaml(content, "points.yaml").model
     assert back == rules
     assert repr(msgspec.to_builtins(back)) == repr(msgspec.to_builtins(rules))
     assert write(back).content == content

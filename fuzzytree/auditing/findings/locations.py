@@ -19,13 +19,10 @@ from fuzzytree.model import (
     Path,
     Rule,
     RuleBase,
+    nowhere,
     sentence,
     shapes_of,
 )
-
-
-def _nowhere(_: Path) -> None:
-    """Say that no place is known."""
 
 
 class ModelFile(msgspec.Struct, frozen=True, eq=False):
@@ -39,7 +36,7 @@ class ModelFile(msgspec.Struct, frozen=True, eq=False):
 
     name: str
     content: bytes
-    locate: Locate = _nowhere
+    locate: Locate = nowhere
 
     def place(self, path: Path) -> FileLocation | None:
         """Return where a part of the model stands, None if that is not known."""
@@ -58,10 +55,10 @@ def model_file(name: str, content: bytes) -> ModelFile:
     @functools.cache
     def known() -> Locate:
         try:
-            find = format_of(name).places
-            return _nowhere if find is None else find(content, name)
+            read = format_of(name).read
+            return nowhere if read is None else read(content, name).locate
         except ReadError:  # such as another format under this suffix
-            return _nowhere
+            return nowhere
 
     return ModelFile(name, content, lambda path: known()(path))
 

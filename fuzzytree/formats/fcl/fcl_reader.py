@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
 from lark import Token
@@ -43,13 +43,12 @@ from fuzzytree.formats.fcl.fcl_syntax import (
 )
 from fuzzytree.formats.fll.fll_differences import constant_degrees, fuzzylite_losses
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree
-from fuzzytree.formats.positions import PositionGroup, Positions
+from fuzzytree.formats.positions import PositionGroup, Positions, locating
 from fuzzytree.formats.text_files import PartError, ReaderNotes, number_of, report
 from fuzzytree.model import (
     Defuzzifier,
     Document,
     FuzzySystem,
-    Locate,
     Reading,
     Singleton,
     SystemInput,
@@ -88,33 +87,6 @@ def read_fcl(content: bytes, name: str) -> Reading:
         >>> read_fcl(text.encode(), "washer.fcl").model.outputs[0].name
         'minutes'
     """
-    return _read(content, name)[0]
-
-
-def fcl_places(content: bytes, name: str) -> Locate:
-    """Return where the parts of the model of an FCL file stand.
-
-    A rule stands at its keyword, a term and a variable at their names.
-
-    Raises:
-        ReadError: With all mistakes of the file.
-    """
-    _, locate = _read(content, name)
-    return locate()
-
-
-def _groups(variables: Mapping[str, FclVariable]) -> tuple[PositionGroup, ...]:
-    return tuple(
-        PositionGroup(
-            place(one.token),
-            tuple(place(term.name) for term in (one.block.terms if one.block else ())),
-        )
-        for one in variables.values()
-    )
-
-
-def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
-    """Return what a file says, and a function that locates its parts."""
     text = parsed(content, name)
     notes = ReaderNotes(list(text.mistakes), remarks=list(text.remarks))
     dialect, sentence = detected(text)
@@ -140,7 +112,17 @@ def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
     except InvalidModelError as error:
         raise report(name, [*positions().placed(error.mistakes)]) from error
     model, facts = _model(joined_by_number(system), text.text, notes)
-    return notes.reading(model), lambda: positions().of_facts(facts).find
+    return notes.reading(model, locating(positions, facts))
+
+
+def _groups(variables: Mapping[str, FclVariable]) -> tuple[PositionGroup, ...]:
+    return tuple(
+        PositionGroup(
+            place(one.token),
+            tuple(place(term.name) for term in (one.block.terms if one.block else ())),
+        )
+        for one in variables.values()
+    )
 
 
 def _positions(known: FclVariables, blocks: Sequence[FclRuleBlock]) -> Positions:

@@ -22,12 +22,11 @@ from fuzzytree.formats.fis.fis_parts import labels_of, rules_of
 from fuzzytree.formats.fis.fis_text import FisEntry, FisSection
 from fuzzytree.formats.fis.fis_words import Dialect
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
-from fuzzytree.formats.positions import Positions
+from fuzzytree.formats.positions import Positions, locating
 from fuzzytree.formats.text_files import ReaderNotes, number_of, report
 from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
-    Locate,
     Reading,
     RuleBlock,
     SNorm,
@@ -88,25 +87,6 @@ def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
         >>> read_fis("\n".join(lines).encode(), "tip.fis").model.columns
         ('food',)
     """
-    return _read(content, name, dialect)[0]
-
-
-def fis_places(content: bytes, name: str) -> Locate:
-    """Return where the parts of the model of a FIS file stand.
-
-    A rule stands where its line begins, a term and a variable behind their `=`.
-
-    Raises:
-        ReadError: With every mistake of the file.
-    """
-    _, locate = _read(content, name, None)
-    return locate()
-
-
-def _read(
-    content: bytes, name: str, dialect: Dialect | None
-) -> tuple[Reading, Callable[[], Locate]]:
-    """Return what a file says, and a function that locates its parts."""
     notes = ReaderNotes()
     page = text.read_page(content, name, notes)
     parts = _system(page, name, dialect or _dialect(page, notes), notes)
@@ -114,7 +94,7 @@ def _read(
         raise report(name, notes.mistakes)
     system, positions = parts
     model, facts = as_written(system, page.comments)
-    return notes.reading(model), lambda: positions().of_facts(facts).find
+    return notes.reading(model, locating(positions, facts))
 
 
 def _dialect(page: text.FisFile, notes: ReaderNotes) -> Dialect:

@@ -21,7 +21,7 @@ from fuzzytree.formats.fll.fll_differences import differences
 from fuzzytree.formats.fll.fll_rules import FllVariable, Vocabulary, read_rule
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree, read_term
 from fuzzytree.formats.fll.fll_words import MOST_BYTES, FllEntry, FllSection, read_page
-from fuzzytree.formats.positions import PositionGroup, Positions
+from fuzzytree.formats.positions import PositionGroup, Positions, locating
 from fuzzytree.formats.text_files import (
     CONTROL,
     LONGEST_NAME,
@@ -40,7 +40,6 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Is,
-    Locate,
     Not,
     Or,
     Points,
@@ -70,21 +69,6 @@ def read_fll(content: bytes, name: str) -> Reading:
         >>> read_fll("\n".join(lines).encode(), "tip.fll").model.columns
         ('food',)
     """
-    return _read(content, name)[0]
-
-
-def fll_places(content: bytes, name: str) -> Locate:
-    """Return where the parts of the model of an FLL file stand: their values.
-
-    Raises:
-        ReadError: With every mistake of the file.
-    """
-    _, locate = _read(content, name)
-    return locate()
-
-
-def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
-    """Return what a file says, and a function that locates its parts."""
     notes = ReaderNotes()
     text, remarks = decoded(content, name, MOST_BYTES)
     check_characters(text, name, CONTROL)
@@ -97,7 +81,7 @@ def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
         raise report(name, notes.mistakes)
     system, positions = parts
     model, facts = as_written(system, page.comments)
-    return notes.reading(model), lambda: positions().of_facts(facts).find
+    return notes.reading(model, locating(positions, facts))
 
 
 def _system(

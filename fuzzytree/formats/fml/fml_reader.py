@@ -8,7 +8,7 @@ their own name back.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
 from fuzzytree.errors import InvalidModelError
@@ -17,13 +17,12 @@ from fuzzytree.formats.fml import xml
 from fuzzytree.formats.fml.fml_rules import FmlVariables, blocks_of
 from fuzzytree.formats.fml.fml_words import CIRCULAR, curve_of, number
 from fuzzytree.formats.fml.xml import FmlElement
-from fuzzytree.formats.positions import PositionGroup, Positions
+from fuzzytree.formats.positions import PositionGroup, Positions, locating
 from fuzzytree.formats.text_files import ReaderNotes, report
 from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Linear,
-    Locate,
     Points,
     Reading,
     RuleBlock,
@@ -54,17 +53,28 @@ def read_fml(content: bytes, name: str) -> Reading:
         Traceback (most recent call last):
         fuzzytree.errors.ReadError: a.xml:1:1: <fuzzySystem> has no <knowledgeBase>
     """
-    return _read(content, name)[0]
-
-
-def fml_places(content: bytes, name: str) -> Locate:
-    """Return where the parts of the model of an FML file stand: their elements.
-
-    Raises:
-        ReadError: With every mistake of the file.
-    """
-    _, locate = _read(content, name)
-    return locate()
+    document = xml.parse(content, name)
+    notes = ReaderNotes()
+    root = document.root
+    if root.name != "fuzzySystem":
+        what = f"the root is <{root.name[:40]}>; that of FML is <fuzzySystem>"
+        notes.mistake(root.position, what)
+    elif root.namespace != words.NAMESPACE:
+        value = repr(root.namespace) if root.namespace else "none"
+        what = (
+            f"the namespace is {value} and not {words.NAMESPACE!r}; read as if it was"
+        )
+        notes.remark(what)
+    parts = None if notes.mistakes else _parts(root, notes)
+    if notes.mistakes or parts is None:
+        raise report(name, notes.mistakes)
+    title = root.attributes.get("name", "") or name.rpartition(".")[0] or "system"
+    try:
+        system = parts.system(title)
+    except InvalidModelError as error:
+        raise report(name, list(parts.positions().placed(error.mistakes))) from error
+    model, facts = as_written(system, document.comments)
+    return notes.reading(model, locating(parts.positions, facts))
 
 
 class _Parts(NamedTuple):
@@ -92,10 +102,8 @@ class _Parts(NamedTuple):
         blocks: list[PositionGroup] = []
         for block in self.blocks:
             rules = [next(waiting) for _ in block.rules]
-            fml_places = tuple(rule.position for _, rule in rules)
-            blocks.append(
-                PositionGroup(rules[0][0].position if rules else (1, 1), fml_places)
-            )
+            head = rules[0][0].position if rules else (1, 1)
+            blocks.append(PositionGroup(head, tuple(one.position for _, one in rules)))
         return Positions(
             tuple(self._group(*one) for one in self.inputs),
             tuple(self._group(*one) for one in self.outputs),
@@ -114,32 +122,6 @@ class _Parts(NamedTuple):
         return PositionGroup(
             element.position, tuple(terms[one.name] for one in variable.labels)
         )
-
-
-def _read(content: bytes, name: str) -> tuple[Reading, Callable[[], Locate]]:
-    """Return what a file says, and a function that locates its parts."""
-    document = xml.parse(content, name)
-    notes = ReaderNotes()
-    root = document.root
-    if root.name != "fuzzySystem":
-        what = f"the root is <{root.name[:40]}>; that of FML is <fuzzySystem>"
-        notes.mistake(root.position, what)
-    elif root.namespace != words.NAMESPACE:
-        value = repr(root.namespace) if root.namespace else "none"
-        what = (
-            f"the namespace is {value} and not {words.NAMESPACE!r}; read as if it was"
-        )
-        notes.remark(what)
-    parts = None if notes.mistakes else _parts(root, notes)
-    if notes.mistakes or parts is None:
-        raise report(name, notes.mistakes)
-    title = root.attributes.get("name", "") or name.rpartition(".")[0] or "system"
-    try:
-        system = parts.system(title)
-    except InvalidModelError as error:
-        raise report(name, list(parts.positions().placed(error.mistakes))) from error
-    model, facts = as_written(system, document.comments)
-    return notes.reading(model), lambda: parts.positions().of_facts(facts).find
 
 
 def _parts(root: FmlElement, notes: ReaderNotes) -> _Parts | None:

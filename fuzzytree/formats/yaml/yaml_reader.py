@@ -39,7 +39,6 @@ from fuzzytree.model import (
     Band,
     Document,
     FuzzyTree,
-    Locate,
     Mistake,
     Path,
     Reading,
@@ -53,7 +52,7 @@ from fuzzytree.model import (
 R = TypeVar("R")
 
 
-def read_yaml(content: bytes, name: str) -> Document:
+def read_yaml(content: bytes, name: str) -> Reading:
     """Return the rule base, tree or system of a YAML file.
 
     Raises:
@@ -63,7 +62,7 @@ def read_yaml(content: bytes, name: str) -> Document:
         >>> from fuzzytree.exporters.yaml import write
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
-        >>> read_yaml(write(tree).content, "tree.yaml") == tree
+        >>> read_yaml(write(tree).content, "tree.yaml").model == tree
         True
     """
     root, found = compose(content, name)
@@ -77,31 +76,12 @@ def read_yaml(content: bytes, name: str) -> Document:
         raise report(name, [*found, *error.found]) from error.__cause__
     if found or model is None:
         raise report(name, found)
-    return model
 
-
-def yaml_reading(content: bytes, name: str) -> Reading:
-    """Return what `read` makes of a file; nothing of it is lost.
-
-    Raises:
-        ReadError: As `read`.
-    """
-    return Reading(read_yaml(content, name))
-
-
-def yaml_places(content: bytes, name: str) -> Locate:
-    """Return where the parts of the model of a YAML file stand, or what holds them.
-
-    Raises:
-        ReadError: If the file is no YAML.
-    """
-    root, _ = compose(content, name)
-
-    def at(path: Path) -> tuple[int, int]:
+    def locate(path: Path) -> tuple[int, int]:
         node = find(root, path)
         return node.line, node.column
 
-    return at
+    return Reading(model, locate=locate)
 
 
 class _UnreadableError(Exception):
