@@ -31,7 +31,7 @@ import numpy.typing as npt
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.benchmarking.clock import measure
+from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.machine import load_averages, machine
 from fuzzytree.model import (
     And,
@@ -124,7 +124,9 @@ def _decided(system: FuzzySystem, rounds: int, folder: Path) -> str:
     right = find_runtime("reference").load(tree)(values).rule
     if loop(values).tolist() != right.tolist():
         raise SystemExit("the tree in C decides otherwise")
-    mine = measure({"c": lambda: loop(values)}, rows=ROWS, rounds=rounds)["c"]
+    mine = time_calls({"c": lambda: loop(values)}, rows=ROWS, rounds=rounds).timings[
+        "c"
+    ]
     engine = _fuzzylite(system, folder)
     others = statistics.median(engine.loop(values, rounds) if engine.loop else [0])
     return (
@@ -264,11 +266,13 @@ def _table(system: FuzzySystem, rounds: int, folder: Path) -> Iterator[str]:
     batches["reading the columns once"] = values.sum
     one = {
         name: timing.median_ns
-        for name, timing in measure(singles, rows=1, rounds=rounds).items()
+        for name, timing in time_calls(singles, rows=1, rounds=rounds).timings.items()
     }
     many = {
         name: timing.median_ns
-        for name, timing in measure(batches, rows=ROWS, rounds=rounds).items()
+        for name, timing in time_calls(
+            batches, rows=ROWS, rounds=rounds
+        ).timings.items()
     }
     for name, engine in found.items():
         if engine.loop is not None:
@@ -324,7 +328,9 @@ def _c(system: FuzzySystem, folder: Path) -> Engine:
     call = _loop(content + _SYSTEM, folder / f"{system.name}.so")
 
     def timed(values: Floats, rounds: int) -> list[int]:
-        found = measure({"c": lambda: call(values)}, rows=ROWS, rounds=rounds)
+        found = time_calls(
+            {"c": lambda: call(values)}, rows=ROWS, rounds=rounds
+        ).timings
         return [int(found["c"].median_ns)]
 
     return Engine(call, loop=timed, note="a loop over rows in C")

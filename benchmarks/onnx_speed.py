@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from onnx import TensorProto, helper
 
-from fuzzytree.benchmarking.clock import measure
+from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.machine import machine
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import OnnxGraph
@@ -185,12 +185,12 @@ def _line(title: str, content: bytes, dtype: Dtype, leaves: int) -> None:
     kind = np.float32 if dtype == "float32" else np.float64
     sizes = [n for n in CHUNKS if n * leaves <= LARGEST]
     # One row is measured apart: large calls would throw it out of the cache.
-    single = measure(
+    single = time_calls(
         {"floor": floor(1), "one": _call(content, "rule", 1, kind)}, rows=1
-    )
+    ).timings
     one, least = single["one"].median_ns, single["floor"].median_ns
     calls = {str(n): _call(content, "rule", n, kind) for n in sizes}
-    many = measure(calls, rows=1, seconds=SECONDS * len(sizes))
+    many = time_calls(calls, rows=1, seconds=SECONDS * len(sizes)).timings
     batch = "".join(f"{many[str(rows)].median_ns / rows:>8.0f}" for rows in sizes)
     print(f"{title:26}{one / 1e3:>9.1f}  {one / least:>8.1f}  {batch}")
 

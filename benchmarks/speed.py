@@ -22,7 +22,7 @@ import numpy.typing as npt
 from sklearn.tree import DecisionTreeClassifier
 from trees import COLUMNS, grow, tree_of, walk
 
-from fuzzytree.benchmarking.clock import measure
+from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.machine import load_averages, machine
 from fuzzytree.model.contracts import Run
 from fuzzytree.model.rulebase import RuleBase
@@ -132,14 +132,14 @@ def _rules(count: int, *, raw: bool, rounds: int) -> None:
     many = np.random.default_rng(2).normal(size=(len(rules.inputs), 100_000))
     part = many[:, : values.shape[1]].copy()
     calls = {"native": lambda: run(part), "best": lambda: best(many)}
-    ours = measure(calls, rows=part.shape[1], rounds=rounds)
+    ours = time_calls(calls, rows=part.shape[1], rounds=rounds).timings
     ratio = ours["native"].median_ns / ours["best"].median_ns
     ratio *= many.shape[1] / part.shape[1]
     print(f"best-first on 100,000 rows is {ratio:.1f} times as fast a row as firing")
 
 
 def _table(candidates: Candidates, rows: int, rounds: int) -> None:
-    times = measure(candidates, rows=rows, rounds=rounds)
+    times = time_calls(candidates, rows=rows, rounds=rounds).timings
     first = next(iter(times.values()))
     print(f"\n{'rows ' + format(rows, ','):34} {'ratio':>9} {'ns a row':>12}")
     for name, timing in times.items():

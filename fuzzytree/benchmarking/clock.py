@@ -80,42 +80,6 @@ class CallTimings(msgspec.Struct, frozen=True):
     is_interrupted: bool = False
 
 
-def measure(
-    calls: Mapping[str, Call],
-    *,
-    rows: int,
-    threads: int = 1,
-    rounds: int = 15,
-    seconds: float = math.inf,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> dict[str, Timing]:
-    """Return how long each call takes; the arguments are those of `time_calls`.
-
-    After Ctrl-C or the time limit, what was measured by then is returned.
-
-    Raises:
-        Exception: What the first call that fails raises.
-
-    Example:
-        >>> found = measure({"a sum": lambda: sum(range(9))}, rows=9, rounds=6)
-        >>> len(found["a sum"].samples_ns)
-        6
-    """
-    found = time_calls(
-        calls,
-        rows=rows,
-        threads=threads,
-        rounds=rounds,
-        seconds=seconds,
-        seed=seed,
-        progress=progress,
-    )
-    for error in found.failures.values():
-        raise error
-    return found.timings
-
-
 def system_clock() -> TimeSource:
     """Return the clocks of this system."""
     is_fine = time.get_clock_info("process_time").resolution <= _FINE_S
@@ -153,6 +117,11 @@ def time_calls(
 
     Raises:
         ValueError: If there is nothing to do: no round, no row, no time.
+
+    Example:
+        >>> found = time_calls({"a sum": lambda: sum(range(9))}, rows=9, rounds=6)
+        >>> len(found.timings["a sum"].samples_ns)
+        6
     """
     _check(rows, threads, rounds, seconds)
     run = _Run(

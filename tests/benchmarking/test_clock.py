@@ -12,7 +12,6 @@ import pytest
 from fuzzytree.benchmarking.clock import (
     TimeSource,
     interval,
-    measure,
     median_ranks,
     orders,
     shared_rounds,
@@ -210,22 +209,14 @@ def test_a_call_that_fails_leaves_the_others_alone(position: int) -> None:
     assert len(found.timings["whole"].samples_ns) == 6
 
 
-def test_measure_raises_what_a_call_raises() -> None:
-    def broken() -> None:
-        raise OverflowError("too much")
-
-    with pytest.raises(OverflowError, match="too much"):
-        measure({"broken": broken}, rows=1, rounds=1)
-
-
 def test_the_garbage_collector_is_off_while_timing_and_on_again() -> None:
     seen: list[bool] = []
-    measure({"look": lambda: seen.append(gc.isenabled())}, rows=1, rounds=1)
+    time_calls({"look": lambda: seen.append(gc.isenabled())}, rows=1, rounds=1)
     assert not any(seen)
     assert gc.isenabled()
     gc.disable()
     try:
-        measure({"look": lambda: None}, rows=1, rounds=1)
+        time_calls({"look": lambda: None}, rows=1, rounds=1)
         assert not gc.isenabled()
     finally:
         gc.enable()
