@@ -15,9 +15,9 @@ from msgspec.structs import replace
 
 from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.records import Timing
-from fuzzytree.checking import DTYPES, Needs, needs, prove
+from fuzzytree.checking import Needs, needs, prove, sizes_of
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters import contents, find_format
+from fuzzytree.exporters import find_format
 from fuzzytree.exporters import write_onnx as write_onnx
 from fuzzytree.model import Agreement, Dtype, Model, Progress, Use, Variable, summary
 from fuzzytree.runtimes import baseline, open_onnx
@@ -228,18 +228,8 @@ def _files(model: Model, uses: Collection[Use], omissions: list[str]) -> Iterato
                 omissions.append(f"{title} as {form.name}: {error}")
                 continue
             yield File(title, form.name, None, len(written.content))
-        for dtype in DTYPES:
-            if title == "tree" and dtype == "mixed":
-                continue  # a path has comparisons alone: it is float64
-            try:
-                content = write_onnx(representation, dtype=dtype, verify=False).content
-            except (LossError, MissingExtraError) as error:
-                omissions.append(f"{title} as onnx {dtype}: {error}")
-                continue
-            inside = contents(content)
-            yield File(
-                title, "onnx", dtype, len(content), inside.nodes, inside.constants
-            )
+    for title, dtype, size in sizes_of(model, uses, omissions):
+        yield File(title, "onnx", dtype, size.bytes, size.nodes, size.constants)
 
 
 # --- costs

@@ -25,12 +25,12 @@ from .converting import proved as proved
 from .converting import read as read
 from .converting import read_content as read_content
 from .converting import refuse_unreadable as refuse_unreadable
-from .dependencies import DTYPES as DTYPES
 from .dependencies import Because as Because
 from .dependencies import Graph as Graph
 from .dependencies import Needs as Needs
 from .dependencies import needs as needs
 from .dependencies import prove as prove
+from .dependencies import sizes_of as sizes_of
 from .programs import ProgramFile as ProgramFile
 from .representations import check as check
 from .stability.results import Criterion as Criterion

@@ -320,61 +320,29 @@ def formed(
         LossError: If the format does not carry it in any form.
         ValueError: If the model has no such form.
     """
-    wants_rules = kind is not None or conjunction is not None
+    _refuse_remaking(model, representation, kind, conjunction)
     if isinstance(model, FuzzyTree):
-        carries = representation or ("rules" if wants_rules else _nearest("tree", form))
-        if carries == "tree":
+        usual = "rules" if kind or conjunction else _nearest("tree", form)
+        if (representation or usual) == "tree":
             return model
         model = rules_from_tree(model, kind or "relative", conjunction=conjunction)
-        representation = representation or _nearest("rules", form)
-    elif isinstance(model, RuleBase):
-        _refuse_remaking(model, representation, kind, conjunction)
+    wanted = representation or _nearest(kind_of(model), form)
+    if wanted == kind_of(model):
+        return model
+    from fuzzytree.semantics import as_rules, as_system
+
     if isinstance(model, RuleBase):
-        if (representation or _nearest("rules", form)) != "system":
-            return model
-        from fuzzytree.semantics import as_system
-
         return as_system(model, scores="winner")
-    return _formed_system(model, form, representation, kind, conjunction)
-
-
-def _formed_system(
-    system: FuzzySystem,
-    form: Format,
-    representation: ModelKind | None,
-    kind: Kind | None,
-    conjunction: Conjunction | None,
-) -> FuzzySystem | RuleBase:
-    """Return a system as it is, or as the rules that it stands for.
-
-    Raises:
-        LossError: If the format carries rules alone, and it is none.
-        ValueError: If it has no such form.
-    """
-    if representation == "tree":
-        raise ValueError(
-            f"as tree: {system.name} is a fuzzy system, and no tree can be made of it"
-        )
-    for option, wanted in (("terms", kind), ("conjunction", conjunction)):
-        if wanted is not None:
-            raise ValueError(
-                f"{option} {wanted}: {system.name} is a fuzzy system; "
-                "such rules are made from a tree"
-            )
-    if (representation or _nearest("system", form)) == "system":
-        return system
-    from fuzzytree.semantics import as_rules
-
-    found = as_rules(system, None)
-    if found is not None:
-        return found
+    rules = as_rules(model, None)
+    if rules is not None:
+        return rules
     if representation == "rules":
         raise ValueError(
-            f"as rules: {system.name} is a fuzzy system whose outputs are numbers, "
+            f"as rules: {model.name} is a fuzzy system whose outputs are numbers, "
             "and no rules that decide for a class can be made of it"
         )
     raise LossError(
-        f"cannot write {system.name} as {form.name}: it carries "
+        f"cannot write {model.name} as {form.name}: it carries "
         f"{' or '.join(form.carries)}, and this is a fuzzy system whose outputs "
         f"are numbers; {', '.join(_representations('system'))} carry one"
     )
@@ -417,24 +385,31 @@ def _nearest(representation: ModelKind, form: Format) -> ModelKind:
 
 
 def _refuse_remaking(
-    rules: RuleBase,
+    model: Document,
     representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
 ) -> None:
+    """Refuse what can be made of a tree alone.
+
+    Raises:
+        ValueError: If the model is none, and is not of that form already.
+    """
+    if isinstance(model, FuzzyTree):
+        return
+    what = f"{model.name} is a {CALLED[kind_of(model)]}"
     if representation == "tree":
-        raise ValueError(
-            f"as tree: {rules.name} is a rule base, and no tree can be made of it"
-        )
-    for option, wanted, found in (
-        ("terms", kind, rules.kind),
-        ("conjunction", conjunction, rules.semantics.conjunction),
-    ):
-        if wanted is not None and wanted != found:
-            raise ValueError(
-                f"{option} {wanted}: {rules.name} is a rule base with "
-                f"{found or 'other'}; other rules are made from the tree"
-            )
+        raise ValueError(f"as tree: {what}, and no tree can be made of it")
+    own: dict[str, str | None] = {}
+    why = "; such rules are made from a tree"
+    if isinstance(model, RuleBase):
+        own = {"terms": model.kind, "conjunction": model.semantics.conjunction}
+    for option, wanted in (("terms", kind), ("conjunction", conjunction)):
+        if wanted is not None and wanted != own.get(option):
+            if own:
+                noun = own[option] or "other"
+                why = f" with {noun}; other rules are made from the tree"
+            raise ValueError(f"{option} {wanted}: {what}{why}")
 
 
 def export(

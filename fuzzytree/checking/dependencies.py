@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import msgspec
 import numpy as np
@@ -21,8 +21,10 @@ from fuzzytree.checking.comparing import (
     ModelRun,
     RowSet,
     compare_bits,
+    counted,
     probed,
 )
+from fuzzytree.checking.converting import kind_of
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters import Contents, contents
 from fuzzytree.exporters import write_onnx as write_onnx
@@ -43,7 +45,7 @@ from fuzzytree.model import (
     Use,
     fingerprint,
 )
-from fuzzytree.runtimes import axis_lines, find_runtime, plan_axes
+from fuzzytree.runtimes import axis_lines, baseline, find_runtime, plan_axes
 from fuzzytree.semantics import (
     Pruned,
     Removed,
@@ -56,10 +58,9 @@ from fuzzytree.semantics import (
 
 if TYPE_CHECKING:
     from fuzzytree.exporters import Output
-    from fuzzytree.model import FloatArray
+    from fuzzytree.model import FloatArray, Runtime
     from fuzzytree.runtimes import Real
-
-DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
+    from fuzzytree.semantics import Form
 
 
 class Because(msgspec.Struct, frozen=True):
@@ -146,12 +147,11 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
     used = pruned(model, uses=uses, inputs=True).model
     left = pruned(model, uses=uses, inputs=True, rules=True)
     graphs, omissions = _graphs(model)
-    is_tree = isinstance(model, FuzzyTree)
     groups = model.sets if isinstance(model, FuzzyTree) else ()
     return Needs(
         model=model.name,
         fingerprint=fingerprint(model),
-        representation="tree" if is_tree else "rules",
+        representation=kind_of(model),
         columns=len(model.columns) or None,
         inputs=used.inputs,
         idle_inputs=tuple(n for n in model.inputs if n not in used.inputs),
@@ -168,30 +168,48 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
 # --- graphs
 
 
-def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
-    found: list[Graph] = []
-    omissions: list[str] = []
-    for title, representation in forms(model).items():
-        for dtype in DTYPES:
+_USUAL: tuple[Output, ...] = ("label", "rule")
+
+
+def sizes_of(
+    model: Model, uses: Collection[Use], omissions: list[str]
+) -> Iterator[tuple[Form, Dtype, Contents]]:
+    """Yield each form of a model and number type with what is in its ONNX graph.
+
+    Args:
+        model: A tree or a rule base.
+        uses: What a tree serves.
+        omissions: Gets a sentence for each that cannot be written.
+    """
+    for title, form in forms(model, uses).items():
+        for dtype in get_args(Dtype):
             if title == "tree" and dtype == "mixed":
                 continue  # a path has comparisons alone: it is float64
             try:
-                found.append(_graph(title, representation, dtype))
+                yield title, dtype, _written(form, dtype, _USUAL)
             except (LossError, MissingExtraError) as error:
                 omissions.append(f"{title} in {dtype}: {error}")
-    return tuple(found), tuple(omissions)
 
 
-def _graph(title: str, model: Model, dtype: Dtype) -> Graph:
-    usual: tuple[Output, ...] = ("label", "rule")
-    whole = _written(model, dtype, usual)
-    if dtype != "float64":
-        return Graph(title, dtype, whole)
+def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
+    omissions: list[str] = []
+    every = forms(model)
+    graphs = [
+        Graph(title, dtype, whole)
+        if dtype != "float64"
+        else _explained(title, every[title], whole)
+        for title, dtype, whole in sizes_of(model, get_args(Use), omissions)
+    ]
+    return tuple(graphs), tuple(omissions)
+
+
+def _explained(title: str, model: Model, whole: Contents) -> Graph:
+    """Return a graph in double with what is in it for what."""
     more: tuple[Output, ...] = ("status",)
     if isinstance(model, RuleBase):
         more = ("status", "strengths")
     on_request = [
-        _because(f"output {one}", _written(model, dtype, (*usual, one)), whole)
+        _because(f"output {one}", _written(model, "float64", (*_USUAL, one)), whole)
         for one in more
     ]
     because: list[Because] = []
@@ -199,12 +217,11 @@ def _graph(title: str, model: Model, dtype: Dtype) -> Graph:
     for what, without in _FEATURES.items():
         other = without(model)
         if other is not None:
-            because.append(_because(what, whole, _written(other, dtype, usual)))
+            because.append(_because(what, whole, _written(other, "float64", _USUAL)))
         elif isinstance(model, RuleBase) or what == COMBINATIONS:
             left_out.append(what)
-    return Graph(
-        title, dtype, whole, tuple(because), tuple(on_request), tuple(left_out)
-    )
+    reasons = (tuple(because), tuple(on_request), tuple(left_out))
+    return Graph(title, "float64", whole, *reasons)
 
 
 def _written(model: Model, dtype: Dtype, outputs: Sequence[Output]) -> Contents:
@@ -307,7 +324,7 @@ def prove(
     *,
     uses: Collection[Use] = ("tree", "relative"),
     data: FloatArray | None = None,
-    runtimes: Sequence[str] = ("native",),
+    runtimes: Sequence[str] = (),
     limit: int = 5_000,
 ) -> Agreement:
     """Compare a pruned model with the model: by proof, and by running both.
@@ -322,7 +339,7 @@ def prove(
         uses: What a tree serves, as when it was pruned.
         data: Rows of one's own, of shape (inputs, rows), in the order of the inputs
             of `model`.
-        runtimes: What runs both.
+        runtimes: The names of what runs both; the native runtime if none.
         limit: The most probes.
 
     Raises:
@@ -332,16 +349,13 @@ def prove(
     faults = [*proof_faults(model, found.model, uses=uses, rules=found.rules)]
     comparisons = [_proof(model, faults)]
     rows = probed(model, data, limit)
-    kinds: dict[str, Dtype] = {name: find_runtime(name).dtype for name in runtimes}
-    types: set[Dtype] = set(kinds.values())
-    seen = {dtype: _is_seen(model, found.model, rows, dtype) for dtype in types}
     for title, representation in whole.items():
         other = left.get(title)
         if other is None or not set(other.inputs) <= set(model.inputs):
             continue
-        for name in runtimes:
+        for name in runtimes or [baseline().name]:
             comparisons += _compared(
-                title, name, representation, other, found, rows, seen[kinds[name]]
+                title, find_runtime(name), representation, other, model, found, rows
             )
     return Agreement(
         model.name, fingerprint(model), tuple(comparisons), probes=rows.probes
@@ -350,51 +364,39 @@ def prove(
 
 def _proof(model: Model, faults: Sequence[str]) -> Comparison:
     size = len(model.nodes if isinstance(model, FuzzyTree) else model.rules)
-    return Comparison(
-        "pruned",
-        "the model",
-        "proof",
-        size,
-        "DISAGREES" if faults else "agrees",
-        differing=len(faults),
-        origin="equal operations on equal numbers",
-        detail=tuple(faults[:5]),
-    )
+    proof = counted("proof", "pruned", "the model", size, faults)
+    return replace(proof, origin="equal operations on equal numbers")
 
 
 def _is_seen(model: Model, left: Model, rows: RowSet, dtype: Dtype) -> BoolArray:
     """Return the rows in which nothing is missing that only the whole model sees."""
-    seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
-    gone = unguarded(model, left)
-    kind: Real = np.dtype(np.float64)
-    if dtype == "float32":
-        kind = np.dtype(np.float32)
+    is_seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
+    kind: Real = np.dtype("float32" if dtype == "float32" else "float64")
     plan = plan_axes(model.variables, kind)
     with np.errstate(invalid="ignore", over="ignore"):
         lines = axis_lines(plan, rows.values)
-    for name in gone:
-        seen &= np.isfinite(lines[plan.line[name]])
-    return seen
+    for name in unguarded(model, left):
+        is_seen &= np.isfinite(lines[plan.line[name]])
+    return is_seen
 
 
 def _compared(
     title: str,
-    name: str,
+    runtime: Runtime,
     model: Model,
     left: Model,
+    whole: Model,
     found: Pruned,
     rows: RowSet,
-    is_seen: BoolArray,
 ) -> Iterator[Comparison]:
-    runtime = find_runtime(name)
-    kind: ModelKind = "tree" if isinstance(model, FuzzyTree) else "rules"
-    if kind not in runtime.runs:
+    if kind_of(model) not in runtime.runs:
         return
+    is_seen = _is_seen(whole, found.model, rows, runtime.dtype)
     order = [model.inputs.index(one) for one in left.inputs]
     outcome = runtime.load(left)(np.ascontiguousarray(rows.values[order]))
     numbered = _in_old_numbers(outcome, model, found.rules)
     pair = [
-        ModelRun(f"pruned {title} in {name}", model, numbered),
+        ModelRun(f"pruned {title} in {runtime.name}", model, numbered),
         ModelRun(title, model, runtime.load(model)(rows.values)),
     ]
     parts = [(is_seen, False), (~is_seen, True)]
