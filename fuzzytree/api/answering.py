@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, TypedDict, Unpack, overload
 
 import msgspec
 import numpy as np
@@ -19,10 +19,8 @@ from fuzzytree.model import (
     FuzzySystem,
     Model,
     ModelSource,
-    RuleBase,
-    Run,
     Runtime,
-    SystemOutcome,
+    SystemRun,
 )
 from fuzzytree.runtimes import (
     OnnxModel,
@@ -32,7 +30,6 @@ from fuzzytree.runtimes import (
     find_runtime,
     is_installed,
     joined,
-    joined_outputs,
     needed_by,
     open_onnx,
     predictions_of,
@@ -73,39 +70,30 @@ def opened(source: Carried, *, allow_loss: bool = False) -> Document | OnnxModel
             return as_model(source)
 
 
+class RunOptions(TypedDict, total=False):
+    """The keywords of `run`."""
+
+    runtime: str | None
+    columns: Sequence[str] | None
+    with_strengths: bool
+    allow_loss: bool
+
+
 @overload
 def run(
-    model: FuzzySystem,
-    table: object,
-    *,
-    runtime: str | None = None,
-    columns: Sequence[str] | None = None,
-    with_strengths: bool = True,
-    allow_loss: bool = False,
+    model: FuzzySystem, table: object, **options: Unpack[RunOptions]
 ) -> Outputs: ...
 
 
 @overload
 def run(
-    model: Model | Fitted,
-    table: object,
-    *,
-    runtime: str | None = None,
-    columns: Sequence[str] | None = None,
-    with_strengths: bool = True,
-    allow_loss: bool = False,
+    model: Model | Fitted, table: object, **options: Unpack[RunOptions]
 ) -> Predictions: ...
 
 
 @overload
 def run(
-    model: Carried,
-    table: object,
-    *,
-    runtime: str | None = None,
-    columns: Sequence[str] | None = None,
-    with_strengths: bool = True,
-    allow_loss: bool = False,
+    model: Carried, table: object, **options: Unpack[RunOptions]
 ) -> Predictions | Outputs: ...
 
 
@@ -142,7 +130,7 @@ def run(
     """
     result = opened(model, allow_loss=allow_loss)
     ready = prepare_answering(result, runtime, with_strengths=with_strengths)
-    return ready.join([one for _, one in ready(table, columns=columns)])
+    return joined([one for _, one in ready(table, columns=columns)])
 
 
 class Answering(msgspec.Struct, frozen=True):
@@ -184,14 +172,7 @@ class Answering(msgspec.Struct, frozen=True):
             rows = batch.values.shape[1]
             starts = range(0, max(rows, 1), _BLOCK)
             result = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
-            yield batch, self.join(result)
-
-    @staticmethod
-    def join(parts: Sequence[Predictions | Outputs]) -> Predictions | Outputs:
-        """Return the answers to several pieces of a table as one."""
-        numbers = [one for one in parts if isinstance(one, Outputs)]
-        classes = [one for one in parts if isinstance(one, Predictions)]
-        return joined_outputs(numbers) if numbers else joined(classes)
+            yield batch, joined(result)
 
 
 def prepare_answering(
@@ -211,20 +192,11 @@ def prepare_answering(
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
     if isinstance(model, FuzzySystem):
         return _answering_system(model, runtime, with_strengths=with_strengths)
-    execute = _loaded(model, runtime or baseline().name)
-    if isinstance(model, RuleBase):
-        ends = [rule.then for rule in model.rules]
-    else:
-        ends = [leaf.label for leaf in model.leaves]
+    execute = _runtime(runtime or baseline().name, model).load(model)
 
     def answer(values: FloatArray) -> Predictions:
-        return predictions_of(
-            execute(np.ascontiguousarray(values)),
-            choices=model.classes,
-            ends=ends,
-            semantics=model.semantics,
-            with_strengths=with_strengths,
-        )
+        outcome = execute(np.ascontiguousarray(values))
+        return predictions_of(outcome, model, with_strengths=with_strengths)
 
     return Answering(model.inputs, model.columns, answer)
 
@@ -238,15 +210,20 @@ def _answering_system(
         raise LossError(f"cannot run {system.name} in {name}: it runs no systems")
     execute = result.load_system(system, activations=with_strengths)
     names = tuple(one.name for one in system.outputs)
+    return _answering_numbers(execute, system.columns, (), names)
 
+
+def _answering_numbers(
+    execute: SystemRun,
+    inputs: tuple[str, ...],
+    trained: tuple[str, ...],
+    names: tuple[str, ...],
+) -> Answering:
     def answer(values: FloatArray) -> Outputs:
-        return _outputs_of(execute(np.ascontiguousarray(values)), names)
+        found = execute(np.ascontiguousarray(values))
+        return Outputs(names, found.outputs, found.status, found.activations)
 
-    return Answering(system.columns, (), answer)
-
-
-def _outputs_of(outcome: SystemOutcome, names: tuple[str, ...]) -> Outputs:
-    return Outputs(names, outcome.outputs, outcome.status, outcome.activations)
+    return Answering(inputs, trained, answer)
 
 
 def _answering_onnx(
@@ -259,12 +236,7 @@ def _answering_onnx(
         )
     execute, label = model.run_system, model.labels
     if execute is not None:
-        run_system = execute  # a name that stays what it is, for type checkers
-
-        def numbers(values: FloatArray) -> Outputs:
-            return _outputs_of(run_system(values), model.names)
-
-        return Answering(model.inputs, model.columns, numbers)
+        return _answering_numbers(execute, model.inputs, model.columns, model.names)
     if label is None:
         raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
     position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
@@ -294,7 +266,3 @@ def _runtime(name: str, model: Document) -> Runtime:
     if not is_installed(runtime):
         raise MissingExtraError(f"the runtime {name!r} needs {needed_by(runtime)}")
     return runtime
-
-
-def _loaded(model: Model, name: str) -> Run:
-    return _runtime(name, model).load(model)

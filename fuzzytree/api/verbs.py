@@ -15,21 +15,21 @@ import msgspec
 import numpy as np
 
 from fuzzytree import semantics
-from fuzzytree.api.answering import Answering, Carried, opened, run
+from fuzzytree.api.answering import Carried, opened
+from fuzzytree.api.answering import run as run
 from fuzzytree.checking import (
     CALLED,
-    Conversion,
     as_model,
-    convert,
     deciding,
-    export,
     format_of,
     kind_of,
-    load,
     load_content,
-    read,
     refuse_unreadable,
 )
+from fuzzytree.checking import convert as convert
+from fuzzytree.checking import export as export
+from fuzzytree.checking import load as load
+from fuzzytree.checking import read as read
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import check_stream, read_bounded, reason, write_atomically
@@ -85,35 +85,6 @@ if TYPE_CHECKING:
     from fuzzytree.learning import LearningSettings, Learnt
     from fuzzytree.model import FloatArray, Use
     from fuzzytree.numerics import Certificate
-
-__all__ = [
-    "Answering",
-    "Carried",
-    "Conversion",
-    "audit",
-    "audited_rows",
-    "bench",
-    "certify",
-    "check",
-    "convert",
-    "diff",
-    "draw",
-    "explain",
-    "export",
-    "learn",
-    "learn_table",
-    "load",
-    "material",
-    "needs",
-    "opened",
-    "read",
-    "recheck",
-    "rows_of",
-    "rules_from_tree",
-    "run",
-    "save",
-    "stability",
-]
 
 
 def learn(

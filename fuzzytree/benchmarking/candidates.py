@@ -6,7 +6,7 @@ import difflib
 import functools
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -26,6 +26,7 @@ from fuzzytree.benchmarking.records import (
     Omission,
     Question,
 )
+from fuzzytree.checking import kind_of
 from fuzzytree.errors import install_hint
 from fuzzytree.model import LR, Band, Dtype, Model, Outcome, Prepared, RuleBase, Runtime
 from fuzzytree.numerics import ApproximateRules, by_degree, by_points, certify
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
 
 Bounds = Callable[[RuleBase, Dtype], Bound | None]
 """The certified error of a rule base's strengths in a number type, if there is one."""
+
+Candidates = tuple[list[Candidate], list[Omission]]
+"""What can be measured, and what cannot be, each with its reason."""
 
 _BLOCK_NUMBERS = 1 << 25  # strengths that a call of the native runtime makes at once
 _BLOCK = 1 << 16
@@ -83,52 +87,35 @@ class Layouts:
         return self._tables[key]
 
 
-def own(
-    model: Model, bounds: Bounds, layouts: Layouts
-) -> tuple[list[Candidate], list[Omission]]:
+def own(model: Model, bounds: Bounds, layouts: Layouts) -> Candidates:
     """Return a candidate for each runtime and each question that it can answer.
 
-    Args:
-        model: A tree or a rule base.
-        bounds: Certifies the strengths of a rule base.
-        layouts: Where sessions share their tables.
-
-    Returns:
-        The candidates, and the runtimes that are not installed.
+    `bounds` certifies the strengths of a rule base; sessions share their tables in
+    `layouts`. What is not installed is omitted.
     """
-    found: list[Candidate] = []
-    omitted: list[Omission] = []
-    forms_by_question = questions(model)
-    for runtime in all_runtimes():
-        if not is_installed(runtime):
-            why = f"not installed ({needed_by(runtime)})"
-            omitted.append(Omission(runtime.name, why))
-            continue
-        for question, form in forms_by_question.items():
-            kind = "rules" if isinstance(form, RuleBase) else "tree"
-            if kind in runtime.runs:
-                one = _candidate(runtime, question, form, bounds, layouts)
-                found.append(one)
-    return found, omitted
-
-
-def _candidate(
-    runtime: Runtime,
-    question: Question,
-    model: Model,
-    bounds: Bounds,
-    layouts: Layouts,
-) -> Candidate:
-    return Candidate(
-        title(runtime.name, question),
-        question,
-        "runtime",
-        partial(load_runtime, runtime, model, layouts),
-        bound=partial(_bound, runtime, model, bounds),
-        note=runtime.note,
-        is_foreign=bool(runtime.modules),
-        is_parallel=runtime.prepare is not None,
-    )
+    runtimes = all_runtimes()
+    omitted = [
+        Omission(one.name, f"not installed ({needed_by(one)})")
+        for one in runtimes
+        if not is_installed(one)
+    ]
+    candidates = [
+        Candidate(
+            title(runtime.name, question),
+            question,
+            "runtime",
+            partial(load_runtime, runtime, form, layouts),
+            bound=partial(_bound, runtime, form, bounds),
+            note=runtime.note,
+            is_foreign=bool(runtime.modules),
+            is_parallel=runtime.prepare is not None,
+        )
+        for runtime in runtimes
+        if is_installed(runtime)
+        for question, form in questions(model).items()
+        if kind_of(form) in runtime.runs
+    ]
+    return candidates, omitted
 
 
 def _bound(runtime: Runtime, model: Model, bounds: Bounds) -> Bound | None:
@@ -155,7 +142,12 @@ def load_runtime(
     million rows and a thousand rules would make 8 GB of them.
     """
     if runtime.prepare is not None:
-        return session_of(runtime.prepare(model, threads=threads), model, layouts)
+        graph = runtime.prepare(model, threads=threads)
+        return LoadedCandidate(
+            partial(_found, graph.run, model),
+            lambda values: partial(graph.call, layouts.table(values, graph)),
+            len(graph.content),
+        )
     run = runtime.load(model)
     block = _BLOCK
     if isinstance(model, RuleBase):
@@ -177,16 +169,6 @@ def _each(run: Callable[[FloatArray], object], parts: Sequence[FloatArray]) -> N
         run(part)
 
 
-def session_of(prepared: Prepared, model: Model, layouts: Layouts) -> LoadedCandidate:
-    """Return a graph that was prepared from a model, as a candidate is loaded."""
-
-    def call(values: FloatArray) -> Callable[[], object]:
-        return partial(prepared.call, layouts.table(values, prepared))
-
-    answer = partial(_found, prepared.run, model)
-    return LoadedCandidate(answer, call, len(prepared.content))
-
-
 def _found(
     run: Callable[[FloatArray], Outcome], model: Model, values: FloatArray
 ) -> CandidateOutput:
@@ -195,28 +177,14 @@ def _found(
 
 def found_of(outcome: Outcome, model: Model) -> CandidateOutput:
     """Return a runtime's outcome as class numbers and strengths."""
-    answers = predictions_of(
-        outcome,
-        choices=model.classes,
-        ends=[*_ends(model)],
-        semantics=model.semantics,
-        with_strengths=True,
-    )
-    return CandidateOutput(answers.codes, outcome.strengths)
-
-
-def _ends(model: Model) -> Iterator[str]:
-    if isinstance(model, RuleBase):
-        yield from (rule.then for rule in model.rules)
-    else:
-        yield from (leaf.label for leaf in model.leaves)
+    return CandidateOutput(predictions_of(outcome, model).codes, outcome.strengths)
 
 
 READING = "floor: the columns read once"
 SESSION = "floor: an empty session call"
 
 
-def floors(question: Question) -> tuple[list[Candidate], list[Omission]]:
+def floors(question: Question) -> Candidates:
     """Return the floors; they answer nothing and have no error.
 
     Args:
@@ -283,39 +251,11 @@ _MOST_TERMS = 400  # their points take seconds
 Make = Callable[[RuleBase], ApproximateRules]
 
 
-class Approximations:
-    """Approximated rule bases: each is made once, when it is first loaded."""
-
-    def __init__(self) -> None:
-        self._known: dict[tuple[Question, str], ApproximateRules] = {}
-
-    def get(
-        self, question: Question, what: str, make: Make, rules: RuleBase
-    ) -> ApproximateRules:
-        """Return one of them.
-
-        Raises:
-            LossError: If the rule base cannot be approximated so.
-        """
-        key = (question, what)
-        if key not in self._known:
-            self._known[key] = make(rules)
-        return self._known[key]
-
-
-def variants(
-    model: Model, bounds: Bounds, layouts: Layouts
-) -> tuple[list[Candidate], list[Omission]]:
+def variants(model: Model, bounds: Bounds, layouts: Layouts) -> Candidates:
     """Return the variants of each rule base that a model gives.
 
-    Args:
-        model: A tree or a rule base.
-        bounds: Certifies the strengths of a rule base.
-        layouts: Where sessions share their tables.
-
-    Returns:
-        The candidates, whose bounds are known once they are loaded, and what makes no
-        variant of its own.
+    The arguments are those of `own`. A candidate's bound is known once it is loaded;
+    what has too many terms is omitted. An approximation is made when it is first used.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -323,9 +263,9 @@ def variants(
         >>> found[0].name
         'native, points 1e-01: relative rules'
     """
-    found: list[Candidate] = []
+    candidates: list[Candidate] = []
     omitted: list[Omission] = []
-    known = Approximations()
+    runtimes = [one for one in all_runtimes() if one.in_variants and is_installed(one)]
     for question, rules in questions(model).items():
         if not isinstance(rules, RuleBase):
             continue
@@ -335,19 +275,18 @@ def variants(
             omitted.append(Omission(f"variants: {question}", why))
             continue
         for what, make in _makers(rules).items():
-            approximate = partial(known.get, question, what, make, rules)
-            for runtime in all_runtimes():
-                if runtime.in_variants and is_installed(runtime):
-                    load = partial(_load, runtime, approximate, bounds, layouts)
-                    one = Candidate(
-                        title(f"{runtime.name}, {what}", question),
-                        question,
-                        "variant",
-                        load,
-                        is_parallel=runtime.prepare is not None,
-                    )
-                    found.append(one)
-    return found, omitted
+            approximate = functools.cache(partial(make, rules))
+            candidates += (
+                Candidate(
+                    title(f"{runtime.name}, {what}", question),
+                    question,
+                    "variant",
+                    partial(_load, runtime, approximate, bounds, layouts),
+                    is_parallel=runtime.prepare is not None,
+                )
+                for runtime in runtimes
+            )
+    return candidates, omitted
 
 
 def _makers(rules: RuleBase) -> dict[str, Make]:
@@ -399,9 +338,6 @@ def _load(
 
     return replace(loaded, bound=bound)
 
-
-Candidates = tuple[list[Candidate], list[Omission]]
-"""What can be measured, and what cannot be, each with its reason."""
 
 Peers = Callable[[Model, Bounds], Candidates]
 """Returns candidates of third-party libraries for a model."""
@@ -505,9 +441,8 @@ def chosen(
     if not kept:
         raise ValueError("no candidate is left to measure")
     left = len(candidates) - len(kept)
-    if not left:
-        return kept, []
-    return kept, [Omission(_counted(left), "not selected")]
+    name = f"{left} candidate{'' if left == 1 else 's'}"
+    return kept, [Omission(name, "not selected")] if left else []
 
 
 def _unknown(word: str, candidates: Sequence[Candidate]) -> str:
@@ -521,10 +456,6 @@ def _unknown(word: str, candidates: Sequence[Candidate]) -> str:
         f"no candidate {word!r}; there is {', '.join(dict.fromkeys(names))}, "
         f"or all of {', '.join(dict.fromkeys(groups))}{hint}"
     )
-
-
-def _counted(count: int) -> str:
-    return f"{count} candidate{'' if count == 1 else 's'}"
 
 
 def _words(one: Candidate) -> set[str]:
@@ -545,16 +476,14 @@ def _bounds(values: FloatArray) -> Bounds:
     Of many terms only the first rows are certified, which the bound's origin counts;
     candidates are judged on fewer.
     """
-    known: dict[tuple[RuleBase, Dtype], Bound | None] = {}
 
+    @functools.cache
     def bounds(rules: RuleBase, dtype: Dtype) -> Bound | None:
-        key = (rules, dtype)
-        if key not in known:
-            terms = sum(len(variable.terms) for variable in rules.variables)
-            rows = max(_MOST_DEGREES // max(terms, 1), MOST_ROWS)
-            found = certify(rules, dtype, values[:, :rows])
-            delta = None if found.unbounded else found.delta
-            known[key] = None if delta is None else (delta, found.origin)
-        return known[key]
+        terms = sum(len(variable.terms) for variable in rules.variables)
+        rows = max(_MOST_DEGREES // max(terms, 1), MOST_ROWS)
+        found = certify(rules, dtype, values[:, :rows])
+        if found.unbounded or found.delta is None:
+            return None
+        return found.delta, found.origin
 
     return bounds

@@ -27,7 +27,7 @@ from fuzzytree.numerics import (
     strength_bounds,
     strength_errors,
 )
-from fuzzytree.runtimes import baseline
+from fuzzytree.runtimes import baseline, predictions_of
 from fuzzytree.semantics import Status, probe_values
 
 if TYPE_CHECKING:
@@ -358,20 +358,7 @@ def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
 
 def labels(answers: ModelRun) -> IntArray:
     """Return the class number of each answer; -1 for no class."""
-    model, outcome = answers.model, answers.outcome
-    classes = {label: number for number, label in enumerate(model.classes)}
-    if isinstance(model, RuleBase):
-        ends = [rule.then for rule in model.rules]
-    else:
-        ends = [leaf.label for leaf in model.leaves]
-    table = np.array([-1, *(classes[label] for label in ends)], np.int64)
-    found = table[outcome.rule]
-    for status, answer in (
-        (Status.UNCOVERED, model.semantics.uncovered),
-        (Status.MISSING, model.semantics.missing),
-    ):
-        found[outcome.status == status] = -1 if answer is None else classes[answer]
-    return found
+    return predictions_of(answers.outcome, answers.model).codes
 
 
 def margins(answers: ModelRun) -> FloatArray | None:

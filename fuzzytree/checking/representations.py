@@ -37,7 +37,13 @@ from fuzzytree.model import (
     checkpoint,
     fingerprint,
 )
-from fuzzytree.runtimes import OnnxModel, chosen_runtimes, is_installed, needed_by
+from fuzzytree.runtimes import (
+    OnnxModel,
+    chosen_runtimes,
+    is_installed,
+    joined,
+    needed_by,
+)
 from fuzzytree.semantics import Status, as_rules, as_system
 
 if TYPE_CHECKING:
@@ -173,7 +179,7 @@ def _calls(title: str, subject: Checked, run: Any, rows: RowSet) -> Comparison:
     sample = np.ascontiguousarray(rows.values)
     count = sample.shape[1]
     whole = run(sample)
-    alone = _joined([run(sample[:, row : row + 1]) for row in range(count)])
+    alone = joined([run(sample[:, row : row + 1]) for row in range(count)])
     faults = [
         f"a row answered alone differs from the same row in a batch, {text}"
         for text in subject.faults(alone, whole, rows)
@@ -181,7 +187,8 @@ def _calls(title: str, subject: Checked, run: Any, rows: RowSet) -> Comparison:
     if subject.faults(run(np.asfortranarray(sample)), whole, rows):
         faults.append("another memory order changes the answers")
     empty = run(np.empty((width, 0)))
-    if any(part.shape[-1:] != (0,) for part in _arrays(empty).values()):
+    arrays = [array for array in msgspec.structs.astuple(empty) if array is not None]
+    if any(array.shape[-1:] != (0,) for array in arrays):
         faults.append("no rows do not give empty answers")
     try:
         run(np.zeros((width + 1, 3)))
@@ -189,23 +196,6 @@ def _calls(title: str, subject: Checked, run: Any, rows: RowSet) -> Comparison:
     except (ValueError, FuzzyTreeError):
         pass
     return counted("calls", title, "itself", count + 3, faults)
-
-
-def _arrays(outcome: Outcome | SystemOutcome) -> dict[str, FloatArray]:
-    """Return the arrays of an outcome that are there, by name; rows come last."""
-    arrays = msgspec.structs.asdict(outcome)
-    return {name: array for name, array in arrays.items() if array is not None}
-
-
-def _joined(parts: Sequence[Any]) -> Any:
-    """Return outcomes for several batches of rows as one."""
-    arrays = [*map(_arrays, parts)]
-    return type(parts[0])(
-        **{
-            name: np.concatenate([one[name] for one in arrays], -1)
-            for name in arrays[0]
-        }
-    )
 
 
 def _shipped(subject: Checked, title: str, other: Shipped) -> Iterator[Finding]:

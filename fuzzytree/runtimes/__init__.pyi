@@ -13,7 +13,6 @@ from .predictions import By as By
 from .predictions import Outputs as Outputs
 from .predictions import Predictions as Predictions
 from .predictions import joined as joined
-from .predictions import joined_outputs as joined_outputs
 from .predictions import predictions_of as predictions_of
 from .predictions import reasons as reasons
 from .programs import ProgramPlan as ProgramPlan

@@ -29,6 +29,7 @@ from fuzzytree.model import (
     SystemRun,
 )
 from fuzzytree.runtimes.rows import checked
+from fuzzytree.runtimes.table import rules_only
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -155,12 +156,8 @@ def load_best_first(model: Model) -> Run:
     Raises:
         LossError: If the model is no rule base.
     """
-    if not isinstance(model, RuleBase):
-        raise LossError(
-            f"cannot run {model.name} as c best-first: it searches rule bases, and "
-            "this is a tree\n  pass rules_from_tree(tree)"
-        )
-    return load(model, has_strengths=False)
+    rules = rules_only(model, "c best-first", "searches")
+    return load(rules, has_strengths=False)
 
 
 def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:

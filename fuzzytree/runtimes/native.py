@@ -11,6 +11,7 @@ from fuzzytree.runtimes.best_first import search
 from fuzzytree.runtimes.descent import follow
 from fuzzytree.runtimes.native_rules import fire
 from fuzzytree.runtimes.programs import run_system
+from fuzzytree.runtimes.table import rules_only
 
 
 def load(model: Model, dtype: Dtype = "float64") -> Run:
@@ -37,12 +38,7 @@ def load_best_first(model: Model) -> Run:
     Raises:
         LossError: If the model is no rule base.
     """
-    if not isinstance(model, RuleBase):
-        raise LossError(
-            f"cannot run {model.name} as best-first: it searches rule bases, and this "
-            "is a tree\n  pass rules_from_tree(tree)"
-        )
-    return search(model)
+    return search(rules_only(model, "best-first", "searches"))
 
 
 _FLOAT32 = "numbers beyond float32, and different numbers that become one in it"

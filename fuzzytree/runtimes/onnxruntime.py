@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -204,32 +204,43 @@ def _require_packages(doing: str) -> None:
             raise MissingExtraError(f"{doing} onnx files needs {install_hint('onnx')}")
 
 
+def _arrays(
+    session: Session, facts: Facts, values: FloatArray, names: Sequence[str]
+) -> dict[str, npt.NDArray[Any]]:
+    """Return outputs by name, rows last."""
+    import numpy as np
+
+    widths, count = _widths(facts), values.shape[1]
+    arrays: dict[str, npt.NDArray[Any]] = {
+        name: np.empty((widths[name], count))
+        if name in widths
+        else np.empty(count, np.int64)
+        for name in names
+    }
+    for start, result in _chunks(session, facts, values, names):
+        for name, array in arrays.items():
+            array[..., start : start + len(result[name])] = result[name].T
+    return arrays
+
+
+def _widths(facts: Facts) -> dict[str, int]:
+    """Return how many numbers the outputs have that give several for a row."""
+    rules = facts.rules
+    return {"strengths": rules, "activations": rules, "outputs": len(facts.names)}
+
+
 def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:
     import numpy as np
 
     from fuzzytree.runtimes.rows import checked
 
     values = checked(values, facts.inputs)
-    count = values.shape[1]
-    has_strengths = "strengths" in facts.outputs
-    outcome = Outcome(
-        rule=np.empty(count, np.int64),
-        status=np.empty(count, np.int64),
-        strengths=np.empty((facts.rules, count)) if has_strengths else None,
-    )
     names = [name for name in facts.outputs if name != "label"]
-    for start, result in _chunks(session, facts, values, names):
-        part = slice(start, start + len(result["rule"]))
-        outcome.rule[part] = result["rule"]
-        if "status" in result:
-            outcome.status[part] = result["status"]
-        if outcome.strengths is not None:
-            outcome.strengths[:, part] = result["strengths"].T
-    if "status" not in names:
-        is_missing = ~np.isfinite(values).all(axis=0)
-        none = np.where(is_missing, 3, 2)
-        outcome.status[:] = np.where(outcome.rule > 0, 0, none)
-    return outcome
+    arrays = _arrays(session, facts, values, names)
+    rule = arrays["rule"]
+    none = np.where(np.isfinite(values).all(axis=0), 2, 3)
+    status = arrays.get("status", np.where(rule > 0, 0, none))
+    return Outcome(rule, status, arrays.get("strengths"))
 
 
 def _refuse(session: Session, facts: Facts, values: FloatArray) -> Outcome:
@@ -242,25 +253,12 @@ def _run_system(session: Session, facts: Facts, values: FloatArray) -> SystemOut
     from fuzzytree.runtimes.rows import checked
 
     values = checked(values, facts.inputs)
-    count = values.shape[1]
-    has_activations = "activations" in facts.outputs
-    outcome = SystemOutcome(
-        outputs=np.empty((len(facts.names), count)),
-        status=np.empty(count, np.int64),
-        activations=np.empty((facts.rules, count)) if has_activations else None,
-    )
-    for start, result in _chunks(session, facts, values, facts.outputs):
-        part = slice(start, start + len(result["outputs"]))
-        outcome.outputs[:, part] = result["outputs"].T
-        if outcome.activations is not None:
-            outcome.activations[:, part] = result["activations"].T
-        if "status" in result:
-            outcome.status[part] = result["status"]
-    if "status" not in facts.outputs:
-        is_none = np.isnan(outcome.outputs).any(axis=0)
-        is_missing = ~np.isfinite(values).all(axis=0)
-        outcome.status[:] = np.where(is_missing, 3, np.where(is_none, 2, 0))
-    return outcome
+    arrays = _arrays(session, facts, values, facts.outputs)
+    outputs = arrays["outputs"]
+    is_known = np.isfinite(values).all(axis=0)
+    none = np.where(np.isnan(outputs).any(axis=0), 2, 0)
+    status = arrays.get("status", np.where(is_known, none, 3))
+    return SystemOutcome(outputs, status, arrays.get("activations"))
 
 
 def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
@@ -341,9 +339,7 @@ def _is_answer(facts: Facts, result: Outputs, rows: int) -> bool:
     """Say whether outputs have the shapes and numbers that answers have."""
     import numpy as np
 
-    widths = {"strengths": facts.rules, "activations": facts.rules}
-    widths["outputs"] = len(facts.names)
-    for name, width in widths.items():
+    for name, width in _widths(facts).items():
         if name in result and result[name].shape != (rows, width):
             return False
     for name, last in (("rule", facts.rules), ("status", 3)):

@@ -14,8 +14,8 @@ import numpy as np
 from fuzzytree.model import (
     Label,
     LabelType,
+    Model,
     RuleBase,
-    Semantics,
     Shape,
     clause_text,
     label_of,
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 By = Literal["class", "rule"]
 T = TypeVar("T")
+S = TypeVar("S", bound=msgspec.Struct)
 
 
 class Predictions(msgspec.Struct, frozen=True, eq=False):
@@ -166,8 +167,8 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
         """Show how many rows got which class, and what was out of the ordinary."""
         result = self.class_counts().items()
         counts = ", ".join(f"{name} {count}" for name, count in result)
-        odd = odd_text(self)
-        return f"{len(self)} rows: {counts}" + (f"; {odd}" if odd else "")
+        unusual = ", ".join(_unusual(self))
+        return f"{len(self)} rows: {counts}" + (f"; {unusual}" if unusual else "")
 
 
 def _csv_text(columns: Mapping[str, Sequence[object]]) -> str:
@@ -178,7 +179,7 @@ def _csv_text(columns: Mapping[str, Sequence[object]]) -> str:
     return text.getvalue()
 
 
-def odd_text(predictions: Predictions) -> str:
+def _unusual(predictions: Predictions | Outputs) -> list[str]:
     """Return the counts of ties, uncovered and missing rows that are not 0."""
     names = {
         Status.TIE: "decided by the order of the rules",
@@ -186,54 +187,47 @@ def odd_text(predictions: Predictions) -> str:
         Status.MISSING: "with missing values",
     }
     counts = {text: predictions.count(status) for status, text in names.items()}
-    return ", ".join(f"{count} {text}" for text, count in counts.items() if count)
+    return [f"{count} {text}" for text, count in counts.items() if count]
 
 
-def joined(parts: Sequence[Predictions]) -> Predictions:
-    """Return the predictions for several batches of rows, one after another."""
-    first = parts[0]
-    strengths = [p.strengths for p in parts if p.strengths is not None]
-    return Predictions(
-        first.choices,
-        np.concatenate([p.codes for p in parts]),
-        np.concatenate([p.rule for p in parts]),
-        np.concatenate([p.status for p in parts]),
-        first.owners,
-        np.hstack(strengths) if len(strengths) == len(parts) else None,
-        first.label_type,
-    )
+def joined(parts: Sequence[S]) -> S:
+    """Return what was predicted for several batches of rows, one after another.
+
+    An array that one of them lacks is None.
+    """
+    arrays: dict[str, object] = {}
+    for name in parts[0].__struct_fields__:
+        columns = [getattr(part, name) for part in parts]
+        if isinstance(columns[0], np.ndarray):
+            is_whole = all(column is not None for column in columns)
+            arrays[name] = np.concatenate(columns, axis=-1) if is_whole else None
+    return msgspec.structs.replace(parts[0], **arrays)
 
 
 def predictions_of(
-    outcome: Outcome,
-    *,
-    choices: tuple[str, ...],
-    ends: Sequence[str],
-    semantics: Semantics,
-    with_strengths: bool,
+    outcome: Outcome, model: Model, *, with_strengths: bool = False
 ) -> Predictions:
-    """Name the classes of an outcome.
-
-    `ends` are the classes of the rules or leaves; `semantics` has the classes where no
-    rule wins.
-    """
-    position = {name: k for k, name in enumerate(choices)}
+    """Name the classes of an outcome of a model."""
+    if isinstance(model, RuleBase):
+        ends = [rule.then for rule in model.rules]
+    else:
+        ends = [leaf.label for leaf in model.leaves]
+    semantics = model.semantics
+    position = {name: k for k, name in enumerate(model.classes)}
     owners = tuple(position[end] for end in ends)
     codes = np.array([-1, *owners], np.int64)[outcome.rule]
     for status, answer in (
         (Status.UNCOVERED, semantics.uncovered),
         (Status.MISSING, semantics.missing),
     ):
-        code = -1 if answer is None else position[answer]
-        codes[outcome.status == status] = code
-    strengths = outcome.strengths if with_strengths else None
+        codes[outcome.status == status] = -1 if answer is None else position[answer]
     return Predictions(
-        choices,
+        model.classes,
         codes,
         outcome.rule,
         outcome.status,
         owners,
-        strengths,
+        outcome.strengths if with_strengths else None,
         semantics.label_type,
     )
 
@@ -400,28 +394,9 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         spans = ", ".join(
             f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in result
         )
-        odd = [
-            f"{count} {what}"
-            for count, what in (
-                (self.count(Status.UNCOVERED), "uncovered"),
-                (self.count(Status.MISSING), "with missing values"),
-            )
-            if count
-        ]
-        return "; ".join([f"{len(self)} rows: {spans or 'no number'}", *odd])
+        spans = f"{len(self)} rows: {spans or 'no number'}"
+        return "; ".join([spans, *_unusual(self)])
 
 
 def _cells(row: FloatArray) -> list[object]:
     return ["" if math.isnan(value) else value for value in row.tolist()]
-
-
-def joined_outputs(parts: Sequence[Outputs]) -> Outputs:
-    """Return the outputs for several batches of rows, one after another."""
-    first = parts[0]
-    degrees = [part.activations for part in parts if part.activations is not None]
-    return Outputs(
-        first.names,
-        np.hstack([part.values for part in parts]),
-        np.concatenate([part.status for part in parts]),
-        np.hstack(degrees) if len(degrees) == len(parts) else None,
-    )

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
 from fuzzytree.model import Clause, Model, Outcome, RuleBase, Run, Runtime, Shape
+from fuzzytree.runtimes.table import rules_only
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
@@ -98,20 +99,15 @@ def load(model: Model) -> Run:
 
 def _carried(model: Model) -> RuleBase:
     """Return a rule base that the library can hold, or raise LossError."""
-    reason = ""
-    if not isinstance(model, RuleBase):
-        raise LossError(
-            f"cannot run {model.name} as scikit-fuzzy: it runs rule bases, and this "
-            "is a tree\n  pass rules_from_tree(tree)"
-        )
-    if len(model.rules) > _MOST_RULES:
-        reason = f"it has {len(model.rules)} rules, more than {_MOST_RULES}"
-    for number, rule in enumerate(model.rules, 1):
+    rules, reason = rules_only(model, "scikit-fuzzy", "runs"), ""
+    if len(rules.rules) > _MOST_RULES:
+        reason = f"it has {len(rules.rules)} rules, more than {_MOST_RULES}"
+    for number, rule in enumerate(rules.rules, 1):
         if not rule.when:
             reason = f"rule {number} has no clause"
     if reason:
-        raise LossError(f"cannot run {model.name} as scikit-fuzzy: {reason}")
-    return model
+        raise LossError(f"cannot run {rules.name} as scikit-fuzzy: {reason}")
+    return rules
 
 
 def _clause_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:

@@ -13,8 +13,8 @@ import importlib.util
 import shutil
 from collections.abc import Sequence
 
-from fuzzytree.errors import install_hint
-from fuzzytree.model import Dtype, Runtime, as_names
+from fuzzytree.errors import LossError, install_hint
+from fuzzytree.model import Dtype, Model, RuleBase, Runtime, as_names
 
 TABLE = (
     "fuzzytree.runtimes.reference",
@@ -86,6 +86,20 @@ def needed_by(runtime: Runtime) -> str:
     if runtime.programs:
         return f"one of the programs {', '.join(runtime.programs)}"
     return install_hint(runtime.extra or "")
+
+
+def rules_only(model: Model, runtime: str, verb: str) -> RuleBase:
+    """Return a rule base.
+
+    Raises:
+        LossError: If it is a tree; the message says what the runtime does with rules.
+    """
+    if isinstance(model, RuleBase):
+        return model
+    raise LossError(
+        f"cannot run {model.name} as {runtime}: it {verb} rule bases, and this "
+        "is a tree\n  pass rules_from_tree(tree)"
+    )
 
 
 def _runtimes_of(module: str) -> tuple[Runtime, ...]:

@@ -13,7 +13,7 @@ from fuzzytree.api.answering import prepare_answering
 from fuzzytree.errors import LossError
 from fuzzytree.model import FuzzySystem
 from fuzzytree.report.systems import system_lines, system_reasons
-from fuzzytree.runtimes.predictions import Outputs, joined_outputs
+from fuzzytree.runtimes.predictions import Outputs, joined
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.random_systems import random_rows, random_system
 from fuzzytree.semantics.reference import Status
@@ -66,8 +66,8 @@ def test_activations_are_absent_unless_requested() -> None:
     bare = Outputs(("y",), np.array([[1.0]]), np.array([0]))
     with pytest.raises(ValueError, match="ask for them"):
         bare.columns(with_activations=True)
-    assert joined_outputs([bare, bare]).activations is None
-    assert len(joined_outputs([bare, bare])) == 2
+    assert joined([bare, bare]).activations is None
+    assert len(joined([bare, bare])) == 2
 
 
 @pytest.mark.parametrize("seed", range(4))
