@@ -38,6 +38,7 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import simplified
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.domains import inputs_of
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows
@@ -172,7 +173,7 @@ def _same_everywhere(pair: RulePair) -> Answer | None:
     if faults or old.inputs != new.inputs:
         return None
     how = "both take the same curves of the same inputs in the same rules, on any input"
-    return Answer("FT801", "decisions", _EQUAL, Proved(how), is_finding=False)
+    return note("FT801", "decisions", _EQUAL, Proved(how))
 
 
 _EQUAL = "both models decide alike"
@@ -188,7 +189,7 @@ def _equal_answer(pair: RulePair, state: State) -> Answer:
             "no decision was seen to differ, and where both margins are larger than "
             f"{state.high:.3g} none does"
         )
-    return Answer("FT801", "decisions", sentence, state, is_finding=False)
+    return note("FT801", "decisions", sentence, state)
 
 
 def _on_rows(rows: AuditRows, found: _Found) -> Answer:
@@ -200,9 +201,7 @@ def _on_rows(rows: AuditRows, found: _Found) -> Answer:
     state = sampled_share(
         "rows that are classified differently", hits, count, rows.name
     )
-    return Answer(
-        "FT801", "rows", sentence, state, is_finding=hits > 0, severity="error"
-    )
+    return Answer("FT801", "rows", sentence, state, hits > 0, severity="error")
 
 
 def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
@@ -211,7 +210,7 @@ def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
     sentence = (
         f"{hits} of {rows} points drawn from the domain are classified differently"
     )
-    return Answer("FT801", "domain", sentence, state, is_finding=hits > 0)
+    return Answer("FT801", "domain", sentence, state, hits > 0)
 
 
 def _left_answer(count: int) -> Answer:
@@ -219,7 +218,7 @@ def _left_answer(count: int) -> Answer:
     points = f"{count} points" if count else "points beside decision boundaries"
     sentence = f"{points} were not looked at: {reason}"
     state = Declined("FTD03", reason)
-    return Answer("FT801", "points", sentence, state, is_finding=False)
+    return note("FT801", "points", sentence, state)
 
 
 def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
@@ -238,13 +237,11 @@ def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
         sentence += _answered(other)
         if name:
             sentence = f"{name}: {sentence}"
-        yield Answer(
+        yield finding(
             "FT801",
             " -> ".join(map(answer_text, labels)),
             sentence,
             state,
-            is_finding=True,
-            severity="error",
             region=spans,
         )
     if len(known) > _MOST_LISTED:
@@ -253,7 +250,7 @@ def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
         point = known[_MOST_LISTED][1][2]
         state = difference_at(pair.old, pair.new, point)
         assert state is not None
-        yield Answer("FT801", "more", sentence, state, is_finding=True)
+        yield Answer("FT801", "more", sentence, state, True)
 
 
 def _simple(

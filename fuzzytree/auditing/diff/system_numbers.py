@@ -32,6 +32,7 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
 )
 from fuzzytree.auditing.engine.witnesses import simplified
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, AuditSettings, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sampled_share
@@ -94,7 +95,7 @@ def number_answers(
         reason = "the budget was spent"
         sentence = f"the numbers of the two were not compared: {reason}"
         state = Declined("FTD03", reason)
-        return [Answer("FT801", "numbers", sentence, state, is_finding=False)]
+        return [note("FT801", "numbers", sentence, state)]
     rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
     found = _Found(pair, open_, rounded, runs)
     answers = [*_sampled(found, rows, settings, clock)]
@@ -114,7 +115,7 @@ def number_answers(
         if known is not None and name not in found.largest:
             sentence = f"both systems compute {name!r} alike{known.where}"
             proof = Proved(known.how)
-            answers.append(Answer("FT801", name, sentence, proof, is_finding=False))
+            answers.append(note("FT801", name, sentence, proof))
     answers += [found.bound(name) for name, how in hows.items() if how is None]
     return answers
 
@@ -153,7 +154,7 @@ def _hows(pair: SystemPair) -> dict[str, _Alike | None]:
 def _proved(pair: SystemPair, sentence: str, how: str) -> Answer:
     if {*pair.old.columns} != {*pair.new.columns}:
         sentence += ", where no value is missing"
-    return Answer("FT801", "decisions", sentence, Proved(how), is_finding=False)
+    return note("FT801", "decisions", sentence, Proved(how))
 
 
 def _sampled(
@@ -190,7 +191,7 @@ def _sampled(
         reason = "the budget was spent"
         sentence = f"{left} points were not looked at: {reason}"
         state = Declined("FTD03", reason)
-        yield Answer("FT801", "points", sentence, state, is_finding=False)
+        yield note("FT801", "points", sentence, state)
 
 
 def _counted(found: _Found, subject: str, hits: int, seen: int, how: str) -> Answer:
@@ -207,7 +208,7 @@ def _counted(found: _Found, subject: str, hits: int, seen: int, how: str) -> Ans
         subject,
         sentence,
         state,
-        is_finding=hits > 0,
+        hits > 0,
         severity="error" if hits else "info",
     )
 
@@ -318,13 +319,11 @@ class _Found:
                 point = {key: Fraction(value) for key, value in found.row.items()}
         except NotExactError:
             pass
-        return Answer(
+        return finding(
             "FT801",
             name,
             f"{said}, {how}",
             Witness(coordinates(point), ()),
-            is_finding=True,
-            severity="error",
             measures=(measure,),
         )
 
@@ -357,9 +356,7 @@ class _Found:
             reason = "nothing bounds what its rules conclude"
             sentence = f"how far {name!r} can differ at most is not known: {reason}"
             state: State = Declined("FTD02", reason)
-            return Answer(
-                "FT801", f"bound of {name}", sentence, state, is_finding=False
-            )
+            return note("FT801", f"bound of {name}", sentence, state)
         high, why = outwards(known[0])[1], known[1]
         is_within = (
             seen is not None
@@ -373,7 +370,7 @@ class _Found:
         low = min(seen.gap, high) if seen is not None and is_within else 0.0
         state = Bracket(of, low, high, why)
         sentence = f"{name!r} differs by at most {high:.6g} where both answer a number"
-        return Answer("FT801", f"bound of {name}", sentence, state, is_finding=False)
+        return note("FT801", f"bound of {name}", sentence, state)
 
 
 def _shown(number: Fraction | float | None) -> str:

@@ -27,6 +27,7 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.auditing.findings.support import sample_points
@@ -100,24 +101,22 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
     yield from slices.rest("FT107", "clause", "whether they are needed")
     for number in silent:
         name = subject.rule_name(number)
-        yield Answer(
+        yield note(
             "FT107",
             name,
             f"{name} never fires, so its clauses are not tested one by one",
             Proved("one of its clauses is 0 on all of the domain"),
-            is_finding=False,
             rules=(number,),
         )
     if needed > MOST_SHOWN:
         rest = needed - MOST_SHOWN
         text = "clause matters: it decides"
         text = text if rest == 1 else "clauses matter: each decides"
-        yield Answer(
+        yield note(
             "FT107",
             "clauses",
             f"{rest} more {text} some input",
             Proved("an input was found for each, and evaluated in fractions"),
-            is_finding=False,
             measures=(Measure("clauses", rest),),
         )
 
@@ -259,7 +258,7 @@ def _answer(subject: Subject, one: _Dropped, state: State) -> Answer:
         f"{name}, {text}",
         sentence,
         state,
-        is_finding=isinstance(state, Proved),
+        isinstance(state, Proved),
         severity="info",
         rules=(one.rule,),
         terms=tuple(TermName(one.clause.variable, term) for term in one.clause.terms),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Final, Literal, TypedDict, Unpack
 
-from fuzzytree.auditing.findings.records import Severity
+from fuzzytree.auditing.engine.states import Span, State
+from fuzzytree.auditing.findings.records import Answer, Measure, Severity, TermName
 from fuzzytree.model import Value
 
 
@@ -420,6 +421,30 @@ _CODES = (
 )
 
 CODES: Final = MappingProxyType({code.code: code for code in _CODES})
+
+
+class Details(TypedDict, total=False):
+    """What an answer is about, and its numbers; see `Answer`."""
+
+    rules: tuple[int, ...]
+    terms: tuple[TermName, ...]
+    region: tuple[Span, ...]
+    measures: tuple[Measure, ...]
+
+
+def finding(
+    code: str, subject: str, sentence: str, state: State, **details: Unpack[Details]
+) -> Answer:
+    """Return a finding, of the severity of its code."""
+    severity = CODES[code].severity
+    return Answer(code, subject, sentence, state, True, severity, **details)
+
+
+def note(
+    code: str, subject: str, sentence: str, state: State, **details: Unpack[Details]
+) -> Answer:
+    """Return what was checked or declined, and is no finding."""
+    return Answer(code, subject, sentence, state, False, **details)
 
 
 class Family(Value, frozen=True):

@@ -21,6 +21,7 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
 )
 from fuzzytree.auditing.engine.states import Proved, counted, short
+from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges
@@ -58,12 +59,11 @@ def answers(subject: Subject) -> Iterator[Answer]:
         )
         measures.append(measure("index of Nauck", product))
         text += f", index of Nauck {short(product.nearest)}"
-    yield Answer(
+    yield note(
         "FT501",
         "the rule base",
         text,
         Proved("counted, and integrated in fractions"),
-        is_finding=False,
         measures=tuple(measures),
     )
 

@@ -22,6 +22,7 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import rows_outside, sample_points
@@ -214,7 +215,7 @@ def convention_answers(
         how = f"each probe was answered by {', '.join(one.title for one in found)}"
         if question.left_out:
             how += f"; {question.left_out} more probes were left out"
-        yield Answer("FT602", question.name, text, Proved(how), is_finding=False)
+        yield note("FT602", question.name, text, Proved(how))
 
 
 def _differ(one: ModelRun, base: ModelRun) -> BoolArray:
@@ -249,14 +250,7 @@ def _broken(
     )
     found: State | None = witness(subject, base.model, values)
     proof = Proved(f"both were run on the probe {probe}")
-    return Answer(
-        "FT602",
-        f"{question.name}, {one.title}",
-        sentence,
-        found or proof,
-        is_finding=True,
-        severity="error",
-    )
+    return finding("FT602", f"{question.name}, {one.title}", sentence, found or proof)
 
 
 def _said(answers: ModelRun, row: int) -> str:
@@ -308,20 +302,18 @@ def system_answers(
             f"{question.name}: {name} and {first} differ in which outputs have a "
             f"number, at {probe}; {rows.size} of {count} probes differ"
         )
-        yield Answer(
+        yield finding(
             "FT602",
             f"{question.name}, {name}",
             text,
             Proved(f"both were run on the probe {probe}"),
-            is_finding=True,
-            severity="error",
         )
     if is_alike:
         text = (
             f"{question.name}: {len(found)} representations answer {count} probes alike"
         )
         how = f"each probe was answered by {', '.join(name for name, _ in found)}"
-        yield Answer("FT602", question.name, text, Proved(how), is_finding=False)
+        yield note("FT602", question.name, text, Proved(how))
 
 
 def _probe(subject: Subject, values: FloatArray) -> str:

@@ -26,6 +26,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,
     bounded_arrangement,
 )
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 
@@ -82,7 +83,13 @@ def _firing(subject: Subject, sides: BoundedArrangement) -> Iterator[Answer]:
             else f"it is open whether {name} ever fires"
         )
         yield Answer(
-            "FT101", name, sentence, state, is_dead, "error", rules=(numbers[0],)
+            "FT101",
+            name,
+            sentence,
+            state,
+            is_dead,
+            severity="error",
+            rules=(numbers[0],),
         )
 
 
@@ -119,7 +126,7 @@ def _winning(
             yield _won(subject, given, number, state)
         if not isinstance(state, Proved | Witness):
             sentence = f"how far {name} leads is open, for it is open whether it wins"
-            yield Answer("FT102", name, sentence, state, False, rules=(number,))
+            yield note("FT102", name, sentence, state, rules=(number,))
     yield from slices.rest("FT101", "rule", "whether they ever win")
     # Only rules that are known to win have a lead.
     yield from slices.rest("FT102", "rule", "how far they lead")
@@ -150,12 +157,12 @@ def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Ans
     name = subject.rule_name(number)
     if isinstance(state, Witness):
         sentence = f"{name} wins somewhere"
-        return Answer(
-            "FT101", name, sentence, state, False, rules=(number,), region=state.region
+        return note(
+            "FT101", name, sentence, state, rules=(number,), region=state.region
         )
     if not isinstance(state, Proved):
         sentence = f"it is open whether {name} ever wins"
-        return Answer("FT101", name, sentence, state, False, rules=(number,))
+        return note("FT101", name, sentence, state, rules=(number,))
     rivals = _rivals(subject, number)
     order = decides_by_order(
         given,
@@ -169,11 +176,13 @@ def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Ans
             f"{name} decides by its place in the list alone: where it is strongest, a "
             "rule of another class further down is exactly as strong"
         )
-        return Answer("FT101", name, sentence, order, True, "warning", rules=(number,))
+        return Answer(
+            "FT101", name, sentence, order, True, severity="warning", rules=(number,)
+        )
     fires = wins(given, number, (), subject.clock.share(_PART))
     if isinstance(fires, Proved):
         sentence = f"{name} never fires on the domain"
-        return Answer("FT101", name, sentence, fires, True, "error", rules=(number,))
+        return finding("FT101", name, sentence, fires, rules=(number,))
     sentence = (
         f"{name} never wins: wherever it fires, a rule of another class is at least "
         "as strong"
@@ -182,7 +191,9 @@ def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Ans
     if not isinstance(order, Proved):
         sentence += "; whether it decides by its place in the list is open"
         severity = "warning"
-    return Answer("FT101", name, sentence, state, True, severity, rules=(number,))
+    return Answer(
+        "FT101", name, sentence, state, True, severity=severity, rules=(number,)
+    )
 
 
 def _led(
@@ -205,14 +216,8 @@ def _led(
     if found.low >= subject.settings.lead:
         state = Witness(found.point, found.claims)
         sentence = f"{name} leads by {found.low:.4g} at least somewhere"
-        return Answer(
-            "FT102",
-            name,
-            sentence,
-            state,
-            False,
-            rules=(number,),
-            measures=measures[:1],
+        return note(
+            "FT102", name, sentence, state, rules=(number,), measures=measures[:1]
         )
     is_marginal = found.high < subject.settings.lead
     sentence = (
@@ -222,9 +227,16 @@ def _led(
         f"{found.high:.3g} is excluded"
     )
     return Answer(
-        "FT102", name, sentence, found, is_marginal, "warning",
-        rules=(number,), region=won.region, measures=measures,
-    )  # fmt: skip
+        "FT102",
+        name,
+        sentence,
+        found,
+        is_marginal,
+        severity="warning",
+        rules=(number,),
+        region=won.region,
+        measures=measures,
+    )
 
 
 class _Ties:
@@ -294,9 +306,7 @@ class _Ties:
         if untested:
             sentence += f"; {counted(untested, 'pair')} were not tested"
             state = Declined("FTD03", "the budget was spent")
-        yield Answer(
-            "FT202", "pairs of rules", sentence, state, False, measures=measures
-        )
+        yield note("FT202", "pairs of rules", sentence, state, measures=measures)
 
     def _tied(self, one: int, other: int, state: Witness) -> Answer:
         first, second = self.subject.rule_name(one), self.subject.rule_name(other)
@@ -304,10 +314,9 @@ class _Ties:
             f"{first} and {second} are equally strong, and the strongest, on more than "
             "a surface: the order of the rules alone decides there"
         )
-        return Answer(
-            "FT202", f"{first} and {second}", sentence, state, True, "warning",
-            rules=(one, other),
-        )  # fmt: skip
+        return finding(
+            "FT202", f"{first} and {second}", sentence, state, rules=(one, other)
+        )
 
 
 def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answer]:
@@ -328,11 +337,11 @@ def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answe
             continue
         if isinstance(state, Witness):
             sentence = f"{name} is somewhere stronger than every other rule"
-            yield Answer("FT103", name, sentence, state, False, rules=(number,))
+            yield note("FT103", name, sentence, state, rules=(number,))
             continue
         if not isinstance(state, Proved):
             sentence = f"it is open whether {name} is needed"
-            yield Answer("FT103", name, sentence, state, False, rules=(number,))
+            yield note("FT103", name, sentence, state, rules=(number,))
             continue
         later = [n for n in _rivals(subject, number) if n > number]
         known = [ties.of(number, n, len(later)) for n in later]
@@ -345,12 +354,12 @@ def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answe
                 f"{name} is nowhere stronger than all others, and where it ties with "
                 "another class it may decide by its place"
             )
-            yield Answer("FT103", name, sentence, tied[0], False, rules=(number,))
+            yield note("FT103", name, sentence, tied[0], rules=(number,))
             continue
         sentence = (
             f"{name} is superfluous: nowhere is it stronger than all other rules, and "
             "without it no decision changes"
             + (", but where strengths only touch" if later else "")
         )
-        yield Answer("FT103", name, sentence, state, True, "info", rules=(number,))
+        yield finding("FT103", name, sentence, state, rules=(number,))
     yield from slices.rest("FT103", "rule", "whether they are needed")

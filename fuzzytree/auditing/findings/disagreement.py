@@ -36,6 +36,7 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.leaves import NOT_LOOKED_AT, too_many_boxes
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.robustness import CrispDecider
@@ -329,26 +330,25 @@ def _nearest_answer(
             why = "the budget was spent before the first row"
         declined = Declined("FTD03" if alike else "FTD06", why)
         text = f"{before}; the nearest disagreement to others is not sought"
-        return Answer("FT203", "rows", text, declined, False, measures=tuple(measures))
+        return note("FT203", "rows", text, declined, measures=tuple(measures))
     some = f"{count} of {alike}" if count < alike else str(alike)
     best, low = search.best, search.low or Fraction(0)
     if best is None or best.point is None or best.high is None:
         state = _no_nearest(search, low)
         text = f"{before}; no disagreement is known around {some} others"
-        return Answer("FT203", "rows", text, state, False, measures=tuple(measures))
+        return note("FT203", "rows", text, state, measures=tuple(measures))
     measures.append(distance_measure("certified distance", low))
     measures.append(distance_measure("distance of the witness", best.high))
     measures.append(Measure("row", search.row))
     state = narrowed_state(
         "the distance of the nearest disagreement", low, best, search.claims, search.why
     )
-    return Answer(
-        code="FT203",
-        subject="rows",
-        sentence=f"{before}; around {some} others the nearest disagreement is "
+    return note(
+        "FT203",
+        "rows",
+        f"{before}; around {some} others the nearest disagreement is "
         f"{percent(best.high)} {OF_RANGES} from row {search.row}",
-        state=state,
-        is_finding=False,
+        state,
         measures=tuple(measures),
     )
 
@@ -371,7 +371,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     found = regions(tree)
     declined = too_many_boxes(found)
     if declined is not None:
-        yield Answer("FT203", "leaves", NOT_LOOKED_AT, declined, False)
+        yield note("FT203", "leaves", NOT_LOOKED_AT, declined)
         return
     known: list[Answer] = []
     for answer in leaf_differences(subject, raw, tree, found):
@@ -411,25 +411,23 @@ def leaf_differences(
             yield _difference(given, region, state)
     text = f"in {alike} of {len(found)} leaves the raw rules decide as the tree does"
     how = f"all other decisions were sought in {count} boxes of the leaves"
-    yield Answer("FT203", "leaves", text, Proved(how), False)
+    yield note("FT203", "leaves", text, Proved(how))
 
 
 def _difference(given: Arrangement, region: Region, state: State) -> Answer:
     name, rules = f"leaf {region.leaf}", (region.leaf,)
     if not isinstance(state, Witness):
         text = f"whether the raw rules decide differently in {name} is left open"
-        return Answer("FT203", name, text, state, False, rules=rules)
+        return note("FT203", name, text, state, rules=rules)
     strengths = strengths_at(given, point_of(state.point))
     best = max(strengths)
     winner = strengths.index(best) + 1
-    return Answer(
-        code="FT203",
-        subject=name,
-        sentence=f"in {name} the tree answers {region.label!r}, and somewhere there "
+    return finding(
+        "FT203",
+        name,
+        f"in {name} the tree answers {region.label!r}, and somewhere there "
         f"the raw rules answer {answer_text(state.claims[-1].label)}",
-        state=state,
-        is_finding=True,
-        severity="warning",
+        state,
         rules=rules if not best or (winner,) == rules else (*rules, winner),
         region=state.region,
     )

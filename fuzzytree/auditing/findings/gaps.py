@@ -19,6 +19,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,
     bounded_arrangement,
 )
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.rows import rank_by_distance
 from fuzzytree.auditing.findings.subject import Subject
@@ -37,7 +38,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if not subject.is_whole:
         reason = "rules that are left out of the view may cover what the others do not"
         sentence = "whether an input is covered by no rule is not decided"
-        yield Answer("FT301", "cover", sentence, Declined("FTD07", reason), False)
+        yield note("FT301", "cover", sentence, Declined("FTD07", reason))
         return
     sides = bounded_arrangement(subject)
     if sides.lower.is_empty:
@@ -49,7 +50,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     sentence = "some rule fires everywhere on the domain"
     if not isinstance(bare, Proved):
         sentence = "it is open whether some rule fires everywhere"
-    yield Answer("FT301", "cover", sentence, bare, False)
+    yield note("FT301", "cover", sentence, bare)
     yield _weak(subject, sides)
 
 
@@ -65,18 +66,17 @@ def _weak(subject: Subject, sides: BoundedArrangement) -> Answer:
     subject_of = f"cover of {epsilon:g}"
     if isinstance(state, Proved):
         sentence = f"some rule has a strength of at least {epsilon:g} everywhere"
-        return Answer("FT301", subject_of, sentence, state, False, measures=measures)
+        return note("FT301", subject_of, sentence, state, measures=measures)
     if isinstance(state, Witness):
         sentence = (
             f"no rule has a strength of {epsilon:g} {_place(state.region)}; where it "
             f"is least, the strongest rule has {least.high:.3g}"
         )
-        return Answer(
-            "FT301", subject_of, sentence, state, True, "warning",
-            region=state.region, measures=measures,
-        )  # fmt: skip
+        return finding(
+            "FT301", subject_of, sentence, state, region=state.region, measures=measures
+        )
     sentence = f"it is open whether some rule reaches {epsilon:g} everywhere"
-    return Answer("FT301", subject_of, sentence, state, False, measures=measures)
+    return note("FT301", subject_of, sentence, state, measures=measures)
 
 
 def _gaps(subject: Subject, given: Arrangement, first: Witness) -> Iterator[Answer]:
@@ -96,7 +96,7 @@ def _gaps(subject: Subject, given: Arrangement, first: Witness) -> Iterator[Answ
         sentence = f"there may be more gaps than the {len(found)} that are listed"
         reason = f"{MOST_GAPS} gaps at most are looked for, within the budget"
         state = Declined("FTD05", reason)
-        yield Answer("FT301", "more gaps", sentence, state, False)
+        yield note("FT301", "more gaps", sentence, state)
 
 
 def _gap(subject: Subject, state: Witness) -> Answer:
@@ -106,7 +106,9 @@ def _gap(subject: Subject, state: Witness) -> Answer:
         what = "what the outputs have by default"
     sentence = f"no rule fires {_place(state.region)}: the answer is {what}"
     severity: Severity = "warning" if answer is None else "info"
-    return Answer("FT301", "gap", sentence, state, True, severity, region=state.region)
+    return Answer(
+        "FT301", "gap", sentence, state, True, severity=severity, region=state.region
+    )
 
 
 def _place(region: tuple[Span, ...]) -> str:

@@ -26,6 +26,7 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
     number_text,
 )
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import FuzzyTree
@@ -51,7 +52,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     declined = too_many_boxes(found)
     if declined is not None:
         for code in ("FT101", "FT205"):
-            yield Answer(code, "leaves", NOT_LOOKED_AT, declined, False)
+            yield note(code, "leaves", NOT_LOOKED_AT, declined)
         return
     yield from leaf_regions(subject, tree, found)
 
@@ -73,7 +74,7 @@ def leaf_regions(
     if count > MOST_LISTED:
         why = f"the leaves are made of {count} boxes, more than {MOST_LISTED}"
         text = "the regions of the leaves are not listed"
-        yield Answer("FT205", "leaves", text, Declined("FTD05", why), False)
+        yield note("FT205", "leaves", text, Declined("FTD05", why))
     for region in found:
         subject.clock.check()
         inside = [*boxes(region, tree, subject.domain)]
@@ -90,7 +91,7 @@ def leaf_regions(
             yield _region(subject, tree, region, name, box, point)
     text = f"{live} of {len(found)} leaves are reached"
     how = "a point in each of their regions was found and evaluated in fractions"
-    yield Answer("FT101", "leaves", text, Proved(how), False)
+    yield note("FT101", "leaves", text, Proved(how))
 
 
 def _region(
@@ -114,12 +115,11 @@ def _region(
     where = f"where {' and '.join(texts)}" if texts else "everywhere"
     claim = Claim("decides", of="tree", label=region.label)
     share = share_of(box, tree, subject.domain)
-    return Answer(
-        code="FT205",
-        subject=name,
-        sentence=f"{name} decides {region.label!r} {where}",
-        state=Witness(coordinates(point), (claim,), spans),
-        is_finding=False,
+    return note(
+        "FT205",
+        name,
+        f"{name} decides {region.label!r} {where}",
+        Witness(coordinates(point), (claim,), spans),
         rules=(region.leaf,),
         region=spans,
         measures=() if share is None else (Measure("share of the domain", share),),
@@ -161,14 +161,12 @@ def _unreached(subject: Subject, tree: FuzzyTree, region: Region, count: int) ->
     how = "the intervals on its path have nothing in common with the domain"
     if count:
         how = f"{count} boxes of combinations tested: no point of the inputs is in them"
-    return Answer(
-        code="FT101",
-        subject=name,
-        sentence=f"{name} (rule {region.leaf}) is never reached: "
+    return finding(
+        "FT101",
+        name,
+        f"{name} (rule {region.leaf}) is never reached: "
         f"{_reason(tree, region, subject.domain)}",
-        state=Proved(how),
-        is_finding=True,
-        severity="error",
+        Proved(how),
         rules=(region.leaf,),
     )
 

@@ -23,6 +23,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     bounded_arrangement,
 )
 from fuzzytree.auditing.findings.clauses import clause_answers
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
@@ -99,14 +100,12 @@ def _subsumed(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer
     for weak, strong in sorted(found.items()):
         name, by = subject.rule_name(weak), subject.rule_name(strong[0])
         noun = _noun(subject)
-        yield Answer(
+        yield finding(
             "FT104",
             name,
             f"{name} is subsumed by {by}: wherever it fires, {by} of the same {noun} "
             "is at least as strong",
             Proved(_how(compared)),
-            is_finding=True,
-            severity="warning",
             rules=(weak, *strong),
             measures=(Measure("rules that subsume it", len(strong)),),
         )
@@ -135,14 +134,12 @@ def _masked(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
         why = "is at least as strong and stands before it"
         if not is_before:
             why = "is stronger"
-        yield Answer(
+        yield finding(
             "FT105",
             name,
             f"{name} is never answered: wherever it fires, {by} of class "
             f"{_then(subject, number)!r} {why}",
             Proved(_how(compared)),
-            is_finding=True,
-            severity="error",
             rules=(weak, *(number for number, _ in strong)),
             measures=(Measure("rules that mask it", len(strong)),),
         )
@@ -184,12 +181,11 @@ def _rest_of_strengths(
         reason = f"{counted(undecided, 'pair')} of strengths are too near to compare"
         sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
         state = Declined("FTD02", reason)
-    yield Answer(
+    yield note(
         code,
         "pairs of rules",
         sentence,
         state,
-        is_finding=False,
         measures=(
             Measure("pairs", tested),
             Measure("pairs too near to compare", undecided),
@@ -245,7 +241,7 @@ def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
             f"{first} and {second}",
             f"{first} and {second} have {nearly} {text}",
             Proved("their curves were compared piece by piece in fractions"),
-            is_finding=True,
+            True,
             severity=severity,
             rules=pair,
             measures=measures,
@@ -263,13 +259,8 @@ def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
         sentence = f"{rest} are shown to have nearly the same antecedent, among "
         sentence += f"{among}: {reason}"
         state = Declined("FTD02", reason)
-    yield Answer(
-        "FT106",
-        "pairs of rules",
-        sentence,
-        state,
-        is_finding=False,
-        measures=(Measure("pairs", pairs),),
+    yield note(
+        "FT106", "pairs of rules", sentence, state, measures=(Measure("pairs", pairs),)
     )
 
 
@@ -359,7 +350,7 @@ def _conflict(subject: Subject, pair: Pair, found: JointMaximum) -> Answer:
         f"{first} and {second}",
         sentence,
         found.state,
-        is_finding=isinstance(found.state, Witness),
+        isinstance(found.state, Witness),
         severity="info",
         rules=pair,
         region=region,
@@ -400,7 +391,7 @@ def _rest_of_conflicts(
         "pairs of rules",
         "; ".join(parts),
         Proved(f"the largest {means} of degrees were found on each axis"),
-        is_finding=bool(hidden),
+        bool(hidden),
         measures=(
             Measure("pairs that never do", clean),
             Measure("pairs not listed", hidden),

@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State
 from fuzzytree.auditing.findings import conventions
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
@@ -122,7 +123,7 @@ def agreement_answers(
             continue
         name = text.partition(" is not installed")[0].partition(": ")[0]
         sentence = f"{name} is not compared: {text}"
-        yield Answer("FT601", name, sentence, Declined("FTD08", text), is_finding=False)
+        yield note("FT601", name, sentence, Declined("FTD08", text))
 
 
 def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answer:
@@ -140,13 +141,11 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answ
         rows = probed(model, values, PROBES).values
         witness = conventions.witness(subject, form, rows[:, [*one.row_numbers]])
         state = witness or state
-    return Answer(
+    return finding(
         "FT601",
         one.representation,
         f"{sentence}: {facts}" if facts else sentence,
         state,
-        is_finding=True,
-        severity="error",
         measures=(
             Measure("rows that differ", one.differing),
             Measure("rows of another class", one.flips),
@@ -177,9 +176,7 @@ def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> Answer:
             text = f"{len(ones)} representations answer alike however they are called"
         case _:
             text = f"{len(ones)} representations are equal on every input"
-    return Answer(
-        "FT601", f"representations, by {basis}", text, Proved(how), is_finding=False
-    )
+    return note("FT601", f"representations, by {basis}", text, Proved(how))
 
 
 # --- what a number type can change
@@ -194,7 +191,7 @@ def _certified(
         facts = "; ".join(one.detail[:2])
         text = f"{name} errs by more than its certified bound: {facts}"
         proof = Proved("each row was compared with its exact answer")
-        yield Answer("FT601", name, text, proof, is_finding=True, severity="error")
+        yield finding("FT601", name, text, proof)
     bound = certify(_within(form, subject.domain), _DTYPES[one.dtype])
     measures = []
     if bound.delta is not None:
@@ -204,14 +201,14 @@ def _certified(
         measures.append(Measure("largest error seen", one.largest))
     sentence = f"{name}: {bound.sentence}"
     state = _bounded(bound, one)
-    yield Answer("FT601", name, sentence, state, False, measures=tuple(measures))
+    yield note("FT601", name, sentence, state, measures=tuple(measures))
     if one.on == "data" and one.rows:
         noun = "rows" if subject.rows is not None else "points"
         text = f"{name}: the class is open on {one.in_band} of {one.rows} {noun}"
         seen = sampled_share(
             f"{noun} within the band of {name}", one.in_band, one.rows, how
         )
-        yield Answer("FT601", f"{name}, its band", text, seen, is_finding=False)
+        yield note("FT601", f"{name}, its band", text, seen)
 
 
 def _bounded(bound: Certificate, one: Certified) -> State:

@@ -42,6 +42,7 @@ from fuzzytree.auditing.engine.states import (
     percent,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.rows import (
@@ -235,17 +236,16 @@ def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[Answer]:
     """
     declined = _declined(subject)
     if declined is not None:
-        yield Answer("FT204", "row", NOT_SOUGHT, declined, False)
+        yield note("FT204", "row", NOT_SOUGHT, declined)
         return
     point = _point(subject, row)
     label, by = decider_of(subject).decided(point)
     claim = Claim("decides", of=decider_of(subject).of, label=label)
-    yield Answer(
-        code="FT204",
-        subject="row",
-        sentence=f"the row is decided as {answer_text(label)} by {by}",
-        state=Witness(coordinates(point), (claim,)),
-        is_finding=False,
+    yield note(
+        "FT204",
+        "row",
+        f"the row is decided as {answer_text(label)} by {by}",
+        Witness(coordinates(point), (claim,)),
     )
     yield radius(subject, row)
 
@@ -290,7 +290,7 @@ def _answer(
         else:
             text = f"no decision other than {answer_text(own)} is known around {name}"
             state = Bracket(what, outwards(found.low)[0], 1.0, found.why)
-        return Answer("FT204", name.removeprefix("the "), text, state, False)
+        return note("FT204", name.removeprefix("the "), text, state)
     other, _ = decider.decided(found.point)
     claim = Claim("decides", of=decider.of, label=other)
     moved = [axis for axis, value in found.point.items() if value != point[axis]]
@@ -302,12 +302,11 @@ def _answer(
         f"{name} stays {answer_text(own)} within {percent(found.low)} {OF_RANGES}"
         f"{aside}; where {changed} it is {answer_text(other)}"
     )
-    return Answer(
-        code="FT204",
-        subject=name.removeprefix("the "),
-        sentence=text,
-        state=narrowed_state(what, found.low, found, [claim], found.why),
-        is_finding=False,
+    return note(
+        "FT204",
+        name.removeprefix("the "),
+        text,
+        narrowed_state(what, found.low, found, [claim], found.why),
         measures=(
             distance_measure("certified radius", found.low),
             distance_measure("distance of the witness", found.high),
@@ -356,7 +355,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         declined = Declined("FTD06", "rows are needed (--data TABLE)")
     if declined is not None or subject.rows is None:
         assert declined is not None  # set above where there are no rows
-        yield Answer("FT204", "rows", NOT_SOUGHT, declined, False)
+        yield note("FT204", "rows", NOT_SOUGHT, declined)
         return
     points = points_of(subject, subject.rows)
     decider = decider_of(subject)
@@ -399,20 +398,19 @@ def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> Answer:
             if points.at
             else Declined("FTD06", "no row lies in the domain")
         )
-        return Answer("FT204", "rows", NOT_SOUGHT, state, False, measures=(count,))
+        return note("FT204", "rows", NOT_SOUGHT, state, measures=(count,))
     first = radii[0]
     least = first.low
     aside = ASIDE if any(one.is_aside for one in radii) else ""
     of_all = "" if len(radii) == len(points.at) else "with the smallest margins "
     median = statistics.median_low([one.low for one in radii])
-    return Answer(
-        code="FT204",
-        subject="rows",
-        sentence=f"of {points.text} {len(radii)} different ones {of_all}were "
+    return note(
+        "FT204",
+        "rows",
+        f"of {points.text} {len(radii)} different ones {of_all}were "
         f"evaluated: each keeps its decision within at least {percent(least)} "
         f"{OF_RANGES}, half of them within {percent(median)}{aside}",
-        state=first.answer.state,
-        is_finding=False,
+        first.answer.state,
         measures=(
             count,
             distance_measure("smallest certified radius", least),

@@ -22,6 +22,7 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
     point_of,
 )
+from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import Variable
@@ -249,7 +250,7 @@ def rows_left_out(code: str, count: int) -> Answer:
     """Return an answer that says how many rows the budget left out."""
     declined = Declined("FTD03", "the budget was spent")
     text = f"{count} more rows are not evaluated"
-    return Answer(code, "more rows", text, declined, False)
+    return note(code, "more rows", text, declined)
 
 
 def narrowed_state(

@@ -10,6 +10,7 @@ import msgspec
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, counted
+from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.records import (
     Answer,
     AuditSettings,
@@ -139,6 +140,4 @@ class TimeSlices:
             reason = "the budget was spent"
             of = counted(self.left_out, noun)
             sentence = f"{what} is not known for {of}: {reason}"
-            yield Answer(
-                code, f"{of} left open", sentence, Declined("FTD03", reason), False
-            )
+            yield note(code, f"{of} left open", sentence, Declined("FTD03", reason))

@@ -17,6 +17,7 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, Sampled
+from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import Clause, RuleBase, shapes_of
@@ -292,7 +293,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if subject.rows is None:
         reason = "rows are needed (--data TABLE)"
         text = f"what rows say about the rules is not known: {reason}"
-        yield Answer("FT701", "rows", text, Declined("FTD06", reason), is_finding=False)
+        yield note("FT701", "rows", text, Declined("FTD06", reason))
     else:
         yield from _of_rows(subject, subject.rows)
     yield from _of_domain(subject)
@@ -310,7 +311,7 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[Answer]:
     ):
         state = sampled_share(name, hits, total, how)
         sentence = f"on {hits} of {total} rows {text}"
-        yield Answer("FT701", name, sentence, state, is_finding=hits > 0)
+        yield Answer("FT701", name, sentence, state, hits > 0)
     if not found.known:
         return
     if found.missing:
@@ -335,7 +336,7 @@ def _of_domain(subject: Subject) -> Iterator[Answer]:
     if not points.shape[1]:
         reason = "no drawn point lies within the sides of the combinations"
         text = f"shares of the domain are not known: {reason}"
-        yield Answer("FT701", "domain", text, Declined("FTD04", reason), False)
+        yield note("FT701", "domain", text, Declined("FTD04", reason))
         return
     found, most = _both(subject, points)
     how = f"points drawn evenly from the domain, seed {settings.seed}"
@@ -364,7 +365,7 @@ def _nearly_fired(
     name, least = subject.rule_name(number), int(found.fired[number - 1])
     reason = f"it fires on {least} of {found.known} at least, and on {most} at most"
     sentence = f"on how many rows {name} fires is not decided: {reason}"
-    return Answer("FT701", name, sentence, Declined("FTD02", reason), is_finding=False)
+    return note("FT701", name, sentence, Declined("FTD02", reason))
 
 
 def _shares(
@@ -383,13 +384,13 @@ def _shares(
             reason = f"there are {fewest} at least, and {hits} at most"
             text = f"how many {noun} are {name} is not decided: {reason}"
             unknown = Declined("FTD02", reason)
-            yield Answer("FT701", f"{name} {noun}", text, unknown, False)
+            yield note("FT701", f"{name} {noun}", text, unknown)
             questions = [one for one in questions if one[0] != name]
     if not subject.is_whole:
         reason = "rules are left out, and they may cover what the others do not"
         text = f"how many {noun} are covered is not known: {reason}"
         name = f"covered {noun}"
-        yield Answer("FT701", name, text, Declined("FTD07", reason), False)
+        yield note("FT701", name, text, Declined("FTD07", reason))
         questions.clear()
     if subject.policy.decision == "strongest":
         margin = f"the two strongest classes are at most {settings.margin!r} apart"
@@ -400,7 +401,7 @@ def _shares(
     for name, hits, text in questions:
         state = sampled_share(f"{name} {noun}", hits, total, how)
         sentence = f"on {hits} of {total} {noun} {text}"
-        yield Answer("FT701", f"{name} {noun}", sentence, state, is_finding=False)
+        yield note("FT701", f"{name} {noun}", sentence, state)
 
 
 def _of_rule(subject: Subject, found: RuleCounts, number: int, how: str) -> Answer:
@@ -428,7 +429,7 @@ def _of_rule(subject: Subject, found: RuleCounts, number: int, how: str) -> Answ
         name,
         sentence,
         state,
-        is_finding=is_finding,
+        is_finding,
         rules=(number,),
         measures=tuple(measures),
     )

@@ -16,6 +16,7 @@ from typing import Final, Literal, NoReturn
 
 from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.curve_bounds import (
     CurveBounds,
     Interval,
@@ -196,12 +197,11 @@ def _answer(
     one: SystemInput, label: SystemLabel, outcome: tuple[str, str], users: str
 ) -> Answer:
     name, (what, reason) = f"term {label.name!r} of {one.name!r}", outcome
-    return Answer(
+    return note(
         "FTD02",
         name,
         f"{name} {what}: {reason}; {users}",
         Declined("FTD02", f"{reason}; {users}"),
-        is_finding=False,
         terms=(TermName(one.name, label.name),),
     )
 

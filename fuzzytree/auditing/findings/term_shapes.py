@@ -30,6 +30,7 @@ from fuzzytree.auditing.engine.states import (
     counted,
     short,
 )
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import (
@@ -59,12 +60,11 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
     if not sound and not shallow:
         return
     shapes = "1 term has" if sound == 1 else f"{sound} terms have"
-    yield Answer(
+    yield note(
         "FT402",
         "terms",
         f"{shapes} no defect of shape of {short(SHALLOW)} or more",
         Proved("turning points and crossings of 0 and 1 were found for each piece"),
-        is_finding=False,
         measures=(Measure("smaller excesses and dips", shallow),),
     )
 
@@ -90,13 +90,11 @@ def _defect(
     region: tuple[Span, ...] = (),
 ) -> Answer:
     name = term_name(of.variable, term)
-    return Answer(
+    return finding(
         "FT402",
         name,
         f"{name} {text}",
         Proved(how),
-        is_finding=True,
-        severity="warning",
         terms=labels_of(of, term),
         region=region,
         measures=measures,
@@ -276,14 +274,12 @@ def _overlapping(
         at, height = max(shared.crossings, key=lambda pair: pair[1].low)
         measures.append(measure("crossing height", height))
         measures.append(Measure("crossing", float(at), unit=of.variable.unit))
-    return Answer(
+    return finding(
         "FT403",
         name,
         f"{name} are hard to distinguish: they share "
         f"{_share(jaccard)} of their area{relation}",
         state,
-        is_finding=True,
-        severity="info",
         terms=labels_of(of, one, other),
         measures=tuple(measures),
     )
@@ -297,12 +293,11 @@ def _share(jaccard: Bounds) -> str:
 def _too_large(of: VariableRange, one: Term, other: Term) -> Answer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
     reason = f"their curves have more than {_MOST_PIECES} pieces"
-    return Answer(
+    return note(
         "FT403",
         name,
         f"{name} were not compared: {reason}",
         Declined("FTD05", reason),
-        is_finding=False,
         terms=labels_of(of, one, other),
     )
 
@@ -319,7 +314,7 @@ def _other_pairs(found: int, apart: int, points: int, limit: float) -> Answer:
         "pairs of terms",
         "; ".join(parts),
         Proved("areas were enclosed on cells, and integrated in fractions where near"),
-        is_finding=found > MOST_SHOWN,
+        found > MOST_SHOWN,
         measures=(
             Measure("pairs apart", apart),
             Measure("pairs not listed", max(found - MOST_SHOWN, 0)),

@@ -12,6 +12,7 @@ from fuzzytree.auditing.engine.domain import span
 from fuzzytree.auditing.engine.measures import Bounds, CurveAxis, curve_axis, heights
 from fuzzytree.auditing.engine.pieces import RuleCurve, pieces
 from fuzzytree.auditing.engine.states import Bracket, Proved, counted, short
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import Term, Variable, questions
@@ -130,12 +131,11 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answe
                 yield _low_term(of, term, height, at, len(made.cells.rank))
     if clean:
         terms = "1 term reaches" if clean == 1 else f"{clean} terms reach"
-        yield Answer(
+        yield note(
             "FT401",
             "terms",
             f"{terms} a degree of {short(level)} or more",
             Proved(f"the height of {clean} terms was found"),
-            is_finding=False,
             measures=(Measure("lowest height", float(lowest), str(lowest)),),
         )
 
@@ -170,7 +170,7 @@ def _low_term(
             f"its curve was visited in {counted(cells, 'stretch', 'stretches')}, in "
             "each of which it is monotone"
         ),
-        is_finding=True,
+        True,
         severity="warning" if height.high else "error",
         terms=labels_of(of, term),
         measures=(measure("height", height),),
@@ -192,7 +192,7 @@ def _low_curve(
         name,
         f"{name} {begins}: {largest} lies between {short(low)} and {short(high)}",
         Bracket(f"the largest degree of {name}", low, high, why),
-        is_finding=is_low,
+        is_low,
         severity="warning",
         terms=labels_of(of, term),
         measures=(Measure("height at least", low), Measure("height at most", high)),
@@ -212,36 +212,31 @@ def _unused(subject: Subject) -> Iterator[Answer]:
     proof = Proved(f"{counted(len(clauses), 'proposition')} of all rules read")
     for name in variables:
         if name not in needed:
-            yield Answer(
+            yield finding(
                 "FT404",
                 f"variable {name!r}",
                 f"no rule uses variable {name!r}",
                 proof,
-                is_finding=True,
-                severity="info",
                 terms=tuple(TermName(name, term) for of, term in terms if of == name),
             )
     idle = [one for one in terms if one[0] in needed and one not in used]
     for name, term in idle:
-        yield Answer(
+        yield finding(
             "FT404",
             f"term {term!r} of {name!r}",
             f"no rule uses term {term!r} of {name!r}",
             proof,
-            is_finding=True,
-            severity="info",
             terms=(TermName(name, term),),
         )
     counts = (
         sum(name in needed for name in variables),
         sum(one in used for one in terms),
     )
-    yield Answer(
+    yield note(
         "FT404",
         "terms and variables",
         f"rules use {counted(counts[0], 'variable')} and {counted(counts[1], 'term')}",
         proof,
-        is_finding=False,
         measures=(
             Measure("variables in use", counts[0]),
             Measure("terms in use", counts[1]),

@@ -21,6 +21,7 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Policy
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules, bounded_rules
 from fuzzytree.auditing.findings.system_conditions import (
@@ -209,7 +210,7 @@ def _moved(one: SystemInput, value: float) -> float:
 
 def _declined(code: str, subject: str, reason: str) -> Answer:
     sentence = f"{subject} is left out: {reason}"
-    return Answer(code, subject, sentence, Declined(code, reason), is_finding=False)
+    return note(code, subject, sentence, Declined(code, reason))
 
 
 class _Taken:
@@ -284,9 +285,7 @@ class _Taken:
     def _never(self, name: str, why: str) -> None:
         sentence = f"{name} never fires: {why}"
         proof = Proved("read off the rule; no input was needed")
-        self.answers.append(
-            Answer("FT101", name, sentence, proof, is_finding=True, severity="error")
-        )
+        self.answers.append(finding("FT101", name, sentence, proof))
 
 
 def _text(then: Iterable[Conclusion]) -> str:
