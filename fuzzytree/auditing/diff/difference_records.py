@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Final, Literal, NamedTuple, TypeVar
 
 import msgspec
 
@@ -15,7 +16,7 @@ from fuzzytree.auditing.findings.records import (
     Measure,
     SourceFile,
 )
-from fuzzytree.model import Path, Value
+from fuzzytree.model import Document, Path, Value
 
 FORMAT: Final = "fuzzytree-diff/1"
 
@@ -168,6 +169,25 @@ class Draft(NamedTuple):
     is_harmless: bool = False
 
 
+_Key = TypeVar("_Key")
+_Part = TypeVar("_Part")
+
+
+def together(
+    old: Mapping[_Key, _Part], new: Mapping[_Key, _Part]
+) -> Iterator[tuple[_Key, _Part | None, _Part | None]]:
+    """Yield old parts, each with the new one of its key, then the new ones alone."""
+    for key in dict.fromkeys((*old, *new)):
+        yield key, old.get(key), new.get(key)
+
+
+def renamed_model(old: Document, new: Document) -> Iterator[Draft]:
+    """Yield that a model has another name, if it has."""
+    if old.name != new.name:
+        text, path = f"the model {old.name!r} is called {new.name!r}", ("name",)
+        yield Draft("name", text, "never", path, path, is_harmless=True)
+
+
 class DecisionEvidence(NamedTuple):
     """How decisions that differ come about.
 
@@ -177,6 +197,7 @@ class DecisionEvidence(NamedTuple):
         has_tie: Whether two rules are equally strong in one of them.
         has_none: Whether no rule fires in one of them.
         is_equal: Whether decisions are proved equal.
+        has_number: Whether a number of two systems differs.
     """
 
     old_rules: frozenset[int] = frozenset()
@@ -184,11 +205,14 @@ class DecisionEvidence(NamedTuple):
     has_tie: bool = False
     has_none: bool = False
     is_equal: bool = False
+    has_number: bool = False
 
     @property
     def is_any(self) -> bool:
-        """Whether some decision differs."""
-        return bool(self.old_rules or self.new_rules or self.has_none)
+        """Whether some decision, or some number, differs."""
+        return bool(
+            self.old_rules or self.new_rules or self.has_none or self.has_number
+        )
 
 
 def grade(draft: Draft, evidence: DecisionEvidence) -> Change:

@@ -10,11 +10,14 @@ from fuzzytree.auditing.diff.decisions import RulePair, all_inputs, decisions, u
 from fuzzytree.auditing.diff.difference_records import (
     Change,
     ComparedModel,
+    DecisionEvidence,
     Difference,
+    Draft,
     grade,
 )
 from fuzzytree.auditing.diff.structure import draft_changes
-from fuzzytree.auditing.diff.system_differences import system_changes
+from fuzzytree.auditing.diff.system_differences import draft_system_changes
+from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, limited
 from fuzzytree.auditing.findings.audit import source_of
@@ -153,7 +156,13 @@ def difference(
     if _give_numbers(old) and _give_numbers(new):
         assert isinstance(old, FuzzySystem)  # no other model gives numbers
         assert isinstance(new, FuzzySystem)
-        changes, answers = system_changes(old, new, domain, rows, settings, clock)
+        drafts = [*draft_system_changes(old, new)]
+        columns = tuple(dict.fromkeys((*old.columns, *new.columns)))
+        systems = SystemPair(old, new, columns, domain)
+        answers = number_answers(systems, rows, settings, clock)
+        is_equal = any(one.subject == "decisions" for one in answers)  # proved
+        has_number = any(one.is_finding for one in answers)
+        evidence = DecisionEvidence(is_equal=is_equal, has_number=has_number)
     else:
         titles = [
             file.name if file else model.name
@@ -162,11 +171,10 @@ def difference(
         models = deciding_model(old, titles[0]), deciding_model(new, titles[1])
         pair = _pair(*models, domain)
         clock.report("comparing rules", 0.0)
-        found = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
+        drafts = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
         clock.report("comparing decisions", 0.1)
         answers, evidence = decisions(pair, rows, settings, clock)
-        changes = [(grade(one, evidence), one.old, one.new) for one in found]
-    located = [_placed(change, paths, both, files) for change, *paths in changes]
+    changes = [_placed(one, evidence, both, files) for one in drafts]
     order = {"breaking": 0, "non-breaking": 1, "cosmetic": 2}
     one, other = (
         ComparedModel(
@@ -185,7 +193,7 @@ def difference(
         0 if rows is None else rows.values.shape[1],
         domain,
         settings,
-        tuple(sorted(located, key=lambda change: order[change.grade])),
+        tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(answers),
     )
 
@@ -207,16 +215,17 @@ def _give_numbers(model: Document) -> bool:
 
 
 def _placed(
-    change: Change,
-    paths: Sequence[Path | None],
+    draft: Draft,
+    evidence: DecisionEvidence,
     models: Sequence[Document],
     files: Sequence[ModelFile | None],
 ) -> Change:
-    """Return a change with its places; a tree's rules are its leaves."""
+    """Return a change with its grade and its places; a tree's rules are its leaves."""
     places = [
         None if file is None or path is None else file.place(_path(model, path))
-        for file, path, model in zip(files, paths, models, strict=True)
+        for file, path, model in zip(files, (draft.old, draft.new), models, strict=True)
     ]
+    change = grade(draft, evidence)
     return msgspec.structs.replace(change, old=places[0], new=places[1])
 
 

@@ -175,7 +175,7 @@ def matching(one: RuleKeys, other: RuleKeys) -> Matching:
         ("curves", RuleKeys.words),
     )
     for how, key in steps:
-        pairs = _paired(
+        pairs = paired(
             {number: key(one, rule) for number, rule in old.items()},
             {number: key(other, rule) for number, rule in new.items()},
         )
@@ -190,7 +190,7 @@ def matching(one: RuleKeys, other: RuleKeys) -> Matching:
     return Matching(tuple(sorted(found)), tuple(old), tuple(new), left)
 
 
-def _paired(
+def paired(
     old: Mapping[int, Hashable], new: Mapping[int, Hashable]
 ) -> list[tuple[int, int]]:
     """Return pairs of equal keys, the first with the first."""

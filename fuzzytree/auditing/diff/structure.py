@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.diff.difference_records import Draft, Shown
+from fuzzytree.auditing.diff.difference_records import Draft, Shown, renamed_model
 from fuzzytree.auditing.diff.matching import (
     Curves,
     Match,
@@ -55,15 +55,7 @@ def draft_changes(
 
 
 def _head_drafts(old: RuleBase, new: RuleBase, found: Matching) -> Iterator[Draft]:
-    if old.name != new.name:
-        yield Draft(
-            "name",
-            f"the model {old.name!r} is called {new.name!r}",
-            "never",
-            ("name",),
-            ("name",),
-            is_harmless=True,
-        )
+    yield from renamed_model(old, new)
     if old.columns != new.columns:
         yield Draft(
             "columns",

@@ -1,6 +1,6 @@
-"""What changed from one fuzzy system to another, whose outputs are numbers.
+"""Changes of the structure of fuzzy systems, whose parts are matched by their names.
 
-Structure is compared by identity, numbers by `fuzzytree.auditing.diff.system_numbers`.
+How their numbers differ is in `fuzzytree.auditing.diff.system_numbers`.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from collections.abc import Hashable, Iterator, Sequence
 
 import msgspec
 
-from fuzzytree.auditing.diff.difference_records import Change, Grade
-from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
-from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.findings.records import Answer, AuditSettings
-from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.diff.difference_records import (
+    Draft,
+    Shown,
+    renamed_model,
+    together,
+)
+from fuzzytree.auditing.diff.matching import paired
 from fuzzytree.model import (
     FuzzySystem,
     Path,
@@ -24,106 +25,78 @@ from fuzzytree.model import (
     SystemRule,
 )
 
-Found = tuple[list[tuple[Change, Path | None, Path | None]], list[Answer]]
+_Variable = SystemInput | SystemOutput
 
 
-def system_changes(
-    old: FuzzySystem,
-    new: FuzzySystem,
-    domain: Domain,
-    rows: AuditRows | None,
-    settings: AuditSettings,
-    clock: Clock,
-) -> Found:
-    """Return the changes of a system with their places, and how its numbers differ.
+def draft_system_changes(old: FuzzySystem, new: FuzzySystem) -> Iterator[Draft]:
+    """Yield the changes from an old system to a new one.
 
-    A change that can move a number counts as breaking where some number was seen to
-    move; which of several changes moved it is not looked for.
-
-    Args:
-        old: The old system.
-        new: The new one.
-        domain: A side for each column of either.
-        rows: Rows of the columns of either, the old one's first.
-        settings: How many points are drawn, and their seed.
-        clock: How much time there is.
-
-    Example:
-        >>> from fuzzytree.auditing.findings.domains import domain_of
-        >>> from fuzzytree.testing import random_system
-        >>> system = random_system(2)
-        >>> changes, answers = system_changes(
-        ...     system, system, domain_of(system), None, AuditSettings(), Clock()
-        ... )
-        >>> changes, answers[0].sentence
-        ([], 'both systems compute alike')
+    A change that can move a number breaks something if any number was seen to move;
+    which of several changes moved it is not looked for.
     """
-    columns = tuple(dict.fromkeys((*old.columns, *new.columns)))
-    pair = SystemPair(old, new, columns, domain)
-    answers = number_answers(pair, rows, settings, clock)
-    moves = any(answer.is_finding for answer in answers)
-    is_equal = any(answer.subject == "decisions" for answer in answers)  # proved
-    found: Found = ([], answers)
-    for shown, part, sentence, one, other in _drafts(old, new):
-        grade: Grade = "breaking" if shown == "always" else "non-breaking"
-        if shown == "moves" and moves:
-            grade = "breaking"
-        elif shown == "cosmetic":
-            grade = "cosmetic"
-        is_proved = is_equal or grade != "non-breaking" or shown == "never"
-        found[0].append((Change(grade, is_proved, part, sentence), one, other))
-    return found
-
-
-# --- structure
-
-_Draft = tuple[str, str, str, Path | None, Path | None]
-"""What shows that it breaks something (`always`, `moves`, `never`, `cosmetic`), the
-part, the sentence, and where both models hold it."""
-
-
-def _drafts(old: FuzzySystem, new: FuzzySystem) -> Iterator[_Draft]:
-    if old.name != new.name:
-        text = f"the model {old.name!r} is called {new.name!r}"
-        yield "cosmetic", "name", text, ("name",), ("name",)
+    yield from renamed_model(old, new)
     if old.note != new.note:
-        yield "cosmetic", "name", "the note has changed", ("note",), ("note",)
+        here: Path = ("note",)
+        yield Draft(
+            "name", "the note has changed", "never", here, here, is_harmless=True
+        )
     yield from _variable_drafts("input", old.inputs, new.inputs)
     yield from _variable_drafts("output", old.outputs, new.outputs)
     yield from _block_drafts(old.blocks, new.blocks)
 
 
-_Variables = Sequence[SystemInput | SystemOutput]
+def _variable_drafts(
+    noun: str, old: Sequence[_Variable], new: Sequence[_Variable]
+) -> Iterator[Draft]:
+    mine, theirs = (
+        {one.name: ((f"{noun}s", k), one) for k, one in enumerate(variables)}
+        for variables in (old, new)
+    )
+    for name, one, other in together(mine, theirs):
+        if one and other:
+            yield from _fact_drafts(noun, one, other, f" of {name!r}")
+            yield from _label_drafts(one, other)
+        else:
+            is_needed = one is not None or noun == "input"
+            shown: Shown = "always" if is_needed else "never"
+            yield _alone(noun, f"the {noun} {name!r}", one, other)._replace(shown=shown)
 
 
-def _variable_drafts(noun: str, old: _Variables, new: _Variables) -> Iterator[_Draft]:
-    mine = {one.name: (k, one) for k, one in enumerate(old)}
-    theirs = {one.name: (k, one) for k, one in enumerate(new)}
-    field = f"{noun}s"
-    for name, (place, one) in mine.items():
-        here: Path = (field, place)
-        if name not in theirs:
-            yield "always", noun, f"the {noun} {name!r} was removed", here, None
+def _alone(
+    part: str,
+    text: str,
+    old: tuple[Path, object] | None,
+    new: tuple[Path, object] | None,
+) -> Draft:
+    """Return that a part is new, or was removed."""
+    text += " is new" if old is None else " was removed"
+    return Draft(part, text, "any", old and old[0], new and new[0])
+
+
+def _fact_drafts(
+    part: str,
+    old: tuple[Path, _Variable | RuleBlock],
+    new: tuple[Path, _Variable | RuleBlock],
+    of: str,
+) -> Iterator[Draft]:
+    """Yield what differs of a variable beside its terms, or of a block beside rules."""
+    for key in old[1].__struct_fields__:
+        was, now = getattr(old[1], key), getattr(new[1], key)
+        if key in ("labels", "rules") or was == now:
             continue
-        at, other = theirs[name]
-        there: Path = (field, at)
-        for key in one.__struct_fields__:
-            was, now = getattr(one, key), getattr(other, key)
-            if key == "labels" or was == now:
-                continue
-            shown = "cosmetic" if key == "unit" else "moves"
-            text = f"the {key} of {name!r} is {_text(now)}, and was {_text(was)}"
-            if key == "clips":
-                text = (
-                    f"values of {name!r} are {'now' if now else 'no longer'} clamped "
-                )
-                text += "to its range"
-            yield shown, "unit" if key == "unit" else noun, text, here, there
-        yield from _label_drafts(one, other, here, there)
-    for name, (place, _) in theirs.items():
-        if name not in mine:
-            shown = "always" if noun == "input" else "never"
-            yield shown, noun, f"the {noun} {name!r} is new", None, (field, place)
+        text = f"the {key}{of} is {_text(now)}, and was {_text(was)}"
+        if key == "clips":
+            text = (
+                f"values{of} are {'now' if now else 'no longer'} clamped to its range"
+            )
+        yield Draft(
+            "unit" if key == "unit" else part,
+            text,
+            "any",
+            old[0],
+            new[0],
+            is_harmless=key in ("unit", "name"),
+        )
 
 
 def _text(value: object) -> str:
@@ -133,85 +106,62 @@ def _text(value: object) -> str:
 
 
 def _label_drafts(
-    one: SystemInput | SystemOutput,
-    other: SystemInput | SystemOutput,
-    here: Path,
-    there: Path,
-) -> Iterator[_Draft]:
-    mine = {label.name: (k, label) for k, label in enumerate(one.labels)}
-    theirs = {label.name: (k, label) for k, label in enumerate(other.labels)}
-    for name, (place, label) in mine.items():
-        path: Path = (*here, "labels", place)
-        term = f"the term {name!r} of {one.name!r}"
-        if name not in theirs:
-            yield "moves", "term", f"{term} was removed", path, None
-        elif theirs[name][1] != label:
-            text = f"the curve of {name!r} of {one.name!r} has changed"
-            yield "moves", "term", text, path, (*there, "labels", theirs[name][0])
-    for name, (place, _) in theirs.items():
-        if name not in mine:
-            text = f"the term {name!r} of {one.name!r} is new"
-            yield "moves", "term", text, None, (*there, "labels", place)
+    old: tuple[Path, _Variable], new: tuple[Path, _Variable]
+) -> Iterator[Draft]:
+    mine, theirs = (
+        {
+            label.name: ((*path, "labels", k), label)
+            for k, label in enumerate(one.labels)
+        }
+        for path, one in (old, new)
+    )
+    for name, one, other in together(mine, theirs):
+        term = f"{name!r} of {old[1].name!r}"
+        if not (one and other):
+            yield _alone("term", f"the term {term}", one, other)
+        elif one[1] != other[1]:
+            text = f"the curve of {term} has changed"
+            yield Draft("term", text, "any", one[0], other[0])
 
 
 def _block_drafts(
     old: Sequence[RuleBlock], new: Sequence[RuleBlock]
-) -> Iterator[_Draft]:
-    for place in range(max(len(old), len(new))):
-        path: Path = ("blocks", place)
-        if place >= len(new):
-            yield "moves", "block", f"block {place + 1} was removed", path, None
-        elif place >= len(old):
-            yield "moves", "block", f"block {place + 1} is new", None, path
+) -> Iterator[Draft]:
+    mine, theirs = (
+        {k: (("blocks", k), block) for k, block in enumerate(blocks)}
+        for blocks in (old, new)
+    )
+    for place, one, other in together(mine, theirs):
+        if one and other:
+            of = f" of block {place + 1}" if place else ""
+            yield from _fact_drafts("block", one, other, of)
+            yield from _rule_drafts(one[1].rules, other[1].rules, one[0], of)
         else:
-            yield from _in_block(old[place], new[place], place)
+            yield _alone("block", f"block {place + 1}", one, other)
 
 
-def _in_block(old: RuleBlock, new: RuleBlock, place: int) -> Iterator[_Draft]:
-    path: Path = ("blocks", place)
-    of = "" if not place else f" of block {place + 1}"
-    for key in old.__struct_fields__:
-        was, now = getattr(old, key), getattr(new, key)
-        if key == "rules" or was == now:
-            continue
-        shown = "cosmetic" if key == "name" else "moves"
-        text = f"the {key}{of} is {_text(now)}, and was {_text(was)}"
-        yield shown, "block", text, path, path
-    keys: list[dict[int, Hashable]] = [
-        {k: _said(rule) for k, rule in enumerate(block.rules)} for block in (old, new)
-    ]
-    left = {key: [*keys[1].values()].count(key) for key in keys[1].values()}
-    gone: list[int] = []
-    for k, said in keys[0].items():
-        if left.get(said, 0):
-            left[said] -= 1
-        else:
-            gone.append(k)
-    come = [k for k in reversed(keys[1]) if _taken(left, keys[1][k])][::-1]
+def _rule_drafts(
+    old: Sequence[SystemRule], new: Sequence[SystemRule], block: Path, of: str
+) -> Iterator[Draft]:
+    pairs = paired(dict(enumerate(map(_key, old))), dict(enumerate(map(_key, new))))
+    gone = sorted({*range(len(old))} - {k for k, _ in pairs})
+    come = sorted({*range(len(new))} - {k for _, k in pairs})
     for k in gone:
-        when = old.rules[k].when
-        match = next((n for n in come if new.rules[n].when == when), None)
-        here: Path = (*path, "rules", k)
+        match = next((n for n in come if new[n].when == old[k].when), None)
+        here: Path = (*block, "rules", k)
         if match is None:
-            yield "moves", "rule", f"rule {k + 1}{of} was removed", here, None
+            yield Draft("rule", f"rule {k + 1}{of} was removed", "any", here)
             continue
         come.remove(match)
         text = f"rule {k + 1}{of} has another conclusion or weight"
-        yield "moves", "rule", text, here, (*path, "rules", match)
+        yield Draft("rule", text, "any", here, (*block, "rules", match))
     for k in come:
-        yield "moves", "rule", f"rule {k + 1}{of} is new", None, (*path, "rules", k)
-    if not gone and not come and [*keys[0].values()] != [*keys[1].values()]:
-        text = f"the rules{of} stand in another order"
-        yield "moves", "order", text, (*path, "rules"), (*path, "rules")
+        there: Path = (*block, "rules", k)
+        yield Draft("rule", f"rule {k + 1}{of} is new", "any", None, there)
+    if len(pairs) == len(old) == len(new) and any(a != b for a, b in pairs):
+        text, rules = f"the rules{of} stand in another order", (*block, "rules")
+        yield Draft("order", text, "any", rules, rules)
 
 
-def _taken(left: dict[Hashable, int], key: Hashable) -> bool:
-    """Return True as often as a key is left, and count it down."""
-    if not left[key]:
-        return False
-    left[key] -= 1
-    return True
-
-
-def _said(rule: SystemRule) -> Hashable:
+def _key(rule: SystemRule) -> Hashable:
     return rule.when, rule.then, rule.weight
