@@ -39,18 +39,17 @@ _CODES = (
         "FT101",
         "dead rule",
         "error",
-        what="The rule never gives the answer. Nowhere on the domain is it stronger "
+        what="The rule never gives the answer: nowhere on the domain is it stronger "
         "than every rule of another class; where all rules take part in the answer, "
         "it never fires. For a tree: no value leads to the leaf.",
-        why="A reader of the rule expects that it does something. Either it is "
-        "superfluous, or the case that it was written for is decided differently.",
+        why="The rule is superfluous, or the case that it was written for is decided "
+        "differently.",
         example="1. IF force is high THEN firm\n"
         "2. IF slip is much THEN loose\n"
         "3. IF force is high AND slip is much THEN soft\n"
-        "Rule 3 is never stronger than rule 1 or than rule 2, and never answers.",
-        remedy="Delete the rule; or narrow those that hide it; or, if they are right, "
-        "find out what the rule was meant for. If the domain is too small for it, give "
-        "wider limits (--limits NAME=LOW:HIGH).",
+        "Rule 3 is never stronger than rule 1 or than rule 2.",
+        remedy="Delete the rule, narrow those that hide it, or audit a wider domain "
+        "(--limits NAME=LOW:HIGH).",
     ),
     Code(
         "FT102",
@@ -59,70 +58,65 @@ _CODES = (
         "strongest",
         what="The rule wins somewhere, but nowhere by more than the setting `lead` "
         "over every rule of another class.",
-        why="A rule that wins by a hair decides in a sliver of the domain, where a "
-        "rounded number or a noisy sensor gives another answer.",
-        example="A rule whose largest lead is 2.8e-8: a million random rows do not "
-        "meet it once, and yet it decides.",
-        remedy="Look at the witness: should this rule decide there? If not, delete "
-        "it. If so, make its terms wider or those of its rival narrower.",
+        why="It decides in a sliver of the domain, where a rounded number or a noisy "
+        "sensor gives another answer.",
+        example="A rule whose largest lead is 2.8e-8.",
+        remedy="If it should decide at the witness, widen its terms or narrow those "
+        "of its rival; if not, delete it.",
     ),
     Code(
         "FT103",
         "redundant rule",
         "info",
         "strongest",
-        what="Without the rule every decision on the domain stays the same: wherever "
-        "it wins, other rules of its class are there to win as well.",
+        what="Without the rule every decision on the domain stays the same.",
         why="It costs reading and computing, and changes nothing.",
         example="1. IF force is high THEN firm\n"
         "2. IF slip is none THEN firm\n"
         "3. IF force is high AND slip is none THEN firm\n"
         "Rule 3 can go.",
-        remedy="Delete it, if its strength is not used otherwise. Delete one rule at a "
-        "time: two that are redundant each may not be so together.",
+        remedy="Delete it, one rule at a time: two may not be redundant together.",
     ),
     Code(
         "FT104",
         "subsumed rule",
         "warning",
-        what="One other rule of the same class is at least as strong everywhere on the "
-        "domain; where all rules take part, one with the same conclusion.",
+        what="One other rule of the same class is at least as strong everywhere on "
+        "the domain; where all rules take part, one with the same conclusion.",
         why="The rule says a special case of what another one says already.",
         example="1. IF force is high THEN firm\n"
         "2. IF force is high AND slip is none THEN firm\n"
         "Rule 1 subsumes rule 2.",
-        remedy="Delete the narrower rule; or, if the wider one was not meant to reach "
-        "that far, narrow the wider one.",
+        remedy="Delete the narrower rule, or narrow the wider one.",
     ),
     Code(
         "FT105",
         "rule masked by another class",
         "error",
         "strongest",
-        what="One rule of another class is at least as strong everywhere on the domain "
-        "and goes before it in a tie: the rule is never answered.",
-        why="The two rules contradict each other, and one always wins. The "
-        "rule base does not say which of them is right.",
+        what="One rule of another class is at least as strong everywhere on the "
+        "domain and goes before it in a tie: the rule is never answered.",
+        why="The two rules contradict each other, and one always wins.",
         example="1. IF force is high THEN firm\n"
         "2. IF force is high AND slip is much THEN loose\n"
-        "Rule 2 is the special case, but rule 1 is at least as strong and stands "
-        "first.",
-        remedy="Exclude the special case from the general rule (AND slip is not much); "
-        "or let the special case stand first, if ties are all that matters.",
+        "Rule 1 is at least as strong and stands first.",
+        remedy="Exclude the special case from the general rule (AND slip is not "
+        "much), or let it stand first if ties are all that matters.",
     ),
     Code(
         "FT106",
         "duplicate antecedent",
         "warning",
         what="Two rules have the same antecedent: equal curves, or curves that differ "
-        "nowhere by more than a tolerance, which the sentence states. With different "
-        "classes they contradict each other, and the finding is an error; where all "
-        "rules take part, one case may well have two conclusions: a note.",
-        why="Of two equal rules one is superfluous; of two contradicting ones the "
+        "by no more than a tolerance, which the sentence states. With different "
+        "classes the finding is an error; where all rules take part in the answer, a "
+        "note.",
+        why="One of two equal rules is superfluous; of two contradicting ones the "
         "order of the file decides.",
-        example="1. IF force is high THEN firm\n2. IF force is strong THEN soft\n"
+        example="1. IF force is high THEN firm\n"
+        "2. IF force is strong THEN soft\n"
         "The terms high and strong have one curve.",
-        remedy="Delete one of the two, and one of the two names of the term.",
+        remedy="Delete one of the two rules, and one of the two names of the term.",
     ),
     Code(
         "FT107",
@@ -130,24 +124,23 @@ _CODES = (
         "info",
         "strongest",
         what="Without the clause the rule base decides the same on all of the domain.",
-        why="A clause that changes nothing makes a rule look more careful than it is, "
-        "and may cost a sensor.",
+        why="It makes a rule look more careful than it is, and may cost a sensor.",
         example="IF force is high AND slip is any THEN firm\n"
         "The term any is 1 on all of the domain.",
-        remedy="Delete the clause; one at a time, for two of them may not be "
-        "irrelevant together.",
+        remedy="Delete the clause; one at a time, for two may not be irrelevant "
+        "together.",
     ),
     Code(
         "FT201",
         "conflict",
         "info",
         what="Two rules of different classes reach the setting `level` at one point.",
-        why="Both say with some force that they are right, and only one is answered.",
-        example="1. IF force is high THEN firm\n2. IF slip is much THEN loose\n"
+        why="Both say with some force that they are right.",
+        example="1. IF force is high THEN firm\n"
+        "2. IF slip is much THEN loose\n"
         "Where the force is high and the slip is much, both have the strength 1.",
-        remedy="Look at the witness and decide which rule should hold there; exclude "
-        "it from the other. Some overlap is the point of fuzzy rules: accept it "
-        "in a baseline.",
+        remedy="Exclude the witness from the rule that should not apply there, or "
+        "accept the overlap in a baseline.",
     ),
     Code(
         "FT202",
@@ -156,13 +149,12 @@ _CODES = (
         "strongest",
         what="The two strongest rules of different classes are equally strong, or "
         "within the setting `margin`, on a part of the domain with an interior.",
-        why="There the order of the rules in the file decides, which nobody reads as "
-        "a decision.",
+        why="There the order of the rules in the file decides.",
         example="1. IF force is high AND slip is none THEN firm\n"
         "2. IF force is high AND slip is much THEN loose\n"
-        "Under min both are as strong as `force is high` where that is the smallest.",
-        remedy="Order the rules on purpose, the safer class first; or use product, "
-        "under which such ties are rare.",
+        "Under min both may be as strong as `force is high`.",
+        remedy="Put the safer class first; or use product, under which such ties are "
+        "rare.",
     ),
     Code(
         "FT203",
@@ -170,14 +162,12 @@ _CODES = (
         "warning",
         "strongest",
         what="At the witness the tree decides for one class and its raw rules (those "
-        "over the fitted sets) for another, or for none. Given rows, the nearest such "
-        "point to any of them; places where strengths only touch are left aside.",
-        why="Raw rules are easier to read, and people take them for the tree. They are "
-        "another classifier.",
-        example="Just below a cut the tree goes left, while the set of the right "
-        "branch is already stronger.",
-        remedy="Ship the relative rules, which equal the tree everywhere; or treat the "
-        "raw rules as a model of their own, and test them as one.",
+        "over the fitted sets) for another, or for none. Places where strengths only "
+        "touch are left aside.",
+        why="Raw rules are another classifier than the tree.",
+        example="Just below a cut the set of the right branch is already stronger.",
+        remedy="Ship the relative rules, which equal the tree everywhere, or test the "
+        "raw rules as a model of their own.",
     ),
     Code(
         "FT204",
@@ -185,22 +175,20 @@ _CODES = (
         "info",
         "strongest",
         what="How far a row is from the nearest point with another decision: the "
-        "largest change of an input, in widths of its domain. Nothing nearer "
-        "decides otherwise; of rules, places where the strengths of two classes only "
-        "touch are left aside where that matters, and the sentence says so.",
+        "largest change of an input, in widths of its domain. Of rules, places where "
+        "the strengths of two classes only touch are left aside where the sentence "
+        "says so.",
         why="A row with a small radius is decided by noise.",
-        example="fuzzytree audit grip.yaml --row force=2.1,slip=0 shows that at a "
-        "distance of 0.02 widths, at force 2.0, the class is another.",
-        remedy="Compare the radius with the noise of the sensors. Where it is smaller, "
-        "show the class together with its rival, or measure again.",
+        example="fuzzytree audit grip.yaml --row force=2.1,slip=0",
+        remedy="Compare the radius with the noise of the sensors; where it is "
+        "smaller, show the class together with its rival.",
     ),
     Code(
         "FT205",
         "region of a leaf",
         "info",
         "strongest",
-        what="The box, or boxes, of values that lead to the leaf; a cut belongs to "
-        "its left side.",
+        what="The box, or boxes, of values that lead to the leaf.",
         why="It is what the tree says, without any degree.",
         example="leaf 2: force above 2, slip up to 0.5",
         remedy="Nothing; read it beside the rules.",
@@ -211,37 +199,33 @@ _CODES = (
         "warning",
         what="In a region of the domain no rule reaches the setting `epsilon`; where "
         "it says 0, no rule fires at all.",
-        why="There the model answers by default, by a very weak rule or not at all: "
-        "nobody has decided what should happen.",
-        example="IF force is high THEN firm\nIF force is low THEN soft\n"
+        why="There the model answers by default, by a very weak rule or not at all.",
+        example="IF force is high THEN firm\n"
+        "IF force is low THEN soft\n"
         "with low up to 2 and high from 3 on: nothing is said about 2.5.",
-        remedy="Add a rule for the region, widen a neighbour's term, or declare "
-        "limits without it if it cannot occur. Start with the gap nearest to the data.",
+        remedy="Add a rule, widen a neighbour's term, or declare limits without the "
+        "region. Start with the gap nearest to the data.",
     ),
     Code(
         "FT401",
         "empty term",
         "error",
-        what="The term's degree is 0 on all of the domain, or stays below the setting "
-        "`level` everywhere.",
+        what="The term's degree stays below the setting `level` on all of the domain.",
         why="Rules that need the term never fire, or only faintly.",
-        example="A term `very high` whose curve begins at 120, of an input that "
-        "goes up to 100.",
-        remedy="Correct the curve's numbers or the range of the input; a wrong unit is "
-        "the usual cause.",
+        example="A term whose curve begins at 120, of an input that goes up to 100.",
+        remedy="Correct the curve or the range of the input; a wrong unit is the "
+        "usual cause.",
     ),
     Code(
         "FT402",
         "shape defect",
         "warning",
-        what="A curve is not what its name suggests: it would leave [0, 1] if it were "
-        "not clipped, rises where it should fall, has several peaks, has no point of "
-        "degree 1, or lies outside of the domain for the most part.",
-        why="A value further away from the middle may then belong more to the term, "
-        "which no reader expects.",
+        what="The curve would leave [0, 1] if it were not clipped, has several peaks, "
+        "has no point of degree 1, or lies outside of the domain for the most part.",
+        why="A value further from the middle may then belong more to the term.",
         example="A fitted polynomial that falls to 0.2, rises to 0.3 and falls again.",
         remedy="Fit with fewer points or a lower degree; move support into the "
-        "domain; or replace the curve by one of straight lines.",
+        "domain; or use a curve of straight lines.",
     ),
     Code(
         "FT403",
@@ -249,8 +233,7 @@ _CODES = (
         "info",
         what="Two terms of a variable share at least the setting `overlap` of their "
         "area: the integral of their minimum by that of their maximum (Jaccard).",
-        why="Two words for nearly one thing: rules with one and rules with the other "
-        "differ less than they read.",
+        why="Rules with one and rules with the other differ less than they read.",
         example="`warm` from 18 to 26 and `mild` from 17 to 26 share 0.9 of their "
         "area.",
         remedy="Merge the two, or move them apart.",
@@ -260,8 +243,7 @@ _CODES = (
         "unused term or variable",
         "info",
         what="No rule uses the term, or the variable at all.",
-        why="An unused input must be measured all the same; a forgotten term "
-        "may be a forgotten rule.",
+        why="An unused input must be measured all the same.",
         example="`force` has low, medium and high, and no rule uses medium.",
         remedy="Delete it, or write the rule that was forgotten.",
     ),
@@ -269,10 +251,9 @@ _CODES = (
         "FT501",
         "complexity",
         "info",
-        what="Counts: rules, clauses, terms in use, the depth of a tree, and the index "
-        "of Nauck (complexity times coverage times partition).",
-        why="They show whether a person can still read the rules, and compare two "
-        "versions of a rule base.",
+        what="Counts: rules, clauses, terms in use, the depth of a tree, and the "
+        "index of Nauck (complexity times coverage times partition).",
+        why="They show whether a person can still read the rules.",
         example="12 rules of 2.4 clauses, 9 terms in use, index 0.11",
         remedy="Nothing; watch the numbers from release to release.",
     ),
@@ -292,10 +273,8 @@ _CODES = (
         "error",
         what="At a tie, at a missing or infinite value, at the end of a curve or "
         "outside of the domain two forms of the model answer differently.",
-        why="These are the inputs on which runtimes usually differ, and no average "
-        "shows it.",
-        example="A runtime in which NaN has degree 0 answers a class where the model "
-        "answers none.",
+        why="These are the inputs on which runtimes usually differ.",
+        example="A runtime in which NaN has degree 0 answers a class instead of none.",
         remedy="Use the runtime that agrees, or handle such rows before the model.",
     ),
     Code(
@@ -306,8 +285,7 @@ _CODES = (
         "have its class (with an interval), and how many rows are uncovered or tied.",
         why="A rule that no row supports is an opinion.",
         example="rule 4 fires on 31 rows and wins none",
-        remedy="Look at rules without rows together with FT101, FT102 and FT103; more "
-        "rows may be the remedy.",
+        remedy="Look at rules without rows together with FT101, FT102 and FT103.",
     ),
     Code(
         "FT801",
@@ -317,16 +295,15 @@ _CODES = (
         what="Two versions of a model decide differently at the witness.",
         why="It is what a user of the model notices.",
         example="fuzzytree diff old.yaml new.yaml",
-        remedy="If it is meant, say so in the release's notes; otherwise find the "
-        "change of structure behind it (FT802).",
+        remedy="If it is not meant, find the change of structure behind it (FT802).",
     ),
     Code(
         "FT802",
         "structure changed",
         "info",
         what="Two versions of a model differ in a rule, a term, a range or a name; "
-        "rules are matched by what they mean, and not by their order.",
-        why="A change of structure explains a change of decisions, or is harmless.",
+        "rules are matched by what they mean, not by their order.",
+        why="It explains a change of decisions, or is harmless.",
         example="rule `IF force is high THEN firm` was removed",
         remedy="Nothing, where FT801 finds no change of decisions.",
     ),
@@ -334,28 +311,24 @@ _CODES = (
         "FTD01",
         "declined: a norm without an exact method",
         "info",
-        what="A rule joins its clauses by a norm other than min and product, or has an "
-        "OR other than max; what depends on it is not decided.",
+        what="A rule uses an AND other than min and product, or an OR other than max; "
+        "what depends on it is not decided.",
         why="A guess would look like a proof.",
         example="A block of a fuzzy system whose AND is the Hamacher product.",
-        remedy="Audit a version with min or product; `fuzzytree check` and `run` work "
-        "with the original.",
+        remedy="Audit a version with min or product.",
     ),
     Code(
         "FTD02",
         "declined: a curve without an exact method",
         "info",
         what="A term's curve is no piecewise polynomial, such as a gaussian. It is "
-        "bounded by two lines of points, about 0.001 apart, and rules that use it are "
-        "evaluated with both: what is proved or has a witness is true of the curve "
-        "itself, and what lies between the lines is a BRACKET. Its shape and its "
-        "overlaps are not checked. A formula has no such lines: what depends on it is "
-        "not decided.",
+        "bounded by two lines of points, about 0.001 apart: what is proved or has a "
+        "witness is true of the curve itself, and what lies between the lines is a "
+        "BRACKET. A formula has no such lines: what depends on it is not decided.",
         why="Its degrees are no fractions, so not every question has an exact answer.",
         example="gaussian: {mean: 20, deviation: 3}",
         remedy="Nothing, where the answers suffice. `fuzzytree convert --allow-loss` "
-        "writes curves as points within a tolerance that it states; that file can "
-        "be audited in full.",
+        "writes curves as points; that file can be audited in full.",
     ),
     Code(
         "FTD03",
@@ -364,8 +337,8 @@ _CODES = (
         what="The question would have taken longer than the time that was left.",
         why="An unknown answer is reported as unknown.",
         example="40 rules over 11 inputs with --budget 10",
-        remedy="Give more time (--budget SECONDS), select fewer codes (--select), or "
-        "take a smaller domain (--limits).",
+        remedy="Give more time (--budget SECONDS), fewer codes (--select), or a "
+        "smaller domain (--limits).",
     ),
     Code(
         "FTD04",
@@ -381,8 +354,7 @@ _CODES = (
         "FTD05",
         "declined: a model too large",
         "info",
-        what="The model, or a part of it, is beyond what the question can take in "
-        "memory or count.",
+        what="The model, or a part of it, is too large for the question.",
         why="Nothing is begun that cannot end.",
         example="A tree whose leaves are made of more than 20,000 boxes.",
         remedy="Audit parts: fewer rules, a smaller domain, or selected codes.",
@@ -400,21 +372,19 @@ _CODES = (
         "FTD07",
         "declined: a condition without an exact method",
         "info",
-        what="A rule's condition uses what the exact method does not support: an "
-        "output, or the negation of a product or of an OR under products.",
-        why="The rule is left out of what is proved, and that is said.",
-        example="IF power is low AND force is high THEN brake is on, where power is "
-        "an output of the rules before",
-        remedy="Use inputs alone, or audit the rules before and those behind as two "
-        "systems.",
+        what="A condition uses an output, or the negation of a product or of an OR "
+        "under products.",
+        why="The rule is left out of what is proved.",
+        example="IF power is low AND force is high THEN brake is on, with the output "
+        "power",
+        remedy="Use inputs alone, or audit the rules before and behind as two systems.",
     ),
     Code(
         "FTD08",
         "declined: a runtime that is not at hand",
         "info",
-        what="A runtime is not installed, or cannot run this model, so its answers "
-        "were not compared.",
-        why="Nothing is known about it, and that is said.",
+        what="A runtime is not installed, or cannot run this model.",
+        why="Its answers were not compared.",
         example="c is not installed (one of the programs gcc, cc, clang)",
         remedy="Install the packages or the program that the reason names.",
     ),
