@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.dominance import Dominance
 from fuzzytree.auditing.engine.factors import RuleDistance
 from fuzzytree.auditing.engine.joint_maximum import JointMaximum
 from fuzzytree.auditing.engine.states import (
@@ -45,9 +48,9 @@ def answers(subject: Subject) -> Iterator[Answer]:
     compared = bounded_arrangement(subject)
     if compared.lower.is_empty:
         return
-    yield from _subsumed(subject, compared)
+    yield from _hidden(subject, compared, is_alike=True)
     if subject.policy.decision == "strongest":
-        yield from _masked(subject, compared)
+        yield from _hidden(subject, compared, is_alike=False)
     yield from _copied(subject, compared)
     yield from _conflicts(subject, compared)
     if subject.policy.decision == "strongest":
@@ -82,69 +85,47 @@ def _noun(subject: Subject) -> str:
 # --- FT104 and FT105: is one rule at least as strong everywhere?
 
 
-def _subsumed(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
+def _hidden(
+    subject: Subject, compared: BoundedArrangement, *, is_alike: bool
+) -> Iterator[Answer]:
+    """Answer which rules another one hides, of their class (FT104) or not (FT105)."""
     tested = undecided = 0
-    found: dict[int, list[int]] = {}
-    for pair in _pairs(subject, is_alike=True):
-        if not all(compared.fires[number - 1] for number in pair):
+    hiding: dict[int, list[int]] = {}
+    for first, second in _pairs(subject, is_alike=is_alike):
+        if not (compared.fires[first - 1] and compared.fires[second - 1]):
             continue
         tested += 1
-        forth, back = (
-            compared.never_weaker(*each) for each in (pair, (pair[1], pair[0]))
-        )
+        forth = compared.never_weaker(first, second)
+        back: Dominance = "not"
+        if is_alike:
+            back = compared.never_weaker(second, first)
+        elif forth != "always":
+            back = compared.from_below.above(second, first)
         undecided += "open" in (forth, back)
         if forth == "always":
-            found.setdefault(pair[1], []).append(pair[0])
+            hiding.setdefault(second, []).append(first)
         elif back == "always":
-            found.setdefault(pair[0], []).append(pair[1])
-    for weak, strong in sorted(found.items()):
+            hiding.setdefault(first, []).append(second)
+    for weak, strong in sorted(hiding.items()):
         name, by = subject.rule_name(weak), subject.rule_name(strong[0])
-        noun = _noun(subject)
-        yield finding(
-            "FT104",
-            name,
-            f"{name} is subsumed by {by}: wherever it fires, {by} of the same {noun} "
-            "is at least as strong",
-            Proved(_how(compared)),
-            rules=(weak, *strong),
-            measures=(Measure("rules that subsume it", len(strong)),),
-        )
-    counts = tested, len(found), undecided
-    yield from _rest_of_strengths("FT104", subject, compared, *counts)
-
-
-def _masked(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
-    tested = undecided = 0
-    found: dict[int, list[tuple[int, bool]]] = {}
-    for first, second in _pairs(subject, is_alike=False):
-        if not all(compared.fires[number - 1] for number in (first, second)):
-            continue
-        tested += 1
-        verdict = compared.never_weaker(first, second)
-        if verdict == "always":
-            found.setdefault(second, []).append((first, True))
-            continue
-        back = compared.from_below.above(second, first)
-        undecided += "open" in (verdict, back)
-        if back == "always":
-            found.setdefault(first, []).append((second, False))
-    for weak, strong in sorted(found.items()):
-        number, is_before = strong[0]
-        name, by = subject.rule_name(weak), subject.rule_name(number)
-        why = "is at least as strong and stands before it"
-        if not is_before:
-            why = "is stronger"
-        yield finding(
-            "FT105",
-            name,
-            f"{name} is never answered: wherever it fires, {by} of class "
-            f"{_then(subject, number)!r} {why}",
-            Proved(_how(compared)),
-            rules=(weak, *(number for number, _ in strong)),
-            measures=(Measure("rules that mask it", len(strong)),),
-        )
-    counts = tested, len(found), undecided
-    yield from _rest_of_strengths("FT105", subject, compared, *counts)
+        code, verb = "FT104", "subsume"
+        text = f"is subsumed by {by}: wherever it fires, {by} of the same "
+        text += f"{_noun(subject)} is at least as strong"
+        if not is_alike:
+            code, verb = "FT105", "mask"
+            text = f"is never answered: wherever it fires, {by} of class "
+            text += f"{_then(subject, strong[0])!r} is "
+            is_before = strong[0] < weak
+            text += (
+                "at least as strong and stands before it" if is_before else "stronger"
+            )
+        count = Measure(f"rules that {verb} it", len(strong))
+        proof, rules = Proved(_how(compared)), (weak, *strong)
+        text = f"{name} {text}"
+        yield finding(code, name, text, proof, rules=rules, measures=(count,))
+    if tested:
+        counts = tested, len(hiding), undecided
+        yield _rest_of_strengths(subject, compared, counts, is_alike=is_alike)
 
 
 def _how(compared: BoundedArrangement) -> str:
@@ -155,43 +136,35 @@ def _how(compared: BoundedArrangement) -> str:
 
 
 def _rest_of_strengths(
-    code: str,
     subject: Subject,
     compared: BoundedArrangement,
-    tested: int,
-    found: int,
-    undecided: int,
-) -> Iterator[Answer]:
-    """Yield what is known of all pairs of which nothing is found."""
-    if not tested:
-        return
+    counts: tuple[int, int, int],
+    *,
+    is_alike: bool,
+) -> Answer:
+    """Return what is known of all pairs of which nothing is found."""
+    tested, hidden, undecided = counts
     silent = len(compared.fires) - int(compared.fires.sum())
-    word = "subsumed" if code == "FT104" else "masked"
-    kind = f"one {_noun(subject)}" if code == "FT104" else "two classes"
-    among = f"{counted(tested, 'pair')} of {kind}"
-    rest = "no rule" if not found else "no other rule"
+    code, word, kind = "FT105", "masked", "two classes"
+    if is_alike:
+        code, word, kind = "FT104", "subsumed", f"one {_noun(subject)}"
+    among = f"{word}, among {counted(tested, 'pair')} of {kind}"
+    rest = "no other rule is" if hidden else "no rule is"
     state: State = Proved(_how(compared))
-    sentence = f"{rest} is {word}, among {among}"
-    shared = coupled(compared.lower)
-    if shared:
-        reason = "the inputs of variables depend on each other"
-        sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
-        state = Declined("FTD04", reason)
+    sentence = f"{rest} {among}"
+    if coupled(compared.lower):
+        state = Declined("FTD04", "the inputs of variables depend on each other")
     elif undecided:
-        reason = f"{counted(undecided, 'pair')} of strengths are too near to compare"
-        sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
-        state = Declined("FTD02", reason)
-    yield note(
-        code,
-        "pairs of rules",
-        sentence,
-        state,
-        measures=(
-            Measure("pairs", tested),
-            Measure("pairs too near to compare", undecided),
-            Measure("rules that never fire", silent),
-        ),
+        pairs = counted(undecided, "pair")
+        state = Declined("FTD02", f"{pairs} of strengths are too near to compare")
+    if isinstance(state, Declined):
+        sentence = f"{rest} shown to be {among}: {state.reason}"
+    measures = (
+        Measure("pairs", tested),
+        Measure("pairs too near to compare", undecided),
+        Measure("rules that never fire", silent),
     )
+    return note(code, "pairs of rules", sentence, state, measures=measures)
 
 
 # --- FT106: do two rules have the same antecedent?
@@ -236,16 +209,10 @@ def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
         severity: Severity = "warning"
         if one != other:  # a contradiction; in a system two rules for two outputs
             severity = "error" if decides else "info"
-        yield Answer(
-            "FT106",
-            f"{first} and {second}",
-            f"{first} and {second} have {nearly} {text}",
-            Proved("their curves were compared piece by piece in fractions"),
-            True,
-            severity=severity,
-            rules=pair,
-            measures=measures,
-        )
+        both = f"{first} and {second}"
+        proof = Proved("their curves were compared piece by piece in fractions")
+        same = finding("FT106", both, f"{both} have {nearly} {text}", proof, rules=pair)
+        yield replace(same, severity=severity, measures=measures)
     if not pairs:
         return
     among = counted(pairs, "pair")
@@ -325,37 +292,21 @@ def _conflict(subject: Subject, pair: Pair, found: JointMaximum) -> Answer:
     first, second = (subject.rule_name(number) for number in pair)
     one, other = (_then(subject, number) for number in pair)
     low, high = found.level
-    reached = level_reached(found)
-    level, most = "highest common level", "highest common level at most"
-    if isinstance(found.state, Witness):
-        region = found.state.region
-        sentence = (
-            f"{first} and {second} conflict: both reach {reached} at one input, "
-            f"and say {one!r} and {other!r}"
-        )
-        exact = str(low) if low == high else None
-        measures = [Measure(level, float(low), exact)]
-        if high - low > NEARLY:
-            least = "highest common level at least"
-            measures = [Measure(least, float(low)), Measure(most, float(high))]
-    else:
-        region = ()
-        sentence = (
-            f"{first} and {second} may conflict, on {one!r} and {other!r}: no more "
-            f"than {short(high)} is reached by both"
-        )
-        measures = [Measure(most, float(high))]
-    return Answer(
-        "FT201",
-        f"{first} and {second}",
-        sentence,
-        found.state,
-        isinstance(found.state, Witness),
-        severity="info",
-        rules=pair,
-        region=region,
-        measures=tuple(measures),
-    )
+    both, state = f"{first} and {second}", found.state
+    most = Measure("highest common level at most", float(high))
+    if not isinstance(state, Witness):
+        text = f"{both} may conflict, on {one!r} and {other!r}: no more than "
+        text += f"{short(high)} is reached by both"
+        return note("FT201", both, text, state, rules=pair, measures=(most,))
+    text = f"{both} conflict: both reach {level_reached(found)} at one input, "
+    text += f"and say {one!r} and {other!r}"
+    exact = str(low) if low == high else None
+    measures: tuple[Measure, ...]
+    measures = (Measure("highest common level", float(low), exact),)
+    if high - low > NEARLY:
+        measures = (Measure("highest common level at least", float(low)), most)
+    conflict = finding("FT201", both, text, state, rules=pair, measures=measures)
+    return replace(conflict, region=state.region)
 
 
 def level_reached(found: JointMaximum) -> str:
@@ -386,14 +337,10 @@ def _rest_of_conflicts(
         more = counted(hidden, "more pair")
         parts.append(f"{more} of rules may reach {level}, not listed")
     means = "products" if compared.is_product else "minima"
-    return Answer(
-        "FT201",
-        "pairs of rules",
-        "; ".join(parts),
-        Proved(f"the largest {means} of degrees were found on each axis"),
-        bool(hidden),
-        measures=(
-            Measure("pairs that never do", clean),
-            Measure("pairs not listed", hidden),
-        ),
+    proof = Proved(f"the largest {means} of degrees were found on each axis")
+    measures = (
+        Measure("pairs that never do", clean),
+        Measure("pairs not listed", hidden),
     )
+    of = finding if hidden else note
+    return of("FT201", "pairs of rules", "; ".join(parts), proof, measures=measures)
