@@ -50,8 +50,8 @@ from .findings.records import VerbResult as VerbResult
 from .findings.results import read_results as read_results
 from .findings.results import with_results as with_results
 from .findings.subject import AuditRows as AuditRows
+from .findings.subject import AuditView as AuditView
 from .findings.subject import Material as Material
-from .findings.views import AuditView as AuditView
 from .findings.views import view as view
 from .recheck import recheck_files as recheck_files
 from .recheck.outcomes import CannotRunError as CannotRunError

@@ -164,7 +164,7 @@ def _concerned(answer: Answer, scene: Scene) -> list[str]:
     numbers = [k for k in answer.rules if 0 < k <= len(rules)]
     items: list[str] = []
     for k in numbers[:6]:
-        name = viewed.rule_names[k - 1] if viewed.rule_names else f"rule {k}"
+        name = viewed.rule_name(k)
         items.append(part("concerned_rule", k, name, rules[k - 1], classes))
     if len(numbers) > 6:
         items.append(f"and {counted(len(numbers) - 6, 'more rule')}")

@@ -34,8 +34,8 @@ from fuzzytree.auditing.findings.records import (
     SourceFile,
     digest_of,
 )
-from fuzzytree.auditing.findings.subject import AuditRows, Subject
-from fuzzytree.auditing.findings.views import AuditView, view
+from fuzzytree.auditing.findings.subject import AuditRows, AuditView, Subject
+from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import (
     Document,
     FuzzyTree,
@@ -171,21 +171,8 @@ def _run_view(
     progress = _Progress([*found.declined])
     if found.rules is None:
         return progress
-    subject = Subject(
-        rules=found.rules,
-        policy=found.policy,
-        domain=found.domain,
-        settings=settings,
-        clock=clock,
-        tree=found.tree,
-        raw=found.raw,
-        system=found.system,
-        rows=rows,
-        rule_names=found.rule_names,
-        declined=found.declined,
-        is_whole=found.is_whole,
-        bounds=found.bounds,
-    )
+    facts = msgspec.structs.asdict(found)
+    subject = Subject(**facts, settings=settings, clock=clock, rows=rows)
     _run_all([*_tasks(wanted, row)], subject, clock, progress)
     return progress
 

@@ -118,8 +118,8 @@ def questions(subject: Subject) -> Iterator[Convention]:
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1)
         >>> box = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in tree.inputs))
-        >>> seen = view(tree, box)
-        >>> subject = Subject(seen.rules, seen.policy, box, AuditSettings(), Clock())
+        >>> facts = msgspec.structs.asdict(view(tree, box))
+        >>> subject = Subject(**facts, settings=AuditSettings(), clock=Clock())
         >>> [question.name for question in questions(subject)][:3]
         ['ties', 'missing values', 'infinite values']
     """

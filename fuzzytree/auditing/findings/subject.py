@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Final, TypeVar
 
 import msgspec
@@ -59,46 +59,61 @@ class Material(msgspec.Struct, frozen=True, eq=False):
     given: tuple[LoadedResult, ...] = ()
 
 
-class Subject(msgspec.Struct, frozen=True, eq=False):
-    """A model as it is audited.
+class AuditView(msgspec.Struct, frozen=True, eq=False):
+    """A model's rules as they are audited.
 
     Attributes:
-        rules: The rules: of a tree its relative rules, which decide as it does; of a
-            system a view of it, whose classes are the texts of conclusions.
-        policy: How the rules decide.
-        domain: The domain of all questions.
-        settings: The thresholds.
-        clock: How much time is left.
-        tree: The tree that the rules come from.
-        raw: The tree's raw rules, if it has fitted sets.
-        system: The system that the rules are a view of.
-        rows: The user's rows.
-        rule_names: Texts such as `rule 2 of block 1` for the rules of a system, one for
-            each rule; empty where rules are simply numbered.
-        declined: What the view could not take over, as answers.
-        is_whole: Whether no rule is left out of the view that may fire. Otherwise what
-            no rule of it covers may be covered all the same, and a term that no rule of
-            it uses may be used.
-        bounds: Lower and upper rules; None if the rules are exact as they stand here.
+        rules: The rules as people read them, without weights, each inexact curve
+            as its lower bound; None if not one rule of a system could be
+            taken over.
+        policy: How they decide.
+        domain: The domain: where inputs are moved into their range, not
+            beyond it.
+        tree: The tree they come from.
+        raw: Its raw rules, if it has fitted sets.
+        system: The system they come from.
+        rule_names: Such as `rule 2 of block 1` for each rule; empty where rules
+            are simply numbered.
+        numbers: The number in the model of each rule, from 1, over all blocks.
+        declined: What was left out, and why; and rules that can never fire.
+        left_out: The number in the model of each rule that is named there.
+        is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
+            the view fires another one may.
+        bounds: The rules from below and from above; None if they are plain.
     """
 
-    rules: RuleBase
+    rules: RuleBase | None
     policy: Policy
     domain: Domain
-    settings: AuditSettings
-    clock: Clock
     tree: FuzzyTree | None = None
     raw: RuleBase | None = None
     system: FuzzySystem | None = None
-    rows: AuditRows | None = None
     rule_names: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
     declined: tuple[Answer, ...] = ()
     is_whole: bool = True
     bounds: BoundedRules | None = None
+    left_out: Mapping[str, int] = {}
 
     def rule_name(self, number: int) -> str:
         """Return what messages call a rule."""
         return self.rule_names[number - 1] if self.rule_names else f"rule {number}"
+
+
+class Subject(AuditView, frozen=True, eq=False, kw_only=True):
+    """A model as the families of questions receive it.
+
+    Attributes:
+        rules: As in a view, at least one.
+        settings: The thresholds.
+        clock: How much time is left.
+        rows: The user's rows.
+    """
+
+    rules: RuleBase
+    settings: AuditSettings
+    clock: Clock
+    rows: AuditRows | None = None
 
 
 _MOST: Final = 0.25  # of the time that is left, for one question

@@ -15,7 +15,7 @@ their curves and numbers, is not part of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import msgspec
 
@@ -23,7 +23,8 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved
 from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Policy
-from fuzzytree.auditing.findings.rule_bounds import BoundedRules, bounded_rules
+from fuzzytree.auditing.findings.rule_bounds import bounded_rules
+from fuzzytree.auditing.findings.subject import AuditView
 from fuzzytree.auditing.findings.system_conditions import (
     MOST_QUESTIONS,
     NORMS,
@@ -52,43 +53,6 @@ from fuzzytree.model import (
     questions,
 )
 from fuzzytree.semantics import as_rules, rules_from_tree
-
-
-class AuditView(msgspec.Struct, frozen=True, eq=False):
-    """A model's rules as they are audited.
-
-    Attributes:
-        rules: The rules as people read them, without weights, each inexact curve
-            as its lower bound; None if not one rule of a system could be
-            taken over.
-        policy: How they decide.
-        domain: The domain: where inputs are moved into their range, not
-            beyond it.
-        tree: The tree they come from.
-        raw: Its raw rules, if it has fitted sets.
-        system: The system they come from.
-        rule_names: Such as `rule 2 of block 1` for each rule; empty where rules
-            are simply numbered.
-        numbers: The number in the model of each rule, from 1, over all blocks.
-        declined: What was left out, and why; and rules that can never fire.
-        left_out: The number in the model of each rule that is named there.
-        is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
-            the view fires another one may.
-        bounds: The rules from below and from above; None if they are plain.
-    """
-
-    rules: RuleBase | None
-    policy: Policy
-    domain: Domain
-    tree: FuzzyTree | None = None
-    raw: RuleBase | None = None
-    system: FuzzySystem | None = None
-    rule_names: tuple[str, ...] = ()
-    numbers: tuple[int, ...] = ()
-    declined: tuple[Answer, ...] = ()
-    is_whole: bool = True
-    bounds: BoundedRules | None = None
-    left_out: Mapping[str, int] = {}
 
 
 def view(model: Document, domain: Domain) -> AuditView:

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.auditing.findings.records import Answer, Audit
-from fuzzytree.auditing.findings.views import AuditView
+from fuzzytree.auditing.findings.subject import AuditView
 from fuzzytree.model import FuzzySystem
 from fuzzytree.semantics.inference import infer
 

@@ -50,7 +50,17 @@ def _asked(
     base = _base(*rules, conjunction=conjunction)
     box = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
     policy = Policy(conjunction, decision)  # type: ignore[arg-type]
-    return [*answers(Subject(base, policy, box, AuditSettings(), Clock(30.0)))]
+    return [
+        *answers(
+            Subject(
+                rules=base,
+                policy=policy,
+                domain=box,
+                settings=AuditSettings(),
+                clock=Clock(30.0),
+            )
+        )
+    ]
 
 
 def _found(given: list[Answer], code: str) -> dict[tuple[int, ...], Answer]:
@@ -156,7 +166,11 @@ def test_where_all_rules_take_part_only_firing_is_tested() -> None:
 
 def _subject(base: RuleBase, clock: Clock) -> Subject:
     return Subject(
-        base, Policy("min", "strongest"), unit_domain(base), AuditSettings(), clock
+        rules=base,
+        policy=Policy("min", "strongest"),
+        domain=unit_domain(base),
+        settings=AuditSettings(),
+        clock=clock,
     )
 
 

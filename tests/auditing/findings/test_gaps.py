@@ -40,7 +40,13 @@ def _asked(
     box = Domain((DomainSide("x", 0.0, 4.0),))
     policy = Policy("min", "strongest", uncovered)
     subject = Subject(
-        base, policy, box, AuditSettings(), Clock(30.0), rows=rows, is_whole=is_whole
+        rules=base,
+        policy=policy,
+        domain=box,
+        settings=AuditSettings(),
+        clock=Clock(30.0),
+        rows=rows,
+        is_whole=is_whole,
     )
     return [*answers(subject)]
 

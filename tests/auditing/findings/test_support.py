@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
@@ -60,21 +60,9 @@ def subject_of(
 ) -> Subject:
     found = view(model, domain_of(model))
     assert found.rules is not None
-    return Subject(
-        found.rules,
-        found.policy,
-        found.domain,
-        settings or AuditSettings(rows=500),
-        Clock(),
-        found.tree,
-        found.raw,
-        found.system,
-        rows,
-        found.rule_names,
-        found.declined,
-        found.is_whole,
-        found.bounds,
-    )
+    facts = asdict(found)
+    settings = settings or AuditSettings(rows=500)
+    return Subject(**facts, settings=settings, clock=Clock(), rows=rows)
 
 
 def queries(subject: Subject) -> dict[str, Answer]:

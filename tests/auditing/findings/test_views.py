@@ -10,8 +10,9 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.findings.subject import AuditView
 from fuzzytree.auditing.findings.system_conditions import MOST_QUESTIONS, MOST_WAYS
-from fuzzytree.auditing.findings.views import AuditView, view
+from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import (
     Activation,
     And,
