@@ -38,6 +38,7 @@ from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import State
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import AuditSettings
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import (
     Clause,
     Conjunction,
@@ -251,7 +252,10 @@ def whole(name: str, budget_s: float) -> str:
     clock = Clock(budget_s, now=time.process_time)
     start, wall = time.process_time(), time.perf_counter()
     found = audit(
-        base, domain=box, settings=AuditSettings(budget_s=budget_s), clock=clock
+        Material(base),
+        domain=box,
+        settings=AuditSettings(budget_s=budget_s),
+        clock=clock,
     )
     taken, wall = time.process_time() - start, time.perf_counter() - wall
     states = Counter(type(one.state).__name__ for one in found.answers)

@@ -493,19 +493,17 @@ def audit(
     from fuzzytree import auditing
     from fuzzytree.auditing import (
         AuditDomain,
-        AuditSelection,
         AuditSettings,
         Clock,
         Material,
         check_settings,
         domain_of,
         limited,
-        with_results,
     )
 
     chosen = settings or AuditSettings()
     check_settings(chosen)
-    where, wanted = domain or AuditDomain(), selection or AuditSelection()
+    where = domain or AuditDomain()
     if not isinstance(model, Material):
         model = material(model, data=data, target=target)
     elif data is not None or target:
@@ -518,21 +516,15 @@ def audit(
         limited=where.limits,
         row=where.row,
     )
-    result = auditing.audit(
-        model.model,
-        rows=model.rows,
+    return auditing.audit(
+        model,
         domain=limited(box, where.limits, model.model),
-        settings=chosen,
-        select=wanted.select,
-        ignore=wanted.ignore,
-        clock=Clock(chosen.budget_s, report=progress),
-        file=model.file,
-        data=model.data,
         row=where.row,
-        accepted=wanted.accepted,
+        selection=selection,
+        settings=chosen,
+        clock=Clock(chosen.budget_s, report=progress),
         repeat=repeat,
     )
-    return with_results(result, model.given) if model.given else result
 
 
 def material(

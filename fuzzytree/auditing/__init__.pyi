@@ -48,7 +48,6 @@ from .findings.records import Severity as Severity
 from .findings.records import SourceFile as SourceFile
 from .findings.records import VerbResult as VerbResult
 from .findings.results import read_results as read_results
-from .findings.results import with_results as with_results
 from .findings.subject import AuditRows as AuditRows
 from .findings.subject import AuditView as AuditView
 from .findings.subject import Material as Material

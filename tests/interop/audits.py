@@ -15,7 +15,13 @@ from fuzzytree import LearningSettings, learn
 from fuzzytree.api.verbs import audited_rows
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.records import Answer, Audit, AuditSettings
+from fuzzytree.auditing.findings.records import (
+    Answer,
+    Audit,
+    AuditSelection,
+    AuditSettings,
+)
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.contracts import Document
 from tests.interop.corpus_fcl import FCL
@@ -72,7 +78,11 @@ def wines() -> Iterator[Case]:
         ("combined", learn(WINE, target="cultivar")),
     ):
         rows = audited_rows(WINE, tree, target="cultivar")
-        found = audit(tree, rows=rows, settings=SETTINGS, ignore=LEFT_OUT[:1])
+        found = audit(
+            Material(tree, rows=rows),
+            settings=SETTINGS,
+            selection=AuditSelection(ignore=LEFT_OUT[:1]),
+        )
         count = len(tree.leaves)
         yield Case(f"wine, {name} features", "tree", count, count, found)
 
@@ -86,7 +96,9 @@ def others() -> Iterator[Case]:
 
 
 def _case(name: str, kind: str, model: Document) -> Case:
-    found = audit(model, settings=SETTINGS, ignore=LEFT_OUT)
+    found = audit(
+        Material(model), settings=SETTINGS, selection=AuditSelection(ignore=LEFT_OUT)
+    )
     audited = set(view(model, found.domain).numbers)
     count = len(getattr(model, "rules", ()))
     return Case(name, kind, count, len(audited), found)

@@ -8,6 +8,8 @@ import pytest
 
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.findings.records import AuditSelection
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import FuzzySystem
 from tests.auditing.findings.grids import check_on_grid
@@ -39,7 +41,10 @@ def test_what_is_told_of_real_files_holds_on_a_grid(
         if seen.bounds is None or ways != {"general"} or len(system.rules) > 11:
             continue
         files += 1
-        found = audit(system, ignore=LEFT_OUT, select=["FT1", "FT2", "FT3"])
+        found = audit(
+            Material(system),
+            selection=AuditSelection(select=["FT1", "FT2", "FT3"], ignore=LEFT_OUT),
+        )
         checked += check_on_grid(
             system, found, seen, STEPS.get(len(found.domain.sides), 3)
         )

@@ -10,7 +10,8 @@ import pytest
 
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
-from fuzzytree.auditing.findings.records import AuditSettings
+from fuzzytree.auditing.findings.records import AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import recheck
 from fuzzytree.auditing.recheck.head import digest_of
 from fuzzytree.checking.converting import load_content
@@ -43,7 +44,9 @@ def test_audits_of_real_files_hold_and_their_numbers_cannot_be_edited(
         model = load_content(content.content, "m.yaml")
         file = model_file("m.yaml", content.content)
         found = audit(
-            model, file=file, ignore=LEFT_OUT, settings=AuditSettings(budget_s=3.0)
+            Material(model, file=file),
+            settings=AuditSettings(budget_s=3.0),
+            selection=AuditSelection(ignore=LEFT_OUT),
         )
         text = msgspec.json.encode(found)
         report = recheck(text, content.content, ("a.json", "m.yaml"))

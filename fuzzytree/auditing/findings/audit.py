@@ -7,7 +7,7 @@ import hashlib
 import importlib
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple, cast
 
 import msgspec
@@ -19,7 +19,6 @@ from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
 from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.locations import (
-    ModelFile,
     locations_of,
     with_ids,
     writable,
@@ -29,12 +28,13 @@ from fuzzytree.auditing.findings.records import (
     LIMITS,
     Answer,
     Audit,
+    AuditSelection,
     AuditSettings,
     Policy,
     SourceFile,
     digest_of,
 )
-from fuzzytree.auditing.findings.subject import AuditRows, AuditView, Subject
+from fuzzytree.auditing.findings.subject import AuditView, Material, Subject
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import (
     Document,
@@ -54,18 +54,13 @@ _TOO_LARGE = "it needs more memory than there is"
 
 
 def audit(
-    model: Document,
+    material: Material,
     *,
-    rows: AuditRows | None = None,
     domain: Domain | None = None,
-    settings: AuditSettings | None = None,
-    select: Sequence[str] = (),
-    ignore: Sequence[str] = (),
-    clock: Clock | None = None,
-    file: ModelFile | None = None,
-    data: SourceFile | None = None,
     row: Mapping[str, float] | None = None,
-    accepted: Collection[str] = (),
+    selection: AuditSelection | None = None,
+    settings: AuditSettings | None = None,
+    clock: Clock | None = None,
     repeat: str = "",
 ) -> Audit:
     """Answer every question about a model.
@@ -74,17 +69,12 @@ def audit(
     kept, and `unasked` lists the rest.
 
     Args:
-        model: The model.
-        rows: The user's rows.
+        material: The model, its file and the user's rows.
         domain: The domain; the model's ranges by default.
-        settings: The thresholds.
-        select: Prefixes of the codes to answer; all by default.
-        ignore: Prefixes of codes to leave out.
-        clock: The budget; that of the settings by default.
-        file: The file of the model, for places.
-        data: The table that the rows come from.
         row: A row whose nearest other decision is also sought.
-        accepted: Ids of findings that a baseline accepts.
+        selection: The codes to answer; all by default.
+        settings: The thresholds.
+        clock: The budget; that of the settings by default.
         repeat: The command that repeats this audit.
 
     Raises:
@@ -92,38 +82,32 @@ def audit(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> audit(random_tree(1), select=["FT501"]).is_complete
+        >>> counts = AuditSelection(select=["FT501"])
+        >>> audit(Material(random_tree(1)), selection=counts).is_complete
         True
     """
-    settings = settings or AuditSettings()
+    model, rows, file = material.model, material.rows, material.file
+    selection, settings = selection or AuditSelection(), settings or AuditSettings()
     check_settings(settings)
-    wanted = chosen_codes(select, ignore)
-    domain = domain or domain_of(model)
-    clock = clock or Clock(settings.budget_s)
+    wanted = chosen_codes(selection.select, selection.ignore)
     if row is not None:
         _check_row(row, inputs_of(model))
-    viewed = view(model, domain)
-    progress = _run_view(viewed, rows, row, settings, clock, wanted)
-    kept = sorted(
-        (one for one in progress.answers if one.code in wanted),
-        key=lambda one: one.code,
-    )
-    bounds = viewed.bounds
-    whole = (viewed.rules, viewed.raw) if bounds is None else (bounds.lower,)
-    representations = [rules for rules in whole if rules is not None]
-    curves = {name: one.key for name, one in bounds.terms.items()} if bounds else {}
-    answers = tuple(
-        _placed(one, viewed, model, file, repeat)
-        for one in with_ids(kept, representations, curves)
-    )
+    viewed = view(model, domain or domain_of(model))
+    progress = _Progress([*viewed.declined], {})
+    if viewed.rules is not None:
+        clock = clock or Clock(settings.budget_s)
+        facts = msgspec.structs.asdict(viewed)
+        subject = Subject(**facts, settings=settings, clock=clock, rows=rows)
+        _run_all([*_tasks(wanted, row)], subject, clock, progress)
+    answers = tuple(_located(progress.answers, wanted, viewed, material, repeat))
     ids = {one.id for one in answers if one.is_finding}
-    found = Audit(
+    result = Audit(
         version=version(),
         model=model.name,
         form=_form(model),
         fingerprint=fingerprint(model),
         file=source_of(file.name, file.content) if file else None,
-        data=data,
+        data=material.data,
         rows=0 if rows is None else rows.values.shape[1],
         policy=viewed.policy,
         domain=viewed.domain,
@@ -132,12 +116,13 @@ def audit(
         unasked=tuple(_unasked(viewed.policy, wanted, progress)),
         limits=LIMITS,
         is_complete=not progress.cut,
-        accepted=tuple(sorted(ids.intersection(accepted))),
+        accepted=tuple(sorted(ids.intersection(selection.accepted))),
+        results=tuple(one.result for one in material.given),
         numbers=() if _is_plain(viewed.numbers) else viewed.numbers,
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
-    found = msgspec.json.decode(msgspec.json.encode(found), type=Audit)
-    return msgspec.structs.replace(found, digest=digest_of(found))
+    result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
+    return msgspec.structs.replace(result, digest=digest_of(result))
 
 
 def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
@@ -159,40 +144,16 @@ def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
         raise ValueError(f"the row has no value of {', '.join(map(repr, absent))}")
 
 
-def _run_view(
-    found: AuditView,
-    rows: AuditRows | None,
-    row: Mapping[str, float] | None,
-    settings: AuditSettings,
-    clock: Clock,
-    wanted: set[str],
-) -> _Progress:
-    """Run all families on a view; none if it has no rule."""
-    progress = _Progress([*found.declined])
-    if found.rules is None:
-        return progress
-    facts = msgspec.structs.asdict(found)
-    subject = Subject(**facts, settings=settings, clock=clock, rows=rows)
-    _run_all([*_tasks(wanted, row)], subject, clock, progress)
-    return progress
-
-
 def source_of(name: str, content: bytes) -> SourceFile:
     """Return the name of a file and the SHA-256 of its bytes."""
     return SourceFile(writable(name), hashlib.sha256(content).hexdigest())
 
 
-class _Progress:
-    """The answers so far, and the codes that were cut short.
+class _Progress(NamedTuple):
+    """The answers so far, and by code why it was cut short or not begun."""
 
-    Attributes:
-        answers: All of them.
-        cut: Why a code was cut short or not begun, by code.
-    """
-
-    def __init__(self, answers: list[Answer]) -> None:
-        self.answers = answers
-        self.cut: dict[str, str] = {}
+    answers: list[Answer]
+    cut: dict[str, str]
 
 
 class _Task(NamedTuple):
@@ -245,12 +206,12 @@ def _run_all(
                     if _is_late(answer):
                         progress.cut[answer.code] = why
         except OutOfTimeError:
-            progress.cut |= dict.fromkeys(task.codes, why)
+            progress.cut.update(dict.fromkeys(task.codes, why))
         except MemoryError:
-            progress.cut |= dict.fromkeys(task.codes, _TOO_LARGE)
+            progress.cut.update(dict.fromkeys(task.codes, _TOO_LARGE))
         except KeyboardInterrupt:
             rest = [code for one in tasks[position:] for code in one.codes]
-            progress.cut |= dict.fromkeys(rest, INTERRUPTED)
+            progress.cut.update(dict.fromkeys(rest, INTERRUPTED))
             return
 
 
@@ -285,22 +246,28 @@ def _unasked(policy: Policy, wanted: set[str], progress: _Progress) -> Iterator[
             yield f"{name}: nothing in this model that it applies to"
 
 
-def _placed(
-    answer: Answer,
+def _located(
+    answers: Iterable[Answer],
+    wanted: Collection[str],
     viewed: AuditView,
-    model: Document,
-    file: ModelFile | None,
+    material: Material,
     repeat: str,
-) -> Answer:
-    """Return an answer with its places and the command that finds it again."""
-    numbers = [viewed.numbers[number - 1] for number in answer.rules]
-    if not numbers and answer.subject in viewed.left_out:
-        numbers = [viewed.left_out[answer.subject]]
-    return msgspec.structs.replace(
-        answer,
-        places=locations_of(answer, model, file, numbers),
-        repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
-    )
+) -> Iterator[Answer]:
+    """Yield the wanted answers with ids, places and the commands that repeat them."""
+    kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
+    bounds = viewed.bounds
+    whole = (viewed.rules, viewed.raw) if bounds is None else (bounds.lower,)
+    representations = [rules for rules in whole if rules is not None]
+    curves = {name: one.key for name, one in bounds.terms.items()} if bounds else {}
+    for answer in with_ids(kept, representations, curves):
+        numbers = [viewed.numbers[number - 1] for number in answer.rules]
+        if not numbers and answer.subject in viewed.left_out:
+            numbers = [viewed.left_out[answer.subject]]
+        yield msgspec.structs.replace(
+            answer,
+            places=locations_of(answer, material.model, material.file, numbers),
+            repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
+        )
 
 
 def _is_plain(numbers: Sequence[int]) -> bool:

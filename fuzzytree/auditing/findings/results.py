@@ -12,7 +12,7 @@ import msgspec
 from msgspec import inspect
 
 from fuzzytree.auditing.findings.locations import writable
-from fuzzytree.auditing.findings.records import Audit, SourceFile, VerbResult, digest_of
+from fuzzytree.auditing.findings.records import SourceFile, VerbResult
 from fuzzytree.checking import Stability
 from fuzzytree.errors import ReadError
 from fuzzytree.files import PathLike, read_bounded
@@ -34,13 +34,6 @@ class LoadedResult(NamedTuple):
 
     result: VerbResult
     found: Agreement | Stability
-
-
-def with_results(audit: Audit, given: Iterable[LoadedResult]) -> Audit:
-    """Return an audit that names the results that it is read beside."""
-    results = tuple(one.result for one in given)
-    audit = msgspec.structs.replace(audit, results=results)
-    return msgspec.structs.replace(audit, digest=digest_of(audit))
 
 
 def read_results(

@@ -19,8 +19,14 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
-from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditSettings, digest_of
-from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.records import (
+    LIMITS,
+    Audit,
+    AuditSelection,
+    AuditSettings,
+    digest_of,
+)
+from fuzzytree.auditing.findings.subject import AuditRows, Material
 from fuzzytree.errors import TableError
 from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.testing import random_system, random_tree
@@ -54,7 +60,7 @@ def steep(*order: int) -> RuleBase:
 
 
 def test_each_code_is_answered_or_listed_as_not_run() -> None:
-    found = audit(grip(), domain=FAR)
+    found = audit(Material(grip()), domain=FAR)
     results = {one.code for one in found.answers}
     results |= {text.split()[0] for text in found.unasked}
     assert results >= AUDITED
@@ -81,13 +87,13 @@ def test_every_function_that_answers_for_a_subject_is_in_the_table() -> None:
 
 
 def test_every_family_answers_with_its_own_codes() -> None:
-    found = audit(grip(), domain=FAR)
+    found = audit(Material(grip()), domain=FAR)
     known = {code for family in FAMILIES for code in family.codes}
     assert {one.code for one in found.answers} <= known
 
 
 def test_an_audit_read_from_its_json_is_the_same_and_keeps_its_digest() -> None:
-    found = audit(grip(), domain=FAR)
+    found = audit(Material(grip()), domain=FAR)
     again = msgspec.json.decode(msgspec.json.encode(found), type=Audit)
     assert again == found
     assert digest_of(again) == found.digest
@@ -99,24 +105,30 @@ def test_an_audit_read_from_its_json_is_the_same_and_keeps_its_digest() -> None:
     ids=str,
 )
 def test_an_edit_changes_the_digest(edit: dict[str, object]) -> None:
-    found = audit(grip(), domain=FAR)
+    found = audit(Material(grip()), domain=FAR)
     assert digest_of(replace(found, **edit)) != found.digest
 
 
 def test_the_same_audit_has_the_same_bytes() -> None:
-    one, other = (msgspec.json.encode(audit(grip(), domain=FAR)) for _ in range(2))
+    one, other = (
+        msgspec.json.encode(audit(Material(grip()), domain=FAR)) for _ in range(2)
+    )
     assert one == other
 
 
 def test_an_unreachable_leaf_is_found_and_gone_where_it_is_reached() -> None:
-    found = audit(grip(), domain=FAR, select=["FT101"])
+    found = audit(
+        Material(grip()), domain=FAR, selection=AuditSelection(select=["FT101"])
+    )
     assert [one.rules for one in found.findings] == [(1,)]
     wide = Domain((DomainSide("force", 0.0, 5.0), DomainSide("slip", 0.0, 1.0)))
-    assert not audit(grip(), domain=wide, select=["FT101"]).findings
+    assert not audit(
+        Material(grip()), domain=wide, selection=AuditSelection(select=["FT101"])
+    ).findings
 
 
 def test_answers_stand_in_the_order_of_their_codes_and_have_their_own_ids() -> None:
-    found = audit(grip(), domain=FAR)
+    found = audit(Material(grip()), domain=FAR)
     codes = [one.code for one in found.answers]
     assert codes == sorted(codes)
     ids = [one.id for one in found.answers]
@@ -126,15 +138,23 @@ def test_answers_stand_in_the_order_of_their_codes_and_have_their_own_ids() -> N
 
 def test_an_id_says_what_a_rule_says_and_not_where_it_stands() -> None:
     box = Domain((DomainSide("x", 0.0, 2.0),))
-    one = audit(steep(0, 1, 2), domain=box, select=["FT101"])
-    other = audit(steep(2, 1, 0), domain=box, select=["FT101"])
+    one = audit(
+        Material(steep(0, 1, 2)), domain=box, selection=AuditSelection(select=["FT101"])
+    )
+    other = audit(
+        Material(steep(2, 1, 0)), domain=box, selection=AuditSelection(select=["FT101"])
+    )
     assert [a.rules for a in one.findings] == [(3,)]
     assert [a.rules for a in other.findings] == [(1,)]
     assert one.findings[0].id == other.findings[0].id
 
 
 def test_codes_that_are_left_out_are_reported() -> None:
-    found = audit(grip(), domain=FAR, select=["FT10"], ignore=["FT102"])
+    found = audit(
+        Material(grip()),
+        domain=FAR,
+        selection=AuditSelection(select=["FT10"], ignore=["FT102"]),
+    )
     codes = {one.code for one in found.answers}
     assert "FT101" in codes
     assert all(code.startswith("FT10") and code != "FT102" for code in codes)
@@ -145,7 +165,9 @@ def test_codes_that_are_left_out_are_reported() -> None:
 def test_a_spent_budget_leaves_the_rest_unanswered_and_says_so() -> None:
     times = itertools.chain([0.0], itertools.repeat(10.0))
     clock = Clock(1.0, now=lambda: next(times))
-    found = audit(grip(), domain=FAR, clock=clock, settings=AuditSettings(budget_s=1.0))
+    found = audit(
+        Material(grip()), domain=FAR, clock=clock, settings=AuditSettings(budget_s=1.0)
+    )
     assert not found.is_complete
     assert not found.was_interrupted
     why = "not run: the budget of 1 s is spent"
@@ -154,12 +176,12 @@ def test_a_spent_budget_leaves_the_rest_unanswered_and_says_so() -> None:
 
 @pytest.mark.heavy
 def test_a_budget_that_ends_midway_keeps_what_was_answered() -> None:
-    whole = audit(grip(), domain=FAR)
+    whole = audit(Material(grip()), domain=FAR)
     counts = set[int]()
     for ticks in (1, 60, 400, 1000, 2000, 4000):
         times = itertools.chain(itertools.repeat(0.0, ticks), itertools.repeat(10.0))
         clock = Clock(1.0, now=functools.partial(next, times))
-        part = audit(grip(), domain=FAR, clock=clock)
+        part = audit(Material(grip()), domain=FAR, clock=clock)
         # A single family may count open pairs that the whole audit does not.
         known = {one.id for one in part.answers if one.rules or one.terms}
         assert known <= {one.id for one in whole.answers}
@@ -168,9 +190,15 @@ def test_a_budget_that_ends_midway_keeps_what_was_answered() -> None:
 
 
 def test_accepted_findings_are_no_longer_open() -> None:
-    found = audit(grip(), domain=FAR, select=["FT101"])
+    found = audit(
+        Material(grip()), domain=FAR, selection=AuditSelection(select=["FT101"])
+    )
     name = found.findings[0].id
-    again = audit(grip(), domain=FAR, select=["FT101"], accepted=[name, "FT101-0"])
+    again = audit(
+        Material(grip()),
+        domain=FAR,
+        selection=AuditSelection(select=["FT101"], accepted=[name, "FT101-0"]),
+    )
     assert again.accepted == (name,)
     assert again.open_findings == ()
     assert again.findings == found.findings
@@ -229,7 +257,7 @@ def test_rows_without_a_class_of_the_model_are_refused(folder: Path) -> None:
 )
 def test_a_wrong_row_is_one_sentence(row: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
-        audit(grip(), domain=FAR, row=row)
+        audit(Material(grip()), domain=FAR, row=row)
     assert str(caught.value) == message
 
 
@@ -237,20 +265,29 @@ def test_a_wrong_row_is_one_sentence(row: dict[str, float], message: str) -> Non
 def test_a_system_is_audited_as_a_view(seed: int) -> None:
     system = random_system(seed)
     box = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in system.columns))
-    found = audit(system, domain=box, select=["FT4", "FT5"])
+    found = audit(
+        Material(system), domain=box, selection=AuditSelection(select=["FT4", "FT5"])
+    )
     assert found.form == "system"
     assert digest_of(found) == found.digest
 
 
 def test_a_tree_with_rows_counts_them() -> None:
     rows = AuditRows("rows", np.array([[3.0, 4.0], [0.0, 1.0]]))
-    assert audit(grip(), domain=FAR, rows=rows, select=["FT205"]).rows == 2
+    assert (
+        audit(
+            Material(grip(), rows=rows),
+            domain=FAR,
+            selection=AuditSelection(select=["FT205"]),
+        ).rows
+        == 2
+    )
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("seed", range(3))
 def test_every_random_tree_is_audited_to_its_end(seed: int) -> None:
-    found = audit(random_tree(seed), settings=AuditSettings(rows=500))
+    found = audit(Material(random_tree(seed)), settings=AuditSettings(rows=500))
     assert found.is_complete
     assert digest_of(found) == found.digest
     assert msgspec.json.decode(msgspec.json.encode(found), type=Audit) == found
@@ -263,7 +300,10 @@ def test_where_all_is_declined_the_audit_says_so() -> None:
     (block,) = tipper.blocks
     ors = (block.rules[0], block.rules[2])
     summed = replace(block, rules=ors, disjunction="algebraic sum")
-    found = audit(replace(tipper, blocks=(summed,)), select=["FT101"])
+    found = audit(
+        Material(replace(tipper, blocks=(summed,))),
+        selection=AuditSelection(select=["FT101"]),
+    )
     assert found.answers
     assert all(isinstance(one.state, Declined) for one in found.answers)
     assert found.unasked[0] == ("FT101 dead rule: all that it applies to was declined")

@@ -17,8 +17,9 @@ from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.bounded_arrangement import BoundedArrangement
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.records import Answer, AuditSelection, AuditSettings
 from fuzzytree.auditing.findings.rule_bounds import bounded_rules
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import (
     And,
@@ -95,7 +96,9 @@ def system_of(
 
 def results(system: FuzzySystem, code: str, **settings: float) -> list[Answer]:
     made = replace(AuditSettings(), **settings)
-    answers = audit(system, settings=made, select=[code]).answers
+    answers = audit(
+        Material(system), settings=made, selection=AuditSelection(select=[code])
+    ).answers
     return [one for one in answers if one.code == code]
 
 
@@ -289,7 +292,8 @@ def test_a_defect_is_found_where_it_is_planted_and_only_there(
 def sound(norm: TNorm) -> tuple[str, ...]:
     """Return the findings about the clean system."""
     answers = audit(
-        system_of(CLEAN, norm=norm, flat=FLAT), select=["FT1", "FT2", "FT401"]
+        Material(system_of(CLEAN, norm=norm, flat=FLAT)),
+        selection=AuditSelection(select=["FT1", "FT2", "FT401"]),
     ).answers
     return tuple(one.sentence for one in answers if one.is_finding)
 
@@ -381,7 +385,9 @@ def drawn_system(seed: int, norm: TNorm) -> FuzzySystem:
 @pytest.mark.parametrize("norm", NORMS)
 def test_answers_about_random_systems_are_true_on_a_grid(norm: TNorm) -> None:
     system = drawn_system(0, norm)
-    found = audit(system, select=["FT1", "FT2", "FT3"])
+    found = audit(
+        Material(system), selection=AuditSelection(select=["FT1", "FT2", "FT3"])
+    )
     assert check_on_grid(system, found, view(system, found.domain), 9) > 4
 
 
@@ -391,7 +397,9 @@ def test_answers_about_many_random_systems_are_true_on_a_grid(norm: TNorm) -> No
     checked = 0
     for seed in range(3, 15):
         system = drawn_system(seed, norm)
-        found = audit(system, select=["FT1", "FT2", "FT3"])
+        found = audit(
+            Material(system), selection=AuditSelection(select=["FT1", "FT2", "FT3"])
+        )
         checked += check_on_grid(system, found, view(system, found.domain), 25)
     assert checked > 100
 

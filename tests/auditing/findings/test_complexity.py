@@ -10,6 +10,8 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.complexity import depth
+from fuzzytree.auditing.findings.records import AuditSelection
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -30,7 +32,9 @@ RULES = RuleBase(
 
 
 def measures(model: RuleBase, domain: Domain | None = None) -> dict[str, str | float]:
-    (answer,) = audit(model, select=["FT501"], domain=domain).answers
+    (answer,) = audit(
+        Material(model), domain=domain, selection=AuditSelection(select=["FT501"])
+    ).answers
     return {one.name: one.exact or one.value for one in answer.measures}
 
 
@@ -88,7 +92,9 @@ def test_rules_that_ask_nothing_have_no_index() -> None:
 
 def test_the_depth_of_a_tree_is_its_longest_path() -> None:
     tree = random_tree(4, leaves=9)
-    (answer,) = audit(tree, select=["FT501"]).answers
+    (answer,) = audit(
+        Material(tree), selection=AuditSelection(select=["FT501"])
+    ).answers
     longest = max(len(rule.when) for rule in rules_from_tree(tree).rules)
     results = {one.name: one.value for one in answer.measures}
     assert results["depth of the tree"] == depth(tree) == longest

@@ -19,7 +19,8 @@ from fuzzytree.auditing.findings.configuration import (
     configuration,
     read_configuration,
 )
-from fuzzytree.auditing.findings.records import Audit, AuditSettings
+from fuzzytree.auditing.findings.records import Audit, AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.errors import ReadError
 from tests.cli.conftest import grip
 
@@ -121,7 +122,9 @@ def test_a_baseline_lies_beside_the_file_that_names_it(tmp_path: Path) -> None:
 def far() -> Audit:
     """Return an audit with one finding."""
     box = Domain((DomainSide("force", 3.0, 5.0), DomainSide("slip", 0.0, 1.0)))
-    return audit(grip(), domain=box, select=["FT101"])
+    return audit(
+        Material(grip()), domain=box, selection=AuditSelection(select=["FT101"])
+    )
 
 
 def test_a_baseline_that_was_written_is_read_and_accepts_all(tmp_path: Path) -> None:

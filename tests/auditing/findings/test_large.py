@@ -11,6 +11,7 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import Audit, AuditSettings
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import RuleBase
 from tests.auditing.engine.bases import random_base, unit_domain
 
@@ -32,7 +33,10 @@ def queries(name: str) -> tuple[Audit, float]:
     start = time.process_time()
     settings = AuditSettings(budget_s=BUDGET_S)
     found = audit(
-        LARGE[name], domain=unit_domain(LARGE[name]), settings=settings, clock=clock
+        Material(LARGE[name]),
+        domain=unit_domain(LARGE[name]),
+        settings=settings,
+        clock=clock,
     )
     return found, time.process_time() - start
 

@@ -17,7 +17,13 @@ from fuzzytree.auditing.findings.locations import (
     term_path,
     with_ids,
 )
-from fuzzytree.auditing.findings.records import Answer, FileLocation, TermName
+from fuzzytree.auditing.findings.records import (
+    Answer,
+    AuditSelection,
+    FileLocation,
+    TermName,
+)
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.checking.converting import format_of, read_content
 from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document
@@ -264,7 +270,9 @@ END_FUNCTION_BLOCK
         (model_file("brake.fcl", text), FileLocation("brake.fcl", 18, 3)),
         (written(model), None),
     ]:
-        found = audit(model, select=["FT101"], file=file)
+        found = audit(
+            Material(model, file=file), selection=AuditSelection(select=["FT101"])
+        )
         dead = next(one for one in found.answers if one.is_finding)
         assert dead.sentence == "rule 2 never fires: its weight is 0"
         assert len(dead.places) == 1

@@ -20,7 +20,8 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.pairs import level_reached
-from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.records import Answer, AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model import Conclusion, Is, Or, RuleBlock, SystemRule
 from fuzzytree.model.rulebase import (
     Band,
@@ -78,7 +79,11 @@ def answers_for(
     rules: RuleBase, code: str, settings: AuditSettings | None = None
 ) -> list[Answer]:
     settings = settings or AuditSettings(budget_s=5.0)
-    return [*audit(rules, select=[code], settings=settings).answers]
+    return [
+        *audit(
+            Material(rules), settings=settings, selection=AuditSelection(select=[code])
+        ).answers
+    ]
 
 
 def results(rules: RuleBase, code: str) -> list[str]:
@@ -303,7 +308,9 @@ def test_curves_that_agree_on_the_domain_only_are_the_same() -> None:
 
 def test_two_ways_of_one_rule_are_no_pair() -> None:
     system = system_of(block_of(Or((Is("a", "low"), Is("b", "low"))), Is("a", "high")))
-    (answer,) = audit(system, select=["FT106"]).answers
+    (answer,) = audit(
+        Material(system), selection=AuditSelection(select=["FT106"])
+    ).answers
     assert answer.sentence == (
         "no two rules have nearly the same antecedent, among 2 pairs"
     )
@@ -474,10 +481,17 @@ def test_only_conclusions_about_one_output_conflict(
     )
     empty = system_of(block_of(A_LOW))
     system = replace(empty, outputs=outputs, blocks=(RuleBlock(rules),))
-    assert len(audit(system, select=["FT201"]).findings) == count
+    assert (
+        len(
+            audit(Material(system), selection=AuditSelection(select=["FT201"])).findings
+        )
+        == count
+    )
     alike = replace(rules[1], when=rules[0].when)
     system = replace(empty, outputs=outputs, blocks=(RuleBlock((rules[0], alike)),))
-    (same,) = audit(system, select=["FT106"]).findings
+    (same,) = audit(
+        Material(system), selection=AuditSelection(select=["FT106"])
+    ).findings
     is_one = conclusions[0] == conclusions[1]
     assert same.severity == ("warning" if is_one else "info")
 
@@ -549,6 +563,10 @@ def test_many_clauses_that_matter_are_reported_up_to_a_number_and_counted(
 
 def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:
     rules = random_base(2, 4, 2, kind="points", odd=0.2, combinations=1)
-    made = audit(rules, select=["FT107"], settings=AuditSettings(budget_s=0.02))
+    made = audit(
+        Material(rules),
+        settings=AuditSettings(budget_s=0.02),
+        selection=AuditSelection(select=["FT107"]),
+    )
     states = {type(one.state) for one in made.answers}
     assert not made.is_complete or Bracket in states

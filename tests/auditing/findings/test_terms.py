@@ -10,7 +10,8 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, short
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.records import Answer, AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -48,7 +49,11 @@ def base(*terms: Term, high: float = 4.0) -> RuleBase:
 def found(
     rules: RuleBase, code: str, settings: AuditSettings | None = None
 ) -> list[Answer]:
-    return [*audit(rules, select=[code], settings=settings).findings]
+    return [
+        *audit(
+            Material(rules), settings=settings, selection=AuditSelection(select=[code])
+        ).findings
+    ]
 
 
 CLEAN = base(LOW, HIGH)
@@ -56,7 +61,7 @@ CLEAN = base(LOW, HIGH)
 
 @pytest.mark.parametrize("code", ["FT401", "FT402", "FT403", "FT404"])
 def test_a_clean_model_has_no_finding_about_terms(code: str) -> None:
-    (answer,) = audit(CLEAN, select=[code]).answers
+    (answer,) = audit(Material(CLEAN), selection=AuditSelection(select=[code])).answers
     assert not answer.is_finding
     assert isinstance(answer.state, Proved)
 
@@ -86,9 +91,13 @@ def test_a_step_at_an_open_lower_end_counts_from_above_only() -> None:
     spike = Term("spike", Points((0.0, 0.0), (1.0, 0.0)))
     domain = Domain((DomainSide("force", 0.0, 4.0),))
     rules = base(LOW, HIGH, spike)
-    assert not audit(rules, select=["FT401"], domain=domain).findings
+    assert not audit(
+        Material(rules), domain=domain, selection=AuditSelection(select=["FT401"])
+    ).findings
     opened = Domain((DomainSide("force", 0.0, 4.0, is_open=True),))
-    (answer,) = audit(rules, select=["FT401"], domain=opened).findings
+    (answer,) = audit(
+        Material(rules), domain=opened, selection=AuditSelection(select=["FT401"])
+    ).findings
     assert "'spike' of 'force' is empty" in answer.sentence
 
 
@@ -140,7 +149,10 @@ def test_a_defect_of_shape_is_reported(shape: Shape, text: str) -> None:
 
 def test_what_is_too_small_to_tell_is_counted() -> None:
     nearly = Band(0.0, 1.0, right=Flank(1.0, 3.0, (2.125, -1.125)))
-    made = audit(base(LOW, HIGH, Term("odd", nearly)), select=["FT402"])
+    made = audit(
+        Material(base(LOW, HIGH, Term("odd", nearly))),
+        selection=AuditSelection(select=["FT402"]),
+    )
     (answer,) = made.answers
     assert not answer.is_finding
     assert answer.measures[0].value == 1
@@ -188,7 +200,11 @@ def test_shares_too_near_to_the_setting_are_a_bracket() -> None:
     rules = base(one, other)
     states = [
         type(
-            audit(rules, select=["FT403"], settings=AuditSettings(overlap=at))
+            audit(
+                Material(rules),
+                settings=AuditSettings(overlap=at),
+                selection=AuditSelection(select=["FT403"]),
+            )
             .answers[0]
             .state
         )
@@ -199,7 +215,7 @@ def test_shares_too_near_to_the_setting_are_a_bracket() -> None:
 
 def test_many_pairs_are_reported_up_to_a_number_and_counted() -> None:
     terms = tuple(Term(f"t{n}", Points((n / 100, 4.0), (1.0, 0.0))) for n in range(8))
-    made = audit(base(*terms), select=["FT403"])
+    made = audit(Material(base(*terms)), selection=AuditSelection(select=["FT403"]))
     *results, rest = made.answers
     assert (len(results), rest.is_finding) == (20, True)
     assert rest.sentence == (
@@ -212,14 +228,18 @@ def test_curves_of_very_many_pieces_are_declined() -> None:
     values = tuple(float(n) for n in range(2100))
     many = Points(values, tuple(n % 2 / 1.0 for n in range(2100)))
     rules = base(Term("a", many), Term("b", many), high=1.0)
-    answer = audit(rules, select=["FT403"]).answers[0]
+    answer = audit(Material(rules), selection=AuditSelection(select=["FT403"])).answers[
+        0
+    ]
     assert isinstance(answer.state, Declined)
     assert answer.state.code == "FTD05"
 
 
 def test_a_domain_of_one_point_has_no_areas() -> None:
     made = audit(
-        CLEAN, select=["FT403"], domain=Domain((DomainSide("force", 1.0, 1.0),))
+        Material(CLEAN),
+        domain=Domain((DomainSide("force", 1.0, 1.0),)),
+        selection=AuditSelection(select=["FT403"]),
     )
     (answer,) = made.answers
     assert answer.sentence == (
@@ -249,7 +269,7 @@ def test_an_input_of_a_used_combination_is_used() -> None:
 
 def test_a_system_is_read_itself_and_not_its_view() -> None:
     system = system_of(block_of(A_LOW))
-    made = audit(system, select=["FT404"])
+    made = audit(Material(system), selection=AuditSelection(select=["FT404"]))
     results = [answer.sentence for answer in made.findings]
     assert all(text.startswith("no rule uses") for text in results)
 

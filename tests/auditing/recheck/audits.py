@@ -9,7 +9,8 @@ import msgspec
 
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
-from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.records import AuditSelection
+from fuzzytree.auditing.findings.subject import AuditRows, Material
 from fuzzytree.exporters import yaml
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import FuzzyTree
@@ -45,8 +46,11 @@ def audited(
     content = yaml.write(model).content
     file = model_file("grip.yaml", content)
     repeat = "fuzzytree audit grip.yaml"
-    options.setdefault("ignore", ["FT6"])
-    found = audit(model, file=file, repeat=repeat, rows=rows, **options)
+    wanted = AuditSelection(
+        select=options.pop("select", ()), ignore=options.pop("ignore", ["FT6"])
+    )
+    material = Material(model, file, rows, options.pop("data", None))
+    found = audit(material, selection=wanted, repeat=repeat, **options)
     return msgspec.json.encode(found), content
 
 

@@ -18,7 +18,8 @@ from fuzzytree.auditing.engine.states import Proved
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.codes import AUDITED
 from fuzzytree.auditing.findings.locations import model_file
-from fuzzytree.auditing.findings.records import Answer, Audit
+from fuzzytree.auditing.findings.records import Answer, Audit, AuditSelection
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import recheck
 from fuzzytree.exporters import yaml
 from fuzzytree.model import (
@@ -139,11 +140,10 @@ def audited(model: RuleBase | FuzzySystem, code: str) -> tuple[Audit, list[str]]
     """Return the audit of one question, and what the re-checker refuses of it."""
     content = yaml.write(model).content
     found = audit(
-        model,
-        select=[code],
+        Material(model, file=model_file("m.yaml", content)),
         clock=Clock(20.0),
-        file=model_file("m.yaml", content),
         repeat="fuzzytree audit m.yaml",
+        selection=AuditSelection(select=[code]),
     )
     text = msgspec.json.encode(found)
     return found, recheck(text, content, ("a.json", "m.yaml")).wrong

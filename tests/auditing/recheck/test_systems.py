@@ -12,6 +12,8 @@ import pytest
 
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
+from fuzzytree.auditing.findings.records import AuditSelection
+from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.audit_records import Audit
 from fuzzytree.auditing.recheck.enclosing import NORMS, bounds, hedged
@@ -156,8 +158,12 @@ def audited(model: FuzzySystem, **options: Any) -> tuple[bytes, bytes]:
     """Return the audit of a system and the file that it is of."""
     content = yaml.write(model).content
     file = model_file("tipper.yaml", content)
-    options.setdefault("ignore", ["FT6", "FT7"])
-    return msgspec.json.encode(audit(model, file=file, **options)), content
+    wanted = AuditSelection(
+        select=options.pop("select", ()), ignore=options.pop("ignore", ["FT6", "FT7"])
+    )
+    material = Material(model, file, options.pop("rows", None))
+    found = audit(material, selection=wanted, **options)
+    return msgspec.json.encode(found), content
 
 
 def wrong_of(facts: dict[str, Any], content: bytes) -> list[str]:
