@@ -20,11 +20,9 @@ from .onnx_compare import Differences as Differences
 from .onnx_compare import contents as contents
 from .onnx_compare import differences as differences
 from .onnx_compare import proto_differences as proto_differences
-from .onnx_ends import NUMBERS as NUMBERS
 from .onnx_ends import InputBlock as InputBlock
 from .onnx_ends import add_winner as add_winner
 from .onnx_ends import is_known as is_known
-from .onnx_ends import scalar as scalar
 from .onnx_graph import TREES as TREES
 from .onnx_graph import OnnxGraph as OnnxGraph
 from .onnx_rules import rules_graph as rules_graph

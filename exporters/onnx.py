@@ -136,7 +136,6 @@ def write_onnx(
         return write_system(
             model, opset=opset, ir=ir, outputs=outputs, facts=facts, verify=verify
         )
-    from fuzzytree.exporters.onnx_ends import NUMBERS
     from fuzzytree.numerics import losses
 
     lost = losses(model, dtype)
@@ -147,6 +146,7 @@ def write_onnx(
     )
     content: bytes = proto.SerializeToString(deterministic=True)
     if verify:
+        from fuzzytree.exporters.onnx_graph import NUMBERS
         from fuzzytree.exporters.onnx_session import prove
 
         is_exact = dtype == "float64" or (dtype == "mixed" and _is_tree(model))
@@ -250,11 +250,10 @@ def _model_proto(
     import numpy as np
     from onnx import TensorProto, helper
 
-    from fuzzytree.exporters.onnx_ends import NUMBERS
-    from fuzzytree.exporters.onnx_graph import OnnxGraph, model_proto
+    from fuzzytree.exporters.onnx_graph import NUMBERS, OnnxGraph, model_proto
 
     numbers = NUMBERS[dtype]
-    graph = OnnxGraph(opset, is_readable=readable)
+    graph = OnnxGraph(opset, numbers, is_readable=readable)
     columns = _columns(model, signature)
     axis = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.axis))
     degree = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
@@ -264,7 +263,7 @@ def _model_proto(
         "status": (TensorProto.INT64, ["rows"]),
         "strengths": (degree, ["rows", _rule_count(model)]),
     }
-    _fill(graph, model, dtype, columns, outputs, plain=plain)
+    _fill(graph, model, columns, outputs, plain=plain)
     return model_proto(
         graph,
         "tree" if _is_tree(model) else "rules",
@@ -279,7 +278,6 @@ def _model_proto(
 def _fill(
     graph: OnnxGraph,
     model: Model,
-    dtype: Dtype,
     columns: Sequence[str],
     outputs: Sequence[Output],
     *,
@@ -287,20 +285,18 @@ def _fill(
 ) -> None:
     """Add all nodes of a graph to a graph."""
     from fuzzytree.exporters import onnx_ends
-    from fuzzytree.exporters.onnx_ends import NUMBERS
 
-    numbers = NUMBERS[dtype]
     if isinstance(model, FuzzyTree):
         from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
 
         is_plain = plain or needs_plain(model)
-        frame = tree_graph(graph, model, numbers, columns, is_plain=is_plain)
-        onnx_ends.add_tree_outputs(graph, model, frame, outputs, numbers)
+        frame = tree_graph(graph, model, columns, is_plain=is_plain)
+        onnx_ends.add_tree_outputs(graph, model, frame, outputs)
     else:
         from fuzzytree.exporters.onnx_rules import rules_graph
 
-        frame, strengths = rules_graph(graph, model, numbers, columns)
-        onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs, numbers)
+        frame, strengths = rules_graph(graph, model, columns)
+        onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs)
 
 
 def _rule_count(model: Model) -> int:

@@ -13,9 +13,9 @@ import numpy as np
 from onnx import numpy_helper
 
 from fuzzytree.exporters.onnx_graph import OnnxGraph
-from fuzzytree.model import Dtype, FuzzyTree, Model, Part, RuleBase, Variable
-from fuzzytree.numerics import RealArray, RealKind, rounded
-from fuzzytree.semantics import BELOW_ONE, Status
+from fuzzytree.model import FuzzyTree, Model, Part, RuleBase, Variable
+from fuzzytree.numerics import RealKind, rounded
+from fuzzytree.semantics import Status
 
 
 class InputBlock(msgspec.Struct, frozen=True):
@@ -40,7 +40,6 @@ class InputBlock(msgspec.Struct, frozen=True):
 def axes(
     graph: OnnxGraph,
     model: Model,
-    numbers: Precision,
     columns: Sequence[str],
     *,
     is_flat: bool = False,
@@ -49,6 +48,7 @@ def axes(
 
     The source of the graph is of shape (rows, columns).
     """
+    numbers = graph.types
     if not model.variables:
         return InputBlock("", {}, _no_guard(graph, numbers.axis, is_flat=is_flat))
     source = graph.node("Transpose", graph.source, hint="columns", perm=[1, 0])
@@ -69,7 +69,7 @@ def axes(
         block = graph.node("Concat", *pieces, hint="variables", axis=0)
     names = [*direct, *(variable.name for variable in derived)]
     # 0 * x is 0 for a finite x and NaN otherwise, and NaN survives every addition.
-    zero = scalar(graph, 0.0, numbers.axis)
+    zero = graph.number(0.0, numbers.axis)
     zeros = graph.node("Mul", block, zero, hint="zero_if_finite")
     if len(names) > 1 or is_flat:
         with graph.about("guard"):
@@ -77,17 +77,16 @@ def axes(
     return InputBlock(block, {name: row for row, name in enumerate(names)}, zeros)
 
 
-def flat_guard(
-    graph: OnnxGraph, model: Model, numbers: Precision, columns: Sequence[str]
-) -> InputBlock:
+def flat_guard(graph: OnnxGraph, model: Model, columns: Sequence[str]) -> InputBlock:
     """Add the guard alone, for a model without combinations; rows stay rows."""
+    numbers = graph.types
     if not model.variables:
         return InputBlock("", {}, _no_guard(graph, numbers.axis, is_flat=True))
     source = graph.source
     if model.inputs != tuple(columns):
         chosen = graph.numbers([columns.index(name) for name in model.inputs], "rows")
         source = graph.node("Gather", source, chosen, hint="columns", axis=1)
-    zero = scalar(graph, 0.0, numbers.axis)
+    zero = graph.number(0.0, numbers.axis)
     zeros = graph.node("Mul", source, zero, hint="zero_if_finite")
     with graph.about("guard"):
         return InputBlock("", {}, graph.total(zeros, axis=1, keepdims=0))
@@ -103,20 +102,10 @@ def _direct(model: Model) -> tuple[str, ...]:
     return tuple(n for n in model.inputs if n in used or n not in guarded)
 
 
-def is_known(graph: OnnxGraph, frame: InputBlock, numbers: Precision) -> str:
+def is_known(graph: OnnxGraph, frame: InputBlock) -> str:
     """Return whether all values of a row are finite, in the guard's shape."""
-    zero = scalar(graph, 0.0, numbers.axis)
+    zero = graph.number(0.0, graph.types.axis)
     return graph.node("Equal", frame.guard, zero, hint="is_row_finite")
-
-
-def scalar(graph: OnnxGraph, value: float, kind: type[RealKind]) -> str:
-    """Return the name of a constant number."""
-    return graph.constant(np.array(value, kind), "number")
-
-
-def column(graph: OnnxGraph, values: RealArray, hint: str) -> str:
-    """Return the name of a constant with one number for each row of a block."""
-    return graph.constant(values.reshape(-1, 1), hint)
 
 
 def _no_guard(graph: OnnxGraph, kind: type[RealKind], *, is_flat: bool) -> str:
@@ -167,9 +156,9 @@ def _summand(
     value = graph.take(source, [columns.index(part.input) for part in parts])
     if any(part.centre for part in parts):  # x - 0.0 is x
         centres = rounded([part.centre for part in parts], kind)
-        value = graph.node("Sub", value, column(graph, centres, "centres"))
+        value = graph.node("Sub", value, graph.column(centres, "centres"))
     weights = rounded([part.weight for part in parts], kind)
-    return graph.node("Mul", value, column(graph, weights, "weights"))
+    return graph.node("Mul", value, graph.column(weights, "weights"))
 
 
 def _rows(graph: OnnxGraph, block: str, start: int, end: int) -> str:
@@ -177,38 +166,11 @@ def _rows(graph: OnnxGraph, block: str, start: int, end: int) -> str:
     return graph.node("Slice", block, first, last, graph.numbers([0], "axes"))
 
 
-class Precision(msgspec.Struct, frozen=True):
-    """The types in which a graph computes.
-
-    Attributes:
-        axis: Of input values and everything up to the cast.
-        degree: Of degrees and strengths.
-        below_one: The largest number below 1 of the degrees' type.
-    """
-
-    axis: type[RealKind]
-    degree: type[RealKind]
-    below_one: float
-
-    @property
-    def is_mixed(self) -> bool:
-        """Return whether degrees have another type than values."""
-        return self.axis is not self.degree
-
-
-NUMBERS: dict[Dtype, Precision] = {
-    "float64": Precision(np.float64, np.float64, BELOW_ONE),
-    "mixed": Precision(np.float64, np.float32, 1.0 - 2.0**-24),
-    "float32": Precision(np.float32, np.float32, 1.0 - 2.0**-24),
-}
-
-
 def add_tree_outputs(
     graph: OnnxGraph,
     tree: FuzzyTree,
     frame: InputBlock,
     outputs: Sequence[str],
-    numbers: Precision,
 ) -> None:
     """Add the outputs of a tree whose leaf numbers are named `rule`."""
     labels = [leaf.label for leaf in tree.leaves]
@@ -216,8 +178,8 @@ def add_tree_outputs(
         table = graph.texts([tree.semantics.missing or "", *labels], "labels")
         graph.node("Gather", table, "rule", axis=0, named="label")
     if "status" in outputs:
-        decided, missing = (_whole(graph, s) for s in (Status.DECIDED, Status.MISSING))
-        known = is_known(graph, frame, numbers)
+        decided, missing = (graph.whole(s) for s in (Status.DECIDED, Status.MISSING))
+        known = is_known(graph, frame)
         graph.node("Where", known, decided, missing, named="status")
 
 
@@ -227,20 +189,19 @@ def add_rule_outputs(
     frame: InputBlock,
     strengths: str,
     outputs: Sequence[str],
-    numbers: Precision,
 ) -> None:
     """Add the outputs of a rule base, given the strengths of no rule and of all."""
     winner = add_winner(graph, strengths)
     if "label" in outputs:
-        _add_label(graph, rules, frame, winner, numbers)
+        _add_label(graph, rules, frame, winner)
     if "status" in outputs:
-        _add_status(graph, frame, strengths, winner, numbers)
+        _add_status(graph, frame, strengths, winner)
     if "strengths" in outputs:
         ends = [graph.numbers([end], "end") for end in (1, 1 + len(rules.rules))]
         with graph.about("strengths"):
             real = graph.node("Slice", strengths, *ends, graph.numbers([0], "axes"))
-            unknown = scalar(graph, np.nan, numbers.degree)
-            real = graph.node("Where", is_known(graph, frame, numbers), real, unknown)
+            unknown = graph.number(np.nan, graph.types.degree)
+            real = graph.node("Where", is_known(graph, frame), real, unknown)
         graph.node("Transpose", real, perm=[1, 0], named="strengths")
 
 
@@ -260,15 +221,14 @@ def _add_label(
     rules: RuleBase,
     frame: InputBlock,
     winner: str,
-    numbers: Precision,
 ) -> None:
     semantics = rules.semantics
     labels = [semantics.uncovered or "", *(rule.then for rule in rules.rules)]
     position = winner
     if semantics.missing != semantics.uncovered:
-        missing = _whole(graph, len(labels))
+        missing = graph.whole(len(labels))
         labels.append(semantics.missing or "")
-        known = _flat(graph, frame, numbers)
+        known = _flat(graph, frame)
         position = graph.node("Where", known, winner, missing, hint="label_number")
     table = graph.texts(labels, "labels")
     graph.node("Gather", table, position, axis=0, named="label")
@@ -279,7 +239,6 @@ def _add_status(
     frame: InputBlock,
     strengths: str,
     winner: str,
-    numbers: Precision,
 ) -> None:
     """Compare the first with the last of the strongest; no rule is number 0."""
     last = graph.node(
@@ -290,19 +249,15 @@ def _add_status(
         keepdims=0,
         select_last_index=1,
     )
-    decided, tie, uncovered, missing = (_whole(graph, status) for status in Status)
+    decided, tie, uncovered, missing = (graph.whole(status) for status in Status)
     is_one = graph.node("Equal", winner, last, hint="is_one_winner")
     status = graph.node("Where", is_one, decided, tie, hint="tie_status")
-    is_none = graph.node("Equal", winner, _whole(graph, 0), hint="is_uncovered")
+    is_none = graph.node("Equal", winner, graph.whole(0), hint="is_uncovered")
     status = graph.node("Where", is_none, uncovered, status, hint="status_if_known")
-    graph.node("Where", _flat(graph, frame, numbers), status, missing, named="status")
+    graph.node("Where", _flat(graph, frame), status, missing, named="status")
 
 
-def _flat(graph: OnnxGraph, frame: InputBlock, numbers: Precision) -> str:
-    known = is_known(graph, frame, numbers)
+def _flat(graph: OnnxGraph, frame: InputBlock) -> str:
+    known = is_known(graph, frame)
     shape = graph.numbers([-1], "flat")
     return graph.node("Reshape", known, shape, hint="is_row_finite")
-
-
-def _whole(graph: OnnxGraph, value: int) -> str:
-    return graph.constant(np.array(value, np.int64), "whole")

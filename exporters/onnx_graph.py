@@ -9,12 +9,14 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Generator, Mapping, Sequence
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import onnx
 from onnx import helper, numpy_helper
 
-from fuzzytree.model import NameMap
+from fuzzytree.model import Dtype, NameMap
+from fuzzytree.numerics import RealArray, RealKind
 
 DOMAIN = "fuzzytree"
 """The domain of our own functions, in readable files."""
@@ -72,11 +74,41 @@ def _number_name(value: Constant, hint: str) -> str:
     return identifier(f"{kind}_{text}")
 
 
+class Precision(msgspec.Struct, frozen=True):
+    """The types in which a graph computes.
+
+    Attributes:
+        axis: Of input values and everything up to the cast.
+        degree: Of degrees and strengths.
+    """
+
+    axis: type[RealKind]
+    degree: type[RealKind]
+
+    @property
+    def below_one(self) -> float:
+        """The largest number below 1 of the degrees' type."""
+        return float(np.nextafter(self.degree(1), self.degree(0)))
+
+    @property
+    def is_mixed(self) -> bool:
+        """Return whether degrees have another type than values."""
+        return self.axis is not self.degree
+
+
+NUMBERS: dict[Dtype, Precision] = {
+    "float64": Precision(np.float64, np.float64),
+    "mixed": Precision(np.float64, np.float32),
+    "float32": Precision(np.float32, np.float32),
+}
+
+
 class OnnxGraph:
     """Nodes, constants and functions, collected; every result is known by its name.
 
     Attributes:
         opset: The version of the operators.
+        types: The types in which it computes.
         source: The name of the input values, of shape (rows, columns).
         topic: What the next nodes are part of: their names begin with it.
         is_readable: Whether `block` makes functions or writes their nodes in place.
@@ -86,9 +118,14 @@ class OnnxGraph:
     """
 
     def __init__(
-        self, opset: int, *, is_readable: bool = False, in_function: bool = False
+        self,
+        opset: int,
+        types: Precision = NUMBERS["float64"],
+        *,
+        is_readable: bool = False,
+        in_function: bool = False,
     ) -> None:
-        self.opset = opset
+        self.opset, self.types = opset, types
         self.source = "inputs"
         self.topic = ""
         self.is_readable = is_readable
@@ -195,6 +232,18 @@ class OnnxGraph:
         """Return the name of a constant list of whole numbers."""
         return self.constant(np.array(values, np.int64), hint)
 
+    def number(self, value: float, kind: type[RealKind] = np.float64) -> str:
+        """Return the name of a constant number."""
+        return self.constant(np.array(value, kind), "number")
+
+    def whole(self, value: int) -> str:
+        """Return the name of a constant whole number."""
+        return self.constant(np.array(value, np.int64), "whole")
+
+    def column(self, values: RealArray, hint: str) -> str:
+        """Return the name of a constant with one number for each row of a block."""
+        return self.constant(values.reshape(-1, 1), hint)
+
     def block(
         self,
         name: str,
@@ -217,7 +266,7 @@ class OnnxGraph:
         if not (self.is_readable and is_plain):
             return body(self, list(inputs.values()), named)
         if name not in self.functions:
-            inner = OnnxGraph(self.opset, in_function=True)
+            inner = OnnxGraph(self.opset, self.types, in_function=True)
             result = body(inner, list(inputs), "result")
             self.functions[name] = helper.make_function(
                 DOMAIN,

@@ -17,13 +17,12 @@ import msgspec
 import numpy as np
 from onnx import helper
 
-from fuzzytree.exporters.onnx_ends import Precision
 from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.model import Points
 from fuzzytree.numerics import Segments, segments_of
 
 if TYPE_CHECKING:
-    from fuzzytree.numerics import Real, Reals
+    from fuzzytree.numerics import Real
 
 MOST_CHAINED = 8
 """Points up to which a chain is the faster way."""
@@ -42,51 +41,47 @@ def is_chained(points_part: PointsPart) -> bool:
     return len(points_part.points.values) <= MOST_CHAINED
 
 
-def polylines(
-    graph: OnnxGraph, values: str, shapes: Sequence[Points], numbers: Precision
-) -> str:
+def polylines(graph: OnnxGraph, values: str, shapes: Sequence[Points]) -> str:
     """Add the degrees of shapes, given their finite values, as one block."""
+    numbers = graph.types
     axis: Real = np.dtype(numbers.axis)
     degree: Real = np.dtype(numbers.degree)
     lines = segments_of(shapes, axis, degree)
     longest = max(len(shape.values) for shape in shapes)
     if longest > MOST_CHAINED:
-        return _searched(graph, values, lines, numbers)
-    return _chained(graph, values, lines, numbers, longest)
+        return _searched(graph, values, lines)
+    return _chained(graph, values, lines, longest)
 
 
 def _chained(
     graph: OnnxGraph,
     values: str,
     lines: Segments,
-    numbers: Precision,
     longest: int,
 ) -> str:
     """Go from point to point; behind a shape's last one nothing changes."""
-    degree = _column(graph, lines.far[lines.first], "degrees")
+    degree = graph.column(lines.far[lines.first], "degrees")
     point_count = 2 * lines.room - 1
     for number in range(longest):
         has_line = number < point_count
         here = lines.first + np.where(has_line, number, 0)
         behind = lines.first + np.where(has_line, number + 1, 0)
         point = np.where(has_line, lines.values[here], lines.values[-1])
-        is_above = graph.node("Greater", values, _column(graph, point, "points"))
-        line = far = _column(graph, lines.far[behind], "degrees")
+        is_above = graph.node("Greater", values, graph.column(point, "points"))
+        line = far = graph.column(lines.far[behind], "degrees")
         if (lines.near[behind] != lines.far[behind]).any():
             parts = {
-                "anchor": _column(graph, lines.anchor[behind], "anchors"),
-                "width": _column(graph, lines.width[behind], "widths"),
-                "near": _column(graph, lines.near[behind], "degrees"),
+                "anchor": graph.column(lines.anchor[behind], "anchors"),
+                "width": graph.column(lines.width[behind], "widths"),
+                "near": graph.column(lines.near[behind], "degrees"),
                 "far": far,
             }
-            line = _line(graph, values, parts, numbers)
+            line = _line(graph, values, parts)
         degree = graph.node("Where", is_above, line, degree)
     return degree
 
 
-def _searched(
-    graph: OnnxGraph, values: str, lines: Segments, numbers: Precision
-) -> str:
+def _searched(graph: OnnxGraph, values: str, lines: Segments) -> str:
     """Halve the room of all shapes at once; a smaller one stays where it is."""
     points = graph.constant(lines.values, "points")
     room = lines.room.astype(np.int32).reshape(-1, 1)
@@ -108,17 +103,12 @@ def _searched(
             ("far", lines.far),
         )
     }
-    return _line(graph, values, parts, numbers)
+    return _line(graph, values, parts)
 
 
-def _column(graph: OnnxGraph, table: Reals, hint: str) -> str:
-    return graph.constant(table.reshape(-1, 1), hint)
-
-
-def _line(
-    graph: OnnxGraph, values: str, parts: dict[str, str], numbers: Precision
-) -> str:
+def _line(graph: OnnxGraph, values: str, parts: dict[str, str]) -> str:
     """Add the degree on a line, as in `fuzzytree.numerics.segments`."""
+    numbers = graph.types
 
     def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
         x, anchor, width, near, far = inputs

@@ -24,16 +24,13 @@ from onnx import helper
 
 from fuzzytree.exporters.onnx_ends import (
     InputBlock,
-    Precision,
     axes,
-    column,
     is_known,
-    scalar,
 )
 from fuzzytree.exporters.onnx_graph import DegreeRows, OnnxGraph
 from fuzzytree.exporters.onnx_lines import PointsPart, is_chained, polylines
 from fuzzytree.model import LR, Clause, Flank, Points, RuleBase, Shape, Side, shapes_of
-from fuzzytree.numerics import RealArray, rounded
+from fuzzytree.numerics import RealArray, RealKind, rounded
 
 Key = tuple[str, str]  # variable and term
 Curve = tuple[float, ...]
@@ -80,7 +77,6 @@ ALWAYS = EdgePart(GUARD, 1, -math.inf, None)
 def rules_graph(
     graph: OnnxGraph,
     rules: RuleBase,
-    numbers: Precision,
     columns: Sequence[str],
 ) -> tuple[InputBlock, str]:
     """Add a rule base up to the strengths of no rule and of every rule.
@@ -91,9 +87,9 @@ def rules_graph(
     Returns:
         The values of the variables, and the strengths, of shape (1 + rules, rows).
     """
-    frame = axes(graph, rules, numbers, columns)
+    frame = axes(graph, rules, columns)
     table = DegreeRows(graph)
-    sequences = _degrees(graph, table, rules, numbers, frame)
+    sequences = _degrees(graph, table, rules, frame)
     is_product = rules.semantics.conjunction == "product"
     with graph.about("rules"):
         return frame, _strengths(graph, table, sequences, is_product=is_product)
@@ -123,7 +119,6 @@ def _degrees(
     graph: OnnxGraph,
     table: DegreeRows,
     rules: RuleBase,
-    numbers: Precision,
     frame: InputBlock,
 ) -> Sequences:
     """Add the degrees of all clauses.
@@ -148,9 +143,9 @@ def _degrees(
         for term in clause.terms
         for part in parts[clause.variable, term]
     )
-    row = _primitives(graph, table, [*wanted, *result], numbers, frame)
+    row = _primitives(graph, table, [*wanted, *result], frame)
     with graph.about("terms"):
-        rows_of = _clauses(graph, table, live, parts, row, numbers)
+        rows_of = _clauses(graph, table, live, parts, row)
     rows_of |= dict.fromkeys(constant - true, (row[NOTHING],))
     always = (row[ALWAYS],) if ALWAYS in row else ()
     sequences = [tuple(r for c in when for r in rows_of[c]) for when in kept]
@@ -161,7 +156,6 @@ def _primitives(
     graph: OnnxGraph,
     table: DegreeRows,
     parts: Sequence[Part],
-    numbers: Precision,
     frame: InputBlock,
 ) -> dict[Part, int]:
     """Add a block for each kind of part; return the row of each part."""
@@ -171,8 +165,8 @@ def _primitives(
     lines = [part for part in parts if isinstance(part, PointsPart)]
     block = frame.block
     if slopes or lines:  # an edge of NaN is 1, but a slope of NaN is NaN
-        zero = scalar(graph, 0.0, numbers.axis)
-        known = is_known(graph, frame, numbers)
+        zero = graph.number(0.0, graph.types.axis)
+        known = is_known(graph, frame)
         block = graph.node("Where", known, block, zero, hint="finite_variables")
     values, place = DegreeRows(graph), {(GUARD, 1): 0}
     values.append(frame.guard, 1)
@@ -186,12 +180,12 @@ def _primitives(
     row: dict[Part, int] = {}
     with graph.about("edges"):
         taken = values.take([place[edge.variable, edge.sign] for edge in edges])
-        first = table.append(_edges(graph, taken, edges, numbers), len(edges))
+        first = table.append(_edges(graph, taken, edges), len(edges))
     row |= {edge: first + number for number, edge in enumerate(edges)}
     if slopes:
         with graph.about("slopes"):
             taken = values.take([place[s.variable, s.sign or 1] for s in slopes])
-            first = table.append(_slopes(graph, taken, slopes, numbers), len(slopes))
+            first = table.append(_slopes(graph, taken, slopes), len(slopes))
         row |= {slope: first + number for number, slope in enumerate(slopes)}
     for is_short in (True, False):
         group = [line for line in lines if is_chained(line) == is_short]
@@ -199,37 +193,36 @@ def _primitives(
             shapes = [line.points for line in group]
             with graph.about("points"):
                 taken = values.take([place[line.variable, 1] for line in group])
-                block = polylines(graph, taken, shapes, numbers)
+                block = polylines(graph, taken, shapes)
             first = table.append(block, len(group))
             row |= {line: first + number for number, line in enumerate(group)}
     return row
 
 
-def _edges(
-    graph: OnnxGraph, values: str, edges: Sequence[EdgePart], numbers: Precision
-) -> str:
+def _edges(graph: OnnxGraph, values: str, edges: Sequence[EdgePart]) -> str:
     """Add the degrees of edges, given their values, as one block."""
-    bounds = column(graph, _bounds(edges, numbers), "bounds")
+    numbers = graph.types
+    bounds = graph.column(_bounds(edges, numbers.axis), "bounds")
     beyond = graph.node("Less", values, bounds)
-    one = scalar(graph, 1.0, numbers.degree)
+    one = graph.number(1.0, numbers.degree)
     flanks = [(edge.sign, edge.flank) for edge in edges]
     if all(flank is None for _, flank in flanks):
-        return graph.node("Where", beyond, scalar(graph, 0.0, numbers.degree), one)
+        return graph.node("Where", beyond, graph.number(0.0, numbers.degree), one)
     ends = rounded([s * f.end if f else 0.0 for s, f in flanks], numbers.axis)
     widths = rounded(
         [s * (f.start - f.end) if f else 1.0 for s, f in flanks],
         numbers.axis,
         is_divisor=True,
     )
-    distance = graph.node("Sub", values, column(graph, ends, "ends"))
-    position = graph.node("Div", distance, column(graph, widths, "widths"))
+    distance = graph.node("Sub", values, graph.column(ends, "ends"))
+    position = graph.node("Div", distance, graph.column(widths, "widths"))
     curves = [flank.curve if flank else (0.0,) for _, flank in flanks]
-    coefficients = _coefficients(graph, curves, numbers)
+    coefficients = _coefficients(graph, curves)
 
     def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
         beyond, position, *curve = inputs
         zero, one, below_one = (
-            scalar(inner, value, numbers.degree)
+            inner.number(value, numbers.degree)
             for value in (0.0, 1.0, numbers.below_one)
         )
         position = inner.node("Clip", position, zero, one)
@@ -239,32 +232,32 @@ def _edges(
         degree = inner.node("Clip", degree, zero, below_one)
         return inner.node("Where", beyond, degree, one, named=named)
 
-    arguments = {"beyond": beyond, "position": _cast(graph, position, numbers)}
+    arguments = {"beyond": beyond, "position": _cast(graph, position)}
     if any(curve != (1.0,) for curve in curves):  # 1 * q is q
         arguments |= coefficients
     return graph.block(f"Edges{len(arguments) - 2}", body, arguments)
 
 
-def _bounds(edges: Sequence[EdgePart], numbers: Precision) -> RealArray:
+def _bounds(edges: Sequence[EdgePart], kind: type[RealKind]) -> RealArray:
     """Return for each edge the smallest value, times its sign, at which it is 1."""
-    bounds = rounded([edge.sign * edge.bound for edge in edges], numbers.axis)
+    bounds = rounded([edge.sign * edge.bound for edge in edges], kind)
     is_left = np.array([edge.sign > 0 for edge in edges])
     with np.errstate(over="ignore"):  # nothing lies above the largest number
-        above = np.nextafter(bounds, numbers.axis(np.inf))
+        above = np.nextafter(bounds, kind(np.inf))
     bounds = np.where(is_left, above, bounds)
     is_always = np.array([edge == ALWAYS for edge in edges])
-    return np.where(is_always, numbers.axis(-np.inf), bounds)
+    return np.where(is_always, kind(-np.inf), bounds)
 
 
 def _slopes(
     graph: OnnxGraph,
     values: str,
     slopes: Sequence[SlopePart],
-    numbers: Precision,
 ) -> str:
     """Add the degrees of slopes, given their values, as one block."""
+    numbers = graph.types
     means = [-s.mean if s.sign < 0 else s.mean for s in slopes]
-    middle = column(graph, rounded(means, numbers.axis), "means")
+    middle = graph.column(rounded(means, numbers.axis), "means")
     distance = graph.node("Sub", values, middle)
     both = sum(1 for slope in slopes if slope.sign == 0)
     if both == len(slopes):
@@ -277,33 +270,28 @@ def _slopes(
         distance = graph.node("Concat", absolute, others, axis=0)
     sides = [slope.side for slope in slopes]
     spreads = rounded([s.spread for s in sides], numbers.axis, is_divisor=True)
-    u = graph.node("Div", distance, column(graph, spreads, "spreads"))
+    u = graph.node("Div", distance, graph.column(spreads, "spreads"))
     reaches = rounded([side.reach for side in sides], numbers.degree)
     rooms = [side.reach - 1.0 for side in sides]
     room = rounded(rooms, numbers.degree, is_divisor=True)
     arguments = {
-        "u": _cast(graph, u, numbers),
-        "reach": column(graph, reaches, "reaches"),
-        "room": column(graph, room, "rooms"),
+        "u": _cast(graph, u),
+        "reach": graph.column(reaches, "reaches"),
+        "room": graph.column(room, "rooms"),
     }
-    arguments |= _coefficients(graph, [side.curve for side in sides], numbers)
-
-    def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
-        return _slope_body(inner, inputs, named, numbers)
-
-    return graph.block(f"Slopes{len(arguments) - 3}", body, arguments)
+    arguments |= _coefficients(graph, [side.curve for side in sides])
+    return graph.block(f"Slopes{len(arguments) - 3}", _slope_body, arguments)
 
 
-def _slope_body(
-    graph: OnnxGraph, inputs: Sequence[str], named: str, numbers: Precision
-) -> str:
+def _slope_body(graph: OnnxGraph, inputs: Sequence[str], named: str) -> str:
+    numbers = graph.types
     u, reach, room, *curve = inputs
-    zero, one = (scalar(graph, value, numbers.degree) for value in (0.0, 1.0))
+    zero, one = (graph.number(value, numbers.degree) for value in (0.0, 1.0))
     u = graph.node("Min", graph.node("Max", u, zero), reach)
     t = graph.node("Min", u, one)
     fall = curve[0]
     if len(curve) > 1:
-        two = scalar(graph, 2.0, numbers.degree)
+        two = graph.number(2.0, numbers.degree)
         v = graph.node("Sub", graph.node("Mul", two, t), one)
         fall = _horner(graph, curve, v)
     body = graph.node("Sub", one, graph.node("Mul", t, fall))
@@ -314,22 +302,20 @@ def _slope_body(
     return graph.node("Mul", body, graph.node("Mul", square, square), named=named)
 
 
-def _cast(graph: OnnxGraph, value: str, numbers: Precision) -> str:
-    if not numbers.is_mixed:
+def _cast(graph: OnnxGraph, value: str) -> str:
+    if not graph.types.is_mixed:
         return value
-    kind = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
+    kind = helper.np_dtype_to_tensor_dtype(np.dtype(graph.types.degree))
     return graph.node("Cast", value, to=kind)
 
 
-def _coefficients(
-    graph: OnnxGraph, curves: Sequence[Curve], numbers: Precision
-) -> dict[str, str]:
+def _coefficients(graph: OnnxGraph, curves: Sequence[Curve]) -> dict[str, str]:
     """Return the columns of c0, c1, ... of all curves, of the longest's length."""
     columns: dict[str, str] = {}
     for power in range(max(map(len, curves))):
         values = [curve[power] if power < len(curve) else 0.0 for curve in curves]
         name = f"c{power}"
-        columns[name] = column(graph, rounded(values, numbers.degree), name)
+        columns[name] = graph.column(rounded(values, graph.types.degree), name)
     return columns
 
 
@@ -346,7 +332,6 @@ def _clauses(
     rules: Sequence[Sequence[Clause]],
     parts: dict[Key, list[Part]],
     row: dict[Part, int],
-    numbers: Precision,
 ) -> dict[Clause, tuple[int, ...]]:
     """Add terms of two parts, OR and negation where there are any.
 
@@ -389,7 +374,7 @@ def _clauses(
     negated = [clause for clause in clauses if clause.negated]
     if negated:
         degrees = table.take([of_clause[clause] for clause in negated])
-        one = scalar(graph, 1.0, numbers.degree)
+        one = graph.number(1.0, graph.types.degree)
         block = graph.node("Sub", one, degrees, hint="negations")
         first = table.append(block, len(negated))
         of_clause |= {clause: first + number for number, clause in enumerate(negated)}

@@ -111,7 +111,7 @@ def add_steps(graph: OnnxGraph, program: Program, columns: Sequence[str]) -> lis
         title = program.titles[place] if program.titles else step.name
         graph.topic = identifier(title) if title else ""
         if step.operation == "input":
-            row = _whole(graph, columns.index(step.name))
+            row = graph.whole(columns.index(step.name))
             names[place] = graph.node("Gather", source, row, hint=graph.topic)
             continue
         first = step.arguments[0]
@@ -177,14 +177,6 @@ def spread(graph: OnnxGraph, source: str, name: str) -> str:
     return graph.node("Expand", name, shape)
 
 
-def _number(graph: OnnxGraph, value: float) -> str:
-    return graph.constant(np.array(value), "number")
-
-
-def _whole(graph: OnnxGraph, value: int) -> str:
-    return graph.constant(np.array(value, np.int64), "whole")
-
-
 def add_step(
     graph: OnnxGraph, step: Step, operands: Sequence[str], program: Program
 ) -> str:
@@ -194,7 +186,7 @@ def add_step(
     match step.operation:
         case "is_finite":
             size = graph.node("Abs", *operands)
-            return graph.node("Less", size, _number(graph, np.inf))
+            return graph.node("Less", size, graph.number(np.inf))
         case "cosine":
             return _cosine(graph, operands[0])
         case "remainder":
@@ -204,13 +196,13 @@ def add_step(
         case "pick":
             return _pick(graph, step, operands[0])
         case "running":
-            return graph.node("CumSum", *operands, _whole(graph, 0))
+            return graph.node("CumSum", *operands, graph.whole(0))
         case "total":
             count = program.steps[step.arguments[0]].samples
             return _total(graph, operands[0], count)
         case "last":
             count = program.steps[step.arguments[0]].samples
-            return graph.node("Gather", operands[0], _whole(graph, count - 1))
+            return graph.node("Gather", operands[0], graph.whole(count - 1))
         case "highest":
             return reduced(graph, "ReduceMax", operands[0])
         case "lowest":
@@ -221,10 +213,10 @@ def add_step(
 
 def _cosine(graph: OnnxGraph, angle: str) -> str:
     """Return 1 - 2 sin^2(a / 2), for many an onnxruntime has no cosine in double."""
-    sine = graph.node("Sin", graph.node("Mul", angle, _number(graph, 0.5)))
+    sine = graph.node("Sin", graph.node("Mul", angle, graph.number(0.5)))
     square = graph.node("Mul", sine, sine)
-    twice = graph.node("Mul", square, _number(graph, 2.0))
-    return graph.node("Sub", _number(graph, 1.0), twice)
+    twice = graph.node("Mul", square, graph.number(2.0))
+    return graph.node("Sub", graph.number(1.0), twice)
 
 
 def _below(graph: OnnxGraph, step: Step, value: str) -> str:
@@ -238,12 +230,12 @@ def _below(graph: OnnxGraph, step: Step, value: str) -> str:
 
 def _pick(graph: OnnxGraph, step: Step, value: str) -> str:
     """Take the entry at a place; places outside, and NaN, take the first."""
-    inside = graph.node("LessOrEqual", _number(graph, 0.0), value)
+    inside = graph.node("LessOrEqual", graph.number(0.0), value)
     last = float(len(step.table) - 1)
     inside = graph.node(
-        "And", inside, graph.node("LessOrEqual", value, _number(graph, last))
+        "And", inside, graph.node("LessOrEqual", value, graph.number(last))
     )
-    place = graph.node("Where", inside, value, _number(graph, 0.0))
+    place = graph.node("Where", inside, value, graph.number(0.0))
     place = graph.node("Cast", place, to=int(np_to_onnx(np.int64)))
     return graph.node("Gather", graph.constant(np.array(step.table), "table"), place)
 

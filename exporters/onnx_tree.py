@@ -16,7 +16,6 @@ from onnx import numpy_helper
 
 from fuzzytree.exporters.onnx_ends import (
     InputBlock,
-    Precision,
     axes,
     flat_guard,
     is_known,
@@ -44,7 +43,6 @@ class OnnxTreeTest(msgspec.Struct, frozen=True):
 def tree_graph(
     graph: OnnxGraph,
     tree: FuzzyTree,
-    numbers: Precision,
     columns: Sequence[str],
     *,
     is_plain: bool,
@@ -60,23 +58,23 @@ def tree_graph(
         variable.parts for variable in tree.variables
     )
     if is_direct:
-        frame = flat_guard(graph, tree, numbers, columns)
+        frame = flat_guard(graph, tree, columns)
     else:
-        frame = axes(graph, tree, numbers, columns, is_flat=True)
+        frame = axes(graph, tree, columns, is_flat=True)
     if not tests:
         leaf = graph.constant(np.array(1, np.int64), "leaf")
     elif is_plain:
         with graph.about("path"):
-            leaf = _walk(graph, tests, frame, numbers, start=_root(tree))
+            leaf = _walk(graph, tests, frame, start=_root(tree))
     else:
         place = {name: columns.index(name) for name in tree.inputs}
         values = graph.source
         if not is_direct:
             place = frame.order
             values = graph.node("Transpose", frame.block, hint="values", perm=[1, 0])
-        leaf = _ensemble(graph, tests, values, place, numbers, start=_root(tree))
+        leaf = _ensemble(graph, tests, values, place, start=_root(tree))
     zero = graph.constant(np.array(0, np.int64), "nothing")
-    known = is_known(graph, frame, numbers)
+    known = is_known(graph, frame)
     graph.node("Where", known, leaf, zero, named=named)
     return frame
 
@@ -135,11 +133,11 @@ def _ensemble(
     tests: Sequence[OnnxTreeTest],
     values: str,
     place: dict[str, int],
-    numbers: Precision,
     *,
     start: int,
 ) -> str:
     """Add one `TreeEnsemble`; a subtree with two ways to it stands in it twice."""
+    numbers = graph.types
     order: list[int] = []
     leaves: list[int] = []
     todo: list[tuple[int, int, bool]] = [(start, -1, False)]
@@ -190,7 +188,6 @@ def _walk(
     graph: OnnxGraph,
     tests: Sequence[OnnxTreeTest],
     frame: InputBlock,
-    numbers: Precision,
     *,
     start: int,
 ) -> str:
@@ -203,7 +200,7 @@ def _walk(
 
     own = range(count, count + leaves)
     places = [frame.order[q.variable] for q in tests] + [0] * leaves
-    cuts = rounded([q.cut for q in tests] + [0.0] * leaves, numbers.axis)
+    cuts = rounded([q.cut for q in tests] + [0.0] * leaves, graph.types.axis)
     place = graph.numbers(places, "variables")
     cut = graph.constant(cuts, "cuts")
     left = graph.numbers([*(state(q.left) for q in tests), *own], "left")

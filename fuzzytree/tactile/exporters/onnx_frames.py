@@ -232,31 +232,28 @@ def _fill(
     plain: bool,
 ) -> None:
     """Add all nodes of a graph to a sheet."""
-    from fuzzytree.exporters import NUMBERS, add_steps, is_known, scalar
+    from fuzzytree.exporters import add_steps, is_known
 
     with sheet.about("sums"):
         columns = _sums(sheet, made)
     *features, pressed = add_steps(sheet, made.program, columns)
-    zero = scalar(sheet, 0.0, np.float64)
+    zero = sheet.number(0.0)
     is_pressed = sheet.node("Less", zero, pressed, hint="is_pressed")
     if features:
         _side_by_side(sheet, features)
     needed = [name for name in outputs if name != "features"]
     if not needed:
         return
-    numbers = NUMBERS["float64"]
     strengths = ""
     if isinstance(model, FuzzyTree):
         from fuzzytree.exporters import needs_plain, tree_graph
 
         is_plain = plain or needs_plain(model)
-        axes = tree_graph(
-            sheet, model, numbers, model.inputs, is_plain=is_plain, named="winner"
-        )
+        axes = tree_graph(sheet, model, model.inputs, is_plain=is_plain, named="winner")
     else:
         from fuzzytree.exporters import add_winner, rules_graph
 
-        axes, strengths = rules_graph(sheet, model, numbers, model.inputs)
+        axes, strengths = rules_graph(sheet, model, model.inputs)
         add_winner(sheet, strengths, "winner")
     answered = _is_answer(sheet, model, axes)
     known = sheet.node("And", is_pressed, answered, hint="is_known")
@@ -265,14 +262,14 @@ def _fill(
         known = sheet.node("And", known, is_strong, hint="is_known")
     _ends(sheet, model, is_pressed, known, outputs)
     if "strengths" in outputs:
-        finite = _flat(sheet, is_known(sheet, axes, numbers))
+        finite = _flat(sheet, is_known(sheet, axes))
         finite = sheet.node("And", is_pressed, finite, hint="is_finite")
         _all_strengths(sheet, model, strengths, finite)
 
 
 def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
     """Add the sums as the sheet's source, shape (frames, sums); return their names."""
-    from fuzzytree.exporters import np_to_onnx, scalar
+    from fuzzytree.exporters import np_to_onnx
 
     sensor = made.sensor
     double, size = int(np_to_onnx(np.float64)), sensor.rows * sensor.columns
@@ -280,7 +277,7 @@ def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
     values = sheet.node("Reshape", "frames", shape, hint="cells")
     values = sheet.node("Cast", values, hint="cells", to=double)
     if sensor.full != np.iinfo(frame_type(sensor)).max:
-        full = scalar(sheet, float(sensor.full), np.float64)
+        full = sheet.number(float(sensor.full))
         values = sheet.node("Min", values, full, hint="cells")
     if offsets(sensor):
         baseline = np.array([offsets(sensor)], np.float64)
@@ -289,10 +286,10 @@ def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
     is_pressed = ""
     counted = any(one.of == "count" for one in made.sums)
     if offsets(sensor) or sensor.threshold or counted:
-        threshold = scalar(sheet, float(sensor.threshold), np.float64)
+        threshold = sheet.number(float(sensor.threshold))
         is_pressed = sheet.node("Less", threshold, values, hint="is_cell_pressed")
     if offsets(sensor) or sensor.threshold:
-        zero = scalar(sheet, 0.0, np.float64)
+        zero = sheet.number(0.0)
         values = sheet.node("Where", is_pressed, values, zero, hint="pressures")
     return _taken(sheet, made.sums, values, is_pressed)
 
@@ -346,23 +343,23 @@ def _flat(sheet: OnnxGraph, truth: str) -> str:
 
 def _is_answer(sheet: OnnxGraph, model: Model, axes: InputBlock) -> str:
     """Return whether the model knows an answer to the features."""
-    from fuzzytree.exporters import NUMBERS, is_known
+    from fuzzytree.exporters import is_known
 
     semantics = model.semantics
     if isinstance(model, RuleBase) and semantics.uncovered is not None:
-        return _flat(sheet, is_known(sheet, axes, NUMBERS["float64"]))
-    return sheet.node("Less", _whole(sheet, 0), "winner", hint="is_answer")
+        return _flat(sheet, is_known(sheet, axes))
+    return sheet.node("Less", sheet.whole(0), "winner", hint="is_answer")
 
 
 def _is_strong(sheet: OnnxGraph, strengths: str, reject: float) -> str:
     """Return whether the rule that decides is as strong as the floor, or is none."""
-    from fuzzytree.exporters import reduced, scalar
+    from fuzzytree.exporters import reduced
 
     with sheet.about("strongest"):
         strongest = reduced(sheet, "ReduceMax", strengths, axis=0, keepdims=0)
-        floor = scalar(sheet, reject, np.float64)
+        floor = sheet.number(reject)
         is_strong = sheet.node("LessOrEqual", floor, strongest)
-        is_none = sheet.node("Equal", "winner", _whole(sheet, 0))
+        is_none = sheet.node("Equal", "winner", sheet.whole(0))
         return sheet.node("Or", is_none, is_strong)
 
 
@@ -376,13 +373,12 @@ def _ends(
     """Add label, state and rule."""
     if "state" in outputs:
         seen, unknown, nothing = (
-            _whole(sheet, state)
-            for state in (State.OBJECT, State.UNKNOWN, State.NOTHING)
+            sheet.whole(state) for state in (State.OBJECT, State.UNKNOWN, State.NOTHING)
         )
         state = sheet.node("Where", known, seen, unknown, hint="state_if_pressed")
         sheet.node("Where", is_pressed, state, nothing, named="state")
     if "rule" in outputs:
-        sheet.node("Where", known, "winner", _whole(sheet, 0), named="rule")
+        sheet.node("Where", known, "winner", sheet.whole(0), named="rule")
     if "label" in outputs:
         labels = (
             [leaf.label for leaf in model.leaves]
@@ -390,7 +386,7 @@ def _ends(
             else [rule.then for rule in model.rules]
         )
         texts = [model.semantics.uncovered or "", *labels, ""]
-        nothing = _whole(sheet, len(texts) - 1)
+        nothing = sheet.whole(len(texts) - 1)
         place = sheet.node("Where", known, "winner", nothing, hint="label_number")
         table = sheet.texts(texts, "labels")
         sheet.node("Gather", table, place, axis=0, named="label")
@@ -398,15 +394,9 @@ def _ends(
 
 def _all_strengths(sheet: OnnxGraph, model: Model, strengths: str, finite: str) -> None:
     """Add the strengths of all rules, 0 where nothing presses."""
-    from fuzzytree.exporters import scalar
-
     count = len(model.rules) if isinstance(model, RuleBase) else 0
     ends = [sheet.numbers([end], "end") for end in (1, 1 + count)]
     with sheet.about("strengths"):
         real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
-        real = sheet.node("Where", finite, real, scalar(sheet, 0.0, np.float64))
+        real = sheet.node("Where", finite, real, sheet.number(0.0))
     sheet.node("Transpose", real, perm=[1, 0], named="strengths")
-
-
-def _whole(sheet: OnnxGraph, value: int) -> str:
-    return sheet.constant(np.array(int(value), np.int64), "whole")
