@@ -25,6 +25,7 @@ from .onnx_ends import add_winner as add_winner
 from .onnx_ends import is_known as is_known
 from .onnx_graph import TREES as TREES
 from .onnx_graph import OnnxGraph as OnnxGraph
+from .onnx_graph import np_to_onnx as np_to_onnx
 from .onnx_rules import rules_graph as rules_graph
 from .onnx_session import RUNTIME_ERRORS as RUNTIME_ERRORS
 from .onnx_session import Bare as Bare
@@ -34,7 +35,6 @@ from .onnx_session import named as named
 from .onnx_session import open_bare as open_bare
 from .onnx_session import open_session as open_session
 from .onnx_steps import add_steps as add_steps
-from .onnx_steps import np_to_onnx as np_to_onnx
 from .onnx_steps import reduced as reduced
 from .onnx_tree import needs_plain as needs_plain
 from .onnx_tree import tree_graph as tree_graph

@@ -26,6 +26,7 @@ from fuzzytree.model import (
     fingerprint,
     narrowing_refusal,
 )
+from fuzzytree.semantics import from_system
 
 if TYPE_CHECKING:
     import onnx
@@ -57,9 +58,6 @@ OLDEST: Mapping[str, str] = {
 """The oldest onnxruntime that gave equal predictions in tests, for systems predictions
 within their bounds; 1.15 is the oldest there is for Python 3.11, and `TreeEnsemble`
 came with 1.21."""
-
-_MOST_ROWS_TO_VERIFY = 24
-
 
 _OF_MODELS: tuple[Output, ...] = ("label", "rule", "strengths", "status")
 _OF_SYSTEMS: tuple[Output, ...] = ("outputs", "status", "activations")
@@ -129,16 +127,9 @@ def write_onnx(
     require("onnx", "writing onnx needs")
     if verify:
         require("onnxruntime", "verifying a written onnx file needs")
-    if isinstance(model, FuzzySystem):
-        from fuzzytree.exporters.onnx_system import write_system
-
-        facts = {"format": FORMAT_VERSION, "version": version()}
-        return write_system(
-            model, opset=opset, ir=ir, outputs=outputs, facts=facts, verify=verify
-        )
     from fuzzytree.numerics import losses
 
-    lost = losses(model, dtype)
+    lost = () if isinstance(model, FuzzySystem) else losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, f"onnx {dtype}", lost)
     proto = _model_proto(
@@ -146,19 +137,20 @@ def write_onnx(
     )
     content: bytes = proto.SerializeToString(deterministic=True)
     if verify:
+        from fuzzytree.exporters import onnx_session
         from fuzzytree.exporters.onnx_graph import NUMBERS
-        from fuzzytree.exporters.onnx_session import prove
 
-        is_exact = dtype == "float64" or (dtype == "mixed" and _is_tree(model))
-        prove(
-            content,
-            model,
-            _columns(model, signature),
-            outputs,
-            kind=NUMBERS[dtype].axis,
-            is_exact=is_exact,
-            limit=_MOST_ROWS_TO_VERIFY,
-        )
+        if isinstance(model, FuzzySystem):
+            onnx_session.prove_system(content, model, outputs)
+        else:
+            onnx_session.prove(
+                content,
+                model,
+                _columns(model, signature),
+                outputs,
+                kind=NUMBERS[dtype].axis,
+                is_exact=dtype == "float64" or (dtype == "mixed" and _is_tree(model)),
+            )
     return Written(content, lost)
 
 
@@ -232,12 +224,14 @@ def require(package: str, purpose: str) -> None:
         raise MissingExtraError(f"{purpose} {install_hint('onnx')}")
 
 
-def _columns(model: Model, signature: Signature) -> tuple[str, ...]:
-    return model.columns if signature == "all" else model.inputs
+def _columns(model: Model | FuzzySystem, signature: Signature) -> tuple[str, ...]:
+    if isinstance(model, FuzzySystem) or signature == "all":
+        return model.columns
+    return model.inputs
 
 
 def _model_proto(
-    model: Model,
+    model: Model | FuzzySystem,
     dtype: Dtype,
     opset: int,
     ir: int,
@@ -247,31 +241,44 @@ def _model_proto(
     readable: bool,
     plain: bool,
 ) -> onnx.ModelProto:
-    import numpy as np
-    from onnx import TensorProto, helper
+    from onnx import TensorProto
 
-    from fuzzytree.exporters.onnx_graph import NUMBERS, OnnxGraph, model_proto
+    from fuzzytree.exporters.onnx_graph import (
+        NUMBERS,
+        OnnxGraph,
+        model_proto,
+        np_to_onnx,
+    )
 
     numbers = NUMBERS[dtype]
     graph = OnnxGraph(opset, numbers, is_readable=readable)
     columns = _columns(model, signature)
-    axis = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.axis))
-    degree = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
+    degree, rules = np_to_onnx(numbers.degree), _rule_count(model)
     kinds: dict[Output, tuple[int, list[str | int]]] = {
         "label": (TensorProto.STRING, ["rows"]),
         "rule": (TensorProto.INT64, ["rows"]),
         "status": (TensorProto.INT64, ["rows"]),
-        "strengths": (degree, ["rows", _rule_count(model)]),
+        "strengths": (degree, ["rows", rules]),
+        "activations": (degree, ["rows", rules]),
     }
-    _fill(graph, model, columns, outputs, plain=plain)
+    facts = _facts(model, dtype, columns, outputs)
+    if isinstance(model, FuzzySystem):
+        from fuzzytree.exporters.onnx_steps import rows_at_once, system_graph
+
+        kinds["outputs"] = (degree, ["rows", len(model.outputs)])
+        program = from_system(model, activations="activations" in outputs)
+        system_graph(graph, program, columns, outputs)
+        facts["chunk"] = str(rows_at_once(model, program))
+    else:
+        _fill(graph, model, columns, outputs, plain=plain)
     return model_proto(
         graph,
-        "tree" if _is_tree(model) else "rules",
-        (axis, len(columns)),
+        facts["carrier"],
+        (np_to_onnx(numbers.axis), len(columns)),
         {name: kinds[name] for name in outputs},
         ir=ir,
         text=_in_words(model, dtype),
-        facts=_facts(model, dtype, columns, outputs),
+        facts=facts,
     )
 
 
@@ -283,7 +290,7 @@ def _fill(
     *,
     plain: bool,
 ) -> None:
-    """Add all nodes of a graph to a graph."""
+    """Add all nodes of a tree or rule base to a graph."""
     from fuzzytree.exporters import onnx_ends
 
     if isinstance(model, FuzzyTree):
@@ -299,41 +306,63 @@ def _fill(
         onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs)
 
 
-def _rule_count(model: Model) -> int:
+def _rule_count(model: Model | FuzzySystem) -> int:
     return len(model.leaves if isinstance(model, FuzzyTree) else model.rules)
 
 
 def _facts(
-    model: Model, dtype: Dtype, columns: Sequence[str], outputs: Sequence[Output]
+    model: Model | FuzzySystem,
+    dtype: Dtype,
+    columns: Sequence[str],
+    outputs: Sequence[Output],
 ) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists and records."""
-    units = {v.name: v.unit for v in model.variables if not v.parts}
-    kind = "descent" if isinstance(model, FuzzyTree) else model.kind or "rules"
+    carrier, kind = "rules", "rules"
+    inputs, classes, semantics = columns, tuple[str, ...](), {}
+    names: dict[str, object] = {}
+    if isinstance(model, FuzzySystem):
+        carrier, kind = "system", "system"
+        names["names"] = [one.name for one in model.outputs]
+    else:
+        inputs, classes = model.inputs, model.classes
+        semantics = msgspec.to_builtins(model.semantics)
+        if isinstance(model, FuzzyTree):
+            carrier, kind = "tree", "descent"
+        else:
+            kind = model.kind or kind
     texts = {
         "format": FORMAT_VERSION,
         "version": version(),
         "name": model.name,
-        "carrier": "tree" if _is_tree(model) else "rules",
+        "carrier": carrier,
         "kind": kind,
         "dtype": dtype,
         "fingerprint": fingerprint(model),
     }
+    units = {one.name: one.unit for one in model.variables if one.name in inputs}
     records: dict[str, object] = {
         "columns": list(columns),
-        "inputs": list(model.inputs),
+        "inputs": list(inputs),
         "units": [units.get(name, "") for name in columns],
-        "classes": list(model.classes),
+        "classes": list(classes),
         "rules": _rule_count(model),
         "outputs": list(outputs),
-        "semantics": msgspec.to_builtins(model.semantics),
+        "semantics": semantics,
+        **names,
     }
-    facts = {
+    return texts | {
         key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
     }
-    return texts | facts
 
 
-def _in_words(model: Model, dtype: Dtype) -> str:
+def _in_words(model: Model | FuzzySystem, dtype: Dtype) -> str:
+    if isinstance(model, FuzzySystem):
+        numbers = ", ".join(repr(one.name) for one in model.outputs)
+        return (
+            f"The fuzzy system {model.name!r} with {len(model.rules)} rules: it "
+            f"computes {numbers}. Missing and infinite values give NaN. "
+            f"Numbers: {dtype}."
+        )
     missing = model.semantics.missing
     answer = "no class" if missing is None else repr(missing)
     if isinstance(model, FuzzyTree):

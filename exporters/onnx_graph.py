@@ -325,6 +325,11 @@ class OnnxGraph:
         return name
 
 
+def np_to_onnx(kind: npt.DTypeLike) -> int:
+    """Return the number by which ONNX knows a type of numpy."""
+    return int(helper.np_dtype_to_tensor_dtype(np.dtype(kind)))
+
+
 def model_proto(
     graph: OnnxGraph,
     name: str,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,15 @@ import onnxruntime
 
 from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters.program_text import answer_of
-from fuzzytree.model import LR, Band, Model, Points, RuleBase, Term
+from fuzzytree.model import LR, Band, FuzzySystem, Model, Points, RuleBase, Term
 from fuzzytree.numerics import RealKind
+from fuzzytree.semantics import (
+    Program,
+    error_bounds,
+    from_system,
+    infer,
+    system_probes,
+)
 
 _STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
 
@@ -93,6 +100,9 @@ def first_line(error: Exception) -> str:
     return text.split(" : ", 3)[-1] if text.startswith("[ONNXRuntimeError]") else text
 
 
+MOST_ROWS = 24
+"""Rows on which a written file is run, at the most."""
+
 _MOST_CLAUSES = 50_000  # what the reference does in well under a second
 
 
@@ -104,7 +114,6 @@ def prove(
     *,
     kind: type[RealKind],
     is_exact: bool,
-    limit: int,
 ) -> None:
     """Load a file, run it and compare its predictions with the reference.
 
@@ -114,7 +123,7 @@ def prove(
         LossError: If onnxruntime does not load or run the file.
         DisagreementError: If an answer differs.
     """
-    rows = list(sample_rows(model, limit))
+    rows = list(_sample_rows(model))
     table = [[row.get(name, 0.0) for name in columns] for row in rows]
     with np.errstate(over="ignore"):  # beyond float32 is missing in float32
         values = np.array(table, np.float64).astype(kind)
@@ -144,7 +153,7 @@ def proved_run(
         ) from error
 
 
-def sample_rows(model: Model, limit: int) -> Iterator[dict[str, float]]:
+def _sample_rows(model: Model) -> Iterator[dict[str, float]]:
     """Yield rows near a model's landmarks, the last with a missing value."""
     size = 1
     if isinstance(model, RuleBase):
@@ -154,7 +163,7 @@ def sample_rows(model: Model, limit: int) -> Iterator[dict[str, float]]:
         for v in model.variables
         if not v.parts
     }
-    for number in range(max(1, min(limit, _MOST_CLAUSES // size))):
+    for number in range(max(1, min(MOST_ROWS, _MOST_CLAUSES // size))):
         yield {
             name: values[(number * (3 + 2 * position) + position) % len(values)]
             for position, (name, values) in enumerate(points.items())
@@ -197,4 +206,58 @@ def _compare(model: Model, row: dict[str, float], outputs: dict[str, object]) ->
             raise DisagreementError(
                 f"the onnx file of {model.name} returns another {name} than the model "
                 f"where {row}: {value}, not {right}"
+            )
+
+
+_MOST_STEPS = 300_000  # of all rows
+
+
+def prove_system(content: bytes, system: FuzzySystem, outputs: Sequence[str]) -> None:
+    """Load a file, run it and compare its outputs with the inference.
+
+    Raises:
+        LossError: If onnxruntime does not load or run the file.
+        DisagreementError: If a number differs by more than its bound.
+    """
+    program = from_system(system, activations=True)
+    limit = max(1, min(MOST_ROWS, _MOST_STEPS // program.size))
+    rows = system_probes(system, limit=limit)
+    table = np.array([[row[name] for name in system.columns] for row in rows])
+    table = table.reshape(len(rows), len(system.columns))
+    results = proved_run(content, system.name, outputs, table)
+    for text in _differences(system, program, rows, table, results):
+        raise DisagreementError(text)
+
+
+def _differences(
+    system: FuzzySystem,
+    program: Program,
+    rows: Sequence[Mapping[str, float]],
+    table: npt.NDArray[np.float64],
+    results: Mapping[str, Array],
+) -> Iterator[str]:
+    """Yield numbers of a file that differ from the inference by more than allowed."""
+    right = [infer(system, row) for row in rows]
+    expected = {
+        "outputs": np.array([one.outputs for one in right], np.float64),
+        "activations": np.array([one.activations for one in right], np.float64),
+        "status": np.array([[one.status] for one in right], np.float64),
+    }
+    bounds = error_bounds(program, table.T).T
+    first, last = len(system.outputs), len(system.outputs) + len(system.rules)
+    allowed = {
+        "outputs": bounds[:, :first],
+        "activations": bounds[:, first:last],
+        "status": bounds[:, last:],
+    }
+    for name, array in results.items():
+        answers = array.astype(np.float64).reshape(expected[name].shape)
+        one = expected[name]
+        is_same = (answers == one) | (np.isnan(answers) & np.isnan(one))
+        with np.errstate(invalid="ignore"):  # of two infinities
+            is_near = is_same | (np.abs(answers - one) <= allowed[name])
+        for row, place in np.argwhere(~(is_near | np.isinf(allowed[name]))).tolist():
+            yield (
+                f"the onnx file of {system.name} gives other {name} than the model "
+                f"where {dict(rows[row])}: {answers[row, place]}, not {one[row, place]}"
             )

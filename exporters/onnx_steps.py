@@ -19,7 +19,9 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.exporters.onnx_graph import OnnxGraph, identifier
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.onnx_graph import OnnxGraph, identifier, np_to_onnx
+from fuzzytree.model import FuzzySystem
 from fuzzytree.semantics import Program, Step, StepValue, still_results
 
 NODES: Mapping[str, str] = {
@@ -224,7 +226,7 @@ def _below(graph: OnnxGraph, step: Step, value: str) -> str:
     ranks = [-1] + [1] * (2 if step.samples else 1)
     table = graph.constant(np.array(step.table).reshape(ranks), "table")
     is_below = graph.node("Less", table, value)
-    kind = int(np_to_onnx(np.float64))
+    kind = np_to_onnx(np.float64)
     return graph.total(graph.node("Cast", is_below, to=kind), axis=0, keepdims=0)
 
 
@@ -236,7 +238,7 @@ def _pick(graph: OnnxGraph, step: Step, value: str) -> str:
         "And", inside, graph.node("LessOrEqual", value, graph.number(last))
     )
     place = graph.node("Where", inside, value, graph.number(0.0))
-    place = graph.node("Cast", place, to=int(np_to_onnx(np.int64)))
+    place = graph.node("Cast", place, to=np_to_onnx(np.int64))
     return graph.node("Gather", graph.constant(np.array(step.table), "table"), place)
 
 
@@ -272,13 +274,6 @@ def reduced(
         axes = graph.numbers([axis], "axes")
         return graph.node(operator, source, axes, keepdims=keepdims)
     return graph.node(operator, source, axes=[axis], keepdims=keepdims)
-
-
-def np_to_onnx(kind: npt.DTypeLike) -> int:
-    """Return the number by which ONNX knows a type of numpy."""
-    from onnx import helper
-
-    return int(helper.np_dtype_to_tensor_dtype(np.dtype(kind)))
 
 
 MOST_SINGLE = 2_000
@@ -474,3 +469,68 @@ class Blocks:
         titles = [self.program.titles[one.place].split() for one in group]
         words = [words[0] for words in zip(*titles, strict=False) if len({*words}) == 1]
         return identifier(" ".join(words)) if words else ""
+
+
+def system_graph(
+    graph: OnnxGraph,
+    program: Program,
+    columns: Sequence[str],
+    outputs: Container[str],
+) -> None:
+    """Add the program of a system and the outputs that are wanted.
+
+    Raises:
+        LossError: If it needs a function that onnxruntime lacks in double.
+    """
+    missing = missing_functions(program)
+    if missing:
+        raise LossError(
+            f"cannot write {program.name} as onnx: a formula needs "
+            f"{', '.join(missing)}, which onnxruntime computes in float32 only"
+        )
+    blocks_of = {
+        "outputs": program.of("output"),
+        "activations": program.of("activation"),
+    }
+    wanted = {name: places for name, places in blocks_of.items() if name in outputs}
+    (status,) = program.of("status")
+    if is_wide(program):
+        blocks = Blocks(graph, program, columns)
+        for name, places in wanted.items():
+            block = blocks.rows(places)
+            graph.node("Transpose", block, perm=[1, 0], named=name)
+        last = blocks.single(status) if "status" in outputs else ""
+    else:
+        names = add_steps(graph, program, columns)
+        known = {one.step: n for one, n in zip(program.results, names, strict=True)}
+        for name, places in wanted.items():
+            _columns(graph, [known[place] for place in places], name)
+        last = known[status]
+    if "status" in outputs:
+        graph.node("Cast", last, named="status", to=np_to_onnx("int64"))
+
+
+def _columns(graph: OnnxGraph, names: Sequence[str], named: str) -> None:
+    """Put blocks of shape (rows,) side by side."""
+    if len(names) == 1:
+        graph.node("Reshape", names[0], graph.numbers([-1, 1], "shape"), named=named)
+        return
+    line = graph.numbers([0], "axes")
+    if graph.opset >= 13:
+        lines = [graph.node("Unsqueeze", name, line, hint=name) for name in names]
+    else:
+        lines = [graph.node("Unsqueeze", name, hint=name, axes=[0]) for name in names]
+    block = graph.node("Concat", *lines, hint=named, axis=0)
+    graph.node("Transpose", block, perm=[1, 0], named=named)
+
+
+def rows_at_once(system: FuzzySystem, program: Program) -> int:
+    """Return how many rows are best run together, so that they stay in the cache."""
+    samples = [
+        one.defuzzifier.samples
+        for one in system.outputs
+        if not one.defuzzifier.is_weighted
+    ]
+    if is_wide(program):
+        samples.append(len(system.rules))
+    return max(2**17 // max(samples, default=8), 64)

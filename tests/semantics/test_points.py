@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.onnx import write_onnx as write_onnx
-from fuzzytree.exporters.onnx_lines import MOST_CHAINED
+from fuzzytree.exporters.onnx_rules import MOST_CHAINED
 from fuzzytree.exporters.yaml import write
 from fuzzytree.formats.yaml.yaml_reader import read_yaml
 from fuzzytree.model.contracts import Dtype, Runtime
