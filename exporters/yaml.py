@@ -7,12 +7,12 @@ numbers are written so that readers of YAML 1.1 and of YAML 1.2 see the same.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Final
 
 from fuzzytree import formats
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.yaml_system import entries_of, losses_of
 from fuzzytree.exporters.yaml_text import (
     Entry,
     Noted,
@@ -23,28 +23,54 @@ from fuzzytree.exporters.yaml_text import (
     numbers,
     range_ends,
     summand,
+    text_losses,
 )
 from fuzzytree.formats import (
     LARGEST_COUNT,
+    LONGEST_NOTE,
     LONGEST_SENTENCE,
+    FormulaError,
     Vocabulary,
+    conclusions_text,
+    condition_text,
+    parse,
     read_yaml,
     readings,
+    text_of,
     vocabulary_of,
 )
 from fuzzytree.model import (
+    LR,
+    Activation,
+    Band,
+    Binary,
     Branch,
     Clause,
+    Curve,
+    Defuzzifier,
     Document,
     Format,
+    Formula,
     FuzzySystem,
     FuzzyTree,
+    Linear,
     Loss,
     Model,
     Node,
+    PiCurve,
+    Points,
     RuleBase,
+    RuleBlock,
     Semantics,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    SystemTerm,
     Term,
+    Trapezoid,
     Variable,
     Written,
     clause_text,
@@ -78,8 +104,7 @@ def write(model: Document, /, *, allow_loss: bool = False) -> Written:
         >>> print(write(random_tree(1, leaves=1)).content.decode().splitlines()[0])
         # A fuzzy decision tree of fuzzytree: node 1 is the root.
     """
-    result = losses_of(model) if isinstance(model, FuzzySystem) else _losses(model)
-    losses = [*result]
+    losses = [*name_losses(_names(model)), *_losses(model)]
     if losses:
         text = "\n".join(f"{loss.where}: {loss.what}" for loss in losses)
         raise LossError(f"cannot write {model.name[:100]} as yaml: {text}")
@@ -89,33 +114,41 @@ def write(model: Document, /, *, allow_loss: bool = False) -> Written:
         case FuzzyTree():
             entries = _tree(model)
         case FuzzySystem():
-            entries = entries_of(model)
+            entries = _system(model)
     return Written(joined(model.name, _TITLES[str(entries["kind"])], entries))
 
 
-def _losses(model: Model) -> Iterator[Loss]:
-    yield from name_losses(_names(model))
-    if isinstance(model, RuleBase):
-        counts = [(f"rule {n}", r.support) for n, r in enumerate(model.rules, 1)]
-    else:
-        counts = [(f"leaf {n}", r.support) for n, r in enumerate(model.leaves, 1)]
+def _losses(model: Document) -> Iterator[Loss]:
+    counts: list[tuple[str, int | None]] = []
+    match model:
+        case FuzzySystem():
+            yield from _system_losses(model)
+        case RuleBase():
+            counts = [(f"rule {n}", r.support) for n, r in enumerate(model.rules, 1)]
+        case FuzzyTree():
+            counts = [(f"leaf {n}", r.support) for n, r in enumerate(model.leaves, 1)]
     for where, count in counts:
         if count is not None and count > LARGEST_COUNT:
             yield Loss(where, f"the support is above {LARGEST_COUNT}")
 
 
-def _names(model: Model) -> Iterator[tuple[str, str]]:
+def _names(model: Document) -> Iterator[tuple[str, str]]:
     """Yield every text of a model that is a name, and what it is the name of."""
     yield "name", model.name
-    yield from (("class", name) for name in model.classes)
-    yield from (("column", name) for name in model.columns)
+    if not isinstance(model, FuzzySystem):
+        yield from (("class", name) for name in model.classes)
+        yield from (("column", name) for name in model.columns)
     for variable in model.variables:
         yield "variable", variable.name
         yield "unit", variable.unit
-        yield from (("term", term.name) for term in variable.terms)
+        terms = variable.terms if isinstance(variable, Variable) else variable.labels
+        yield from (("term", term.name) for term in terms)
     if isinstance(model, FuzzyTree):
         yield from (("pattern", leaf.pattern) for leaf in model.leaves)
         yield from (("set", term.name) for group in model.sets for term in group.terms)
+    if isinstance(model, FuzzySystem):
+        yield from (("block", block.name) for block in model.blocks)
+        yield from (("rule", rule.name) for rule in model.rules)
 
 
 def _rule_base(rules: RuleBase) -> dict[str, Entry]:
@@ -173,7 +206,7 @@ def _tree(tree: FuzzyTree) -> dict[str, Entry]:
     return entries
 
 
-def _head(model: Model, kind: str) -> dict[str, Entry]:
+def _head(model: Document, kind: str) -> dict[str, Entry]:
     return {"format": formats.YAML_FORMAT, "kind": kind, "name": model.name}
 
 
@@ -186,18 +219,27 @@ def _body(model: Model) -> dict[str, Entry]:
     return entries
 
 
-def _variable(variable: Variable) -> dict[str, Entry]:
+def _variable(variable: Variable | SystemInput | SystemOutput) -> dict[str, Entry]:
     entries: dict[str, Entry] = {"name": variable.name}
     if variable.unit:
         entries["unit"] = variable.unit
     ends = range_ends(variable.low, variable.high)
+    if not isinstance(variable, Variable) and variable.clips:
+        ends["outside"] = "clipped"
     if ends:
         entries["range"] = Short(ends)
-    if variable.parts:
+    if not isinstance(variable, SystemOutput) and variable.parts:
         entries["sum of"] = [*map(summand, variable.parts)]
-    if variable.terms:
-        entries["terms"] = [*map(_term, variable.terms)]
+    terms = _terms(variable)
+    if terms:
+        entries["terms"] = terms
     return entries
+
+
+def _terms(variable: Variable | SystemInput | SystemOutput) -> list[Entry]:
+    if isinstance(variable, Variable):
+        return [*map(_term, variable.terms)]
+    return [*map(_label, variable.labels)]
 
 
 def _term(term: Term) -> dict[str, Entry]:
@@ -252,6 +294,160 @@ def _semantics(semantics: Semantics) -> dict[str, Entry]:
 
 def _answer(label: str | None) -> str:
     return "no class" if label is None else f"class {label}"
+
+
+def _system(system: FuzzySystem) -> dict[str, Entry]:
+    entries = _head(system, "system")
+    if system.note:
+        entries["note"] = system.note
+    if system.inputs:
+        entries["inputs"] = [*map(_variable, system.inputs)]
+    entries["outputs"] = [*map(_output, system.outputs)]
+    entries["blocks"] = [*map(_block, system.blocks)]
+    entries["semantics"] = {
+        "not": "1 - degree",
+        "activated": "rules whose weighted degree is above 0",
+        "missing": "a value that is missing or infinite makes every output nan",
+    }
+    return entries
+
+
+def _system_losses(system: FuzzySystem) -> Iterator[Loss]:
+    yield from text_losses("the note", system.note)
+    if len(system.note) > LONGEST_NOTE:
+        text = f"{len(system.note)} characters are more than {LONGEST_NOTE}"
+        yield Loss("the note", text)
+    for variable in system.variables:
+        for label in variable.labels:
+            if isinstance(label.curve, Formula) and not _is_readable(label.curve):
+                where = f"term {label.name!r} of {variable.name!r}"
+                yield Loss(where, "its formula is too long or nested too deeply")
+    for number, block in enumerate(system.blocks, 1):
+        if block.activation.count > LARGEST_COUNT:
+            yield Loss(f"block {number}", f"its count is above {LARGEST_COUNT}")
+    for number, rule in enumerate(system.rules, 1):
+        if max(map(len, _sentences(rule))) > LONGEST_SENTENCE:
+            yield Loss(f"rule {number}", f"more than {LONGEST_SENTENCE} characters")
+
+
+def _is_readable(formula: Formula) -> bool:
+    try:
+        return parse(text_of(formula.expression)) == formula.expression
+    except FormulaError:
+        return False
+
+
+def _output(one: SystemOutput) -> dict[str, Entry]:
+    entries = _variable(one)
+    how, usual = one.defuzzifier, Defuzzifier(one.defuzzifier.method)
+    entries["defuzzifier"] = how.method
+    if not how.is_weighted or how != usual:
+        entries["samples"] = how.samples
+        entries["grid"] = how.grid
+    if one.aggregation is not None:
+        entries["aggregation"] = one.aggregation
+    if one.default is not None:
+        entries["default"] = Noted(float(one.default), "where it has no number")
+    return entries
+
+
+def _label(label: SystemTerm) -> Entry:
+    match label.curve:
+        case Band() | LR() | Points():
+            entries = named_shape(label.name, label.curve)
+            if label.height != 1.0:
+                entries["height"] = float(label.height)
+            return entries
+        case curve:
+            entries = {"name": label.name, **_curve(curve)}
+            if label.height != 1.0:
+                entries["height"] = float(label.height)
+            return Short(entries)
+
+
+def _curve(curve: Curve) -> dict[str, Entry]:
+    match curve:
+        case Band() | LR() | Points():
+            return named_shape("", curve)
+        case Trapezoid():
+            return _trapezoid(curve)
+        case SigmoidDifference(first, second) | SigmoidProduct(first, second):
+            return {_name(curve): Short([_numbers(first), _numbers(second)])}
+        case PiCurve(a=a, b=b, c=c, d=d):
+            return {"pi": numbers((a, b, c, d))}
+        case Binary(start=start, is_above=is_above):
+            return {"at least" if is_above else "at most": float(start)}
+        case Singleton(value=value):
+            return {"singleton": float(value)}
+        case Linear(weights=weights, offset=offset):
+            whole: dict[str, Entry] = {"weights": numbers(weights)}
+            return {"linear": Short({**whole, "offset": float(offset)})}
+        case Formula(expression=expression):
+            return {"formula": text_of(expression)}
+        case _:
+            return {_name(curve): _numbers(curve)}
+
+
+def _trapezoid(curve: Trapezoid) -> dict[str, Entry]:
+    """Return a trapezoid, a triangle where its plateau is one number."""
+    a = -math.inf if curve.a is None else curve.a
+    d = math.inf if curve.d is None else curve.d
+    is_triangle = None not in (curve.a, curve.d) and repr(curve.b) == repr(curve.c)
+    if is_triangle:
+        return {"triangle": numbers((a, curve.b, d))}
+    return {"trapezoid": numbers((a, curve.b, curve.c, d))}
+
+
+def _name(curve: Curve) -> str:
+    return str(curve.__struct_config__.tag)
+
+
+def _numbers(curve: Curve) -> Short:
+    """Return the numbers of a curve by their names."""
+    fields = curve.__struct_fields__
+    return Short(
+        {name.replace("_", " "): float(getattr(curve, name)) for name in fields}
+    )
+
+
+def _block(block: RuleBlock) -> dict[str, Entry]:
+    entries: dict[str, Entry] = {}
+    if block.name:
+        entries["name"] = block.name
+    for key, norm in (
+        ("and", block.conjunction),
+        ("or", block.disjunction),
+        ("implication", block.implication),
+    ):
+        if norm is not None:
+            entries[key] = norm
+    entries["activation"] = _activation(block.activation)
+    entries["rules"] = [*map(_rule, block.rules)]
+    return entries
+
+
+def _activation(how: Activation) -> Short:
+    entries: dict[str, Entry] = {"method": how.method}
+    if how.count != 1 or how.method in ("first", "last", "highest", "lowest"):
+        entries["count"] = how.count
+    is_asked = how.method in ("first", "last", "threshold")
+    if repr(float(how.threshold)) != "0.0" or is_asked:
+        entries["threshold"] = float(how.threshold)
+    if how.relation != ">=" or how.method == "threshold":
+        entries["relation"] = how.relation
+    return Short(entries)
+
+
+def _sentences(rule: SystemRule) -> tuple[str, str]:
+    return condition_text(rule.when), conclusions_text(rule.then)
+
+
+def _rule(rule: SystemRule) -> dict[str, Entry]:
+    entries: dict[str, Entry] = {"name": rule.name} if rule.name else {}
+    entries["if"], entries["then"] = _sentences(rule)
+    if rule.weight != 1.0:
+        entries["weight"] = float(rule.weight)
+    return entries
 
 
 FORMAT = Format(
