@@ -19,20 +19,23 @@ from fuzzytree.exporters.c_steps import (
     system_heading,
     system_selftest,
 )
-from fuzzytree.exporters.c_tables import Tables, tables_of
+from fuzzytree.exporters.c_tables import CTreeTest, Tables, cut_tests, tables_of
 from fuzzytree.exporters.c_text import (
     DOUBLE,
     SINGLE,
     CNumbers,
     constants,
     fill,
+    integer_type,
+    place_type,
     prefix_of,
+    real_lines,
     real_table,
     remark,
+    whole_lines,
     whole_table,
 )
-from fuzzytree.exporters.c_tree import CTreeTest, cut_tests, tree_code
-from fuzzytree.exporters.reference_tables import places_of
+from fuzzytree.exporters.program_text import places_of
 from fuzzytree.model import (
     Document,
     Format,
@@ -437,6 +440,75 @@ def axes_code(
     yield from whole_table(f"{prefix}_part", inputs, "Their inputs.")
     yield from whole_table(f"{prefix}_part_end", ends, "Behind each combination.")
     yield fill(text, prefix) + fill(_COMBINED, prefix) + "\n"
+
+
+_WALK = """
+name_answer name_decide(const name_real *x)
+{
+    name_answer answer = {NAME_WHEN_MISSING, 0, NAME_MISSING};
+    PLACE_TYPE place = 0;
+TAKE_AXES
+    do
+        place = name_tree.next[
+            2 * place + (value[name_tree.line[place]] > name_tree.cut[place])];
+    while (place < NAME_QUESTIONS);
+    answer.label = name_tree.label[place - NAME_QUESTIONS];
+    answer.rule = (long)(place - NAME_QUESTIONS) + 1;
+    answer.status = NAME_DECIDED;
+    return answer;
+}
+"""
+
+_TABLES = """\
+/* Is the value at `line` above the cut? No and yes lead to the next two: a test, or
+ * NAME_QUESTIONS + leaf - 1. And the class of each leaf. */
+static const struct {
+"""
+
+_ONE_LEAF = """
+name_answer name_decide(const name_real *x)
+{
+    name_answer answer = {NAME_WHEN_MISSING, 0, NAME_MISSING};
+TAKE_AXES
+    answer.label = LABEL;
+    answer.rule = 1;
+    answer.status = NAME_DECIDED;
+    return answer;
+}
+"""
+
+
+def tree_code(
+    tree: FuzzyTree,
+    line: Mapping[str, int],
+    numbers: CNumbers,
+    prefix: str,
+    axes: str,
+) -> Iterator[str]:
+    """Yield the tables of a tree and the function that walks through them."""
+    tests = cut_tests(tree, line)
+    numbered = {label: place for place, label in enumerate(tree.classes)}
+    labels = [numbered[leaf.label] for leaf in tree.leaves]
+    if not tests:
+        plain = axes.replace("    const name_real *value = x;\n", "")
+        text = _ONE_LEAF.replace("LABEL", str(labels[0]))
+        yield fill(text.replace("TAKE_AXES\n", plain), prefix)
+        return
+    ends = [place for test in tests for place in (test.no, test.yes)]
+    lines = [test.line for test in tests]
+    cuts = numbers.rounded([test.cut for test in tests])
+    yield fill(f"#define NAME_QUESTIONS {len(tests)}u\n\n", prefix)
+    yield fill(_TABLES, prefix)
+    for name, values in (("line", lines), ("next", ends), ("label", labels)):
+        yield f"    {integer_type(max(values))} {name}[{len(values)}];\n"
+    yield f"    {numbers.name} cut[{len(cuts)}];\n"
+    yield fill("} name_tree = {\n", prefix)
+    for values in (lines, ends, labels):
+        yield from ("    {\n", *whole_lines(values), "    },\n")
+    yield from ("    {\n", *real_lines(cuts, numbers), "    }\n};\n")
+    kind = place_type(2 * len(tests) + len(labels))
+    walk = _WALK.replace("PLACE_TYPE", kind).replace("TAKE_AXES\n", axes)
+    yield fill(walk, prefix)
 
 
 FORMAT = Format(

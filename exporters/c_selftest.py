@@ -12,14 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import msgspec
 import numpy as np
 
-from fuzzytree.exporters.c_tables import (
-    HIGH_END,
-    LOW_END,
-    POINTS,
-    Tables,
-)
+from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CTreeTest, Tables
 from fuzzytree.exporters.c_text import CNumbers, fill
-from fuzzytree.exporters.c_tree import CTreeTest
 from fuzzytree.exporters.program_text import answer_of, digest_of
 from fuzzytree.model import FuzzyTree, Model, Variable
 from fuzzytree.semantics import Answer, Row, Status, few_probes

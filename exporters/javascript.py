@@ -32,10 +32,11 @@ from fuzzytree.exporters.js_text import (
     table,
     text_of,
 )
-from fuzzytree.exporters.program_text import answer_of, digest_of
-from fuzzytree.exporters.reference_tables import (
+from fuzzytree.exporters.program_text import (
     RuleRows,
+    answer_of,
     combination_row,
+    digest_of,
     node_rows,
     places_of,
 )

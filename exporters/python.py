@@ -13,9 +13,9 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from fuzzytree.exporters.program_text import answer_of
-from fuzzytree.exporters.reference_tables import (
+from fuzzytree.exporters.program_text import (
     RuleRows,
+    answer_of,
     combination_row,
     node_rows,
     places_of,

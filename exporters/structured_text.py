@@ -16,7 +16,7 @@ from typing import Literal
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.reference_tables import targets_of
+from fuzzytree.exporters.program_text import targets_of
 from fuzzytree.exporters.st_steps import RuleSteps, SystemSteps, decision
 from fuzzytree.exporters.st_text import (
     LONG,

@@ -11,11 +11,9 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.c import FORMAT, write_c
 from fuzzytree.exporters.c_selftest import axis_values, leaf, strengths, words_of
 from fuzzytree.exporters.c_steps import number_text
-from fuzzytree.exporters.c_tables import tables_of
+from fuzzytree.exporters.c_tables import cut_tests, tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
-from fuzzytree.exporters.c_tree import cut_tests
-from fuzzytree.exporters.program_text import digest_of
-from fuzzytree.exporters.reference_tables import places_of
+from fuzzytree.exporters.program_text import digest_of, places_of
 from fuzzytree.model.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
