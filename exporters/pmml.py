@@ -15,7 +15,7 @@ A row with a value that is missing or not finite has a branch of its own.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from fuzzytree.exporters.pmml_elements import (
     NUMBER,
@@ -29,6 +29,7 @@ from fuzzytree.exporters.pmml_elements import (
     joined,
     norm_continuous,
     ref,
+    schema,
     text_of,
 )
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
@@ -96,27 +97,18 @@ def write(
             raise refusal(model.name, "pmml", losses)
     if isinstance(model, FuzzySystem):
         return _written_system(model)
-    names = _Names.of(model)
-    functions = Functions()
-    axes = [*_axes(model.variables, names, functions)]
+    names = _Names(model)
+    functions = names.functions
+    axes = [*_axes(model.variables, functions)]
     if isinstance(model, RuleBase):
-        is_exact = curves == "exact"
-        fields, body = _rules(model, names, functions, is_exact=is_exact)
+        fields, body = _rules(model, names, is_exact=curves == "exact")
     else:
-        fields, body = _tree(model, names, functions)
-    dictionary = element(
-        "TransformationDictionary",
-        *functions.defined.values(),
-        *axes,
-        *fields,
-    )
-    target = element(
-        "DataField",
-        *(element("Value", value=name) for name in model.classes),
-        name=names.target,
-        **TEXT,
-    )
+        fields, body = _tree(model, names)
+    transformations = [*functions.defined.values(), *axes, *fields]
+    values = [element("Value", value=name) for name in model.classes]
+    target = element("DataField", *values, name=names.target, **TEXT)
     data = element("DataDictionary", *_columns(model.variables), target)
+    dictionary = element("TransformationDictionary", *transformations)
     content = _content(_header(model), data, dictionary, body)
     return Written(content, losses)
 
@@ -127,32 +119,17 @@ def _written_system(system: FuzzySystem) -> Written:
     system_fields = SystemFields(system, taken)
     first, *others = system.outputs
     result = unlike("result", taken)
+    how = {"feature": "transformedValue", **NUMBER}
     outputs = [
-        element(
-            "OutputField",
-            value,
-            name=one.name,
-            feature="transformedValue",
-            **NUMBER,
-        )
+        element("OutputField", value, name=one.name, **how)
         for one, value in zip(others, system_fields.outputs[1:], strict=True)
     ]
+    predictor = element("NumericPredictor", name=result, coefficient="1")
     model = element(
         "RegressionModel",
-        element(
-            "MiningSchema",
-            *(
-                element("MiningField", name=name, invalidValueTreatment="asIs")
-                for name in system.columns
-            ),
-            element("MiningField", name=first.name, usageType="target"),
-        ),
+        schema(system.columns, first.name),
         *([element("Output", *outputs)] if outputs else []),
-        element(
-            "RegressionTable",
-            element("NumericPredictor", name=result, coefficient="1"),
-            intercept="0",
-        ),
+        element("RegressionTable", predictor, intercept="0"),
         modelName=system.name,
         functionName="regression",
     )
@@ -179,27 +156,23 @@ def _content(*parts: PmmlElement) -> bytes:
     return text.encode("utf-8")
 
 
-class _Names(NamedTuple):
-    """Names of the file, besides those of variables and classes.
+class _Names:
+    """Names of the file, besides those of variables and classes, and its functions.
 
     Attributes:
         target: The field of the class.
-        taken: Names of fields.
+        functions: The functions.
     """
 
-    target: str
-    taken: set[str]
-
-    @staticmethod
-    def of(model: Model) -> _Names:
-        taken = {variable.name for variable in model.variables}
-        target = unlike("class", taken)
-        return _Names(target, taken | {target})
+    def __init__(self, model: Model) -> None:
+        self._taken = {variable.name for variable in model.variables}
+        self.target = self.new("class")
+        self.functions = Functions()
 
     def new(self, name: str) -> str:
         """Return a name for one more field."""
-        result = unlike(name, self.taken)
-        self.taken.add(result)
+        result = unlike(name, self._taken)
+        self._taken.add(result)
         return result
 
 
@@ -248,9 +221,7 @@ def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[PmmlElemen
         )
 
 
-def _axes(
-    variables: Sequence[Variable], names: _Names, functions: Functions
-) -> Iterator[PmmlElement]:
+def _axes(variables: Sequence[Variable], functions: Functions) -> Iterator[PmmlElement]:
     """Yield the field of each combination; missing where a summand is not finite."""
     for variable in variables:
         if variable.parts:
@@ -265,21 +236,10 @@ def _axes(
             yield derived(variable.name, functions.total(summands))
 
 
-def _usable(
-    variables: Sequence[Variable], names: _Names, functions: Functions
-) -> PmmlElement:
+def _usable(variables: Sequence[Variable], functions: Functions) -> PmmlElement:
     """Return 1 where every value is there and finite, and 0 elsewhere."""
     parts = [functions.finite(ref(v.name)) for v in variables]
     return joined("min", parts) if parts else constant(1.0)
-
-
-def _schema(model: Model, names: _Names) -> PmmlElement:
-    fields = [
-        element("MiningField", name=name, invalidValueTreatment="asIs")
-        for name in model.inputs
-    ]
-    target = element("MiningField", name=names.target, usageType="target")
-    return element("MiningSchema", *fields, target)
 
 
 def _model(
@@ -289,22 +249,14 @@ def _model(
     nodes: Iterable[PmmlElement],
 ) -> PmmlElement:
     """Return a tree model whose answer is null where no node of the root fits."""
-    predicted = element(
-        "OutputField",
-        name=names.new("answer"),
-        **TEXT,
-        feature="predictedValue",
-    )
-    number = element(
-        "OutputField",
-        name=names.new("rule"),
-        **TEXT,
-        feature="entityId",
-    )
+    fields = [
+        element("OutputField", name=names.new(name), **TEXT, feature=feature)
+        for name, feature in (("answer", "predictedValue"), ("rule", "entityId"))
+    ]
     return element(
         "TreeModel",
-        _schema(model, names),
-        element("Output", predicted, number, *outputs),
+        schema(model.inputs, names.target),
+        element("Output", *fields, *outputs),
         element("Node", element("True"), *nodes, id="0"),
         modelName=model.name,
         functionName="classification",
@@ -315,7 +267,7 @@ def _model(
 
 
 def _rules(
-    rules: RuleBase, names: _Names, functions: Functions, *, is_exact: bool
+    rules: RuleBase, names: _Names, *, is_exact: bool
 ) -> tuple[list[PmmlElement], PmmlElement]:
     """Return the derived fields and the model of a rule base."""
     terms: dict[tuple[str, str], str] = {}
@@ -328,7 +280,7 @@ def _rules(
             degree = (
                 norm_continuous(term.shape, field)
                 if isinstance(term.shape, Points) and not is_exact
-                else functions.degree(term.shape, field)
+                else names.functions.degree(term.shape, field)
             )
             fields.append(derived(name, degree))
     strengths = [names.new(f"strength {k}") for k in range(1, len(rules.rules) + 1)]
@@ -342,14 +294,12 @@ def _rules(
         whole = joined(how, parts) if parts else constant(1.0)
         fields.append(derived(strength, whole))
     usable, best = names.new("usable"), names.new("best")
-    fields.append(derived(usable, _usable(rules.variables, names, functions)))
+    fields.append(derived(usable, _usable(rules.variables, names.functions)))
     fields.append(derived(best, joined("max", list(map(ref, strengths)))))
     winner = names.new("winner")
     fields.append(derived(winner, _winner(strengths, usable, best)))
     outputs = _outputs(rules, strengths, usable, names)
-    nodes = _rule_nodes(rules, winner, names)
-    body = _model(rules, names, outputs, nodes)
-    return fields, body
+    return fields, _model(rules, names, outputs, _rule_nodes(rules, winner))
 
 
 def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> PmmlElement:
@@ -396,26 +346,18 @@ def _outputs(
         yield output(f"strength of class {name}", value)
 
 
-def _rule_nodes(rules: RuleBase, winner: str, names: _Names) -> Iterator[PmmlElement]:
-    def node(
-        number: float, label: str, id_: str, count: int | None = None
-    ) -> PmmlElement:
-        return element(
-            "Node",
-            _predicate(winner, "equal", number),
-            id=id_,
-            score=label,
-            recordCount=None if count is None else str(count),
-        )
-
+def _rule_nodes(rules: RuleBase, winner: str) -> Iterator[PmmlElement]:
     for k, rule in enumerate(rules.rules, 1):
-        result = node(float(k), rule.then, str(k), rule.support)
+        is_winner = _predicate(winner, "equal", float(k))
+        result = _node(is_winner, str(k), rule.then, rule.support)
         text = _extension("rule", sentence(rule))
         yield result._replace(children=(text, *result.children))
-    if rules.semantics.uncovered is not None:
-        yield node(_UNCOVERED, rules.semantics.uncovered, "uncovered")
-    if rules.semantics.missing is not None:
-        yield node(_MISSING, rules.semantics.missing, "missing")
+    for number, name, label in (
+        (_UNCOVERED, "uncovered", rules.semantics.uncovered),
+        (_MISSING, "missing", rules.semantics.missing),
+    ):
+        if label is not None:
+            yield _node(_predicate(winner, "equal", number), name, label)
 
 
 def _predicate(field: str, operator: str, value: float) -> PmmlElement:
@@ -424,56 +366,39 @@ def _predicate(field: str, operator: str, value: float) -> PmmlElement:
     )
 
 
-def _tree(
-    tree: FuzzyTree, names: _Names, functions: Functions
-) -> tuple[list[PmmlElement], PmmlElement]:
+def _tree(tree: FuzzyTree, names: _Names) -> tuple[list[PmmlElement], PmmlElement]:
     """Return the derived fields and the model of a tree."""
     usable = names.new("usable")
-    fields = [derived(usable, _usable(tree.variables, names, functions))]
+    fields = [derived(usable, _usable(tree.variables, names.functions))]
     is_usable = _predicate(usable, "equal", 1.0)
-    nodes_by_number: dict[
-        int, PmmlElement
-    ] = {}  # by number; a node's children have higher ones
+    children: dict[int, list[PmmlElement]] = {}  # a node's have higher numbers
+
+    def node(predicate: PmmlElement, number: int | None, end: int) -> PmmlElement:
+        """Return a node of the tree, or a leaf if it has no number."""
+        if number is not None:
+            inner = children.pop(number)
+            return element("Node", predicate, *inner, id=f"node {number}")
+        leaf = tree.leaves[end - 1]
+        return _node(predicate, str(end), leaf.label, leaf.support)
+
     for number in range(len(tree.nodes), 0, -1):
-        node = tree.nodes[number - 1]
-        children: list[PmmlElement] = []
-        for owner, branch in enumerate(node.branches):
-            predicate = _owned(node, owner, node.variable)
-            if branch.node is not None:
-                children.append(
-                    _with_predicate(nodes_by_number.pop(branch.node), predicate)
-                )
-            else:
-                children.append(_leaf(tree, branch.leaf or 0, predicate, names))
-        nodes_by_number[number] = element("Node", *children, id=f"node {number}")
-    root = (
-        _with_predicate(nodes_by_number[1], is_usable)
-        if tree.nodes
-        else _leaf(tree, 1, is_usable, names)
-    )
-    nodes = [root]
+        own = tree.nodes[number - 1]
+        children[number] = [
+            node(_owned(own, owner, own.variable), branch.node, branch.leaf or 0)
+            for owner, branch in enumerate(own.branches)
+        ]
+    nodes = [node(is_usable, 1 if tree.nodes else None, 1)]
     if tree.semantics.missing is not None:
-        label = tree.semantics.missing
         is_missing = _predicate(usable, "equal", 0.0)
-        nodes.append(element("Node", is_missing, id="missing", score=label))
+        nodes.append(_node(is_missing, "missing", tree.semantics.missing))
     return fields, _model(tree, names, (), nodes)
 
 
-def _with_predicate(node: PmmlElement, predicate: PmmlElement) -> PmmlElement:
-    return node._replace(children=(predicate, *node.children))
-
-
-def _leaf(
-    tree: FuzzyTree, number: int, predicate: PmmlElement, names: _Names
+def _node(
+    predicate: PmmlElement, id_: str, label: str, count: int | None = None
 ) -> PmmlElement:
-    leaf = tree.leaves[number - 1]
-    return element(
-        "Node",
-        predicate,
-        id=str(number),
-        score=leaf.label,
-        recordCount=None if leaf.support is None else str(leaf.support),
-    )
+    support = None if count is None else str(count)
+    return element("Node", predicate, id=id_, score=label, recordCount=support)
 
 
 def _owned(node: Node, owner: int, field: str) -> PmmlElement:

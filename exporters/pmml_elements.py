@@ -8,7 +8,7 @@ the bits of the reference in every engine that computes in doubles.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from fuzzytree.model import LR, Band, Flank, Points, Shape, Side
@@ -104,6 +104,52 @@ def derived(name: str, expression: PmmlElement) -> PmmlElement:
     return element("DerivedField", expression, name=name, **NUMBER)
 
 
+def defined(
+    name: str,
+    parameters: Mapping[str, Mapping[str, str]],
+    body: PmmlElement,
+    gives: Mapping[str, str] = NUMBER,
+) -> PmmlElement:
+    """Return the definition of a function, from its parameters and their types."""
+    fields = [element("ParameterField", name=p, **t) for p, t in parameters.items()]
+    return element("DefineFunction", *fields, body, name=name, **gives)
+
+
+def schema(inputs: Iterable[str], target: str) -> PmmlElement:
+    """Return the fields that a model takes as they are, and the one it predicts."""
+    fields = [
+        element("MiningField", name=name, invalidValueTreatment="asIs")
+        for name in inputs
+    ]
+    target_field = element("MiningField", name=target, usageType="target")
+    return element("MiningSchema", *fields, target_field)
+
+
+def halved(
+    x: PmmlElement,
+    last: int,
+    limit: Callable[[int], float],
+    end: Callable[[int], PmmlElement],
+) -> PmmlElement:
+    """Return nested questions that find the first place up to whose limit x is.
+
+    Args:
+        x: The value.
+        last: The last place, which has no limit; the first one is 0.
+        limit: Gives the limit of a place.
+        end: Gives the expression of a place.
+    """
+
+    def within(low: int, high: int) -> PmmlElement:
+        if low == high:
+            return end(low)
+        middle = (low + high) // 2
+        is_low = _up_to(x, limit(middle))
+        return apply("if", is_low, within(low, middle), within(middle + 1, high))
+
+    return within(0, last)
+
+
 def joined(function: str, parts: list[PmmlElement]) -> PmmlElement:
     """Return a function of as many expressions as there are; one stays itself."""
     return parts[0] if len(parts) == 1 else apply(function, *parts)
@@ -166,16 +212,7 @@ class Functions:
 
     def _define(self, name: str, parameters: Sequence[str], body: PmmlElement) -> str:
         if name not in self.defined:
-            fields = [
-                element("ParameterField", name=one, **NUMBER) for one in parameters
-            ]
-            self.defined[name] = element(
-                "DefineFunction",
-                *fields,
-                body,
-                name=name,
-                **NUMBER,
-            )
+            self.defined[name] = defined(name, dict.fromkeys(parameters, NUMBER), body)
         return name
 
     def _clipped(self, value: PmmlElement, high: PmmlElement) -> PmmlElement:
@@ -226,22 +263,13 @@ class Functions:
 
     def _points(self, points: Points, x: PmmlElement) -> PmmlElement:
         """Return nested questions that halve the points, down to a line or a degree."""
-        values, degrees = points.values, points.degrees
-        count = len(values)
-
-        def within(first: int, last: int) -> PmmlElement:
-            # Of places 0 (up to the first point), 1, ..., count (behind the last one).
-            if first == last:
-                return self._line(points, first, x)
-            middle = (first + last) // 2
-            return apply(
-                "if",
-                _up_to(x, values[middle]),
-                within(first, middle),
-                within(middle + 1, last),
-            )
-
-        return within(0, count) if count > 1 else constant(degrees[0])
+        values, count = points.values, len(points.values)
+        if count == 1:
+            return constant(points.degrees[0])
+        # Of places 0 (up to the first point), 1, ..., count (behind the last one).
+        return halved(
+            x, count, values.__getitem__, lambda place: self._line(points, place, x)
+        )
 
     def _line(self, points: Points, after: int, x: PmmlElement) -> PmmlElement:
         values, degrees = points.values, points.degrees

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml_elements import (
@@ -21,7 +21,10 @@ from fuzzytree.exporters.pmml_elements import (
     PmmlElement,
     apply,
     constant,
+    defined,
     element,
+    halved,
+    joined,
     ref,
 )
 from fuzzytree.model import FuzzySystem, unlike
@@ -210,18 +213,10 @@ class SystemFields:
         if operation in self.functions:
             return
         known = OPERATIONS[operation]
-        names = ("a", "b", "c")[: len(known.takes)]
         kinds = {"number": NUMBER, "truth": TRUTH}
-        parameters = [
-            element("ParameterField", name=name, **kinds[kind])
-            for name, kind in zip(names, known.takes, strict=True)
-        ]
-        self.functions[operation] = element(
-            "DefineFunction",
-            *parameters,
-            _body(operation, names),
-            name=_own(operation),
-            **kinds[known.gives],
+        takes = dict(zip("abc", (kinds[one] for one in known.takes), strict=False))
+        self.functions[operation] = defined(
+            _own(operation), takes, _body(operation, takes), kinds[known.gives]
         )
 
 
@@ -248,12 +243,12 @@ def _prefix(taken: set[str]) -> str:
     return f"{result} "
 
 
-def _body(operation: str, names: tuple[str, ...]) -> PmmlElement:
+def _body(operation: str, names: Iterable[str]) -> PmmlElement:
     operands = [ref(name) for name in names]
     if operation in _LOGIC:
         return apply(_LOGIC[operation], *operands)
     is_missing = [apply("isMissing", one) for one in operands]
-    nothing = apply("or", *is_missing) if len(operands) > 1 else is_missing[0]
+    nothing = joined("or", is_missing)
     if operation in _COMPARED:
         return apply(
             "if", nothing, _truth(False), apply(_COMPARED[operation], *operands)
@@ -293,16 +288,12 @@ def _expression(value: Value) -> PmmlElement:
 def _table(step: Step, value: Value) -> PmmlElement:
     """Return a number that is looked up by halving."""
     table, x = step.table, _expression(value)
-    is_pick = step.operation == "pick"
-
-    def within(first: int, last: int) -> PmmlElement:
-        if first == last:
-            return constant(table[first] if is_pick else float(first))
-        middle = (first + last) // 2
-        limit = middle + 0.5 if is_pick else table[middle]
-        is_low = apply("lessOrEqual", x, constant(limit))
-        return apply("if", is_low, within(first, middle), within(middle + 1, last))
-
-    whole = within(0, len(table) - 1 if is_pick else len(table))
-    first = constant(table[0] if is_pick else 0.0)
-    return apply("if", apply("isMissing", x), first, whole)
+    if step.operation == "pick":
+        numbers: Sequence[float] = table
+        whole = halved(
+            x, len(table) - 1, lambda k: k + 0.5, lambda k: constant(table[k])
+        )
+    else:
+        numbers = (0.0,)
+        whole = halved(x, len(table), table.__getitem__, lambda k: constant(float(k)))
+    return apply("if", apply("isMissing", x), constant(numbers[0]), whole)
