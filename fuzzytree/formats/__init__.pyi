@@ -26,9 +26,9 @@ from .fis.fis_words import curve_of as curve_of
 from .fll.fll_differences import differences as differences
 from .fll.fll_differences import fuzzylite_losses as fuzzylite_losses
 from .fll.fll_reader import read_fll as read_fll
-from .fll.fll_rules import FLL_HEDGES as FLL_HEDGES
 from .fll.fll_rules import RULE_WORDS as RULE_WORDS
 from .fll.fll_words import ACTIVATIONS as ACTIVATIONS
+from .fll.fll_words import FLL_HEDGES as FLL_HEDGES
 from .fll.fll_words import FLL_METHODS as FLL_METHODS
 from .fll.fll_words import S_NORMS as S_NORMS
 from .fll.fll_words import T_NORMS as T_NORMS

@@ -23,9 +23,9 @@ from fuzzytree.formats.fcl.fcl_syntax import (
     place,
 )
 from fuzzytree.formats.fll.fll_terms import CLASSES
-from fuzzytree.formats.fll.fll_words import FLL_METHODS, S_NORMS, T_NORMS, Method
+from fuzzytree.formats.fll.fll_words import FLL_METHODS, S_NORMS, T_NORMS
 from fuzzytree.formats.text_files import ReaderNotes
-from fuzzytree.model import Defuzzifier, SNorm, TNorm, name_choice
+from fuzzytree.model import Defuzzifier, DefuzzifierMethod, SNorm, TNorm, name_choice
 
 _Norm = TypeVar("_Norm")
 
@@ -80,7 +80,7 @@ S_WORDS: Mapping[str, SNorm] = {
     "SUM": "sum",
     **{name.upper(): norm for name, norm in S_NORMS.items()},
 }
-METHOD_WORDS: Mapping[str, Method] = {
+METHOD_WORDS: Mapping[str, DefuzzifierMethod] = {
     "COG": "centroid",
     "COGS": "weighted average",
     "COGF": "weighted average",

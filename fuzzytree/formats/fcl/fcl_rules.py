@@ -26,6 +26,7 @@ from fuzzytree.formats.fcl.fcl_syntax import (
     place,
     raw,
 )
+from fuzzytree.formats.fll.fll_words import FLL_HEDGES
 from fuzzytree.formats.text_files import ReaderNotes, number_of
 from fuzzytree.model import (
     And,
@@ -45,15 +46,6 @@ from fuzzytree.model import (
     name_choice,
     questions,
 )
-
-_HEDGES: Mapping[str, Hedge] = {
-    "any": "any",
-    "not": "not",
-    "very": "very",
-    "somewhat": "somewhat",
-    "extremely": "extremely",
-    "seldom": "seldom",
-}
 
 
 class Scope(msgspec.Struct, frozen=True):
@@ -131,9 +123,9 @@ def _conclusion(proposition: FclProposition, scope: Scope) -> Conclusion:
 def _hedges(words: Sequence[Token], scope: Scope) -> tuple[Hedge, ...]:
     results: list[Hedge] = []
     for word in words:
-        hedge = _HEDGES.get(word.lower())
+        hedge = FLL_HEDGES.get(word.lower())
         if hedge is None:
-            sentence = f"no hedge {str(word)!r}; {name_choice(word[:99], _HEDGES)}"
+            sentence = f"no hedge {str(word)!r}; {name_choice(word[:99], FLL_HEDGES)}"
             scope.notes.mistake(place(word), sentence)
         else:
             results.append(hedge)

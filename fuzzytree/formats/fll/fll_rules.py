@@ -7,6 +7,7 @@ from typing import Final
 
 import msgspec
 
+from fuzzytree.formats.fll.fll_words import FLL_HEDGES
 from fuzzytree.formats.text_files import (
     MOST_SHOWN,
     FileMistake,
@@ -25,16 +26,6 @@ from fuzzytree.model import (
     SystemRule,
     name_choice,
 )
-
-FLL_HEDGES: Mapping[str, Hedge] = {
-    "any": "any",
-    "not": "not",
-    "very": "very",
-    "somewhat": "somewhat",
-    "extremely": "extremely",
-    "seldom": "seldom",
-}
-"""The hedges that fuzzylite knows, by their words."""
 
 RULE_WORDS: Final = ("if", "is", "then", "and", "or", "with", *FLL_HEDGES)
 

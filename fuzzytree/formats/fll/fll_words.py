@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Final, Literal, TypeVar
+from typing import Final, TypeVar, get_args
 
 import msgspec
 
@@ -17,7 +17,17 @@ from fuzzytree.formats.text_files import (
     split_lines,
     words,
 )
-from fuzzytree.model import Activation, Defuzzifier, SNorm, TNorm, name_choice
+from fuzzytree.model import (
+    Activation,
+    ActivationMethod,
+    Defuzzifier,
+    DefuzzifierMethod,
+    Hedge,
+    Relation,
+    SNorm,
+    TNorm,
+    name_choice,
+)
 
 KEYS: Mapping[str, tuple[str, ...]] = {
     "Engine": ("description",),
@@ -63,16 +73,7 @@ S_NORMS: Mapping[str, SNorm] = {
     "UnboundedSum": "sum",
 }
 
-Method = Literal[
-    "centroid",
-    "bisector",
-    "smallest of maximum",
-    "largest of maximum",
-    "mean of maximum",
-    "weighted average",
-    "weighted sum",
-]
-FLL_METHODS: Mapping[str, Method] = {
+FLL_METHODS: Mapping[str, DefuzzifierMethod] = {
     "Centroid": "centroid",
     "Bisector": "bisector",
     "SmallestOfMaximum": "smallest of maximum",
@@ -87,27 +88,20 @@ TYPES: Final = ("Automatic", "TakagiSugeno", "Tsukamoto")
 SAMPLES: Final = 1000
 """At how many values a curve is looked at where a file does not say it."""
 
-Choice = Literal[
-    "general", "first", "last", "highest", "lowest", "proportional", "threshold"
-]
-ACTIVATIONS: Mapping[str, Choice] = {
-    "General": "general",
-    "First": "first",
-    "Last": "last",
-    "Highest": "highest",
-    "Lowest": "lowest",
-    "Proportional": "proportional",
-    "Threshold": "threshold",
+ACTIVATIONS: Mapping[str, ActivationMethod] = {
+    method.capitalize(): method for method in get_args(ActivationMethod)
 }
-Relation = Literal["<", "<=", "==", "!=", ">=", ">"]
-RELATIONS: Mapping[str, Relation] = {
-    "<": "<",
-    "<=": "<=",
-    "==": "==",
-    "!=": "!=",
-    ">=": ">=",
-    ">": ">",
+FLL_HEDGES: Mapping[str, Hedge] = {
+    "any": "any",
+    "not": "not",
+    "very": "very",
+    "somewhat": "somewhat",
+    "extremely": "extremely",
+    "seldom": "seldom",
 }
+"""The hedges that fuzzylite knows, by their words."""
+
+_RELATIONS: Mapping[str, Relation] = {one: one for one in get_args(Relation)}
 
 
 class FllEntry(msgspec.Struct, frozen=True):
@@ -301,9 +295,9 @@ def activation(entry: FllEntry | None, notes: ReaderNotes) -> Activation:
     if not rest or method in ("general", "proportional"):
         return Activation(method)
     if method == "threshold":
-        relation = RELATIONS.get(rest[0].text)
+        relation = _RELATIONS.get(rest[0].text)
         if relation is None:
-            sentence = f"no relation {rest[0].text!r}; {name_choice('', RELATIONS)}"
+            sentence = f"no relation {rest[0].text!r}; {name_choice('', _RELATIONS)}"
             notes.mistake(rest[0].position, sentence)
         threshold = _threshold(rest[1], notes)
         return Activation(method, threshold=threshold, relation=relation or ">=")
@@ -312,7 +306,7 @@ def activation(entry: FllEntry | None, notes: ReaderNotes) -> Activation:
     return Activation(method, count, threshold)
 
 
-_WANTED: Mapping[Choice, str] = {
+_WANTED: Mapping[ActivationMethod, str] = {
     "general": "nothing",
     "proportional": "nothing",
     "first": "a number of rules and a threshold",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final, Literal
+from typing import Final
 
 from fuzzytree.formats.fml.xml import FmlElement
 from fuzzytree.formats.text_files import ReaderNotes, number_of
 from fuzzytree.model import (
     Curve,
     Defuzzifier,
+    DefuzzifierMethod,
     Gaussian,
     Hedge,
     PiCurve,
@@ -49,18 +50,7 @@ FML_SNORMS: Final[Mapping[str, SNorm]] = {
     "HSUM": "hamacher sum",
     "NILMAX": "nilpotent maximum",
 }
-FML_METHODS: Final[
-    Mapping[
-        str,
-        Literal[
-            "centroid",
-            "bisector",
-            "smallest of maximum",
-            "largest of maximum",
-            "mean of maximum",
-        ],
-    ]
-] = {
+FML_METHODS: Final[Mapping[str, DefuzzifierMethod]] = {
     "COG": "centroid",
     "COA": "bisector",
     "LM": "smallest of maximum",
