@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.sheet import LINE, MARGIN, SIZE, TITLE, WORD, Sheet, short
+from fuzzytree.report.plots.sheet import (
+    LINE,
+    MARGIN,
+    SIZE,
+    TITLE,
+    WORD,
+    Sheet,
+    short,
+    style,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -300,7 +300,7 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
     import numpy as np
     from confusion import MOST_CLASSES, draw_confusion
 
-    from fuzzytree.report.plots.saving import drawn
+    from fuzzytree.report.plots.sheet import drawn
     from fuzzytree.report.plots.trees import MOST_LEAVES, draw_tree
     from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames

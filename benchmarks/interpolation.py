@@ -20,8 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.report.plots import save
-from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.sheet import SIZE
+from fuzzytree.report.plots.sheet import SIZE, style
 from fuzzytree.tactile.interpolation import interpolated
 from fuzzytree.tactile.plots import colours, draw_frames
 from fuzzytree.tactile.presses import read_frames

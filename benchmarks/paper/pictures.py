@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from fuzzytree.report.plots.saving import drawn, style
+from fuzzytree.report.plots.sheet import drawn, style
 from paper.inference import wilson
 from paper.judging import PRIMARY, Line, Verdict, lines, verdicts
 from paper.records import Claims

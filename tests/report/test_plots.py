@@ -21,7 +21,7 @@ from fuzzytree.benchmarking.records import Kind, Point, Question, Study
 from fuzzytree.errors import MissingExtraError, WriteError
 from fuzzytree.report import plots
 from fuzzytree.report.plots.precision import time_text
-from fuzzytree.report.plots.saving import drawn
+from fuzzytree.report.plots.sheet import drawn
 from tests.benchmarking.studies import error, point, study, timing
 
 if TYPE_CHECKING:

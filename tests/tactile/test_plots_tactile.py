@@ -21,7 +21,7 @@ from fuzzytree.errors import MissingExtraError
 from fuzzytree.model.rulebase import Band, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.report import plots
-from fuzzytree.report.plots.saving import drawn
+from fuzzytree.report.plots.sheet import drawn
 from fuzzytree.report.plots.trees import COLOURS, MOST_LEAVES, class_colours
 from fuzzytree.report.svg_tree import boxes_of, placed
 from fuzzytree.tactile.plots import MOST_FRAMES, FrameAxis, colours, draw_frames

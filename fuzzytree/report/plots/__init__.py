@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.report.plots.precision import work_precision
-from fuzzytree.report.plots.saving import SUFFIXES, save
+from fuzzytree.report.plots.sheet import SUFFIXES, save
 from fuzzytree.report.plots.trees import draw_tree
 
 __all__ = [

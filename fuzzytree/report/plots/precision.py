@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from fuzzytree.benchmarking import Kind, Point, Question, Study, Timing, error_of
-from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.sheet import SIZE
+from fuzzytree.report.plots.sheet import SIZE, style
 from fuzzytree.report.text import counted
 
 if TYPE_CHECKING:

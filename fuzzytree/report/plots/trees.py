@@ -7,8 +7,16 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from fuzzytree.model import FuzzyTree
-from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.sheet import LINE, MARGIN, SIZE, TITLE, WORD, Sheet, short
+from fuzzytree.report.plots.sheet import (
+    LINE,
+    MARGIN,
+    SIZE,
+    TITLE,
+    WORD,
+    Sheet,
+    short,
+    style,
+)
 from fuzzytree.report.svg_tree import EDGE, HIGH, WIDE, Box, boxes_of, placed
 from fuzzytree.report.text import counted
 
