@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from fuzzytree.auditing import (
@@ -12,10 +12,11 @@ from fuzzytree.auditing import (
     Answer,
     Audit,
     Bracket,
-    Coordinate,
+    Code,
     Declined,
     FileLocation,
     Measure,
+    Span,
     Witness,
 )
 from fuzzytree.model import printable
@@ -28,7 +29,7 @@ from fuzzytree.report.audit_states import (
     state_word,
 )
 from fuzzytree.report.svg_terms import span_text
-from fuzzytree.report.text import aligned, counted, number
+from fuzzytree.report.text import aligned, counted, number, some, wrapped
 
 WIDTH: Final = 100
 MOST_FINDINGS: Final = 200
@@ -93,10 +94,8 @@ def audit_lines(
     """
     audit = as_in_file(audit)
     paint = _painted if is_coloured else _plain
-    yield from _wrapped(audit_verdict(audit, gone), WIDTH, "  ")
-    findings = sorted(
-        audit.open_findings, key=lambda one: [*SEVERITIES].index(one.severity)
-    )
+    yield from wrapped(audit_verdict(audit, gone), WIDTH, rest="  ")
+    findings = sorted(audit.open_findings, key=_gravity)
     if not (is_verbose or is_whole):
         yield from _short(audit, findings, paint)
         return
@@ -137,7 +136,7 @@ def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[
         codes = Counter(one.code for one in findings[_MOST_SHORT:])
         said = ", ".join(f"{code} ({count})" for code, count in codes.items())
         rest = counted(len(findings) - _MOST_SHORT, "more finding")
-        yield from _wrapped(f"{rest}: {said}; --verbose lists all", WIDTH, "  ")
+        yield from wrapped(f"{rest}: {said}; --verbose lists all", WIDTH, rest="  ")
     given = [o for o in audit.answers if (o.code, o.subject) == ("FT204", "row")]
     yield from _brief("the row of --row", given, paint)
     states = Counter(state_word(one.state) for one in audit.answers)
@@ -180,8 +179,8 @@ def audit_verdict(audit: Audit, gone: Collection[str] = ()) -> str:
         ids = counted(len(gone), "accepted finding")
         said += f"; {ids} no longer found, which --write-baseline forgets"
     if found:
-        gravest = min(found, key=lambda one: [*SEVERITIES].index(one.severity))
-        said += f"; `fuzzytree explain {gravest.code}` explains the gravest"
+        gravest = min(found, key=_gravity).code
+        said += f"; `fuzzytree explain {gravest}` explains the gravest"
     elif audit.is_complete:
         said += f"; {_asked_text(audit)}"
     return said
@@ -237,10 +236,11 @@ def _finding(
 
 def _sentence(answer: Answer, audit: Audit, paint: _Paint) -> Iterator[str]:
     """Yield where a finding is, and what it says."""
-    where = _where(answer.places[0] if answer.places else None, audit)
+    file = audit.file.name if audit.file else ""
+    where = str(answer.places[0]) if answer.places else file
     name = f"{answer.code} {answer.severity}:"
     lead = f"{where}: {name}" if where else name
-    first, *rest = _wrapped(f"{lead} {answer.sentence}", WIDTH, "  ")
+    first, *rest = wrapped(f"{lead} {answer.sentence}", WIDTH, rest="  ")
     yield first.replace(name, paint(name, answer.severity), 1)
     yield from rest
 
@@ -250,20 +250,9 @@ def _evidence(
 ) -> Iterator[str]:
     """Yield how a finding is known: all facts, or only the first few."""
     for title, text in [*_facts(answer)][:only]:
-        begin, *rest = _wrapped(text, WIDTH - 11) or [""]
+        begin, *rest = wrapped(text, WIDTH - 11) or [""]
         yield f"  {paint(f'{title:8}', title)} {begin}".rstrip()
         yield from (f"           {line}" for line in rest)
-
-
-def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
-    """Return a text in lines; what a terminal might obey is written as an escape."""
-    return textwrap.wrap(
-        printable(text),
-        width,
-        subsequent_indent=indent,
-        break_on_hyphens=False,
-        break_long_words=False,
-    )
 
 
 def _painted(text: str, key: str) -> str:
@@ -280,14 +269,12 @@ def _facts(answer: Answer) -> Iterator[tuple[str, str]]:
     yield state_word(answer.state), state_text(answer.state)
     match answer.state:
         case Witness(point=point) | Bracket(point=point) if point:
-            yield "at", _point_text(point)
+            values = (f"{c.input} = {c.decimal} ({c.hex or c.exact})" for c in point)
+            yield "at", some(values, _MOST_INPUTS, "more inputs")
         case _:
             pass
     if answer.region:
-        shown = [f"{s.variable} {span_text(s)}" for s in answer.region[:_MOST_INPUTS]]
-        if len(answer.region) > _MOST_INPUTS:
-            shown.append(f"{len(answer.region) - _MOST_INPUTS} more")
-        yield "region", "; ".join(shown)
+        yield "region", region_text(answer.region)
     if answer.measures:
         yield "measured", "; ".join(map(_measure_text, answer.measures[:8]))
     others = [f"{one.line}:{one.column}" for one in answer.places[1:]]
@@ -299,25 +286,15 @@ def _facts(answer: Answer) -> Iterator[tuple[str, str]]:
         yield "again", answer.repeat
 
 
-def _point_text(point: Sequence[Coordinate]) -> str:
-    shown = [
-        f"{one.input} = {one.decimal} ({one.hex or one.exact})"
-        for one in point[:_MOST_INPUTS]
-    ]
-    if len(point) > _MOST_INPUTS:
-        shown.append(f"{len(point) - _MOST_INPUTS} more inputs")
-    return ", ".join(shown)
+def region_text(region: Iterable[Span]) -> str:
+    """Return the sides of a region in words, a dozen at most."""
+    sides = (f"{side.variable} {span_text(side)}" for side in region)
+    return some(sides, _MOST_INPUTS, joint="; ")
 
 
 def _measure_text(measure: Measure) -> str:
     unit = f" {measure.unit}" if measure.unit else ""
     return f"{measure.name} {number(measure.value)}{unit}"
-
-
-def _where(place: FileLocation | None, audit: Audit) -> str:
-    if place is not None:
-        return f"{place.file}:{place.line}:{place.column}"
-    return audit.file.name if audit.file else ""
 
 
 def _quoted(place: FileLocation, source: Sequence[str]) -> Iterator[str]:
@@ -339,6 +316,10 @@ def _counts(answers: Sequence[Answer]) -> Iterator[str]:
     counts = [len(answers), found]
     counts += [words.count(word) for word in STATES]
     yield from (str(count) if count else "-" for count in counts)
+
+
+def _gravity(answer: Answer) -> int:
+    return [*SEVERITIES].index(answer.severity)
 
 
 def _by_severity(found: Sequence[Answer]) -> str:
@@ -383,7 +364,7 @@ def _brief(
     yield title
     for answer in answers:
         word = state_word(answer.state)
-        first, *rest = _wrapped(answer.sentence, WIDTH - 17) or [""]
+        first, *rest = wrapped(answer.sentence, WIDTH - 17) or [""]
         yield f"  {answer.code} {paint(f'{word:8}', word)} {first}".rstrip()
         yield from (f"{' ' * 17}{line}" for line in rest)
     if more:
@@ -455,6 +436,41 @@ def _asked_text(audit: Audit) -> str:
 
 
 def _item(text: str) -> Iterator[str]:
-    first, *rest = _wrapped(text, WIDTH - 2)
+    first, *rest = wrapped(text, WIDTH - 2)
     yield f"- {first}"
     yield from (f"  {line}" for line in rest)
+
+
+def explanation_lines(code: Code) -> Iterator[str]:
+    """Yield what a code means, why it matters, a case, and what to do."""
+    where = "" if code.decision == "any" else ", where the strongest rule decides"
+    yield f"{code.code}  {code.title} ({code.severity}{where})"
+    for title, text in (
+        ("what", code.what),
+        ("why", code.why),
+        ("example", code.example),
+        ("what to do", code.remedy),
+    ):
+        yield ""
+        yield title
+        for line in text.splitlines():
+            yield from textwrap.wrap(
+                line, WIDTH - 4, initial_indent="  ", subsequent_indent="  "
+            ) or [""]
+
+
+def code_lines(codes: Sequence[Code], *, is_whole: bool = True) -> Iterator[str]:
+    """Yield codes with their severities and titles, after their number.
+
+    Args:
+        codes: The codes.
+        is_whole: Whether to list the codes of declined questions, and not only count.
+    """
+    declined = [one for one in codes if one.code.startswith("FTD")]
+    shown = codes if is_whole else [one for one in codes if one not in declined]
+    yield f"{counted(len(codes), 'code')}; `fuzzytree explain CODE` explains one"
+    rows = [("code", "severity", "finding")]
+    yield from aligned([*rows, *((c.code, c.severity, c.title) for c in shown)])
+    if len(shown) < len(codes):
+        count = counted(len(declined), "code")
+        yield f"FTD..  {count} of declined questions: `fuzzytree explain FTD`"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import get_args
 
@@ -18,7 +17,7 @@ from fuzzytree.benchmarking import (
     times_faster,
     title,
 )
-from fuzzytree.report.text import aligned, counted, digits, duration
+from fuzzytree.report.text import aligned, counted, digits, duration, wrapped
 from fuzzytree.runtimes import baseline
 
 _HEAD = (
@@ -53,7 +52,8 @@ def study_lines(
         is_full: Whether to list variants too that are beaten in both run time and
             error; it includes the rest.
     """
-    yield from _wrapped(found.advice[-1] if found.advice else _nothing(found), "")
+    advice = found.advice[-1] if found.advice else _nothing(found)
+    yield from wrapped(advice, _WIDTH, rest="  ")
     yield f"{found.model}: {found.data}; {found.seconds:.0f} s"
     if is_verbose or is_full:
         yield from _tables(found, is_full=is_full)
@@ -73,7 +73,7 @@ def _nothing(found: Study) -> str:
 
 def _more(title: str, shown: Sequence[str], rest: int) -> Iterator[str]:
     for text in shown:
-        yield from _wrapped(f"{title}{text}", "")
+        yield from wrapped(f"{title}{text}", _WIDTH, rest="  ")
     if rest > 0:
         yield f"{title}{rest} more; --verbose lists all"
 
@@ -251,16 +251,4 @@ def _section(name: str, lines: Iterable[str]) -> Iterator[str]:
         if not position:
             yield ""
             yield name
-        yield from _wrapped(line, "  ")
-
-
-def _wrapped(line: str, indent: str) -> Iterator[str]:
-    """Yield a sentence in lines of which the later ones are indented further."""
-    yield from textwrap.wrap(
-        line,
-        _WIDTH,
-        initial_indent=indent,
-        subsequent_indent=f"{indent}  ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+        yield from wrapped(line, _WIDTH, "  ", "    ")

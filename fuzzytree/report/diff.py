@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator, Sequence
-from typing import Final
 
 from fuzzytree.auditing import (
     Answer,
-    Bracket,
     Change,
     ComparedModel,
-    Coordinate,
     Difference,
-    FileLocation,
     Witness,
 )
 from fuzzytree.model import printable
+from fuzzytree.report.audit import WIDTH, region_text
 from fuzzytree.report.audit_states import state_text, state_word
-from fuzzytree.report.svg_terms import span_text
-from fuzzytree.report.text import counted
-
-WIDTH: Final = 100
+from fuzzytree.report.text import counted, some, wrapped
 
 _MOST_ANSWERS = 6  # answers about decisions, unless all are printed
 _MOST_CHANGES = 6
@@ -45,7 +38,8 @@ def diff_lines(found: Difference, *, is_verbose: bool = False) -> Iterator[str]:
         shown = [
             f"{s.variable} {s.low:.6g} to {s.high:.6g}" for s in found.domain.sides
         ]
-        yield from _lines("domain  ", ", ".join(shown) or "no inputs", indent=" " * 9)
+        domain = ", ".join(shown) or "no inputs"
+        yield from wrapped(domain, WIDTH, "domain   ", " " * 9)
     yield "decisions"
     answers = sorted(found.answers, key=lambda one: isinstance(one.state, Witness))
     most = len(answers) if is_verbose else _MOST_ANSWERS
@@ -107,53 +101,25 @@ def _model_text(title: str, model: ComparedModel) -> str:
 
 def _answer_lines(answer: Answer, *, has_point: bool) -> Iterator[str]:
     word = state_word(answer.state)
-    yield from _lines(f"  {word:8}", answer.sentence)
+    yield from wrapped(answer.sentence, WIDTH, f"  {word:8} ", _INDENT)
     if not has_point:
         return
     match answer.state:
         case Witness(point=point):
-            yield from _lines(f"{_INDENT}at", _point_text(point), indent=_INDENT)
-        case Bracket():
-            yield from _lines(_INDENT[:-1], state_text(answer.state))
+            values = (f"{c.input} = {c.decimal if c.hex else c.exact}" for c in point)
+            shown = some(values, _MOST_INPUTS) or "any row"
+            yield from wrapped(shown, WIDTH, f"{_INDENT}at ", _INDENT)
         case state:
-            yield from _lines(_INDENT[:-1], state_text(state))
+            yield from wrapped(state_text(state), WIDTH, _INDENT, _INDENT)
     if answer.region:
-        shown = [f"{s.variable} {span_text(s)}" for s in answer.region[:_MOST_INPUTS]]
-        more = len(answer.region) - len(shown)
-        shown += [f"{more} more"] if more > 0 else []
-        text = f"everywhere in the box of {'; '.join(shown)}"
-        yield from _lines(_INDENT[:-1], text)
-
-
-def _point_text(point: Sequence[Coordinate]) -> str:
-    shown = [
-        f"{one.input} = {one.decimal if one.hex else one.exact}"
-        for one in point[:_MOST_INPUTS]
-    ]
-    more = len(point) - len(shown)
-    shown += [f"{more} more"] if more > 0 else []
-    return ", ".join(shown) or "any row"
+        text = f"everywhere in the box of {region_text(answer.region)}"
+        yield from wrapped(text, WIDTH, _INDENT, _INDENT)
 
 
 def _change_lines(change: Change, *, has_place: bool) -> Iterator[str]:
-    places = " -> ".join(map(_place_text, filter(None, (change.old, change.new))))
+    places = " -> ".join(map(str, filter(None, (change.old, change.new))))
     doubt = "" if change.is_proved else " (not proved)"
     text = f"{change.sentence}{doubt}"
-    yield from _lines(f"  {change.grade:12}", text, indent=" " * 15)
+    yield from wrapped(text, WIDTH, f"  {change.grade:12} ", " " * 15)
     if places and has_place:
         yield printable(f"{' ' * 15}{places}")
-
-
-def _place_text(place: FileLocation) -> str:
-    return f"{place.file}:{place.line}:{place.column}"
-
-
-def _lines(lead: str, text: str, *, indent: str = _INDENT) -> Iterator[str]:
-    yield from textwrap.wrap(
-        printable(text),
-        WIDTH,
-        initial_indent=f"{lead} ",
-        subsequent_indent=indent,
-        break_on_hyphens=False,
-        break_long_words=False,
-    )

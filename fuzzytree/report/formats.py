@@ -114,7 +114,7 @@ def _limits(found: Iterable[tuple[str, tuple[str, ...]]]) -> Iterator[str]:
 
 def ability_lines(found: Found) -> Iterator[str]:
     """Yield the table of what each format can carry: a line for each kind of model."""
-    rows = [*_rows(found)]
+    rows = [*ability_rows(found)]
     if rows:
         yield from aligned(rows)
         yield ""
@@ -124,18 +124,8 @@ def ability_lines(found: Found) -> Iterator[str]:
             yield f"  {name}: {reason}"
 
 
-def ability_table(found: Found, *, legend: bool = True) -> str:
-    """Return the same table as Markdown."""
-    head, *rows = _rows(found)
-    lines = [head, ["---", *[":-:"] * (len(head) - 1)], *rows]
-    table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    if not legend:
-        return table
-    signs = "".join(f"- `{SIGNS[one]}` {text}\n" for one, text in MEANINGS.items())
-    return f"{table}\n{signs}"
-
-
-def _rows(found: Found) -> Iterator[Sequence[str]]:
+def ability_rows(found: Found) -> Iterator[Sequence[str]]:
+    """Yield the names of formats, then the signs of each kind of model."""
     known = {name: one for name, one in found.items() if not isinstance(one, str)}
     if not known:
         return

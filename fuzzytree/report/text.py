@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -27,6 +28,7 @@ from fuzzytree.model import (
     Shape,
     Side,
     Variable,
+    printable,
     sentence,
 )
 from fuzzytree.runtimes import Facts, OnnxModel
@@ -53,6 +55,38 @@ def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
         "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
         for row in table
     ]
+
+
+def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """Return a text in lines; what a terminal might obey is written as an escape.
+
+    Args:
+        text: The text.
+        width: Of a line, its indent included.
+        first: Stands before the first line.
+        rest: Stands before the others.
+    """
+    return textwrap.wrap(
+        printable(text),
+        width,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+
+
+def some(words: Iterable[str], most: int, more: str = "more", joint: str = ", ") -> str:
+    """Return the first of some words, and how many more there are.
+
+    Example:
+        >>> some(["a", "b", "c"], 2)
+        'a, b, 1 more'
+    """
+    shown = [*words]
+    if len(shown) > most:
+        shown[most:] = [f"{len(shown) - most} {more}"]
+    return joint.join(shown)
 
 
 def duration(ns: float) -> str:

@@ -27,7 +27,7 @@ from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Loss, Written
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.report.formats import SIGNS, ability_table
+from fuzzytree.report.formats import SIGNS, Found, ability_rows
 from fuzzytree.semantics.conversion import as_system, flattened
 from fuzzytree.semantics.inference import input_values
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -43,13 +43,24 @@ def _tried(form: str) -> tuple[Ability, ...]:
     return abilities_of(find_format(form))
 
 
+def _ability_table(found: Found, *, legend: bool = True) -> str:
+    """Return the table of abilities as Markdown."""
+    head, *rows = ability_rows(found)
+    lines = [head, ["---", *[":-:"] * (len(head) - 1)], *rows]
+    table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    if not legend:
+        return table
+    signs = "".join(f"- `{SIGNS[one]}` {text}\n" for one, text in MEANINGS.items())
+    return f"{table}\n{signs}"
+
+
 def _page() -> str:
-    made = ability_table({one.name: _tried(one.name) for one in all_formats()})
+    made = _ability_table({one.name: _tried(one.name) for one in all_formats()})
     for form in all_formats():
         known = {name: abilities_of(form, dialect=name) for name in dialects_of(form)}
         lines = zip(*known.values(), strict=True)
         if any(len({one.outcome for one in line}) > 1 for line in lines):
-            table = ability_table(known, legend=False)
+            table = _ability_table(known, legend=False)
             made += f"\nThe dialects of {form.name}:\n\n{table}"
     text = PAGE.read_text("utf-8")
     return MARKED.sub(lambda found: f"{found[1]}{made}\n{found[2]}", text)

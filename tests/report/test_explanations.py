@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.report.audit import WIDTH
-from fuzzytree.report.explanations import code_lines, explanation_lines
+from fuzzytree.report.audit import WIDTH, code_lines, explanation_lines
 
 
 def test_every_code_is_explained_within_the_width() -> None:

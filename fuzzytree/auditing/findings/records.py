@@ -28,6 +28,10 @@ class FileLocation(Value, frozen=True):
     line: int
     column: int
 
+    def __str__(self) -> str:
+        """Return it as compilers do."""
+        return f"{self.file}:{self.line}:{self.column}"
+
 
 class TermName(Value, frozen=True):
     """A term of a variable."""
