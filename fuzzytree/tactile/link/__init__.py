@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, assert_never
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, assert_never
 
 import numpy as np
 
@@ -107,10 +107,11 @@ def ports() -> list[SerialPort]:
         from serial.tools import list_ports
     except ImportError as error:
         raise _missing() from error
-    found = [
-        SerialPort(port.device, _known(port.description), _known(port.hwid))
-        for port in list_ports.comports()
-    ]
+    found: list[SerialPort] = []
+    for port in list_ports.comports():
+        texts = (port.description, port.hwid)
+        known = ("" if text in (None, "n/a") else str(text) for text in texts)
+        found.append(SerialPort(port.device, *known))
     return sorted(found, key=lambda port: port.device)
 
 
@@ -169,7 +170,7 @@ def start(board: Board, frames: Iterable[Frame]) -> Started:
     return Started(measured(board, cells), remarks(board, cells))
 
 
-class Connection:
+class Connection(contextlib.AbstractContextManager["Connection"]):
     """The frames of a board, read in a thread of their own.
 
     Iterating waits for each frame and ends with the line. `take` waits no longer than
@@ -238,10 +239,6 @@ class Connection:
         """Give frames until the line ends."""
         while (frame := self.take()) is not None:
             yield frame
-
-    def __enter__(self) -> Self:
-        """Return the line, which is closed at the end of the block."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Close the port."""
@@ -401,9 +398,8 @@ def _why(port: str, baud: int, error: OSError | ValueError) -> str:
         return f"{port}: another program has it open"
     if number in (errno.EACCES, errno.EPERM):
         return f"{port}: you may not open it{_group_hint(port)}"
-    if Path(port).exists() and "Could not configure port" in str(error):
-        return f"{port}: is not a serial port"
-    if number == errno.EISDIR:
+    is_other = Path(port).exists() and "Could not configure port" in str(error)
+    if is_other or number == errno.EISDIR:
         return f"{port}: is not a serial port"
     if "baud" in str(error):
         return f"{port}: cannot be set to {baud} baud"
@@ -418,19 +414,13 @@ def _group_hint(port: str) -> str:
         group = grp.getgrgid(Path(port).stat().st_gid).gr_name
     except (ImportError, KeyError, OSError):
         return ""
-    return (
-        f"; it belongs to the group {group!r}: "
-        f"`sudo usermod -aG {group} {os.environ.get('USER', 'YOU')}`, then log in again"
-    )
+    command = f"sudo usermod -aG {group} {os.environ.get('USER', 'YOU')}"
+    return f"; it belongs to the group {group!r}: `{command}`, then log in again"
 
 
 def _sum(first: Counters, second: Counters) -> Counters:
     pairs = zip(astuple(first), astuple(second), strict=True)
     return Counters(*(one + other for one, other in pairs))
-
-
-def _known(text: str | None) -> str:
-    return "" if text in (None, "n/a") else str(text)
 
 
 def _missing() -> MissingExtraError:

@@ -13,10 +13,10 @@ import stat
 import threading
 import time
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import Final, NamedTuple, Self
+from typing import Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -49,10 +49,14 @@ FIXED: Final = np.dtype(
 )
 """What stands at the beginning, before the text of the board."""
 
+LARGEST_ARRAY: Final = 2**31
+"""The most bytes of cells that `read_recording` holds at once."""
+
 _NS = 1_000_000_000
 _COUNTERS = len(fields(Counters))
 _PATIENCE = 8  # how often each byte may be looked at,
 _TRIES_BYTES = 2**24  # beside these
+_CHUNK = 2**20
 
 
 class FrameRecord(NamedTuple):
@@ -63,11 +67,7 @@ class FrameRecord(NamedTuple):
 
 
 def header(board: Board, started_ns: int) -> bytes:
-    """Return the beginning of a recording: sizes, time and the board as text.
-
-    Args:
-        board: Its fields as JSON, which is YAML too.
-        started_ns: Since 1970 (UTC).
+    """Return the beginning of a recording: sizes, time, and the board as text.
 
     Raises:
         WriteError: If the board is too large.
@@ -105,9 +105,7 @@ def cell_type(board: Board) -> np.dtype[np.unsignedinteger]:
 def layout_of(board: Board, *, counters: int = _COUNTERS) -> np.dtype[np.void]:
     """Return how the fields of a record lie in its bytes.
 
-    Args:
-        board: What sends the frames.
-        counters: How many a record has; there may be more in a later version.
+    A later version may have more counters.
     """
     shape = (board.sensor.rows, board.sensor.columns)
     return np.dtype(
@@ -122,94 +120,20 @@ def layout_of(board: Board, *, counters: int = _COUNTERS) -> np.dtype[np.void]:
     )
 
 
-def packed(record: FrameRecord, board: Board) -> bytes:
-    """Return a record as bytes.
-
-    Raises:
-        TableError: If the frame is of another size, or a cell has no place.
-    """
-    frame, counters = record
-    fields = np.zeros((), layout_of(board))
+def _packed(frame: Frame, counters: Counters, board: Board) -> bytes:
+    """Return a record as bytes."""
     cells = check_frames(board.sensor, frame.cells)[0]
     largest = np.iinfo(cell_type(board)).max
     if cells.min() < 0 or cells.max() > largest:
         wrong = cells.min() if cells.min() < 0 else cells.max()
         raise TableError(f"a cell lies in 0 to {largest}, not {wrong}")
-    fields["mark"] = MARK
-    fields["number"] = frame.number
-    fields["time_ns"] = round(frame.time * _NS)
-    fields["counters"] = astuple(counters)
-    fields["cells"] = cells
-    content = fields.tobytes()[:-4]
+    time_ns = round(frame.time * _NS)
+    values = (MARK, frame.number, time_ns, astuple(counters), cells, 0)
+    content = np.array(values, layout_of(board)).tobytes()[:-4]
     return content + crc(content)
 
 
-def unpacked_sizes(fixed: bytes, name: str) -> int:
-    """Return how long the text of the board is that follows the fixed part.
-
-    Raises:
-        ReadError: If it is no beginning of a recording.
-    """
-    if not fixed.startswith(MAGIC) or len(fixed) < FIXED.itemsize:
-        raise ReadError(f"{name}: is no recording of a board")
-    head = np.frombuffer(fixed, FIXED, 1)[0]
-    if head["version"] != VERSION:
-        raise ReadError(
-            f"{name}: is a recording of version {head['version']}; "
-            f"this program reads version {VERSION}"
-        )
-    return int(head["board_bytes"])
-
-
-def unpacked_board(content: bytes, name: str) -> tuple[Board, int, int]:
-    """Return a header's board, when it began, and how many counters a record has.
-
-    Raises:
-        ReadError: If the header is damaged, or contradicts itself.
-    """
-    fixed, text = content[: FIXED.itemsize], content[FIXED.itemsize : -4]
-    is_whole = len(text) == unpacked_sizes(fixed, name)
-    if not is_whole or crc(content[:-4]) != content[-4:]:
-        raise ReadError(f"{name}: its header is damaged")
-    head = np.frombuffer(fixed, FIXED)[0]
-    started_ns, counters = int(head["started_ns"]), int(head["counters"])
-    try:
-        board = msgspec.json.decode(text, type=Board)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise ReadError(f"{name}: its board cannot be read: {error}") from error
-    if fixed_part(board, len(text), started_ns, counters=counters) != fixed:
-        raise ReadError(f"{name}: its header contradicts its board")
-    return board, started_ns, counters
-
-
-def pieces(
-    chunks: Iterable[bytes], layout: np.dtype[np.void], name: str
-) -> Iterator[FrameRecord | int]:
-    """Give records, and between them how many bytes belong to none."""
-    length = layout.itemsize
-    window, passed, tried = b"", 0, 0
-    for chunk in chunks:
-        window += chunk
-        at = 0
-        while at + length <= len(window):
-            if (record := unpacked(window[at : at + length], layout)) is not None:
-                at += length
-                yield record
-                continue
-            # A file made to be slow has a mark everywhere, and each is tried.
-            tried += length if window.startswith(MARK, at) else 0
-            if tried > _PATIENCE * (passed + at) + _TRIES_BYTES:
-                raise ReadError(f"{name}: is damaged all over")
-            found = window.find(MARK, at + 1)
-            after = found if found >= 0 else max(len(window) - len(MARK) + 1, at + 1)
-            yield after - at
-            at = after
-        window, passed = window[at:], passed + at
-    if window:
-        yield len(window)
-
-
-def unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
+def _unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
     """Return a record, or None if the bytes are none, or a damaged one."""
     if not content.startswith(MARK) or content[-4:] != crc(content[:-4]):
         return None
@@ -226,12 +150,6 @@ def unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
 def crc(content: bytes) -> bytes:
     """Return the CRC-32 (that of zip and PNG), low byte first."""
     return zlib.crc32(content).to_bytes(4, "little")
-
-
-LARGEST_ARRAY: Final = 2**31
-"""The most bytes of cells that `read_recording` holds at once."""
-
-_CHUNK = 2**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,7 +177,7 @@ class Recording:
     started_ns: int
 
 
-class Recorder:
+class Recorder(contextlib.AbstractContextManager["Recorder"]):
     """Write frames to a file, so that at most the last one can be lost.
 
     Each frame goes to the system in one piece: whatever ends this program, it is in
@@ -325,10 +243,12 @@ class Recorder:
             TableError: If the frame is of another size, or a cell has no place.
             WriteError: If it cannot be written; all frames before it are kept.
         """
-        content = packed(FrameRecord(frame, counters), self._board)
+        content = _packed(frame, counters, self._board)
         self._raise_failure()
+        rest = memoryview(content)
         try:
-            self._put(content)
+            while rest:
+                rest = rest[os.write(self._file, rest) :]
         except OSError as error:
             raise self._error(error) from error
         with self._wake:
@@ -351,18 +271,9 @@ class Recorder:
         os.close(self._file)
         self._raise_failure()
 
-    def __enter__(self) -> Self:
-        """Return the recorder, which is closed at the end of the block."""
-        return self
-
     def __exit__(self, *_: object) -> None:
         """Close the file."""
         self.close()
-
-    def _put(self, content: bytes) -> None:
-        rest = memoryview(content)
-        while rest:
-            rest = rest[os.write(self._file, rest) :]
 
     def _sync(self) -> None:
         """Ask the disk to keep the file whenever there are new frames."""
@@ -389,7 +300,7 @@ class Recorder:
         return WriteError(f"{self._name}: cannot be written: {reason(error)}")
 
 
-class RecordingFile:
+class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
     """Read a recording frame by frame, however long it is.
 
     Iterating begins at the first record. What is damaged is left out and counted.
@@ -423,15 +334,30 @@ class RecordingFile:
         Raises:
             ReadError: If it cannot be read, or nearly all of it is damaged.
         """
-        self.damaged = self.cut_bytes = lost = 0
-        length = self._layout.itemsize
-        for piece in pieces(self._chunks(), self._layout, self._name):
-            if isinstance(piece, int):
-                lost += piece
-            else:
-                self.damaged += -(-lost // length)  # rounded up
-                lost = 0
-                yield piece
+        self.damaged = self.cut_bytes = lost = passed = tried = 0
+        length, place, window = self._layout.itemsize, self._begin, b""
+        while chunk := self._read(place, min(_CHUNK, self._end - place)):
+            place += len(chunk)
+            window += chunk
+            at = 0
+            while at + length <= len(window):
+                if record := _unpacked(window[at : at + length], self._layout):
+                    self.damaged += -(-lost // length)  # rounded up
+                    lost = 0
+                    at += length
+                    yield record
+                    continue
+                # A file made to be slow has a mark everywhere, and each is tried.
+                tried += length if window.startswith(MARK, at) else 0
+                if tried > _PATIENCE * (passed + at) + _TRIES_BYTES:
+                    raise ReadError(f"{self._name}: is damaged all over")
+                after = window.find(MARK, at + 1)
+                if after < 0:
+                    after = max(len(window) - len(MARK) + 1, at + 1)
+                lost += after - at
+                at = after
+            window, passed = window[at:], passed + at
+        lost += len(window)
         self.damaged += lost // length
         self.cut_bytes = lost % length
 
@@ -439,20 +365,9 @@ class RecordingFile:
         """Close the file."""
         self._file.close()
 
-    def __enter__(self) -> Self:
-        """Return the file, which is closed at the end of the block."""
-        return self
-
     def __exit__(self, *_: object) -> None:
         """Close the file."""
         self.close()
-
-    def _chunks(self) -> Iterator[bytes]:
-        """Give what was in the file when it was opened."""
-        place = self._begin
-        while chunk := self._read(place, min(_CHUNK, self._end - place)):
-            place += len(chunk)
-            yield chunk
 
     def _read(self, place: int, size: int) -> bytes:
         try:
@@ -463,12 +378,29 @@ class RecordingFile:
             raise ReadError(text) from error
 
     def _read_header(self) -> None:
-        size = FIXED.itemsize
+        size, name = FIXED.itemsize, self._name
         fixed = self._read(0, size)
-        length = min(unpacked_sizes(fixed, self._name), LARGEST_BOARD)
-        self._begin = size + length + 4
-        content = fixed + self._read(size, length + 4)
-        self.board, self.started_ns, counters = unpacked_board(content, self._name)
+        if not fixed.startswith(MAGIC) or len(fixed) < size:
+            raise ReadError(f"{name}: is no recording of a board")
+        head = np.frombuffer(fixed, FIXED)[0]
+        if head["version"] != VERSION:
+            raise ReadError(
+                f"{name}: is a recording of version {head['version']}; "
+                f"this program reads version {VERSION}"
+            )
+        length, counters = int(head["board_bytes"]), int(head["counters"])
+        self.started_ns = int(head["started_ns"])
+        rest = self._read(size, min(length, LARGEST_BOARD) + 4)
+        text = rest[:-4]
+        if len(text) != length or crc(fixed + text) != rest[-4:]:
+            raise ReadError(f"{name}: its header is damaged")
+        try:
+            self.board = msgspec.json.decode(text, type=Board)
+        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+            raise ReadError(f"{name}: its board cannot be read: {error}") from error
+        if fixed != fixed_part(self.board, length, self.started_ns, counters=counters):
+            raise ReadError(f"{name}: its header contradicts its board")
+        self._begin = size + len(rest)
         self._layout = layout_of(self.board, counters=counters)
 
 
@@ -531,13 +463,12 @@ def _open(path: PathLike) -> io.FileIO:
     """Open a file; a pipe or a device is none, and would keep us waiting."""
     name = os.fspath(path)
     try:
-        if stat.S_ISREG(Path(path).stat().st_mode):
+        is_file = stat.S_ISREG(Path(path).stat().st_mode)
+        if is_file:
             return io.FileIO(path)
-        raise ReadError(f"{name}: is no file")
     except (OSError, ValueError) as error:
-        if isinstance(error, ReadError):
-            raise
         raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
+    raise ReadError(f"{name}: is no file")
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,7 @@ _HEADERS = {
 }
 
 
-class LivePage:
+class LivePage(contextlib.AbstractContextManager["LivePage"]):
     """Serves the page of what is recognised, in threads, until it is closed.
 
     It listens on 127.0.0.1, answers only what names that host (a page of another name
@@ -79,10 +79,6 @@ class LivePage:
             target=self._server.serve_forever, args=(0.05,), name="page", daemon=True
         )
         self._thread.start()
-
-    def __enter__(self) -> LivePage:
-        """Return itself."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Close the page."""

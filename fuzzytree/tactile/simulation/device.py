@@ -20,7 +20,6 @@ from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 from msgspec.structs import replace
@@ -50,7 +49,10 @@ _WIRE_POLL_S = 0.02
 _PIECE_S = 0.002  # duration of the bytes that are written at once
 _SLACK_S = 0.02  # by how much a late piece may hurry the next ones
 _INPUT_BYTES = 64  # size of the input buffer, as on an Arduino
-_PAUSE = re.compile(r"([0-9.e+-]+)s?(?:/([0-9]{1,9}))?", re.ASCII)
+_PAUSE = re.compile(
+    r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)s?(?:/([0-9]{1,9}))?",
+    re.ASCII,
+)
 
 
 class Pause(Value, frozen=True):
@@ -116,13 +118,9 @@ def faults_of(texts: Sequence[str]) -> Faults:
         if name in known:
             raise ValueError(f"the fault {name!r} is stated twice")
         parts = _PAUSE.fullmatch(value)
-        try:
-            seconds = float(parts[1]) if parts else None
-        except ValueError:
-            seconds = None
-        if parts is None or seconds is None:
+        if parts is None:
             raise ValueError(f"{text}: must be seconds, such as 2s or 2s/500")
-        known[name] = Pause(seconds, int(parts[2] or EVERY))
+        known[name] = Pause(float(parts[1]), int(parts[2] or EVERY))
     return replace(Faults(), **known)
 
 
@@ -184,7 +182,12 @@ class Wire:
         self._due = 0.0
         self._terminal = ""
 
-    def _check_link(self) -> None:
+    def plug_in(self) -> None:
+        """Make the pseudo-terminal and its link.
+
+        Raises:
+            WriteError: If it cannot be made.
+        """
         if not hasattr(os, "openpty"):
             raise WriteError("this system has no pseudo-terminals")
         if self._link.exists():
@@ -192,19 +195,13 @@ class Wire:
             if not self._link.is_symlink():
                 what = "something else is there"
             raise WriteError(f"{self._link}: cannot be made a port: {what}")
-
-    def plug_in(self) -> None:
-        """Make the pseudo-terminal and its link.
-
-        Raises:
-            WriteError: If it cannot be made.
-        """
-        self._check_link()
         try:
             self._master, slave = os.openpty()
             os.set_blocking(self._master, False)
             tty.setraw(slave)
-            self._set_speed(slave)
+            settings = termios.tcgetattr(slave)
+            settings[4:6] = [bauds().get(self._port.baud, bauds()[UNSET])] * 2
+            termios.tcsetattr(slave, termios.TCSANOW, settings)
             self._terminal = os.ttyname(slave)
             new = self._link.with_name(f".{self._link.name}.{os.getpid()}")
             new.symlink_to(self._terminal)
@@ -222,20 +219,17 @@ class Wire:
             os.close(self._master)
             self._master = None
 
-    def _set_speed(self, terminal: int) -> None:
-        speed = bauds().get(self._port.baud, bauds()[UNSET])
-        settings = termios.tcgetattr(terminal)
-        settings[4] = settings[5] = speed
-        termios.tcsetattr(terminal, termios.TCSANOW, settings)
-
     @property
     def is_open(self) -> bool:
         """Whether a host has the port open."""
-        if self._master is None:
-            return False
+        return self._master is not None and not self._poll(0) & select.POLLHUP
+
+    def _poll(self, wait_s: float, wanted: int = select.POLLIN) -> int:
+        """Wait for something to happen on the board's end; return what did."""
+        assert self._master is not None
         poll = select.poll()
-        poll.register(self._master, select.POLLIN)
-        return not any(event & select.POLLHUP for _, event in poll.poll(0))
+        poll.register(self._master, wanted)
+        return next((event for _, event in poll.poll(1000 * wait_s)), 0)
 
     def rest(self) -> None:
         """Note that the connection was idle until now."""
@@ -260,11 +254,10 @@ class Wire:
     def _write(self, data: bytes) -> bool:
         """Write bytes; without room they are lost, or wait if no time is kept."""
         assert self._master is not None
-        poll = select.poll()
-        poll.register(self._master, select.POLLOUT)
+        wait_s = 0 if self._byte_s else _WIRE_POLL_S
         while data:
-            events = poll.poll(0 if self._byte_s else 1000 * _WIRE_POLL_S)
-            if self._stop.is_set() or any(e & select.POLLHUP for _, e in events):
+            event = self._poll(wait_s, select.POLLOUT)
+            if self._stop.is_set() or event & select.POLLHUP:
                 return False
             try:
                 data = data[os.write(self._master, data) :]
@@ -277,9 +270,7 @@ class Wire:
     def received(self, patience_s: float = _WIRE_POLL_S) -> bytes:
         """Return the bytes from the host, after waiting for some time at most."""
         assert self._master is not None
-        poll = select.poll()
-        poll.register(self._master, select.POLLIN)
-        if any(event & select.POLLIN for _, event in poll.poll(1000 * patience_s)):
+        if self._poll(patience_s) & select.POLLIN:
             with contextlib.suppress(OSError):  # closed by the host meanwhile
                 return os.read(self._master, 4096)
         return b""
@@ -292,7 +283,7 @@ def bauds() -> dict[int, int]:
     return {int(name[1:]): getattr(termios, name) for name in names}
 
 
-class Device:
+class Device(contextlib.AbstractContextManager["Device"]):
     """A board that sends frames through a port of its own, in a thread.
 
     It begins when a host opens the port, as boards do that reset then, and time stands
@@ -359,10 +350,6 @@ class Device:
     def is_open(self) -> bool:
         """Whether a host has the port open."""
         return self._wire.is_open
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Close the port."""
