@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
+from fuzzytree.checking import counted
 from fuzzytree.errors import TableError
 from fuzzytree.model import Agreement, Comparison, Model, RuleBase, fingerprint
 from fuzzytree.tactile.features import frame_program
@@ -36,20 +37,10 @@ if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
 
 
-_PARTS = {
-    1: (1, (2,)),
-    2: (1, (2, 2)),
-    3: (1, (3, 3)),
-    4: (1, (3, 3)),
-    5: (2, (3, 3, 3, 3)),
-    6: (2, (3, 3, 2)),
-    7: (1, (4, 4)),
-    8: (1, (4, 4)),
-    9: (1, (4,)),
-    10: (2, (4, 4, 4)),
-    11: (2, (4, 2)),
-}
-"""Of each invariant: a factor, and the orders of the moments that it is made of."""
+_ORDERS = ("2", "22", "33", "33", "3333", "332", "44", "44", "4", "444", "42")
+"""Of S1 to S11: the orders of the moments that it is a product of."""
+
+_TWICE = (5, 6, 10, 11)  # of the invariants: twice the real part of the product
 
 _DEGREES = 90.0 / math.pi  # of half an angle, for each radian of the whole
 
@@ -85,11 +76,12 @@ def errors(
         apart = abs(Fraction(value) - right)
         if feature.base == "angle":
             apart = min(apart, 180 - apart)  # -90 and 90 are one direction
-        if not apart:
-            found.append(0.0)
-            continue
-        scale = _scale(feature, sizes, cells, float(right))
-        found.append(float(apart) / scale if scale else math.inf)
+        scale = _scale(feature, sizes, max(cells.shape))
+        if feature.is_log:  # an error of v is one of v / (1 + |v|) in log(1 + |v|)
+            size = abs(float(right))
+            scale = scale / (1.0 + math.expm1(size)) + max(size, 1.0)
+        share = float(apart) / scale if scale else math.inf
+        found.append(share if apart else 0.0)
     return tuple(found)
 
 
@@ -104,39 +96,23 @@ def _sizes(cells: FloatArray) -> list[float]:
     return [*found, float(abs((cells * z**2).sum()))]
 
 
-def _scale(
-    feature: Feature,
-    sizes: Sequence[float],
-    cells: FloatArray,
-    right: float,
-) -> float:
-    """Return the scale of a feature."""
-    scale = _own_scale(feature, sizes, cells)
-    if feature.is_log:  # an error of v is one of v / (1 + |v|) in log(1 + |v|)
-        value = math.expm1(abs(right))
-        return scale / (1.0 + value) + max(abs(right), 1.0)
-    return scale
-
-
-def _own_scale(
-    feature: Feature,
-    sizes: Sequence[float],
-    cells: FloatArray,
-) -> float:
+def _scale(feature: Feature, sizes: Sequence[float], side: int) -> float:
+    """Return the scale of a feature, of its value itself if it is a logarithm."""
     unit = sizes[0] if feature.per_force else 1.0
     base, direction = feature.base, sizes[2] / (sizes[5] or math.inf)
     if feature.kind != "moment" or base in ("force", "area", "peak"):
         return sizes[0] / unit
     match base:
         case "x" | "y":
-            return float(max(cells.shape))
+            return float(side)
         case "angle":
             return 90.0 + _DEGREES * direction
         case "cos2" | "sin2":
             return 1.0 + direction
         case _ if base[0] == "S":
-            factor, orders = _PARTS[int(base[1:])]
-            return factor * math.prod(sizes[order] / unit for order in orders)
+            number = int(base[1:])
+            product = math.prod(sizes[int(n)] / unit for n in _ORDERS[number - 1])
+            return 2 * product if number in _TWICE else product
         case _:
             return sizes[int(base[-2]) + int(base[-1])] / unit
 
@@ -217,24 +193,25 @@ def check_frames_agree(
     run_plain = ways.pop(PLAIN)
     found = {name: run(rows) for name, run in ways.items()}
     cells = sensor.rows * sensor.columns
-    some = rows[: max(_PLAIN_CELLS // cells, _FEWEST)]
-    few = rows[: max(_EXACT_CELLS // cells, _FEWEST)]
-    plain = run_plain(some)
-    if len(some) < len(rows):
-        skipped.append(f"{PLAIN}: {len(rows) - len(some)} frames, to save time")
-    comparisons = [_compared(NUMPY, found[NUMPY], PLAIN, plain, model)]
-    for name in found:
+    plain = run_plain(rows[: max(_PLAIN_CELLS // cells, _FEWEST)])
+    exact = _against_exact(
+        model, sensor, rows[: max(_EXACT_CELLS // cells, _FEWEST)], plain, reject
+    )
+    for name, count in ((PLAIN, len(plain.codes)), (EXACT, exact.rows)):
+        if count < len(rows):
+            skipped.append(f"{name}: {len(rows) - count} frames, to save time")
+    comparisons = [exact, _compared(NUMPY, found[NUMPY], PLAIN, plain, model)]
+    for name, one in found.items():
         if name != NUMPY:
-            one = _compared(name, found[name], NUMPY, found[NUMPY], model)
-            comparisons += [one, _compared(name, found[name], PLAIN, plain, model)]
+            comparisons += [
+                _compared(name, one, NUMPY, found[NUMPY], model),
+                _compared(name, one, PLAIN, plain, model),
+            ]
     comparisons += [_singly(n, run, rows, found[n]) for n, run in ways.items()]
-    exact = _against_exact(model, sensor, few, plain, reject)
-    if len(few) < len(rows):
-        skipped.append(f"{EXACT}: {len(rows) - len(few)} frames, to save time")
     return FramesAgreement(
         model.name,
         fingerprint(model),
-        (exact, *comparisons),
+        tuple(comparisons),
         skipped=tuple(skipped),
         probes=len(aimed),
         shown=_shown(model, sensor, rows, len(aimed), reject),
@@ -261,18 +238,14 @@ def _shown(
 def _compared(
     name: str, one: RunnerResult, other_name: str, other: RunnerResult, model: Model
 ) -> Comparison:
-    """Hold the answers to some frames against others: bits, states, classes, rules."""
+    """Compare the answers to some frames with others: bits, states, classes, rules."""
     count = min(one.features.shape[1], other.features.shape[1])
-    bits = [
-        np.ascontiguousarray(f.features[:, :count]).view(np.uint64)
-        for f in (one, other)
-    ]
-    wrong = (bits[0] != bits[1]).any(axis=0)
+    values, others = (np.ascontiguousarray(f.features[:, :count]) for f in (one, other))
+    wrong = (values.view(np.uint64) != others.view(np.uint64)).any(axis=0)
     flips = one.codes[:count] != other.codes[:count]
     wrong = wrong | flips | (one.states[:count] != other.states[:count])
     if one.rules is not None and other.rules is not None:
         wrong = wrong | (one.rules[:count] != other.rules[:count])
-    apart = np.abs(one.features[:, :count] - other.features[:, :count])
     shown = np.flatnonzero(wrong)[:_SHOWN].tolist()
     return Comparison(
         name,
@@ -281,7 +254,7 @@ def _compared(
         count,
         "DISAGREES" if wrong.any() else "agrees",
         differing=int(wrong.sum()),
-        largest_difference=float(apart.max(initial=0.0)),
+        largest_difference=float(np.abs(values - others).max(initial=0.0)),
         flips=int(flips.sum()),
         detail=tuple(_difference_text(frame, one, other, model) for frame in shown),
     )
@@ -294,19 +267,15 @@ def _difference_text(
     every = zip(model.inputs, *ends, strict=True)
     shown = [(name, repr(a), repr(b)) for name, a, b in every]  # -0.0 is not 0.0
     texts = [f"{name} {a}, not {b}" for name, a, b in shown if a != b]
-    labels = [_label(found, frame, model) for found in (one, other)]
+    codes = [(int(f.codes[frame]), State(f.states[frame])) for f in (one, other)]
+    labels = [model.classes[c] if c >= 0 else state.name.lower() for c, state in codes]
     if labels[0] != labels[1]:
         texts.append(f"{labels[0]}, not {labels[1]}")
     return f"frame {frame}: {'; '.join(texts) or 'another rule'}"
 
 
-def _label(found: RunnerResult, frame: int, model: Model) -> str:
-    code = int(found.codes[frame])
-    return model.classes[code] if code >= 0 else State(found.states[frame]).name.lower()
-
-
 def _singly(name: str, run: Runner, frames: Cells, found: RunnerResult) -> Comparison:
-    """Ask with no frame, one at a time, some, another memory order, a wrong width."""
+    """Compare calls: no frame, single ones, some, other memory order, wrong width."""
     wrong: list[str] = []
     step = max(len(frames) // 8, 1)
     part = slice(None, None, step)
@@ -324,15 +293,8 @@ def _singly(name: str, run: Runner, frames: Cells, found: RunnerResult) -> Compa
         wrong.append("frames of another size get an answer")
     except TableError:
         pass
-    return Comparison(
-        name,
-        "itself",
-        "calls",
-        len(range(0, len(frames), step)) + 4,
-        "DISAGREES" if wrong else "agrees",
-        differing=len(wrong),
-        detail=tuple(wrong),
-    )
+    calls = len(range(0, len(frames), step)) + 4
+    return counted("calls", name, "itself", calls, wrong)
 
 
 def _is_same(one: RunnerResult, all_of: RunnerResult, part: slice) -> bool:
@@ -346,7 +308,7 @@ def _is_same(one: RunnerResult, all_of: RunnerResult, part: slice) -> bool:
 def _against_exact(
     model: Model, sensor: Sensor, frames: Cells, plain: RunnerResult, reject: float
 ) -> Comparison:
-    """Hold plain Python's features against fractions, and its classes against theirs.
+    """Compare plain Python's features with fractions, and its classes with theirs.
 
     A class may differ where a feature is within its rounding of a cut.
     """

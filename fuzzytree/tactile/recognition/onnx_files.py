@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 
 _SHOWN = 3
+_RECORDS = ("sensor", "features", "classes", "outputs", "reject")
 _MOST_CELLS = 2**22  # of frames for plain Python, about a minute
 
 
@@ -68,9 +69,8 @@ def frames_file(content: bytes, name: str) -> FramesFile:
             f"{name}: the file takes rows, and not frames of a sensor; "
             "`fuzzytree check` checks it"
         )
-    records = {"sensor", "features", "classes", "outputs", "reject"}
     try:
-        known = {k: json.loads(v) if k in records else v for k, v in texts.items()}
+        known = {k: json.loads(v) if k in _RECORDS else v for k, v in texts.items()}
         found = msgspec.convert(known, FramesFile)
     except (json.JSONDecodeError, msgspec.ValidationError, RecursionError) as error:
         raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
@@ -129,7 +129,10 @@ def check_onnx_files(
                 "name the right one with --sensor or --board"
             )
         if known.features != model.inputs or known.classes != model.classes:
-            comparisons.append(_strangers(known, name))
+            features, classes = ", ".join(known.features), ", ".join(known.classes)
+            text = f"it uses {features}, and has the classes {classes}"
+            against = "the model's features and classes"
+            comparisons.append(counted("file", name, against, 1, (text,)))
             continue
         made = frame_program(known.sensor, model.inputs)
         aimed = proving_frames(made, model)
@@ -139,7 +142,12 @@ def check_onnx_files(
         if len(some) < len(rows):
             skipped.append(f"{name}: {len(rows) - len(some)} frames, to save time")
         probes += len(aimed)
-        stated = _misstated(known, sensor, reject)
+        stated: list[str] = []
+        if sensor is not None and known.sensor != sensor:
+            own, other = _sensor_text(known.sensor), _sensor_text(sensor)
+            stated.append(f"its sensor is {own}, not {other}")
+        if known.reject != reject:
+            stated.append(f"its reject is {known.reject!r}, not {reject!r}")
         graph, metadata = _differences(model, known, content)
         answers = _answers(model, known, loaded(content, name), some, name)
         comparisons += [
@@ -157,26 +165,11 @@ def check_onnx_files(
     )
 
 
-def _misstated(
-    known: FramesFile, sensor: Sensor | None, reject: float
-) -> Iterator[str]:
-    if sensor is not None and known.sensor != sensor:
-        yield f"its sensor is {_sensor_text(known.sensor)}, not {_sensor_text(sensor)}"
-    if known.reject != reject:
-        yield f"its reject is {known.reject!r}, not {reject!r}"
-
-
 def _sensor_text(sensor: Sensor) -> str:
     text = f"{sensor.rows} x {sensor.columns} cells up to {sensor.full}"
     text += f", threshold {sensor.threshold}"
     extras = (("baseline", sensor.baseline), ("masked cells", sensor.masked))
     return text + "".join(f", with {name}" for name, value in extras if value)
-
-
-def _strangers(known: FramesFile, name: str) -> Comparison:
-    features, classes = ", ".join(known.features), ", ".join(known.classes)
-    text = f"it uses {features}, and has the classes {classes}"
-    return counted("file", name, "the model's features and classes", 1, (text,))
 
 
 def _differences(model: Model, known: FramesFile, content: bytes) -> Differences:
@@ -214,7 +207,9 @@ def _answers(
     wrong: dict[int, list[tuple[Output, str]]] = {}
     for number, output, text in apart(found, made, model, frames, known.reject):
         wrong.setdefault(number, []).append((output, text))
-    firsts = [(number, *found[0]) for number, found in wrong.items()][:_SHOWN]
+    detail = [f"frame {n}: {' '.join(every[0])}" for n, every in wrong.items()]
+    decisive = {"label", "state"}
+    flips = [not decisive.isdisjoint(dict(every)) for every in wrong.values()]
     return Comparison(
         name,
         PLAIN,
@@ -222,11 +217,8 @@ def _answers(
         len(frames),
         "DISAGREES" if wrong else "agrees",
         differing=len(wrong),
-        flips=sum(
-            any(output in ("label", "state") for output, _ in found)
-            for found in wrong.values()
-        ),
-        detail=tuple(f"frame {number}: {one} {text}" for number, one, text in firsts),
+        flips=sum(flips),
+        detail=tuple(detail[:_SHOWN]),
     )
 
 
