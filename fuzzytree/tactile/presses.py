@@ -8,16 +8,16 @@ a number for each person or object that pressed.
 
 from __future__ import annotations
 
-import ast
 import io
 import lzma
 import math
 import os
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +38,14 @@ LIMIT = 2**30
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first that a zip file can hold
 _MOST_MEMBERS = 64
 _LONGEST_HEADER = 4096
+_HEADERS: Mapping[tuple[int, int], Any] = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
+_BROKEN_HEADER = (
+    *(ValueError, KeyError, TypeError, SyntaxError, tokenize.TokenError),
+    *(MemoryError, RecursionError),
+)
 _USED = ("frames", "full", "threshold", "label", "label_names", "subject")
 
 
@@ -174,27 +182,11 @@ def _array(content: bytes, name: str, title: str) -> npt.NDArray[Any]:
     file = io.BytesIO(content)
     try:
         version = np.lib.format.read_magic(file)
-        size = 2 if version == (1, 0) else 4
-        length = int.from_bytes(file.read(size), "little")
-        if not 0 < length <= _LONGEST_HEADER:
-            raise ValueError("its header is too long")
-        header = ast.literal_eval(file.read(length).decode("latin-1").strip())
-        dtype, shape = np.dtype(str(header["descr"])), tuple(header["shape"])
-        is_turned = bool(header["fortran_order"])
-    except (
-        ValueError,
-        SyntaxError,
-        KeyError,
-        TypeError,
-        MemoryError,
-        RecursionError,
-    ) as error:
+        read = _HEADERS[version]
+        shape, is_turned, dtype = read(file, max_header_size=_LONGEST_HEADER)
+    except _BROKEN_HEADER as error:
         raise ReadError(f"{name}: {title!r} is no numpy array: {error}") from error
-    if (
-        dtype.kind not in "iuU"
-        or not dtype.itemsize
-        or not all(type(side) is int for side in shape)
-    ):
+    if dtype.kind not in "iuU" or not dtype.itemsize:
         raise ReadError(f"{name}: {title!r} holds {dtype}, not whole numbers or text")
     rest = len(content) - file.tell()
     if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != rest:
@@ -257,6 +249,12 @@ class SensorFrames:
 
     presses: Presses
     sensor: Sensor
+
+    def of_class(self, name: str) -> SensorFrames:
+        """Return the same frames, all of one class."""
+        code = np.zeros(len(self.presses.frames), np.int64)
+        presses = replace(self.presses, label=code, label_names=(name,))
+        return replace(self, presses=presses)
 
 
 def read_frames(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import shlex
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,27 +75,19 @@ def command(options: TactileFeaturesOptions) -> int:
     with wrong_options():
         names = names_of(options.text)
     parts = [
-        _of_class(word, frames_and_sensor(path, options, label=options.label))
+        frames_and_sensor(path, options, label=options.label, word=word)
         for word, path in _named(options.frames)
     ]
     _check_alike(options.frames, parts)
     found = costs(parts[0].sensor, names)
-    if options.output is None:
-        if options.as_json:
-            answer_json({"costs": found})
-        else:
-            for name in names:
-                click.echo(f"{found[name]:8.0f}  {name}")
-        return 0
-    return _table(
-        options.frames,
-        parts,
-        names,
-        found,
-        options.output,
-        as_json=options.as_json,
-        quiet=options.quiet,
-    )
+    if options.output is not None:
+        return _table(options, options.output, parts, found)
+    if options.as_json:
+        answer_json({"costs": found})
+    else:
+        for name in names:
+            click.echo(f"{found[name]:8.0f}  {name}")
+    return 0
 
 
 def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
@@ -108,25 +99,14 @@ def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     for text in frames:
         word, sign, path = text.partition("=")
-        is_path = not sign or Path(text).exists()
-        found.append(("", text) if is_path else (word, path))
-    for word, path in found:
-        if not word and len(found) > 1:
+        if not sign or Path(text).exists():
+            word, path = "", text
+        if not word and len(frames) > 1:
             raise click.UsageError(
                 f"of several files, each has a class: CLASS={path}, not {path}"
             )
+        found.append((word, path))
     return found
-
-
-def _of_class(word: str, given: SensorFrames) -> SensorFrames:
-    """Return frames of one class, unchanged if none is stated."""
-    if not word:
-        return given
-    import numpy as np
-
-    presses = given.presses
-    code = np.zeros(len(presses.frames), np.int64)
-    return replace(given, presses=replace(presses, label=code, label_names=(word,)))
 
 
 def _check_alike(frames: Sequence[str], parts: Sequence[SensorFrames]) -> None:
@@ -153,21 +133,18 @@ def _check_alike(frames: Sequence[str], parts: Sequence[SensorFrames]) -> None:
 
 
 def _table(
-    sources: Sequence[str],
-    parts: Sequence[SensorFrames],
-    names: Sequence[str],
-    costs: object,
+    options: TactileFeaturesOptions,
     output: str,
-    *,
-    as_json: bool,
-    quiet: bool,
+    parts: Sequence[SensorFrames],
+    costs: Mapping[str, float],
 ) -> int:
     from fuzzytree.report import counted
     from fuzzytree.tactile.runtimes.frames import features_of
     from fuzzytree.tactile.sensor import saturated
 
+    names = [*costs]
     found = [features_of(part.sensor, part.presses.frames, names) for part in parts]
-    content = "".join(_lines(parts, found)).encode()
+    content = _csv(parts, found).encode()
     if output == "-":
         answer_bytes(content)
         return 0
@@ -181,7 +158,7 @@ def _table(
     size = f"{sensor.rows} x {sensor.columns} cells"
     rows = [
         ("read", source, f"{counted(count, 'frame')} of {size}")
-        for source, count in zip(sources, counts, strict=True)
+        for source, count in zip(options.frames, counts, strict=True)
     ]
     if none:
         rows.append(("left out", counted(none, "frame"), "nothing presses"))
@@ -192,29 +169,31 @@ def _table(
     after += ["--ignore", "subject"] if len(presses.subject) else []
     text = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
     rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {text}"))
-    say_rows(*rows, quiet=quiet)
-    if as_json:
+    say_rows(*rows, quiet=options.quiet)
+    if options.as_json:
         answer_json(
             {
                 "file": output,
                 "frames": sum(counts),
                 "nothing": none,
                 "saturated": full,
-                "features": list(names),
+                "features": names,
                 "costs": costs,
             }
         )
     return 0
 
 
-def _lines(parts: Sequence[SensorFrames], found: Sequence[Features]) -> Iterator[str]:
-    """Yield the lines of a table: features, and class and subject where known."""
+def _csv(parts: Sequence[SensorFrames], found: Sequence[Features]) -> str:
+    """Return the table: features, and class and subject where known."""
     has_class = bool(len(parts[0].presses.label))
     has_subject = bool(len(parts[0].presses.subject))
     heads = [*found[0].names]
     heads += [CLASS] if has_class else []
     heads += ["subject"] if has_subject else []
-    yield _line(heads)
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(heads)
     for part, features in zip(parts, found, strict=True):
         presses = part.presses
         for number in features.is_pressed.nonzero()[0].tolist():
@@ -223,10 +202,5 @@ def _lines(parts: Sequence[SensorFrames], found: Sequence[Features]) -> Iterator
                 cells.append(presses.label_names[int(presses.label[number])])
             if has_subject:
                 cells.append(int(presses.subject[number]))
-            yield _line(cells)
-
-
-def _line(cells: Sequence[object]) -> str:
-    line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow(cells)
-    return line.getvalue()
+            table.writerow(cells)
+    return text.getvalue()

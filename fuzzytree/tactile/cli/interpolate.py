@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,33 +92,18 @@ def command(options: TactileInterpolateOptions) -> int:
     check_place(options.output)
     given = frames_and_sensor(options.frames, options)
     values = pressed(given.sensor, given.presses.frames)
-    number = _chosen(
-        options.frames, options.frame, values, is_picture=suffix != ARCHIVE
-    )
+    number = _chosen(options, values, is_picture=suffix != ARCHIVE)
     if number is not None:
         values = values[number : number + 1]
     with wrong_options():
         if number is None or suffix == ARCHIVE:
             content = _archive(values, times)
         else:
-            content = _picture(
-                given,
-                number,
-                times,
-                suffix,
-                source=options.frames,
-                is_marked=options.is_marked,
-            )
+            content = _picture(options, given, number, values[0], times)
     write_atomically(options.output, content)
     facts = _facts(given, number, values, times)
     if not options.quiet:
-        _tell(
-            options.frames,
-            options.output,
-            facts,
-            full=given.sensor.full,
-            size=len(content),
-        )
+        _tell(options, facts, full=given.sensor.full, size=len(content))
     if options.as_json:
         answer_json({"file": options.output, "bytes": len(content), **facts})
     return 0
@@ -144,28 +130,31 @@ def _facts(
 
 
 def _tell(
-    source: str, output: str, facts: Mapping[str, Any], *, full: int, size: int
+    options: TactileInterpolateOptions,
+    facts: Mapping[str, Any],
+    *,
+    full: int,
+    size: int,
 ) -> None:
     from fuzzytree.report import counted
 
     rows, columns = facts["rows"], facts["columns"]
     one = f"frame {facts['frame']} of {counted(facts['of'], 'frame')}"
     read = counted(facts["frames"], "frame") if facts["frame"] is None else one
-    lines = [("read", source, f"{read}, {rows} x {columns} cells")]
+    lines = [("read", options.frames, f"{read}, {rows} x {columns} cells")]
     if facts["nothing"]:
         lines.append(("empty", counted(facts["nothing"], "frame"), "nothing presses"))
     if facts["saturated"]:
         text = f"a cell reads {full} or more"
         lines.append(("full", counted(facts["saturated"], "frame"), text))
     sizes = ", ".join(f"{n * rows} x {n * columns}" for n in facts["times"])
-    lines.append(("wrote", output, f"{sizes} points, {size} bytes"))
+    lines.append(("wrote", options.output, f"{sizes} points, {size} bytes"))
     say_rows(*lines)
 
 
 def _times(text: str) -> list[int]:
     parts = [part.strip() for part in text.split(",")]
-    is_number = [part.isascii() and part.isdecimal() for part in parts]
-    if not all(is_number) or not all(len(p) < 5 and int(p) for p in parts):
+    if not all(re.fullmatch("0*[1-9][0-9]{0,3}", part) for part in parts):
         raise click.UsageError(
             f"--times {text}: must be whole numbers from 1 to 9999, such as 3,5,7"
         )
@@ -176,20 +165,19 @@ def _times(text: str) -> list[int]:
 
 
 def _chosen(
-    source: str, frame: int | None, values: Pressed, *, is_picture: bool
+    options: TactileInterpolateOptions, values: Pressed, *, is_picture: bool
 ) -> int | None:
     """Return the frame to take; None for all.
 
     Raises:
         click.UsageError: If there is no such frame.
     """
-    if frame is None and not is_picture:
-        return None
+    frame = options.frame
     if frame is None:
-        return int(values.any(axis=(1, 2)).argmax())
+        return int(values.any(axis=(1, 2)).argmax()) if is_picture else None
     if not 0 <= frame < len(values):
-        last = len(values) - 1
-        raise click.UsageError(f"--frame {frame}: {source} has frames 0 to {last}")
+        known = f"{options.frames} has frames 0 to {len(values) - 1}"
+        raise click.UsageError(f"--frame {frame}: {known}")
     return frame
 
 
@@ -208,39 +196,32 @@ def _archive(values: Pressed, times: Sequence[int]) -> bytes:
 
 
 def _picture(
+    options: TactileInterpolateOptions,
     given: SensorFrames,
     number: int,
+    cells: Pressed,
     times: Sequence[int],
-    suffix: str,
-    *,
-    source: str,
-    is_marked: bool,
 ) -> bytes:
     from fuzzytree.report import drawn
     from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames
-    from fuzzytree.tactile.sensor import pressed
 
     presses, sensor = given.presses, given.sensor
-    cells = pressed(sensor, presses.frames[number])[0]
     images = [cells, *(interpolated(cells, n) for n in times)]
-    title = f"{Path(source).name}, frame {number}"
+    title = f"{Path(options.frames).name}, frame {number}"
     if len(presses.label):
         title = f"{title}, {presses.label_names[presses.label[number]]}"
-    axis = _axis(given, number) if is_marked else None
+    axis = _axis(given, number) if options.is_marked else None
+    names = [f"{n} times" if n > 1 else "once" for n in times]
     figure = draw_frames(
         images,
-        titles=[f"{sensor.rows} x {sensor.columns} cells", *map(_times_text, times)],
+        titles=[f"{sensor.rows} x {sensor.columns} cells", *names],
         title=title,
         axes=[axis] * len(images),
         cells=[(sensor.rows, sensor.columns)] * len(images),
         unit="reading",
     )
-    return drawn(figure, suffix)
-
-
-def _times_text(times: int) -> str:
-    return f"{times} times" if times > 1 else "once"
+    return drawn(figure, Path(options.output).suffix.lower())
 
 
 def _axis(given: SensorFrames, number: int) -> FrameAxis | None:

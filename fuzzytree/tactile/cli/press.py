@@ -86,7 +86,12 @@ def command(options: TactilePressOptions) -> None:
         found = {
             one: press(one, options.count, options.seed, settings) for one in names
         }
-    say_rows(*(_row(one, made) for one, made in found.items()), quiet=options.quiet)
+    width = max(map(len, found))
+    for name, made in found.items():
+        clipped, outside = int(made.clipped.sum()), float(made.outside.max())
+        over = f", up to {100 * outside:.0f} % over the edge" if outside > 1e-9 else ""
+        said = f"{len(made.frames)} times, {clipped} cells clipped at full{over}"
+        say_rows(("pressed", name, said), width=width, quiet=options.quiet)
     facts: dict[str, object] = {
         "count": options.count,
         "seed": options.seed,
@@ -145,24 +150,11 @@ def _value(name: str, text: str, kind: type) -> object:
         raise click.UsageError(f"{name}: must be {what}, not {text!r}") from error
 
 
-def _row(name: str, found: Simulated) -> tuple[str, str, str]:
-    clipped, outside = int(found.clipped.sum()), float(found.outside.max())
-    over = f", up to {100 * outside:.0f} % over the edge" if outside > 1e-9 else ""
-    facts = f"{len(found.frames)} times, {clipped} cells clipped at full{over}"
-    return "pressed", name, facts
-
-
 def _facts(name: str, found: Simulated) -> dict[str, object]:
     truth = found.truth
-    return {
-        "name": name,
-        "clipped": found.clipped.tolist(),
-        "outside": found.outside.tolist(),
-        "x": truth.x.tolist(),
-        "y": truth.y.tolist(),
-        "angle_deg": truth.angle_deg.tolist(),
-        "force_n": truth.force_n.tolist(),
-    }
+    places = {key: getattr(truth, key) for key in ("x", "y", "angle_deg", "force_n")}
+    arrays = {"clipped": found.clipped, "outside": found.outside, **places}
+    return {"name": name, **{key: one.tolist() for key, one in arrays.items()}}
 
 
 def _content(found: dict[str, Simulated]) -> bytes:

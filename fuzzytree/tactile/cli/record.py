@@ -97,12 +97,12 @@ def command(options: TactileRecordOptions) -> int:
             known, options.port, wait=not options.no_wait, most_waiting=_waiting(known)
         ) as line,
     ):
-        coming = _Coming(line, stop, quiet=options.quiet)
-        settings = f"{known.port.baud} baud"
+        coming = _Coming(line, stop, options)
         say_rows(
-            ("opened", options.port, f"{known.name}, {settings}"), quiet=options.quiet
+            ("opened", options.port, f"{known.name}, {known.port.baud} baud"),
+            quiet=options.quiet,
         )
-        coming.begin(options.seconds)  # a line that stays silent ends, too
+        coming.begin()  # a line that stays silent ends, too
         try:
             started = start(known, coming.frames())
         except PortError:
@@ -112,86 +112,79 @@ def command(options: TactileRecordOptions) -> int:
             return 0
         _tell_start(started, quiet=options.quiet)
         with Recorder(options.output, started.board, replace=options.force) as recorder:
-            end = _record(
-                line, coming, recorder, frames=options.frames, seconds=options.seconds
-            )
-    _tell(options.output, line, started, recorder, coming, quiet=options.quiet)
+            end = coming.record(recorder)
+    _tell(options, line, recorder, coming)
     if options.as_json:
-        answer_json(_facts(options.output, line, started, recorder, coming, end))
+        facts: dict[str, object] = {
+            "file": options.output,
+            "board": started.board.name,
+            "masked": started.board.sensor.masked,
+            "remarks": started.remarks,
+            "frames": coming.count,
+            "seconds": coming.seconds,
+            "end": end,
+            "counters": line.counters.facts(),
+            "most_at_risk": recorder.most_at_risk,
+        }
+        answer_json(facts)
     return 1 if end == "port" else 0
 
 
-def _record(
-    line: Connection,
-    coming: _Coming,
-    recorder: Recorder,
-    *,
-    frames: int | None,
-    seconds: float | None,
-) -> End:
-    """Write frames until it is enough; return why it ended."""
-    coming.begin(seconds)
-    for frame in coming.frames():
-        if not coming.takes(frame):
-            return "seconds"
-        recorder.write(frame, line.counters)
-        if coming.written(frame) == frames:
-            return "frames"
-    if line.state == "ended":
-        return "port"
-    if not coming.is_stopped():
-        return "seconds"
-    line.close()  # what came before is kept
-    with contextlib.suppress(PortError):  # whatever it is, it comes too late
-        for frame in line:
-            recorder.write(frame, line.counters)
-            if coming.written(frame) == frames:
-                break
-    return "told"
-
-
 class _Coming:
-    """The frames of a line, with a word on whatever happens to it."""
+    """The frames of a line, with a word on whatever happens to it.
 
-    def __init__(self, line: Connection, stop: threading.Event, *, quiet: bool) -> None:
-        self.count = 0
-        self.first_s = self.last_s = 0.0
-        self._line, self._stop, self._quiet = line, stop, quiet
+    Attributes:
+        count: How many were written.
+        seconds: From the first to the last of these.
+    """
+
+    def __init__(
+        self, line: Connection, stop: threading.Event, options: TactileRecordOptions
+    ) -> None:
+        self.count, self.seconds = 0, 0.0
+        self._line, self._stop, self._options = line, stop, options
         self._state: State = "open"
         self._reconnects = 0
         self._any = False
-        self._limit_s: float | None = None
+        self._first_s = 0.0
         self._begun = self._said = time.monotonic()
 
-    @property
-    def seconds(self) -> float:
-        """From the first to the last frame that was written."""
-        return self.last_s - self.first_s
-
-    def begin(self, limit_s: float | None) -> None:
-        """Begin to count, now."""
+    def begin(self) -> None:
+        """Begin to count the seconds, now."""
         self._begun = self._said = time.monotonic()
-        self._limit_s = limit_s
 
-    def is_stopped(self) -> bool:
-        """Return whether a signal ends the recording."""
-        return self._stop.is_set()
+    def record(self, recorder: Recorder) -> End:
+        """Write frames until it is enough; return why it ended."""
+        self.begin()
+        limit_s, most = self._options.seconds, self._options.frames
+        for frame in self.frames():
+            if self.count and limit_s and frame.time - self._first_s >= limit_s:
+                return "seconds"
+            if self._written(frame, recorder) == most:
+                return "frames"
+        if self._line.state == "ended":
+            return "port"
+        if not self._stop.is_set():
+            return "seconds"
+        self._line.close()  # what came before is kept
+        with contextlib.suppress(PortError):  # whatever it is, it comes too late
+            for frame in self._line:
+                if self._written(frame, recorder) == most:
+                    break
+        return "told"
 
-    def takes(self, frame: Frame) -> bool:
-        """Return whether a frame came within the time limit."""
-        limit_s = self._limit_s
-        return limit_s is None or not self.count or frame.time - self.first_s < limit_s
-
-    def written(self, frame: Frame) -> int:
-        """Count a frame; return how many there are."""
+    def _written(self, frame: Frame, recorder: Recorder) -> int:
+        """Write a frame; return how many there are."""
+        recorder.write(frame, self._line.counters)
         if not self.count:
-            self.first_s = frame.time
-        self.last_s = frame.time
+            self._first_s = frame.time
+        self.seconds = frame.time - self._first_s
         self.count += 1
         return self.count
 
     def frames(self) -> Iterator[Frame]:
         """Yield frames until a signal, the time limit or the end of the connection."""
+        limit_s = self._options.seconds
         while not self._stop.is_set():
             frame = None
             try:
@@ -204,33 +197,29 @@ class _Coming:
             if frame is not None:
                 self._any = True
                 yield frame
-            elif self._line.state == "ended" or self._is_late():
+                continue
+            is_late = limit_s and time.monotonic() - self._begun >= limit_s
+            if is_late or self._line.state == "ended":
                 return
-
-    def _is_late(self) -> bool:
-        limit_s = self._limit_s
-        return limit_s is not None and time.monotonic() - self._begun >= limit_s
 
     def _tell(self) -> None:
         """Say when the line changes, and each second, on a terminal, how far it is."""
         state, before = self._line.state, self._state
         self._state = state
-        counters = self._line.counters
+        counters, quiet = self._line.counters, self._options.quiet
+        text = _SENTENCES.get(state, "") if state != before else ""
         if counters.reconnects != self._reconnects:
             self._reconnects = counters.reconnects
-            self._say("went away, and is back")
-        elif state != before and state in _SENTENCES:
-            self._say(_SENTENCES[state])
+            text = "went away, and is back"
+        if text:
+            say(f"{self._line.port}: {text}", quiet=quiet)
         now = time.monotonic()
         if now - self._said >= 1 and self.count:
             self._said = now
             if sys.stderr.isatty():
                 text = f"{now - self._begun:.0f} s, {self.count} frames"
                 wrong = f"{counters.damaged} damaged, {counters.dropped} dropped"
-                say(f"{text}, {wrong}", quiet=self._quiet)
-
-    def _say(self, text: str) -> None:
-        say(f"{self._line.port}: {text}", quiet=self._quiet)
+                say(f"{text}, {wrong}", quiet=quiet)
 
 
 def _waiting(board: Board) -> int:
@@ -252,51 +241,24 @@ def _tell_start(started: Started, *, quiet: bool) -> None:
 
 
 def _tell(
-    output: str,
+    options: TactileRecordOptions,
     line: Connection,
-    started: Started,
     recorder: Recorder,
     coming: _Coming,
-    *,
-    quiet: bool,
 ) -> None:
     from fuzzytree.report import counted
 
     rate = ""
     if coming.seconds:
         rate = f", {(coming.count - 1) / coming.seconds:.1f} a second"
+    frames = counted(coming.count, "frame")
     facts = line.counters.facts().items()
     risk = counted(recorder.most_at_risk, "frame")
+    after = shlex.join(["fuzzytree", "tactile", "replay", options.output])
     say_rows(
-        (
-            "wrote",
-            output,
-            f"{counted(coming.count, 'frame')}, {coming.seconds:.1f} s{rate}",
-        ),
+        ("wrote", options.output, f"{frames}, {coming.seconds:.1f} s{rate}"),
         ("counted", ", ".join(f"{name} {count}" for name, count in facts), ""),
         ("at risk", f"{risk} at most, if the power had failed", ""),
-        ("next", shlex.join(["fuzzytree", "tactile", "replay", output]), ""),
-        quiet=quiet,
+        ("next", after, ""),
+        quiet=options.quiet,
     )
-
-
-def _facts(
-    output: str,
-    line: Connection,
-    started: Started,
-    recorder: Recorder,
-    coming: _Coming,
-    end: End,
-) -> dict[str, object]:
-    board: Board = started.board
-    return {
-        "file": output,
-        "board": board.name,
-        "masked": board.sensor.masked,
-        "remarks": started.remarks,
-        "frames": coming.count,
-        "seconds": coming.seconds,
-        "end": end,
-        "counters": line.counters.facts(),
-        "most_at_risk": recorder.most_at_risk,
-    }

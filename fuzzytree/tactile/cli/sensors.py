@@ -59,32 +59,38 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
     """
     from fuzzytree.tactile.sensor import Sensor
 
-    board, size = options.board, options.size
-    full, threshold = options.full, options.threshold
-    if board is not None:
-        if size is not None or full is not None or threshold is not None:
-            raise click.UsageError(
-                "--board sets --sensor, --full and --threshold; choose one of them"
-            )
-        from fuzzytree.tactile.board_file import load_board
-
-        return load_board(board).sensor
-    if size is None:
+    if options.board is not None:
+        return _sensor_of_board(options, "--sensor, --full and --threshold")
+    if options.size is None:
         raise click.UsageError(
             "name the board with --board, or its size: --sensor 16x16"
         )
-    found = _SIZE.fullmatch(size)
+    found = _SIZE.fullmatch(options.size)
     if found is None:
-        raise click.UsageError(f"--sensor {size}: rows and columns are as in 16x16")
+        text = "rows and columns are as in 16x16"
+        raise click.UsageError(f"--sensor {options.size}: {text}")
     rows, columns = map(int, found.groups())
+    full = 255 if options.full is None else options.full
     with wrong_options():
-        return Sensor(rows, columns, 255 if full is None else full, threshold or 0)
+        return Sensor(rows, columns, full, options.threshold or 0)
+
+
+def _sensor_of_board(options: SensorOptions | FramesOptions, others: str) -> Sensor:
+    """Return the sensor of `--board`; refuse options that contradict it."""
+    from fuzzytree.tactile.board_file import load_board
+
+    size = options.size if isinstance(options, SensorOptions) else None
+    if any(one is not None for one in (size, options.full, options.threshold)):
+        raise click.UsageError(f"--board sets {others}; choose one of them")
+    return load_board(options.board or "").sensor
 
 
 def frames_and_sensor(
-    path: str, options: FramesOptions, *, label: str = "label"
+    path: str, options: FramesOptions, *, label: str = "label", word: str = ""
 ) -> SensorFrames:
     """Return the frames of an archive or recording, with the sensor they fit.
+
+    All of them are of the class `word`, if it is not empty.
 
     Raises:
         click.UsageError: If a board is named with --full or --threshold.
@@ -92,17 +98,14 @@ def frames_and_sensor(
     """
     from fuzzytree.tactile.presses import read_frames
 
-    board, full, threshold = options.board, options.full, options.threshold
-    if board is None:
-        return read_frames(path, full=full, threshold=threshold, label=label)
-    from fuzzytree.tactile.board_file import load_board
-
-    sensor = load_board(board).sensor
-    if full is not None or threshold is not None:
-        raise click.UsageError(
-            "--board sets --full and --threshold; choose one of them"
-        )
-    return read_frames(path, sensor=sensor, label=label)
+    sensor = None
+    if options.board is not None:
+        sensor = _sensor_of_board(options, "--full and --threshold")
+    full, threshold = options.full, options.threshold
+    found = read_frames(
+        path, sensor=sensor, full=full, threshold=threshold, label=label
+    )
+    return found.of_class(word) if word else found
 
 
 def frames_of_file(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator, Sequence
 from itertools import cycle, islice
 from typing import TYPE_CHECKING
@@ -25,7 +24,6 @@ from fuzzytree.tactile.cli.signals import stop_signal
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
     from fuzzytree.tactile.sensor import Cells
-    from fuzzytree.tactile.simulation.device import Device
 
 ALL = "all"
 _LOOK_S = 0.05
@@ -87,9 +85,7 @@ def command(options: TactileSimulateOptions) -> None:
     from fuzzytree.tactile.simulation.device import Device, faults_of
 
     known = load_board(options.board)
-    rest, coming = _frames(
-        known, options.name, options.recording, options.seed, quiet=options.quiet
-    )
+    rest, coming = _frames(known, options)
     with stop_signal() as stop:
         with wrong_options():
             device = Device(
@@ -109,7 +105,9 @@ def command(options: TactileSimulateOptions) -> None:
             say_rows(
                 ("opened", device.port, f"{known.name}, {speed}"), quiet=options.quiet
             )
-            _wait(device, stop)
+            while not stop.wait(_LOOK_S):
+                if device.over.is_set() and not device.is_open:
+                    break
     facts = device.counts.facts()
     counts = ", ".join(f"{what} {count}" for what, count in facts.items() if count)
     say_rows(("counted", counts or "nothing", ""), quiet=options.quiet)
@@ -117,20 +115,14 @@ def command(options: TactileSimulateOptions) -> None:
         answer_json({"port": device.port, "board": known.name, "truth": facts})
 
 
-def _wait(device: Device, stop: threading.Event) -> None:
-    """Wait for a signal, or for the host to close the port after the last frame."""
-    while not stop.wait(_LOOK_S):
-        if device.over.is_set() and not device.is_open:
-            return
-
-
 def _frames(
-    board: Board, name: str | None, recording: str | None, seed: int, *, quiet: bool
+    board: Board, options: TactileSimulateOptions
 ) -> tuple[Cells, Iterator[Cells]]:
     """Return a frame without pressure and those to send, fitted to the board."""
     from fuzzytree.tactile.simulation.device import blob, empty, fitted
     from fuzzytree.tactile.simulation.physics import FULL, SIDE
 
+    name, recording, quiet = options.name, options.recording, options.quiet
     if recording is not None:
         import numpy as np
 
@@ -148,7 +140,7 @@ def _frames(
         frames = cycle(list(found.frames))
         return rest, (fitted(board, one, sensor.full) for one in frames)
     if name is None:
-        return empty(board), blob(board, seed)
+        return empty(board), blob(board, options.seed)
     from fuzzytree.tactile.recognition.frame_sources import simulated
     from fuzzytree.tactile.simulation.objects import OBJECTS
 
@@ -157,7 +149,7 @@ def _frames(
         raise click.UsageError(f"no object {name!r}; there is {known}, or {ALL}")
     names = tuple(OBJECTS) if name == ALL else (name,)
     _say_fit(board, (SIDE, SIDE), FULL, quiet=quiet)
-    records = simulated(seed, names=names)
+    records = simulated(options.seed, names=names)
     return empty(board), (fitted(board, one.frame.cells, FULL) for one in records)
 
 
