@@ -18,8 +18,7 @@ from fuzzytree.tactile.cli.sensors import frames_model
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
     from fuzzytree.tactile.link import Connection
-    from fuzzytree.tactile.link.recording import Recorder
-    from fuzzytree.tactile.recognition.live import FrameSource, Hold, Live, LiveResult
+    from fuzzytree.tactile.recognition.live import FrameSource, Live, LiveResult
     from fuzzytree.tactile.sensor import Frame
 
 SIMULATOR = "simulator"
@@ -113,50 +112,39 @@ def command(options: TactileLiveOptions) -> None:
     another. A terminal shows a picture, the class and the strengths; elsewhere there
     is a line for each object that is newly recognised. Ctrl-C ends.
     """
-    from fuzzytree.tactile.recognition.live import Hold, Live
+    from fuzzytree.tactile.link.recording import Recorder
+    from fuzzytree.tactile.recognition.live import Live
     from fuzzytree.tactile.recognition.recogniser import Recogniser, usual_floor
+    from fuzzytree.tactile.report.page import LivePage
 
     known = frames_model(options.model)
     floor = usual_floor(known) if options.reject is None else options.reject
+    labels: Counter[str] = Counter()
     with contextlib.ExitStack() as stack:
-        stack.callback(_switched(SWITCH_S))
+        stack.callback(sys.setswitchinterval, sys.getswitchinterval())
+        sys.setswitchinterval(SWITCH_S)
         with wrong_options():
             found, used = _opened(options)
             stack.callback(found.close)
             recogniser = Recogniser(known, used.sensor, floor)
         live = Live(recogniser, found, options.source)
-        recorder = _recorder(options.record, used)
-        if recorder is not None:
-            stack.callback(recorder.close)
+        recorder = None
+        if options.record is not None:
+            recorder = stack.enter_context(Recorder(options.record, used))
         if options.page is not None:
-            url = _served(live, options.page, options.times, stack)
+            page = LivePage(live, options.page, times=options.times)
+            url = stack.enter_context(page).url
             say_rows(("serves", url, ""), quiet=options.quiet)
-        tally = _Tally()
         try:
-            with _display(
-                live, options.times, is_wanted=not (options.lines or options.as_json)
-            ) as shows:
-                write = (
-                    None
-                    if shows
-                    else _writer(Hold(options.hold), as_json=options.as_json)
-                )
+            with _display(live, options) as write:
                 for answer in live.answers(options.frames):
-                    if write is not None:
-                        write(answer)
-                    tally.add(answer)
+                    write(answer)
+                    labels[_word(answer)] += 1
                     if recorder is not None:
                         recorder.write(answer.frame, found.counters)
         except KeyboardInterrupt:
             pass
-    tally.report(live, floor, options.record, quiet=options.quiet)
-
-
-def _switched(seconds: float) -> Callable[[], None]:
-    """Let threads give way sooner; return what makes it as it was."""
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(seconds)
-    return lambda: sys.setswitchinterval(before)
+    _report(live, labels, floor, options)
 
 
 def _opened(options: TactileLiveOptions) -> tuple[FrameSource, Board]:
@@ -172,134 +160,103 @@ def _opened(options: TactileLiveOptions) -> tuple[FrameSource, Board]:
     if board is not None and (source == SIMULATOR or is_file):
         raise click.UsageError(f"--board is for a port; {source} has its own")
     if source == SIMULATOR:
-        return sources.Paced(
-            sources.simulated(options.seed), speed
-        ), sources.PAPER_BOARD
+        frames = sources.simulated(options.seed)
+        return sources.Paced(frames, speed), sources.PAPER_BOARD
     if is_file:
         replayed = sources.Replayed(source, speed)
         return replayed, replayed.board
     assert board is not None  # refused above
-    is_kept = options.record is not None
-    return _line(source, board, is_kept=is_kept, quiet=options.quiet)
+    return _line(board, options)
 
 
-def _line(
-    port: str, board: str, *, is_kept: bool, quiet: bool
-) -> tuple[FrameSource, Board]:
+def _line(board: str, options: TactileLiveOptions) -> tuple[FrameSource, Board]:
     """Open a port, and measure what its board reads when nothing presses."""
     from fuzzytree.tactile import link as lines
     from fuzzytree.tactile.board_file import load_board
     from fuzzytree.tactile.recognition.frame_sources import FromPort
 
-    known = load_board(board)
-    most = lines.MOST_WAITING if is_kept else MOST_WAITING
-    line = lines.open_connection(known, port, most_waiting=most)
+    known, quiet = load_board(board), options.quiet
+    most = MOST_WAITING if options.record is None else lines.MOST_WAITING
+    line = lines.open_connection(known, options.source, most_waiting=most)
     try:
-        return FromPort(line), _rested(known, line, quiet=quiet)
+        count = known.start.frames
+        if count:
+            what = f"the baseline in {count} frames: nothing may lie on the sensor"
+            say_rows(("measures", what, ""), quiet=quiet)
+        found = lines.start(known, _coming(line, quiet=quiet))
+        for remark in found.remarks:
+            say_rows(("remark", remark, ""), quiet=quiet)
+        return FromPort(line), found.board
     except BaseException:
         line.close()
         raise
 
 
-def _rested(board: Board, line: Connection, *, quiet: bool) -> Board:
-    """Return a board with the baseline that its first frames show."""
-    from fuzzytree.tactile.link import start
-
-    count = board.start.frames
-    if count:
-        what = f"the baseline in {count} frames: nothing may lie on the sensor"
-        say_rows(("measures", what, ""), quiet=quiet)
-    found = start(board, _coming(line, quiet=quiet))
-    for remark in found.remarks:
-        say_rows(("remark", remark, ""), quiet=quiet)
-    return found.board
-
-
 def _coming(line: Connection, *, quiet: bool) -> Iterator[Frame]:
     """Give the frames of a line; say once that none comes."""
-    is_told = False
+    is_late = False
     while line.state != "ended":
         frame = line.take(_PATIENCE_S)
         if frame is not None:
             yield frame
-        elif not is_told:
-            is_told = True
+        elif not is_late:
+            is_late = True
             say_rows(("waits", "no frame comes", "Ctrl-C ends"), quiet=quiet)
 
 
-def _served(live: Live, port: int, times: int, stack: contextlib.ExitStack) -> str:
-    from fuzzytree.tactile.report.page import LivePage
-
-    return stack.enter_context(LivePage(live, port, times=times)).url
-
-
-def _recorder(path: str | None, board: Board) -> Recorder | None:
-    from fuzzytree.tactile.link.recording import Recorder
-
-    return None if path is None else Recorder(path, board)
-
-
 @contextlib.contextmanager
-def _display(live: Live, times: int, *, is_wanted: bool) -> Generator[bool]:
-    """Show a picture on a terminal; yield whether there is one."""
+def _display(
+    live: Live, options: TactileLiveOptions
+) -> Generator[Callable[[LiveResult], None]]:
+    """Show a picture on a terminal; elsewhere yield what writes new, stable results."""
     from fuzzytree.tactile.cli.screen import Screen, ended_by_signals, look_of
-
-    look = look_of(sys.stdout) if is_wanted else None
-    if look is None:
-        with ended_by_signals(None):
-            yield False
-        return
-    shown = Screen(live, sys.stdout, look, times)
-    with ended_by_signals(shown), shown:
-        yield True
-
-
-def _writer(hold: Hold, *, as_json: bool) -> Callable[[LiveResult], None]:
-    """Return a function that writes a line for each new, stable result."""
+    from fuzzytree.tactile.recognition.live import Hold
     from fuzzytree.tactile.report.live import line, line_facts
+
+    hold = Hold(options.hold)
 
     def write(answer: LiveResult) -> None:
         if answer.state is None or not hold((answer.state, answer.code)):
             return
-        text = msgspec.json.encode(line_facts(answer)).decode() if as_json else ""
-        sys.stdout.write(f"{text or line(answer)}\n")
+        facts = line_facts(answer)
+        text = msgspec.json.encode(facts).decode() if options.as_json else line(answer)
+        sys.stdout.write(f"{text}\n")
         sys.stdout.flush()
 
-    return write
+    is_wanted = not (options.lines or options.as_json)
+    look = look_of(sys.stdout) if is_wanted else None
+    if look is None:
+        with ended_by_signals(None):
+            yield write
+        return
+    shown = Screen(live, sys.stdout, look, options.times)
+    with ended_by_signals(shown), shown:
+        yield lambda _answer: None
 
 
-class _Tally:
-    """Counts the answers."""
+def _word(answer: LiveResult) -> str:
+    from fuzzytree.tactile.recognition.live import STATES
 
-    def __init__(self) -> None:
-        self._labels: Counter[str] = Counter()
+    return answer.label or ("refused" if answer.state is None else STATES[answer.state])
 
-    def add(self, answer: LiveResult) -> None:
-        """Take an answer."""
-        from fuzzytree.tactile.recognition.live import STATES
 
-        word = "refused" if answer.state is None else STATES[answer.state]
-        self._labels[answer.label or word] += 1
+def _report(
+    live: Live, labels: Counter[str], reject: float, options: TactileLiveOptions
+) -> None:
+    """Say what was answered, how fast, and what was out of the ordinary."""
+    from fuzzytree.tactile.recognition.live import STATES
+    from fuzzytree.tactile.recognition.recogniser import State
+    from fuzzytree.tactile.report.live import counts, timing, visible
 
-    def report(
-        self, live: Live, reject: float, record: str | None, *, quiet: bool
-    ) -> None:
-        """Say what was answered, how fast, and what was out of the ordinary."""
-        from fuzzytree.tactile.recognition.live import STATES
-        from fuzzytree.tactile.recognition.recogniser import State
-        from fuzzytree.tactile.report.live import counts, timing, visible
-
-        view = live.view()
-        found = [f"{visible(label)} {n}" for label, n in sorted(self._labels.items())]
-        total = sum(self._labels.values())
-        word = STATES[State.UNKNOWN]
-        unknown = self._labels[word]
-        floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
-        say_rows(
-            ("answered", f"{total} frames", ", ".join(found)),
-            *([(word, f"{unknown} frames", floor)] if unknown else []),
-            ("counted", counts(view), ""),
-            *([("took", timing(view), "")] if view.latency else []),
-            *([("wrote", record, "")] if record else []),
-            quiet=quiet,
-        )
+    view, word = live.view(), STATES[State.UNKNOWN]
+    found = [f"{visible(label)} {count}" for label, count in sorted(labels.items())]
+    unknown = labels[word]
+    floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
+    say_rows(
+        ("answered", f"{labels.total()} frames", ", ".join(found)),
+        *([(word, f"{unknown} frames", floor)] if unknown else []),
+        ("counted", counts(view), ""),
+        *([("took", timing(view), "")] if view.latency else []),
+        *([("wrote", options.record, "")] if options.record else []),
+        quiet=options.quiet,
+    )

@@ -10,6 +10,7 @@ from collections.abc import Generator, Mapping
 from types import FrameType
 from typing import TYPE_CHECKING, TextIO
 
+from fuzzytree.tactile.cli.signals import Handler, handled
 from fuzzytree.tactile.report.live import Look, screen
 
 if TYPE_CHECKING:
@@ -126,13 +127,8 @@ def ended_by_signals(shown: Screen | None) -> Generator[None]:
             with shown.given_back():
                 os.kill(os.getpid(), signal.SIGSTOP)
 
-    wanted = {"SIGTERM": end, "SIGHUP": end}
+    wanted: dict[str, Handler] = {"SIGTERM": end, "SIGHUP": end}
     if shown is not None:
         wanted["SIGTSTP"] = stop
-    with contextlib.ExitStack() as stack:
-        if threading.current_thread() is threading.main_thread():
-            for name in wanted.keys() & signal.Signals.__members__.keys():
-                number = signal.Signals[name]  # some systems lack some
-                stack.callback(signal.signal, number, signal.getsignal(number))
-                signal.signal(number, wanted[name])
+    with handled(wanted):
         yield
