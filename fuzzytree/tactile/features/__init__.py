@@ -262,10 +262,9 @@ def _every_sum(sensor: Sensor, features: Sequence[Feature]) -> list[Sum]:
         for q in range(order + 1)
     ]
     found += [Sum("area", "count"), Sum("peak", "peak")]
-    blocks = {feature.base: feature for feature in features if feature.rows}
-    cells = {f.base: f for f in features if f.kind == "cell"}
-    for base, feature in (blocks | cells).items():
-        found.append(Sum(base, "cells", _inside(sensor, feature)))
+    for kind in ("block", "cell"):
+        parts = {feature.base: feature for feature in features if feature.kind == kind}
+        found += [Sum(base, "cells", _inside(sensor, f)) for base, f in parts.items()]
     return found
 
 

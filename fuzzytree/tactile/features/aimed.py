@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -126,16 +125,17 @@ def edge_frames(
     for line, cut in dict.fromkeys(cuts):
         is_above = values[line] > cut
         if is_above.any() and not is_above.all():
-            below, above = _nearest(values[line], cut)
+            below = np.where(is_above, -np.inf, values[line]).argmax()
+            above = np.where(is_above, values[line], np.inf).argmin()
             pair = frames[below].astype(np.int64), frames[above].astype(np.int64)
-            found += _parted(pair, cut, partial(_one, features, line))
+
+            def feature(frame: Whole, line: int = line) -> float:
+                return float(features(frame[np.newaxis])[line, 0])
+
+            found += _parted(pair, cut, feature)
     if not found:
         return frames[:0]
     return np.array(found, np.int64).astype(frames.dtype)
-
-
-def _one(features: Features, line: int, frame: Whole) -> float:
-    return float(features(frame[np.newaxis])[line, 0])
 
 
 def _parted(
@@ -175,17 +175,14 @@ def proving_frames(made: FrameProgram, model: Model, presses: int = 12) -> Cells
     frames = aimed_frames(made.sensor, presses)
 
     def values(some: Cells) -> npt.NDArray[np.float64]:
-        return np.array([_axes(made, model, frame) for frame in some]).T
+        """Return the values of the model's variables, combinations among them."""
+        rows = [plain_features(made, frame)[0] for frame in some]
+        named = [dict(zip(model.inputs, row, strict=True)) for row in rows]
+        axes = [axis_values(model.variables, row) for row in named]
+        return np.array([[*one.values()] for one in axes]).T
 
     pairs = edge_frames(frames, cuts_of(model)[:_MOST_CUTS], values)
     return np.concatenate([frames, pairs])
-
-
-def _axes(made: FrameProgram, model: Model, frame: Cells) -> list[float]:
-    """Return the values of a model's variables, combinations among them."""
-    features, _ = plain_features(made, frame)
-    row = dict(zip(model.inputs, features, strict=True))
-    return [*axis_values(model.variables, row).values()]
 
 
 def cuts_of(model: Model) -> list[tuple[int, float]]:
@@ -201,10 +198,3 @@ def cuts_of(model: Model) -> list[tuple[int, float]]:
             for value in landmarks(term.shape)
         ]
     return list(dict.fromkeys(pairs))
-
-
-def _nearest(values: npt.NDArray[np.float64], cut: float) -> tuple[int, int]:
-    """Return the places of the nearest value at or below a cut and of that above."""
-    below = np.where(values <= cut, values, -np.inf)
-    above = np.where(values > cut, values, np.inf)
-    return int(below.argmax()), int(above.argmin())

@@ -6,16 +6,16 @@ pressure, and not from the steps of `fuzzytree.tactile.features`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import cached_property
 
 from fuzzytree.tactile.features.names import Feature, features_of_names
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
-BITS = 256
-"""Angles, roots and logarithms are within 2^-200 of their size, at least."""
+_DIGITS = Context(prec=80)
+"""Angles, roots and logarithms are within 1e-60 of their size, at least."""
 
 Point = tuple[Fraction, Fraction]
 """A complex number."""
@@ -181,9 +181,11 @@ def degrees(y: Fraction, x: Fraction) -> Fraction:
     if not x and not y:
         return Fraction(0)
     low, high = sorted((abs(x), abs(y)))
-    found = _arc_tangent(_short(low / high)) * 45 / _arc_tangent(Fraction(1))
-    if low == high:
-        found = Fraction(45)
+    found = Fraction(45)
+    if low != high:
+        with localcontext(_DIGITS):
+            found = Fraction(_arc_tangent(_decimal(low / high)) * 45)
+            found /= Fraction(_arc_tangent(Decimal(1)))
     if abs(y) > abs(x):
         found = 90 - found
     if x < 0:
@@ -191,40 +193,23 @@ def degrees(y: Fraction, x: Fraction) -> Fraction:
     return -found if y < 0 else found
 
 
-def _short(value: Fraction) -> Fraction:
-    """Return a number with as many binary digits as are kept."""
-    if not value:
-        return value
-    size = value.numerator.bit_length() - value.denominator.bit_length()
-    places = BITS - size
-    scaled = value * Fraction(2) ** places
-    return Fraction(round(scaled)) / Fraction(2) ** places
+def _decimal(value: Fraction) -> Decimal:
+    return Decimal(value.numerator) / Decimal(value.denominator)
 
 
 def _root(value: Fraction) -> Fraction:
-    if not value:
-        return value
-    size = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
-    places = BITS - size
-    return Fraction(math.isqrt(math.floor(value * 4**places)), 2**places)
-
-
-def _arc_tangent(t: Fraction) -> Fraction:
-    for _ in range(6):
-        t = _short(t / (1 + _root(1 + t * t)))
-    square, power, total = _short(t * t), t, Fraction(0)
-    for k in range(32):
-        total += power / (2 * k + 1) * (-1) ** k
-        power = _short(power * square)
-    return total * 64
+    with localcontext(_DIGITS):
+        return Fraction(_decimal(value).sqrt())
 
 
 def _logarithm(value: Fraction) -> Fraction:
-    for _ in range(16):
-        value = _root(value)
-    t = _short((value - 1) / (value + 1))
-    square, power, total = _short(t * t), t, Fraction(0)
-    for k in range(16):
-        total += power / (2 * k + 1)
-        power = _short(power * square)
-    return total * 2**17
+    with localcontext(_DIGITS):
+        return Fraction(_decimal(value).ln())
+
+
+def _arc_tangent(t: Decimal) -> Decimal:
+    """Return the angle of a tangent of at most 1: six halvings, then the series."""
+    for _ in range(6):
+        t = t / (1 + (1 + t * t).sqrt())
+    terms = ((-1) ** k * t ** (2 * k + 1) / (2 * k + 1) for k in range(32))
+    return 64 * sum(terms, Decimal(0))

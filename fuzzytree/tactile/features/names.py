@@ -57,9 +57,12 @@ ORIENTATION: tuple[str, ...] = ("angle", "Re C30", "Re C21")
 """Features that distinguish orientations on any sensor."""
 
 _UNSCALED = frozenset(("angle", "cos2", "sin2", "area", "x", "y"))
-_PLACE = "(0|[1-9][0-9]{0,2})"
-_CELL = re.compile(f"cell r{_PLACE} c{_PLACE}")
-_BLOCK = re.compile(f"block r{_PLACE} c{_PLACE} of {_PLACE}x{_PLACE}")
+_PLACE = "(?P<{}>0|[1-9][0-9]{{0,2}})"
+_AT = f"r{_PLACE.format('row')} c{_PLACE.format('column')}"
+_CELL = re.compile(f"cell {_AT}")
+_BLOCK = re.compile(
+    f"block {_AT} of {_PLACE.format('rows')}x{_PLACE.format('columns')}"
+)
 
 Kind = Literal["moment", "cell", "block"]
 
@@ -116,23 +119,15 @@ def feature_of(name: str) -> Feature:
     """
     base = name.removeprefix(LOG).removesuffix(PER_FORCE)
     is_log, per_force = name.startswith(LOG), name.endswith(PER_FORCE)
-    found: Feature | None = None
-    if base in FEATURES and not (per_force and base in (*_UNSCALED, "force")):
-        found = Feature(name, base, is_log=is_log, per_force=per_force)
     cell, block = _CELL.fullmatch(base), _BLOCK.fullmatch(base)
-    if cell:
-        row, column = map(int, cell.groups())
-        found = Feature(
-            name, base, "cell", row, column, is_log=is_log, per_force=per_force
-        )
-    if block:
-        row, column, rows, columns = map(int, block.groups())
-        found = Feature(
-            name, base, "block", row, column, rows, columns, is_log, per_force
-        )
-    if found is None:
+    if base in FEATURES and not (per_force and base in (*_UNSCALED, "force")):
+        return Feature(name, base, is_log=is_log, per_force=per_force)
+    match = cell or block
+    if match is None:
         raise TableError(_unknown(name, base))
-    return found
+    numbers = {key: int(digits) for key, digits in match.groupdict().items()}
+    kind: Kind = "cell" if cell else "block"
+    return Feature(name, base, kind, is_log=is_log, per_force=per_force, **numbers)
 
 
 def features_of_names(names: Sequence[str]) -> tuple[Feature, ...]:
@@ -197,10 +192,9 @@ def names_of(text: str) -> tuple[str, ...]:
     """
     found: dict[str, None] = {}
     for part in text.split(","):
-        for name in _members(part.strip()):
-            found[name] = None
-            if len(found) > MOST_FEATURES:
-                raise TableError(f"{text[:80]!r}: more than {MOST_FEATURES} features")
+        found |= dict.fromkeys(_members(part.strip()))
+        if len(found) > MOST_FEATURES:
+            raise TableError(f"{text[:80]!r}: more than {MOST_FEATURES} features")
     return tuple(found)
 
 
@@ -215,7 +209,11 @@ def _members(part: str) -> Iterator[str]:
     elif base in SETS:
         members = SETS[base]
     else:
-        yield _name_of(part)
+        try:
+            yield feature_of(part).name
+        except TableError as error:
+            text = f"{error}; sets are {', '.join(SETS)} and blocks:16x8"
+            raise TableError(text) from error
         return
     log = LOG if part.startswith(LOG) else ""
     force = PER_FORCE if part.endswith(PER_FORCE) else ""
@@ -224,11 +222,3 @@ def _members(part: str) -> Iterator[str]:
             yield name
         else:
             yield f"{log}{name}{'' if name in ('force', 'area') else force}"
-
-
-def _name_of(part: str) -> str:
-    try:
-        return feature_of(part).name
-    except TableError as error:
-        sets = ", ".join(SETS)
-        raise TableError(f"{error}; sets are {sets} and blocks:16x8") from error

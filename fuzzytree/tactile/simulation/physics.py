@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterator
 from dataclasses import astuple, dataclass
 from typing import Annotated, Literal, assert_never, get_args
 
@@ -18,7 +17,7 @@ import numpy.typing as npt
 from msgspec import Meta
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model import Mistake, Value
+from fuzzytree.model import Value
 from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 from fuzzytree.tactile.simulation.objects import (
     OBJECTS,
@@ -174,16 +173,13 @@ class PhysicsSettings(Value, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         """Refuse a number out of its range."""
-        mistakes = [*_mistakes(self)]
+        mistakes = [*limit_mistakes(self)]
+        if self.wiring not in get_args(Wiring):
+            known = ", ".join(get_args(Wiring))
+            text = f"wiring is one of {known}, not {self.wiring!r}"
+            mistakes.append((("wiring",), text))
         if mistakes:
             raise InvalidModelError(mistakes)
-
-
-def _mistakes(settings: PhysicsSettings) -> Iterator[Mistake]:
-    yield from limit_mistakes(settings)
-    if settings.wiring not in get_args(Wiring):
-        known = ", ".join(get_args(Wiring))
-        yield ("wiring",), f"wiring is one of {known}, not {settings.wiring!r}"
 
 
 PAPER = PhysicsSettings()
@@ -302,58 +298,48 @@ def press_object(
     """
     if not 1 <= count <= MOST:
         raise ValueError(f"1 to {MOST} presses can be made at a time, not {count}")
+    # The numbers of some presses are drawn at a time, before any setting scales them:
+    # the first presses do not know the count.
+    random = np.random.default_rng([seed, zlib.crc32(thing.name.encode())])
     truth = []
     found = []
-    for draws in _draws(thing, count, seed):
-        done = _truth(thing, draws, settings)
-        noise = settings.noise * draws.noise
+    for begin in range(0, count, _AT_ONCE):
+        some = slice(count - begin)
+        places = random.uniform(-1.0, 1.0, (_AT_ONCE, 2))[some]
+        turns, forces = (random.standard_normal(_AT_ONCE)[some] for _ in range(2))
+        tilts = random.standard_normal((_AT_ONCE, 2))[some]
+        noise = random.standard_normal((_AT_ONCE, SIDE, SIDE))[some]
+        done = _truth(thing, settings, places, turns, forces, tilts)
         truth.append(astuple(done))
-        found.append((*_read(thing, done, noise, settings), outside(thing, done)))
+        read = _read(thing, done, settings.noise * noise, settings)
+        found.append((*read, outside(thing, done)))
     frames, clipped, over = map(np.concatenate, zip(*found, strict=True))
     sensor = Sensor(SIDE, SIDE, full=FULL, threshold=settings.threshold)
     facts = PressTruth(*map(np.concatenate, zip(*truth, strict=True)))
     return Simulated(frames, sensor, facts, clipped, over)
 
 
-@dataclass(frozen=True, slots=True)
-class _Draws:
-    """Random numbers of some presses, before any setting scales them."""
-
-    place: FloatArray  # (presses, 2) in [-1, 1)
-    turn: FloatArray  # (presses,) normal, like all that follow
-    force: FloatArray  # (presses,)
-    tilt: FloatArray  # (presses, 2)
-    noise: FloatArray  # (presses, rows, columns)
-
-
-def _draws(thing: Object, count: int, seed: int) -> Iterator[_Draws]:
-    """Draw numbers for presses, some at a time; the first do not know the count."""
-    random = np.random.default_rng([seed, zlib.crc32(thing.name.encode())])
-    for begin in range(0, count, _AT_ONCE):
-        some = slice(count - begin)
-        yield _Draws(
-            place=random.uniform(-1.0, 1.0, (_AT_ONCE, 2))[some],
-            turn=random.standard_normal(_AT_ONCE)[some],
-            force=random.standard_normal(_AT_ONCE)[some],
-            tilt=random.standard_normal((_AT_ONCE, 2))[some],
-            noise=random.standard_normal((_AT_ONCE, SIDE, SIDE))[some],
-        )
-
-
-def _truth(thing: Object, draws: _Draws, settings: PhysicsSettings) -> PressTruth:
+def _truth(
+    thing: Object,
+    settings: PhysicsSettings,
+    places: FloatArray,
+    turns: FloatArray,
+    forces: FloatArray,
+    tilts: FloatArray,
+) -> PressTruth:
     """Scale random numbers by the settings, and lay the object on the sensor.
 
     It lies in the middle, moved by a share of the room that is free; an object larger
     than the sensor has none.
     """
-    angle = thing.turned_deg + settings.turn_deg * draws.turn
-    force = thing.force_n * settings.force * np.exp(settings.force_spread * draws.force)
-    slope = settings.tilt * draws.tilt / radius_of(thing)
+    angle = thing.turned_deg + settings.turn_deg * turns
+    force = thing.force_n * settings.force * np.exp(settings.force_spread * forces)
+    slope = settings.tilt * tilts / radius_of(thing)
     corners = np.concatenate(_outlines(thing, angle), axis=1)
     low = -SIDE / 2 - corners.min(axis=1)
     high = SIDE / 2 - corners.max(axis=1)
     room = settings.roam * np.maximum(high - low, 0.0) / 2
-    x, y = ((low + high) / 2 + room * draws.place).T
+    x, y = ((low + high) / 2 + room * places).T
     return PressTruth(x, y, angle, force, slope[:, 0], slope[:, 1])
 
 
