@@ -74,9 +74,7 @@ class Presses:
 def read_presses(path: PathLike, *, label: str = "label") -> Presses:
     """Return the frames of an archive.
 
-    Args:
-        path: The file.
-        label: The array of the classes; their names are in that of `LABEL_names`.
+    The classes are in the array `label`, and their names in that of `LABEL_names`.
 
     Raises:
         ReadError: If it is no such archive, or larger than 1 GiB.

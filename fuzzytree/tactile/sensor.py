@@ -153,14 +153,8 @@ def pressed(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
     """Return what presses on each cell: 0 where nothing does.
 
     That is the value over the baseline where it is above the threshold, and 0
-    elsewhere and in masked cells.
-
-    Args:
-        sensor: The sensor.
-        frames: Shape (frames, rows, columns), or one frame.
-
-    Returns:
-        Shape (frames, rows, columns), in 0 to `sensor.full`.
+    elsewhere and in masked cells: shape (frames, rows, columns), in 0 to `sensor.full`,
+    also for one frame.
 
     Raises:
         TableError: If they are of another size, or no whole numbers.

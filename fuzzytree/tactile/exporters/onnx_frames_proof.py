@@ -49,12 +49,7 @@ def apart(
 ) -> Iterator[tuple[int, Output, str]]:
     """Yield each answer that is not plain Python's: frame, output, and both in words.
 
-    Args:
-        found: The answers, by output: an entry for each frame.
-        made: What computes the features.
-        model: The model.
-        frames: Shape (frames, rows, columns).
-        reject: As `fuzzytree.tactile.exporters.onnx_frames.write_frames`.
+    Each output of `found` has an entry for each frame.
     """
     for number, frame in enumerate(frames):
         right = plain_shown(made, model, frame, reject)

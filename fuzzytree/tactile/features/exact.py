@@ -26,11 +26,6 @@ def exact_features(
 ) -> tuple[Fraction, ...]:
     """Return features of one frame, rational ones exactly, the others to 60 digits.
 
-    Args:
-        sensor: The sensor.
-        frame: Shape (rows, columns).
-        names: Of the features.
-
     Raises:
         TableError: If a name is no feature's, or the frame does not fit the sensor.
 

@@ -44,11 +44,7 @@ class Shown(Value, frozen=True):
 
 
 def plain_features(made: FrameProgram, frame: Cells) -> tuple[tuple[float, ...], bool]:
-    """Return the features of one frame, and whether anything presses.
-
-    Args:
-        made: The program of the features.
-        frame: Shape (rows, columns), whole numbers.
+    """Return the features of one frame (rows, columns), and whether anything presses.
 
     Raises:
         TableError: If the frame is of another size, or holds no whole numbers.
@@ -110,13 +106,9 @@ def check_reject(model: Model, reject: float) -> None:
 def plain_answer(
     model: Model, values: Sequence[float], *, is_pressed: bool, reject: float = 0.0
 ) -> Shown:
-    """Return what a frame of some features shows.
+    """Return what a frame shows, from the values of the model's inputs in their order.
 
-    Args:
-        model: A tree, or a rule base.
-        values: Of the model's inputs, in order.
-        is_pressed: Whether anything presses on the sensor.
-        reject: A class whose rule is weaker is none of the known objects.
+    A class whose rule is weaker than `reject` is none of the known objects.
     """
     given = tuple(values)
     if not is_pressed:

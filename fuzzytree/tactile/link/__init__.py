@@ -40,14 +40,10 @@ __all__ = ["Decoder", "decoder_of"]
 def decoder_of(board: Board, *, is_joined: bool = False) -> Decoder:
     """Return what finds the frames of a board in its bytes.
 
-    Nothing of it reads, writes or looks at a clock. A decoder is for one stream.
-
-    Args:
-        board: The board.
-        is_joined: Whether the stream begins anywhere, as that of a board that sent
-            before. Then the first line of text, or the first bytes up to one that
-            ends a frame, are skipped: cut at their front they could still look whole.
-            Where the banner comes, nothing else is skipped.
+    Nothing of it reads, writes or looks at a clock. A decoder is for one stream. That
+    of a board that sent before is joined: it begins anywhere. Its first line of text,
+    or its first bytes up to one that ends a frame, are skipped: cut at their front they
+    could still look whole. Where the banner comes, nothing else is skipped.
 
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor
@@ -152,9 +148,7 @@ class Started(NamedTuple):
 def start(board: Board, frames: Iterable[Frame]) -> Started:
     """Measure what a sensor reads at rest, from the first frames that come.
 
-    Args:
-        board: It says how many (`start.frames`); with 0 it stays as it is.
-        frames: Of a line, while nothing presses; the first ones are taken.
+    The board says how many (`start.frames`); with 0 it stays as it is.
 
     Raises:
         PortError: If the line ended before.

@@ -233,11 +233,7 @@ class Recorder(contextlib.AbstractContextManager["Recorder"]):
         self._syncing.start()
 
     def write(self, frame: Frame, counters: Counters) -> None:
-        """Append a frame.
-
-        Args:
-            frame: Its cells fit the board.
-            counters: What the line has counted so far.
+        """Append a frame, and what the line has counted so far.
 
         Raises:
             TableError: If the frame is of another size, or a cell has no place.
@@ -405,10 +401,7 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
 
 
 def read_recording(path: PathLike) -> Recording:
-    """Return all of a recording.
-
-    Args:
-        path: The file. One that is still being written gives what is there.
+    """Return all of a recording; one that is still being written gives what is there.
 
     Raises:
         ReadError: If it is no recording, or its header is damaged, or it is too large

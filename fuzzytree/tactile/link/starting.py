@@ -24,10 +24,6 @@ def measured(board: Board, frames: Cells) -> Board:
     rounded down, if their number is even). A cell whose baseline is above the share
     `start.hot` of full is masked, beside those that are masked already.
 
-    Args:
-        board: What sent the frames; its own baseline is replaced.
-        frames: While nothing presses: shape (frames, rows, columns), 1 frame or more.
-
     Raises:
         TableError: If there is no frame, or they are of another size.
 
@@ -55,9 +51,6 @@ def remarks(board: Board, frames: Cells) -> list[str]:
 
     Hot cells, something that lies on it or touches it, and cells that never move
     though both neighbours do: these may be dead, and are not masked.
-
-    Returns:
-        Sentences; none if all is well.
 
     Raises:
         TableError: If there is no frame, or they are of another size.
@@ -88,14 +81,7 @@ def still(board: Board, frames: Cells) -> Places:
     """Return which cells never move though both neighbours in a line do.
 
     The line is a row or a column, so a dead row is found, and a dead column. Cells
-    that are masked are left out.
-
-    Args:
-        board: What sent the frames.
-        frames: Shape (frames, rows, columns), 1 frame or more.
-
-    Returns:
-        Shape (rows, columns).
+    that are masked are left out. There must be 1 frame or more.
     """
     found = check_frames(board.sensor, frames)
     is_moved: Places = found.max(axis=0) > found.min(axis=0)

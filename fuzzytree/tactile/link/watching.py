@@ -35,9 +35,6 @@ def described(board: Board, content: bytes, *, requests: int = 0) -> str:
         content: What came; not empty.
         requests: Number of requests that were sent meanwhile.
 
-    Returns:
-        A clause, in one line.
-
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor
         >>> board = Board("mat", Sensor(2, 2), Marker("AA"))
@@ -272,11 +269,7 @@ class Watch:
         return True
 
     def contradiction(self, now: float) -> str | None:
-        """Describe, after each time of patience, bytes that are no frame.
-
-        Returns:
-            A sentence, or None.
-        """
+        """Describe bytes without a frame in a sentence, after each time of patience."""
         since = self._unread_since
         patience_s = max(PATIENCE_S, 2 * STALL_FRAMES * self._frame_s)
         if since is None or now - since <= patience_s:

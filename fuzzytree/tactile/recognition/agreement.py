@@ -54,13 +54,6 @@ def errors(
 ) -> tuple[float, ...]:
     """Return how far features are from the exact ones, as shares of their scales.
 
-    Args:
-        sensor: The sensor.
-        frame: Shape (rows, columns).
-        names: Of the features.
-        values: What was computed.
-        exact: What is right.
-
     Example:
         >>> bar = np.array([[0, 255, 255]])
         >>> errors(Sensor(1, 3), bar, ["S1"], [0.75], [Fraction(1, 2)])
@@ -169,9 +162,6 @@ def check_frames_agree(
         sensor: Whose frames come.
         frames: Shape (frames, rows, columns); beside the aimed ones.
         reject: Of raw rules: what is weaker in the rule that decides is unknown.
-
-    Returns:
-        What was compared and counted.
 
     Raises:
         TableError: If an input of the model is no feature, or frames do not fit.

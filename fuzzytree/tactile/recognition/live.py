@@ -164,11 +164,7 @@ class Live:
         self._past: tuple[str, float] = "", -_SHOWN_S
 
     def answers(self, most: int | None = None) -> Iterator[LiveResult]:
-        """Give an answer for each frame, until the source has no more.
-
-        Args:
-            most: After how many to end; None for no end.
-        """
+        """Give an answer for each frame, `most` of them, or until there are no more."""
         try:
             for frame in itertools.islice(self.source, most):
                 answer = self._answered(frame)
@@ -180,11 +176,7 @@ class Live:
                 self._news.notify_all()
 
     def wait(self, known: int, seconds: float) -> int:
-        """Wait for a new result, or for the end.
-
-        Args:
-            known: The result of the last call; 0 at first.
-            seconds: The longest to wait.
+        """Wait for more answers than those known, or for the end, some seconds at most.
 
         Returns:
             How many answers there were.
@@ -292,10 +284,7 @@ def _counted(count: int) -> str:
 
 
 class Hold:
-    """Detects a change that lasts for some frames.
-
-    Args:
-        frames: For how many frames it must stay, from 1.
+    """Detects a change that lasts for some frames, 1 or more.
 
     Raises:
         ValueError: If `frames` is below 1.

@@ -74,13 +74,8 @@ _CODES: dict[Look, list[str]] = {
 def shades(cells: Cells, full: int, times: int) -> npt.NDArray[np.uint8]:
     """Return what presses as shares of full, from 0 to 255, interpolated.
 
-    Args:
-        cells: Shape (rows, columns), from 0 to `full`.
-        full: What a cell reads that takes no more.
-        times: Points for a cell on each side.
-
-    Returns:
-        Shape (times rows, times columns).
+    Cells of shape (rows, columns), from 0 to `full`, become points of shape
+    (times rows, times columns).
 
     Example:
         >>> shades(np.array([[0, 1023]]), 1023, 3)[0].tolist()
@@ -101,7 +96,7 @@ def picture(
     fit, a point shows the largest of several.
 
     Args:
-        cells: What presses, of shape (rows, columns).
+        cells: What presses, of shape (rows, columns), from 0 to `full`.
         full: What a cell reads that takes no more.
         columns: The most signs in a line.
         lines: The most lines.

@@ -264,12 +264,9 @@ def hello_facts(view: LiveView) -> dict[str, object]:
 
 
 def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object]:
-    """Return what a page shows at one moment.
+    """Return what a page shows at one moment, the last one if it is over.
 
-    Args:
-        view: What there is to see.
-        times: Points for a cell on each side of the picture.
-        is_over: Whether nothing will come after it.
+    The picture has at most `times` points for a cell on each side.
     """
     answer = view.answer
     state = answer.state if answer else None

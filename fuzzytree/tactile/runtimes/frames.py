@@ -95,12 +95,7 @@ class FramePlan:
 
 
 def features_of(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features:
-    """Return features of frames.
-
-    Args:
-        sensor: The sensor.
-        frames: Shape (frames, rows, columns), whole numbers; or one frame.
-        names: Of the features; see `fuzzytree.tactile.features.names`.
+    """Return features of frames, whole numbers of shape (frames, rows, columns).
 
     Raises:
         TableError: If a name is no feature's, or the frames do not fit the sensor.

@@ -513,13 +513,8 @@ def blob(board: Board, seed: int = 0) -> Generator[Cells]:
 def fitted(board: Board, cells: Cells, full: int) -> Cells:
     """Return a frame of another sensor, resampled to the board's cells and range.
 
-    Each cell takes the nearest cell of the other sensor, and 0 to `full` becomes the
-    range of the board, rounded down.
-
-    Args:
-        board: The board.
-        cells: Shape (rows, columns), in 0 to `full`.
-        full: The most that a cell of the other sensor reads.
+    Each cell takes the nearest cell of the other sensor, and 0 to `full`, the most that
+    such a cell reads, becomes the range of the board, rounded down.
 
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor

@@ -29,15 +29,9 @@ _NEWLINE = "\r\n"  # what println of an Arduino ends a line with
 
 
 def encoded(board: Board, cells: Cells, number: int = 0) -> bytes:
-    """Return the bytes of one frame.
+    """Return the bytes of one frame, from the first to the last.
 
-    Args:
-        board: The board.
-        cells: Whole numbers of shape (rows, columns), in 0 to `full`.
-        number: From 0, of the frame; stands where boards put a time stamp.
-
-    Returns:
-        Everything from the first byte of the frame to its last.
+    The number of the frame, from 0, stands where boards put a time stamp.
 
     Raises:
         TableError: If the cells are of another size, or hold what this board cannot

@@ -227,19 +227,12 @@ class Simulated:
 
 
 def fsr(force_n: FloatArray, settings: PhysicsSettings) -> FloatArray:
-    """Return what cells conduct: 0 up to the break force, then a line that bends.
+    """Return the microsiemens of cells: 0 up to the break force, then a bent line.
 
     `G = slope * s / (1 + s / bend)` with `s = max(force - break, 0)`: the three
     regions that the makers describe (Interlink Electronics, FSR Integration Guide,
     94-00004, 2.2): a switch-like turn-on, conductance nearly proportional to force,
     saturation.
-
-    Args:
-        force_n: Any shape, newtons.
-        settings: `break_n`, `slope_us` and `bend_n` count.
-
-    Returns:
-        Microsiemens, of the same shape.
 
     Example:
         >>> law = PhysicsSettings(break_n=1.0, slope_us=100.0, bend_n=4.0)
@@ -391,13 +384,8 @@ def forces_of(thing: Object, truth: PressTruth, aperture: float) -> FloatArray:
     in each cell the value at the cell's middle. Where a tilted object lifts off,
     nothing presses, and the cells' forces add up to more than the object's own.
 
-    Args:
-        thing: What is pressed.
-        truth: How.
-        aperture: The share of a cell that feels, a square in its middle.
-
-    Returns:
-        Newtons, of shape (presses, 16, 16), rows from the top.
+    A share of a cell feels, its aperture, a square in its middle. The result is in
+    newtons, of shape (presses, 16, 16), rows from the top.
     """
     centres = np.arange(SIDE, dtype=np.float64) - (SIDE - 1) / 2
     half = math.sqrt(aperture) / 2
@@ -426,11 +414,9 @@ def _between(below: FloatArray) -> FloatArray:
 def quantised(
     share: FloatArray, noise: FloatArray
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
-    """Return 8-bit readings, and how many of each frame would have been above full.
+    """Return 8-bit readings of shares of full, and how many would have been above it.
 
-    Args:
-        share: Of full, shape (presses, rows, columns).
-        noise: To be added before rounding, in counts.
+    Noise is added before rounding, in counts.
     """
     counts = np.rint(share * FULL + noise)
     clipped: npt.NDArray[np.int64] = (counts > FULL).sum(axis=(1, 2))
