@@ -9,9 +9,9 @@ from .c_text import remark as remark
 from .c_text import whole_lines as whole_lines
 from .c_text import whole_table as whole_table
 from .onnx import FORMAT_VERSION as FORMAT_VERSION
-from .onnx import IRS as IRS
-from .onnx import OPSETS as OPSETS
 from .onnx import Output as Output
+from .onnx import check_outputs as check_outputs
+from .onnx import check_versions as check_versions
 from .onnx import require as require
 from .onnx import version as version
 from .onnx import write_onnx as write_onnx
@@ -25,6 +25,7 @@ from .onnx_ends import add_winner as add_winner
 from .onnx_ends import is_known as is_known
 from .onnx_graph import TREES as TREES
 from .onnx_graph import OnnxGraph as OnnxGraph
+from .onnx_graph import model_proto as model_proto
 from .onnx_graph import np_to_onnx as np_to_onnx
 from .onnx_rules import rules_graph as rules_graph
 from .onnx_session import RUNTIME_ERRORS as RUNTIME_ERRORS

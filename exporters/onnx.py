@@ -173,24 +173,14 @@ def _check_options(
     outputs: Sequence[Output],
 ) -> None:
     is_system = isinstance(model, FuzzySystem)
-    known = _OF_SYSTEMS if is_system else _OF_MODELS
     for name, value, choices in (
         ("dtype", dtype, ("float64",) if is_system else get_args(Dtype)),
         ("signature", signature, ("needed",) if is_system else get_args(Signature)),
-        *(("outputs", output, known) for output in outputs),
     ):
         if value not in choices:
             raise ValueError(f"{name}: there is {', '.join(choices)}, not {value!r}")
-    if not outputs or len(set(outputs)) != len(outputs):
-        raise ValueError(f"outputs: name each once, at least one, not {outputs!r}")
-    if "strengths" in outputs and _is_tree(model):
-        raise ValueError(
-            "outputs: a tree has no strengths; write its rules to have them"
-        )
-    if opset not in OPSETS:
-        raise ValueError(_range_text("opset", OPSETS, opset))
-    if ir not in IRS:
-        raise ValueError(_range_text("ir", IRS, ir))
+    check_outputs(model, outputs, _OF_SYSTEMS if is_system else _OF_MODELS)
+    check_versions(opset, ir)
     if signature == "all" and not (isinstance(model, FuzzySystem) or model.columns):
         raise ValueError(
             f"{model.name!r} does not know the columns of its training table, "
@@ -214,8 +204,27 @@ def _check_variants(
         )
 
 
-def _range_text(what: str, known: range, value: int) -> str:
-    return f"{what}: onnx files are written for {known[0]} to {known[-1]}, not {value}"
+def check_outputs(
+    model: Model | FuzzySystem, outputs: Sequence[str], known: Sequence[str]
+) -> None:
+    """Refuse outputs that a graph does not have, or that are named twice."""
+    for name in outputs:
+        if name not in known:
+            raise ValueError(f"outputs: there is {', '.join(known)}, not {name!r}")
+    if not outputs or len(set(outputs)) != len(outputs):
+        raise ValueError(f"outputs: name each once, at least one, not {outputs!r}")
+    if "strengths" in outputs and _is_tree(model):
+        raise ValueError(
+            "outputs: a tree has no strengths; write its rules to have them"
+        )
+
+
+def check_versions(opset: int, ir: int) -> None:
+    """Refuse versions of operators and files that no file is written for."""
+    for what, known, value in (("opset", OPSETS, opset), ("ir", IRS, ir)):
+        if value not in known:
+            text = f"{what}: onnx files are written for {known[0]} to {known[-1]}"
+            raise ValueError(f"{text}, not {value}")
 
 
 def require(package: str, purpose: str) -> None:
@@ -274,7 +283,7 @@ def _model_proto(
     return model_proto(
         graph,
         facts["carrier"],
-        (np_to_onnx(numbers.axis), len(columns)),
+        ("inputs", np_to_onnx(numbers.axis), ["rows", len(columns)]),
         {name: kinds[name] for name in outputs},
         ir=ir,
         text=_in_words(model, dtype),

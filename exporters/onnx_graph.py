@@ -333,7 +333,7 @@ def np_to_onnx(kind: npt.DTypeLike) -> int:
 def model_proto(
     graph: OnnxGraph,
     name: str,
-    columns: tuple[int, int],
+    source: tuple[str, int, list[str | int]],
     outputs: Mapping[str, tuple[int, list[str | int]]],
     *,
     ir: int,
@@ -345,17 +345,16 @@ def model_proto(
     Args:
         graph: All nodes.
         name: The name of the graph.
-        columns: The type and the number of columns of `inputs`.
+        source: The name, type and shape of the input.
         outputs: The type and shape of each output, in order.
         ir: The version of the file.
         text: The description of the model.
         facts: The metadata, by keys without `fuzzytree.`.
     """
-    kind, count = columns
     body = helper.make_graph(
         graph.nodes,
         name,
-        [helper.make_tensor_value_info("inputs", kind, ["rows", count])],
+        [helper.make_tensor_value_info(*source)],
         [helper.make_tensor_value_info(key, *how) for key, how in outputs.items()],
         graph.tensors,
     )

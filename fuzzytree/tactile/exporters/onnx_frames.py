@@ -18,7 +18,13 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from fuzzytree.errors import DisagreementError
-from fuzzytree.exporters import FORMAT_VERSION, IRS, OPSETS, require, version
+from fuzzytree.exporters import (
+    FORMAT_VERSION,
+    check_outputs,
+    check_versions,
+    require,
+    version,
+)
 from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, fingerprint
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
@@ -84,7 +90,10 @@ def write_frames(
         >>> write_frames(tree, Sensor(4, 4)).losses
         ()
     """
-    _check_options(model, outputs, opset, ir, plain=plain)
+    check_outputs(model, outputs, get_args(Output))
+    if plain and not isinstance(model, FuzzyTree):
+        raise ValueError("plain is for trees: rules never need ai.onnx.ml")
+    check_versions(opset, ir)
     check_reject(model, reject)
     require("onnx", "writing onnx needs")
     if verify:
@@ -106,29 +115,6 @@ def frames_at_once(sensor: Sensor) -> int:
     return max(_NUMBERS_AT_ONCE // (sensor.rows * sensor.columns), 1)
 
 
-def _check_options(
-    model: Model, outputs: Sequence[Output], opset: int, ir: int, *, plain: bool
-) -> None:
-    known = get_args(Output)
-    for name in outputs:
-        if name not in known:
-            raise ValueError(f"outputs: there is {', '.join(known)}, not {name!r}")
-    if not outputs or len(set(outputs)) != len(outputs):
-        raise ValueError(f"outputs: name each once, at least one, not {outputs!r}")
-    if "strengths" in outputs and isinstance(model, FuzzyTree):
-        raise ValueError(
-            "outputs: a tree has no strengths; write its rules to have them"
-        )
-    if plain and not isinstance(model, FuzzyTree):
-        raise ValueError("plain is for trees: rules never need ai.onnx.ml")
-    for what, value, versions in (("opset", opset, OPSETS), ("ir", ir, IRS)):
-        if value not in versions:
-            raise ValueError(
-                f"{what}: onnx files are written for {versions[0]} to {versions[-1]}, "
-                f"not {value}"
-            )
-
-
 def _model_proto(
     made: FrameProgram,
     model: Model,
@@ -139,12 +125,13 @@ def _model_proto(
     *,
     plain: bool,
 ) -> onnx.ModelProto:
-    from onnx import TensorProto, helper
+    from onnx import TensorProto
 
-    from fuzzytree.exporters import TREES, OnnxGraph
+    from fuzzytree.exporters import OnnxGraph, model_proto
 
     sheet, sensor = OnnxGraph(opset), made.sensor
     _fill(sheet, made, model, outputs, reject, plain=plain)
+    sheet.tensors = sheet.used()
     rules = len(model.rules) if isinstance(model, RuleBase) else 0
     kinds: dict[Output, tuple[int, list[str | int]]] = {
         "label": (TensorProto.STRING, ["frames"]),
@@ -154,28 +141,15 @@ def _model_proto(
         "strengths": (TensorProto.DOUBLE, ["frames", rules]),
     }
     kind = TensorProto.UINT8 if sensor.bits == 8 else TensorProto.UINT16
-    shape: list[str | int] = ["frames", sensor.rows, sensor.columns]
-    graph = helper.make_graph(
-        sheet.nodes,
+    return model_proto(
+        sheet,
         "frames",
-        [helper.make_tensor_value_info("frames", kind, shape)],
-        [helper.make_tensor_value_info(name, *kinds[name]) for name in outputs],
-        sheet.used(),
+        ("frames", kind, ["frames", sensor.rows, sensor.columns]),
+        {name: kinds[name] for name in outputs},
+        ir=ir,
+        text=_in_words(made, model),
+        facts=_facts(made, model, outputs, reject),
     )
-    imports = [helper.make_opsetid("", opset)]
-    if any(node.domain == TREES for node in sheet.nodes):
-        imports.append(helper.make_opsetid(TREES, 5))
-    proto = helper.make_model(
-        graph,
-        opset_imports=imports,
-        ir_version=ir,
-        producer_name="fuzzytree",
-        producer_version=version(),
-        doc_string=_in_words(made, model),
-    )
-    for key, value in _facts(made, model, outputs, reject).items():
-        proto.metadata_props.add(key=f"fuzzytree.{key}", value=value)
-    return proto
 
 
 def _facts(
