@@ -9,12 +9,12 @@ them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
-from xml.sax.saxutils import escape, quoteattr
 
 from fuzzytree.exporters.fml_rules import FmlRule, FmlRules, rules_of
 from fuzzytree.exporters.fuzzy_files import FileNames, inverse, without_heights
+from fuzzytree.exporters.xml_text import XmlElement, element, text_element, text_of
 from fuzzytree.formats import (
     FML_FAR,
     FML_METHODS,
@@ -37,7 +37,6 @@ from fuzzytree.model import (
     NameMap,
     Points,
     RuleBase,
-    RuleBlock,
     SCurve,
     Singleton,
     SystemInput,
@@ -118,9 +117,11 @@ def write(
         raise refusal(model.name, "fml", losses)
     names = _naming(system, result)
     remarks += names.remarks(system)
-    lines = _lines(system, result, names, facts)
-    content = ("\n".join(lines) + "\n").encode("utf-8")
-    return Written(content, tuple(losses), tuple(remarks), names.changed())
+    text = '<?xml version="1.0" encoding="UTF-8"?>\n'
+    if facts:
+        text += f"<!-- {FACTS}{facts} -->\n"
+    text += f"{text_of(_root(system, result, names))}\n"
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
 
 
 class _Ids(FileNames, frozen=True):
@@ -214,70 +215,57 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
                 )
 
 
-def _lines(
-    system: FuzzySystem, rules: FmlRules, names: _Ids, facts: str
-) -> Iterator[str]:
-    yield '<?xml version="1.0" encoding="UTF-8"?>'
-    if facts:
-        yield f"<!-- {FACTS}{facts} -->"
-    yield f'<fuzzySystem xmlns="{NAMESPACE}" name="{names.system[system.name]}">'
-    yield "  <knowledgeBase>"
-    for one in system.inputs:
-        yield from _input(one, rules, names)
-    for output in system.outputs:
-        yield from _output(output, names)
-    yield "  </knowledgeBase>"
+def _root(system: FuzzySystem, rules: FmlRules, names: _Ids) -> XmlElement:
+    inputs = [_input(one, rules, names) for one in system.inputs]
+    outputs = [_output(output, names) for output in system.outputs]
+    bases: list[XmlElement] = []
     number = 0
     for place, (kind, block, own_rules) in enumerate(rules.bases, 1):
-        tag = f"{kind}RuleBase"
-        norms = _norms(block)
-        act = "" if kind == "tsk" else f' activationMethod="{_t(block.implication)}"'
-        yield f'  <{tag} name="rules.{place}."{act}{norms}>'
-        for rule in own_rules:
-            number += 1
-            yield from _rule(rule, number, (kind == "tsk", norms), names)
-        yield f"  </{tag}>"
-    yield "</fuzzySystem>"
-
-
-def _norms(block: RuleBlock) -> str:
-    return (
-        f' andMethod="{_t(block.conjunction)}" '
-        f'orMethod="{inverse(FML_SNORMS, block.disjunction, "MAX")}"'
-    )
+        norms = {
+            "andMethod": _t(block.conjunction),
+            "orMethod": inverse(FML_SNORMS, block.disjunction, "MAX"),
+        }
+        own = [
+            _rule(rule, k, kind == "tsk", norms, names)
+            for k, rule in enumerate(own_rules, number + 1)
+        ]
+        number += len(own)
+        act = None if kind == "tsk" else _t(block.implication)
+        how = {"name": f"rules.{place}.", "activationMethod": act, **norms}
+        bases.append(element(f"{kind}RuleBase", *own, **how))
+    knowledge = element("knowledgeBase", *inputs, *outputs)
+    title = names.system[system.name]
+    return element("fuzzySystem", knowledge, *bases, xmlns=NAMESPACE, name=title)
 
 
 def _t(norm: str | None) -> str:
     return inverse(FML_TNORMS, norm, "MIN")
 
 
-def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> Iterator[str]:
-    yield (f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="input">')
-    for label in one.labels:
-        yield from _term("fuzzyTerm", one.name, label, names)
+def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> XmlElement:
+    terms = [_term("fuzzyTerm", one.name, label, names) for label in one.labels]
     if not one.labels:  # the schema requires one; no rule can use it
-        yield f'      <fuzzyTerm name="{names.variables[one.name]}.">'
-        yield '        <pointSetShape><point x="0.0" y="1.0"/></pointSetShape>'
-        yield "      </fuzzyTerm>"
+        points = element("pointSetShape", element("point", x="0.0", y="1.0"))
+        name = f"{names.variables[one.name]}."
+        terms.append(element("fuzzyTerm", points, name=name))
     for made in rules.made.get(one.name, ()):
-        yield f'      <fuzzyTerm name="{names.term(one.name, made.name)}">'
-        yield "        <circularDefinition>"
-        yield from made.lines(names.term, one.name)
-        yield "        </circularDefinition>"
-        yield "      </fuzzyTerm>"
-    yield "    </fuzzyVariable>"
+        definition = element(
+            "circularDefinition", made.definition(names.term, one.name)
+        )
+        name = names.term(one.name, made.name)
+        terms.append(element("fuzzyTerm", definition, name=name))
+    how = {**_head(one, names), **_domain(one), "type": "input"}
+    return element("fuzzyVariable", *terms, **how)
 
 
-def _head(one: SystemInput | SystemOutput, names: _Ids) -> str:
-    scale = (
-        f" scale={quoteattr(one.unit)}" if one.unit.isprintable() and one.unit else ""
-    )
-    return f'name="{names.variables[one.name]}"{scale}'
+def _head(one: SystemInput | SystemOutput, names: _Ids) -> dict[str, str | None]:
+    scale = one.unit if one.unit.isprintable() and one.unit else None
+    return {"name": names.variables[one.name], "scale": scale}
 
 
-def _domain(one: SystemInput | SystemOutput) -> str:
+def _domain(one: SystemInput | SystemOutput) -> dict[str, str]:
     low, high = _range(one)
-    return f' domainleft="{_float(low)}" domainright="{_float(high)}"'
+    return {"domainleft": _float(low), "domainright": _float(high)}
 
 
 def _range(one: SystemInput | SystemOutput) -> tuple[float, float]:
@@ -296,73 +284,52 @@ def _range(one: SystemInput | SystemOutput) -> tuple[float, float]:
     return (low, high) if low < high else (low - 1.0, low + 1.0)
 
 
-def _output(one: SystemOutput, names: _Ids) -> Iterator[str]:
-    default = math.nan if one.default is None else one.default
-    last = f' defaultValue="{_float(default)}">'
+def _output(one: SystemOutput, names: _Ids) -> XmlElement:
+    default = _float(math.nan if one.default is None else one.default)
+    last = {"combination": "WA", "defaultValue": default}
+    how = {**_head(one, names), **_domain(one), "type": "output"}
     if not one.defuzzifier.is_weighted:
-        method = inverse(FML_METHODS, one.defuzzifier.method, "COG")
-        join = inverse(FML_SNORMS, one.aggregation, "MAX")
-        yield (
-            f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="output"'
-            f' accumulation="{join}" defuzzifier="{method}"{last}'
-        )
         kind, tag = "fuzzyTerm", "fuzzyVariable"
-    elif _is_tsk(one):
-        yield (
-            f'    <tskVariable {_head(one, names)} type="output" combination="WA"{last}'
-        )
-        for label in one.labels:
-            yield from _tsk_term(one.name, label, names)
-        yield "    </tskVariable>"
-        return
+        last = {
+            "accumulation": inverse(FML_SNORMS, one.aggregation, "MAX"),
+            "defuzzifier": inverse(FML_METHODS, one.defuzzifier.method, "COG"),
+            "defaultValue": default,
+        }
+    elif all(isinstance(label.curve, Singleton | Linear) for label in one.labels):
+        kind, tag = "tskTerm", "tskVariable"
+        how = {**_head(one, names), "type": "output"}
     else:
-        yield (
-            f'    <tsukamotoVariable {_head(one, names)}{_domain(one)} type="output"'
-            f' combination="WA"{last}'
-        )
         kind, tag = "tsukamotoTerm", "tsukamotoVariable"
-    for label in one.labels:
-        yield from _term(kind, one.name, label, names)
-    yield f"    </{tag}>"
+    terms = [_term(kind, one.name, label, names) for label in one.labels]
+    return element(tag, *terms, **how, **last)
 
 
-def _is_tsk(one: SystemOutput) -> bool:
-    return all(isinstance(label.curve, Singleton | Linear) for label in one.labels)
-
-
-def _tsk_term(variable: str, label: SystemTerm, names: _Ids) -> Iterator[str]:
-    numbers: tuple[float, ...] = ()
+def _term(kind: str, variable: str, label: SystemTerm, names: _Ids) -> XmlElement:
+    name = names.term(variable, label.name)
     match label.curve:
-        case Singleton(value=value):
-            order, numbers = 0, (value,)
-        case Linear(weights=weights, offset=offset):
-            order, numbers = 1, (offset, *weights)
-        case _:
-            order = 0
-    yield f'      <tskTerm name="{names.term(variable, label.name)}" order="{order}">'
-    for number in numbers:
-        yield f"        <tskValue>{_float(number)}</tskValue>"
-    yield "      </tskTerm>"
-
-
-def _term(kind: str, variable: str, label: SystemTerm, names: _Ids) -> Iterator[str]:
-    yield f'      <{kind} name="{names.term(variable, label.name)}">'
-    result = _shape(label.curve)
+        case Singleton(value=value) if kind == "tskTerm":
+            return _tsk_term(name, value)
+        case Linear(weights=weights, offset=offset) if kind == "tskTerm":
+            return _tsk_term(name, offset, *weights)
+        case curve:
+            result = _shape(curve)
     if result is not None:
-        name, numbers = result
-        attribute = " ".join(
-            f'param{k}="{_float(number)}"' for k, number in enumerate(numbers, 1)
-        )
-        yield f"        <{name} {attribute}/>"
-    else:
-        points = shape_of(label.curve)
-        assert isinstance(points, Points)  # others are refused or became points
-        tag = "pointSetMonotonicShape" if kind == "tsukamotoTerm" else "pointSetShape"
-        yield f'        <{tag} interpolationMethod="linear">'
-        for x, y in zip(points.values, points.degrees, strict=True):
-            yield f'          <point x="{_float(x)}" y="{_float(y)}"/>'
-        yield f"        </{tag}>"
-    yield f"      </{kind}>"
+        word, numbers = result
+        texts = {f"param{k}": _float(one) for k, one in enumerate(numbers, 1)}
+        return element(kind, element(word, **texts), name=name)
+    shape = shape_of(label.curve)
+    assert isinstance(shape, Points)  # others are refused or became points
+    tag = "pointSetMonotonicShape" if kind == "tsukamotoTerm" else "pointSetShape"
+    pairs = zip(shape.values, shape.degrees, strict=True)
+    points = [element("point", x=_float(x), y=_float(y)) for x, y in pairs]
+    how = element(tag, *points, interpolationMethod="linear")
+    return element(kind, how, name=name)
+
+
+def _tsk_term(name: str, *numbers: float) -> XmlElement:
+    values = [text_element("tskValue", _float(number)) for number in numbers]
+    order = "1" if len(numbers) > 1 else "0"
+    return element("tskTerm", *values, name=name, order=order)
 
 
 def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
@@ -391,40 +358,33 @@ def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
 
 
 def _rule(
-    rule: FmlRule, number: int, about: tuple[bool, str], names: _Ids
-) -> Iterator[str]:
-    is_tsk, norms = about
-    tag = "tskRule" if is_tsk else "rule"
-    connector = "or" if rule.is_or else "and"
-    yield (
-        f'    <{tag} name="rule.{number}."{norms} connector="{connector}" '
-        f'weight="{_float(rule.weight)}">'
-    )
-    yield "      <antecedent>"
-    for variable, label, modifier in rule.clauses:
-        attribute = f' modifier="{modifier}"' if modifier else ""
-        yield from _clause("clause", attribute, (variable, label), names, 8)
-    yield "      </antecedent>"
-    start, then, clause = "consequent", "then", "clause"
+    rule: FmlRule, number: int, is_tsk: bool, norms: Mapping[str, str], names: _Ids
+) -> XmlElement:
+    clauses = [
+        _clause("clause", (variable, label), names, modifier or None)
+        for variable, label, modifier in rule.clauses
+    ]
+    tag, start, then, clause = "rule", "consequent", "then", "clause"
     if is_tsk:
-        start, then, clause = "tskConsequent", "tskThen", "tskClause"
-    yield f"      <{start}>"
-    yield f"        <{then}>"
-    for concluded in rule.concluded:
-        yield from _clause(clause, "", concluded, names, 10)
-    yield f"        </{then}>"
-    yield f"      </{start}>"
-    yield f"    </{tag}>"
+        tag, start, then, clause = "tskRule", "tskConsequent", "tskThen", "tskClause"
+    concluded = [_clause(clause, one, names) for one in rule.concluded]
+    return element(
+        tag,
+        element("antecedent", *clauses),
+        element(start, element(then, *concluded)),
+        name=f"rule.{number}.",
+        **norms,
+        connector="or" if rule.is_or else "and",
+        weight=_float(rule.weight),
+    )
 
 
 def _clause(
-    tag: str, attribute: str, named: tuple[str, str], names: _Ids, indent: int
-) -> Iterable[str]:
-    pad = " " * indent
-    yield f"{pad}<{tag}{attribute}>"
-    yield f"{pad}  <variable>{escape(names.variables[named[0]])}</variable>"
-    yield f"{pad}  <term>{escape(names.term(*named))}</term>"
-    yield f"{pad}</{tag}>"
+    tag: str, named: tuple[str, str], names: _Ids, modifier: str | None = None
+) -> XmlElement:
+    variable = text_element("variable", names.variables[named[0]])
+    term = text_element("term", names.term(*named))
+    return element(tag, variable, term, modifier=modifier)
 
 
 def _float(number: float) -> str:

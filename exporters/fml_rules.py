@@ -13,6 +13,7 @@ import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fuzzy_files import inverse, operands, refuse
+from fuzzytree.exporters.xml_text import XmlElement, element, text_element
 from fuzzytree.formats import FML_SNORMS, FML_TNORMS, MODIFIERS
 from fuzzytree.model import (
     And,
@@ -56,17 +57,20 @@ class CircularTerm(msgspec.Struct, frozen=True):
     word: str
     norm: str
 
-    def lines(self, term: Callable[[str, str], str], variable: str) -> Iterator[str]:
-        """Yield the definition: two parts at a time, the first ones innermost."""
+    def definition(self, term: Callable[[str, str], str], variable: str) -> XmlElement:
+        """Return the definition: two parts at a time, the first ones innermost."""
         key = "t-norm" if self.word == "and" else "t-conorm"
-        pad = " " * 10
-        for _ in self.parts[1:]:
-            yield f'{pad}<{self.word} {key}="{self.norm}">'
-        for place, (label, is_negated) in enumerate(self.parts):
-            attribute = ' complement="true"' if is_negated else ""
-            yield f"{pad}  <termName{attribute}>{term(variable, label)}</termName>"
-            if place:
-                yield f"{pad}</{self.word}>"
+        whole, *others = (
+            text_element(
+                "termName",
+                term(variable, label),
+                complement="true" if is_negated else None,
+            )
+            for label, is_negated in self.parts
+        )
+        for other in others:
+            whole = element(self.word, whole, other, **{key: self.norm})
+        return whole
 
 
 class FmlRule(msgspec.Struct, frozen=True):

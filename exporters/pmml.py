@@ -21,18 +21,16 @@ from fuzzytree.exporters.pmml_elements import (
     NUMBER,
     TEXT,
     Functions,
-    PmmlElement,
     apply,
     constant,
     derived,
-    element,
     joined,
     norm_continuous,
     ref,
     schema,
-    text_of,
 )
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
+from fuzzytree.exporters.xml_text import XmlElement, element, text_of
 from fuzzytree.model import (
     Clause,
     Document,
@@ -149,7 +147,7 @@ def _written_system(system: FuzzySystem) -> Written:
     return Written(content, (), (remark,) if system_fields.is_inexact else ())
 
 
-def _content(*parts: PmmlElement) -> bytes:
+def _content(*parts: XmlElement) -> bytes:
     xmlns = "http://www.dmg.org/PMML-4_4"
     root = element("PMML", *parts, version="4.4", xmlns=xmlns)
     text = f'<?xml version="1.0" encoding="UTF-8"?>\n{text_of(root)}\n'
@@ -176,7 +174,7 @@ class _Names:
         return result
 
 
-def _header(model: Model) -> PmmlElement:
+def _header(model: Model) -> XmlElement:
     kind = "rule base" if isinstance(model, RuleBase) else "tree"
     facts = {
         "fingerprint": fingerprint(model),
@@ -187,7 +185,7 @@ def _header(model: Model) -> PmmlElement:
     return _heading(f"A fuzzy {kind}, named {model.name}.", facts)
 
 
-def _heading(description: str, facts: Mapping[str, str]) -> PmmlElement:
+def _heading(description: str, facts: Mapping[str, str]) -> XmlElement:
     return element(
         "Header",
         *(_extension(name, text) for name, text in facts.items()),
@@ -200,11 +198,11 @@ def _answer(label: str | None) -> str:
     return "no class" if label is None else f"class {label}"
 
 
-def _extension(name: str, value: str) -> PmmlElement:
+def _extension(name: str, value: str) -> XmlElement:
     return element("Extension", extender="fuzzytree", name=name, value=value)
 
 
-def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[PmmlElement]:
+def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[XmlElement]:
     for variable in variables:
         if variable.parts:
             continue
@@ -221,7 +219,7 @@ def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[PmmlElemen
         )
 
 
-def _axes(variables: Sequence[Variable], functions: Functions) -> Iterator[PmmlElement]:
+def _axes(variables: Sequence[Variable], functions: Functions) -> Iterator[XmlElement]:
     """Yield the field of each combination; missing where a summand is not finite."""
     for variable in variables:
         if variable.parts:
@@ -236,7 +234,7 @@ def _axes(variables: Sequence[Variable], functions: Functions) -> Iterator[PmmlE
             yield derived(variable.name, functions.total(summands))
 
 
-def _usable(variables: Sequence[Variable], functions: Functions) -> PmmlElement:
+def _usable(variables: Sequence[Variable], functions: Functions) -> XmlElement:
     """Return 1 where every value is there and finite, and 0 elsewhere."""
     parts = [functions.finite(ref(v.name)) for v in variables]
     return joined("min", parts) if parts else constant(1.0)
@@ -245,9 +243,9 @@ def _usable(variables: Sequence[Variable], functions: Functions) -> PmmlElement:
 def _model(
     model: Model,
     names: _Names,
-    outputs: Iterable[PmmlElement],
-    nodes: Iterable[PmmlElement],
-) -> PmmlElement:
+    outputs: Iterable[XmlElement],
+    nodes: Iterable[XmlElement],
+) -> XmlElement:
     """Return a tree model whose answer is null where no node of the root fits."""
     fields = [
         element("OutputField", name=names.new(name), **TEXT, feature=feature)
@@ -268,10 +266,10 @@ def _model(
 
 def _rules(
     rules: RuleBase, names: _Names, *, is_exact: bool
-) -> tuple[list[PmmlElement], PmmlElement]:
+) -> tuple[list[XmlElement], XmlElement]:
     """Return the derived fields and the model of a rule base."""
     terms: dict[tuple[str, str], str] = {}
-    fields: list[PmmlElement] = []
+    fields: list[XmlElement] = []
     for variable in rules.variables:
         for term in variable.terms:
             name = names.new(f"{variable.name} is {term.name}")
@@ -285,7 +283,7 @@ def _rules(
             fields.append(derived(name, degree))
     strengths = [names.new(f"strength {k}") for k in range(1, len(rules.rules) + 1)]
     how = "product" if rules.semantics.conjunction == "product" else "min"
-    clauses: dict[int, PmmlElement] = {}
+    clauses: dict[int, XmlElement] = {}
     for strength, rule in zip(strengths, rules.rules, strict=True):
         for clause in rule.when:
             if id(clause) not in clauses:
@@ -302,13 +300,13 @@ def _rules(
     return fields, _model(rules, names, outputs, _rule_nodes(rules, winner))
 
 
-def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> PmmlElement:
+def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> XmlElement:
     degrees = [ref(terms[clause.variable, term]) for term in clause.terms]
     whole = joined("max", degrees)
     return apply("-", constant(1.0), whole) if clause.negated else whole
 
 
-def _winner(strengths: Sequence[str], usable: str, best: str) -> PmmlElement:
+def _winner(strengths: Sequence[str], usable: str, best: str) -> XmlElement:
     """Return the number of the first strongest rule."""
     none = float(len(strengths) + 1)
     candidates = [
@@ -323,11 +321,11 @@ def _winner(strengths: Sequence[str], usable: str, best: str) -> PmmlElement:
 
 def _outputs(
     rules: RuleBase, strengths: Sequence[str], usable: str, names: _Names
-) -> Iterator[PmmlElement]:
+) -> Iterator[XmlElement]:
     """Yield the strength of each rule, and of each class's strongest."""
     is_usable = apply("equal", ref(usable), constant(1.0))
 
-    def output(name: str, value: PmmlElement) -> PmmlElement:
+    def output(name: str, value: XmlElement) -> XmlElement:
         return element(
             "OutputField",
             apply("if", is_usable, value),
@@ -338,7 +336,7 @@ def _outputs(
 
     for k, strength in enumerate(strengths, 1):
         yield output(f"strength of rule {k}", ref(strength))
-    own: dict[str, list[PmmlElement]] = {name: [] for name in rules.classes}
+    own: dict[str, list[XmlElement]] = {name: [] for name in rules.classes}
     for strength, rule in zip(strengths, rules.rules, strict=True):
         own[rule.then].append(ref(strength))
     for name, parts in own.items():
@@ -346,7 +344,7 @@ def _outputs(
         yield output(f"strength of class {name}", value)
 
 
-def _rule_nodes(rules: RuleBase, winner: str) -> Iterator[PmmlElement]:
+def _rule_nodes(rules: RuleBase, winner: str) -> Iterator[XmlElement]:
     for k, rule in enumerate(rules.rules, 1):
         is_winner = _predicate(winner, "equal", float(k))
         result = _node(is_winner, str(k), rule.then, rule.support)
@@ -360,20 +358,20 @@ def _rule_nodes(rules: RuleBase, winner: str) -> Iterator[PmmlElement]:
             yield _node(_predicate(winner, "equal", number), name, label)
 
 
-def _predicate(field: str, operator: str, value: float) -> PmmlElement:
+def _predicate(field: str, operator: str, value: float) -> XmlElement:
     return element(
         "SimplePredicate", field=field, operator=operator, value=repr(float(value))
     )
 
 
-def _tree(tree: FuzzyTree, names: _Names) -> tuple[list[PmmlElement], PmmlElement]:
+def _tree(tree: FuzzyTree, names: _Names) -> tuple[list[XmlElement], XmlElement]:
     """Return the derived fields and the model of a tree."""
     usable = names.new("usable")
     fields = [derived(usable, _usable(tree.variables, names.functions))]
     is_usable = _predicate(usable, "equal", 1.0)
-    children: dict[int, list[PmmlElement]] = {}  # a node's have higher numbers
+    children: dict[int, list[XmlElement]] = {}  # a node's have higher numbers
 
-    def node(predicate: PmmlElement, number: int | None, end: int) -> PmmlElement:
+    def node(predicate: XmlElement, number: int | None, end: int) -> XmlElement:
         """Return a node of the tree, or a leaf if it has no number."""
         if number is not None:
             inner = children.pop(number)
@@ -395,19 +393,19 @@ def _tree(tree: FuzzyTree, names: _Names) -> tuple[list[PmmlElement], PmmlElemen
 
 
 def _node(
-    predicate: PmmlElement, id_: str, label: str, count: int | None = None
-) -> PmmlElement:
+    predicate: XmlElement, id_: str, label: str, count: int | None = None
+) -> XmlElement:
     support = None if count is None else str(count)
     return element("Node", predicate, id=id_, score=label, recordCount=support)
 
 
-def _owned(node: Node, owner: int, field: str) -> PmmlElement:
+def _owned(node: Node, owner: int, field: str) -> XmlElement:
     """Return whether a value lies in one of the intervals that a branch owns."""
-    parts: list[PmmlElement] = []
+    parts: list[XmlElement] = []
     for one, (low, high) in zip(node.owners, intervals(node), strict=True):
         if one != owner:
             continue
-        ends: list[PmmlElement] = []
+        ends: list[XmlElement] = []
         if low is not None:
             ends.append(_predicate(field, "greaterThan", low))
         if high is not None:
@@ -416,7 +414,7 @@ def _owned(node: Node, owner: int, field: str) -> PmmlElement:
     return _compound("or", parts)
 
 
-def _compound(operator: str, parts: list[PmmlElement]) -> PmmlElement:
+def _compound(operator: str, parts: list[XmlElement]) -> XmlElement:
     if len(parts) == 1:
         return parts[0]
     return element("CompoundPredicate", *parts, booleanOperator=operator)

@@ -1,6 +1,6 @@
 """Elements of PMML, and degrees as its expressions.
 
-XML is written without recursion. Degrees use the operations of the reference in its
+Degrees use the operations of the reference in its
 order; functions that several terms need are defined once in the file. So a degree has
 the bits of the reference in every engine that computes in doubles.
 """
@@ -8,23 +8,11 @@ the bits of the reference in every engine that computes in doubles.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from fuzzytree.exporters.xml_text import XmlElement, element
 from fuzzytree.model import LR, Band, Flank, Points, Shape, Side
 from fuzzytree.semantics import BELOW_ONE
-
-_ESCAPES = {
-    "&": "&amp;",
-    "<": "&lt;",
-    ">": "&gt;",
-    '"': "&quot;",
-    "\t": "&#9;",
-    "\n": "&#10;",
-    "\r": "&#13;",
-}
-_DEEPEST = 20  # levels that are indented further than the one above
-
 
 NUMBER = {"optype": "continuous", "dataType": "double"}
 TEXT = {"optype": "categorical", "dataType": "string"}
@@ -32,74 +20,22 @@ TRUTH = {"optype": "categorical", "dataType": "boolean"}
 """The attributes of a field's type."""
 
 
-class PmmlElement(NamedTuple):
-    """An element of XML, with attributes, and with children or a text."""
-
-    tag: str
-    attributes: dict[str, str]
-    children: tuple[PmmlElement, ...] = ()
-    text: str = ""
-
-
-def element(tag: str, *children: PmmlElement, **attributes: str | None) -> PmmlElement:
-    """Return an element; attributes that are None are left out.
-
-    Example:
-        >>> print(text_of(element("Node", element("True"), id="1", score=None)))
-        <Node id="1">
-          <True/>
-        </Node>
-    """
-    known = {name: text for name, text in attributes.items() if text is not None}
-    return PmmlElement(tag, known, children)
-
-
-def text_of(root: PmmlElement) -> str:
-    """Return an element as text, a line for each."""
-    return "\n".join(_lines(root))
-
-
-def _lines(root: PmmlElement) -> Iterator[str]:
-    todo: list[tuple[int, PmmlElement | str]] = [(0, root)]
-    while todo:
-        depth, one = todo.pop()
-        indent = "  " * min(depth, _DEEPEST)
-        if isinstance(one, str):
-            yield f"{indent}</{one}>"
-            continue
-        attributes = "".join(
-            f' {name}="{_escaped(text)}"' for name, text in one.attributes.items()
-        )
-        if one.children:
-            yield f"{indent}<{one.tag}{attributes}>"
-            todo.append((depth, one.tag))
-            todo += [(depth + 1, child) for child in reversed(one.children)]
-        elif one.text:
-            yield f"{indent}<{one.tag}{attributes}>{_escaped(one.text)}</{one.tag}>"
-        else:
-            yield f"{indent}<{one.tag}{attributes}/>"
-
-
-def _escaped(text: str) -> str:
-    return "".join(_ESCAPES.get(character, character) for character in text)
-
-
-def constant(value: float) -> PmmlElement:
+def constant(value: float) -> XmlElement:
     """Return a number of an expression."""
-    return PmmlElement("Constant", {"dataType": "double"}, (), repr(float(value)))
+    return XmlElement("Constant", {"dataType": "double"}, (), repr(float(value)))
 
 
-def ref(name: str) -> PmmlElement:
+def ref(name: str) -> XmlElement:
     """Return the value of a field, or of a parameter of a function."""
-    return PmmlElement("FieldRef", {"field": name})
+    return XmlElement("FieldRef", {"field": name})
 
 
-def apply(function: str, *arguments: PmmlElement) -> PmmlElement:
+def apply(function: str, *arguments: XmlElement) -> XmlElement:
     """Return a function of some expressions."""
-    return PmmlElement("Apply", {"function": function}, arguments)
+    return XmlElement("Apply", {"function": function}, arguments)
 
 
-def derived(name: str, expression: PmmlElement) -> PmmlElement:
+def derived(name: str, expression: XmlElement) -> XmlElement:
     """Return a field that is computed."""
     return element("DerivedField", expression, name=name, **NUMBER)
 
@@ -107,15 +43,15 @@ def derived(name: str, expression: PmmlElement) -> PmmlElement:
 def defined(
     name: str,
     parameters: Mapping[str, Mapping[str, str]],
-    body: PmmlElement,
+    body: XmlElement,
     gives: Mapping[str, str] = NUMBER,
-) -> PmmlElement:
+) -> XmlElement:
     """Return the definition of a function, from its parameters and their types."""
     fields = [element("ParameterField", name=p, **t) for p, t in parameters.items()]
     return element("DefineFunction", *fields, body, name=name, **gives)
 
 
-def schema(inputs: Iterable[str], target: str) -> PmmlElement:
+def schema(inputs: Iterable[str], target: str) -> XmlElement:
     """Return the fields that a model takes as they are, and the one it predicts."""
     fields = [
         element("MiningField", name=name, invalidValueTreatment="asIs")
@@ -126,11 +62,11 @@ def schema(inputs: Iterable[str], target: str) -> PmmlElement:
 
 
 def halved(
-    x: PmmlElement,
+    x: XmlElement,
     last: int,
     limit: Callable[[int], float],
-    end: Callable[[int], PmmlElement],
-) -> PmmlElement:
+    end: Callable[[int], XmlElement],
+) -> XmlElement:
     """Return nested questions that find the first place up to whose limit x is.
 
     Args:
@@ -140,7 +76,7 @@ def halved(
         end: Gives the expression of a place.
     """
 
-    def within(low: int, high: int) -> PmmlElement:
+    def within(low: int, high: int) -> XmlElement:
         if low == high:
             return end(low)
         middle = (low + high) // 2
@@ -150,7 +86,7 @@ def halved(
     return within(0, last)
 
 
-def joined(function: str, parts: list[PmmlElement]) -> PmmlElement:
+def joined(function: str, parts: list[XmlElement]) -> XmlElement:
     """Return a function of as many expressions as there are; one stays itself."""
     return parts[0] if len(parts) == 1 else apply(function, *parts)
 
@@ -164,9 +100,9 @@ class Functions:
     """
 
     def __init__(self) -> None:
-        self.defined: dict[str, PmmlElement] = {}
+        self.defined: dict[str, XmlElement] = {}
 
-    def degree(self, shape: Shape, field: str) -> PmmlElement:
+    def degree(self, shape: Shape, field: str) -> XmlElement:
         """Return the degree of a field's value."""
         x = ref(field)
         match shape:
@@ -186,7 +122,7 @@ class Functions:
             case Points():
                 return self._points(shape, x)
 
-    def finite(self, x: PmmlElement) -> PmmlElement:
+    def finite(self, x: XmlElement) -> XmlElement:
         """Return 1 where a value is there and finite, and 0 elsewhere."""
         value, zero = ref("value"), constant(0.0)
         is_small = apply(
@@ -196,7 +132,7 @@ class Functions:
         body = apply("if", apply("isMissing", value), zero, known)
         return apply(self._define("finite", ("value",), body), x)
 
-    def total(self, summands: Sequence[PmmlElement]) -> PmmlElement:
+    def total(self, summands: Sequence[XmlElement]) -> XmlElement:
         """Return a sum from left to right, missing if a summand is not finite.
 
         So infinities of both signs never meet: engines differ about what that is.
@@ -210,17 +146,17 @@ class Functions:
         whole = apply("if", apply("equal", usable, constant(1.0)), total)
         return apply(self._define(f"sum{len(names)}", names, whole), *summands)
 
-    def _define(self, name: str, parameters: Sequence[str], body: PmmlElement) -> str:
+    def _define(self, name: str, parameters: Sequence[str], body: XmlElement) -> str:
         if name not in self.defined:
             self.defined[name] = defined(name, dict.fromkeys(parameters, NUMBER), body)
         return name
 
-    def _clipped(self, value: PmmlElement, high: PmmlElement) -> PmmlElement:
+    def _clipped(self, value: XmlElement, high: XmlElement) -> XmlElement:
         clamped = apply("max", ref("value"), constant(0.0))
         body = apply("min", clamped, ref("high"))
         return apply(self._define("clip", ("value", "high"), body), value, high)
 
-    def _flank(self, flank: Flank | None, x: PmmlElement) -> PmmlElement:
+    def _flank(self, flank: Flank | None, x: XmlElement) -> XmlElement:
         if flank is None:
             return constant(0.0)
         names = _names(len(flank.curve))
@@ -233,7 +169,7 @@ class Functions:
             curve, self._clipped(q, constant(1.0)), *map(constant, flank.curve)
         )
 
-    def _side(self, side: Side, distance: PmmlElement) -> PmmlElement:
+    def _side(self, side: Side, distance: XmlElement) -> XmlElement:
         names = _names(len(side.curve))
         count = len(names)
         coefficients = tuple(map(ref, names))
@@ -261,7 +197,7 @@ class Functions:
             *map(constant, side.curve),
         )
 
-    def _points(self, points: Points, x: PmmlElement) -> PmmlElement:
+    def _points(self, points: Points, x: XmlElement) -> XmlElement:
         """Return nested questions that halve the points, down to a line or a degree."""
         values, count = points.values, len(points.values)
         if count == 1:
@@ -271,7 +207,7 @@ class Functions:
             x, count, values.__getitem__, lambda place: self._line(points, place, x)
         )
 
-    def _line(self, points: Points, after: int, x: PmmlElement) -> PmmlElement:
+    def _line(self, points: Points, after: int, x: XmlElement) -> XmlElement:
         values, degrees = points.values, points.degrees
         if after in (0, len(values)):
             return constant(degrees[after and -1])
@@ -297,7 +233,7 @@ class Functions:
         return apply(name, x, *map(constant, numbers))
 
 
-def norm_continuous(points: Points, field: str) -> PmmlElement:
+def norm_continuous(points: Points, field: str) -> XmlElement:
     """Return points as PMML's own lists, one for each stretch between steps.
 
     An engine rounds in its own order: a stretch whose degrees are below 1 is clamped to
@@ -314,7 +250,7 @@ def norm_continuous(points: Points, field: str) -> PmmlElement:
     return result
 
 
-def _run(run: list[tuple[float, float]], field: str) -> PmmlElement:
+def _run(run: list[tuple[float, float]], field: str) -> XmlElement:
     if len({degree for _, degree in run}) == 1:
         return constant(run[0][1])
     norms = [element("LinearNorm", orig=repr(x), norm=repr(d)) for x, d in run]
@@ -327,16 +263,16 @@ def _names(count: int) -> tuple[str, ...]:
     return tuple(f"c{k}" for k in range(count))
 
 
-def _horner(names: Sequence[str], x: PmmlElement) -> PmmlElement:
+def _horner(names: Sequence[str], x: XmlElement) -> XmlElement:
     total = ref(names[-1])
     for name in reversed(names[:-1]):
         total = apply("+", apply("*", total, x), ref(name))
     return total
 
 
-def _up_to(x: PmmlElement, value: float) -> PmmlElement:
+def _up_to(x: XmlElement, value: float) -> XmlElement:
     return apply("lessOrEqual", x, constant(value))
 
 
-def _above(x: PmmlElement, value: float) -> PmmlElement:
+def _above(x: XmlElement, value: float) -> XmlElement:
     return apply("greaterThan", x, constant(value))

@@ -18,15 +18,14 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml_elements import (
     NUMBER,
     TRUTH,
-    PmmlElement,
     apply,
     constant,
     defined,
-    element,
     halved,
     joined,
     ref,
 )
+from fuzzytree.exporters.xml_text import XmlElement, element
 from fuzzytree.model import FuzzySystem, unlike
 from fuzzytree.semantics import (
     INEXACT,
@@ -41,7 +40,7 @@ from fuzzytree.semantics import (
 MOST_FIELDS = 20_000
 """The most derived fields of a file: engines look each other's values up one by one."""
 
-_MISSING = PmmlElement("Constant", {"dataType": "double", "missing": "true"})
+_MISSING = XmlElement("Constant", {"dataType": "double", "missing": "true"})
 _A, _B = ref("a"), ref("b")
 _PLAIN: Mapping[str, str] = {
     "add": "+",
@@ -61,7 +60,7 @@ _PLAIN: Mapping[str, str] = {
 }
 _ZERO, _ONE = constant(0.0), constant(1.0)
 _ENDLESS = apply("greaterThan", apply("abs", _A), constant(sys.float_info.max))
-_PARTIAL: Mapping[str, tuple[PmmlElement, PmmlElement]] = {
+_PARTIAL: Mapping[str, tuple[XmlElement, XmlElement]] = {
     # The result, and where there is none.
     "divide": (
         apply("/", _A, _B),
@@ -92,7 +91,7 @@ _COMPARED: Mapping[str, str] = {
 }
 _LOGIC: Mapping[str, str] = {"and": "and", "or": "or", "not": "not"}
 
-Value = PmmlElement | float | bool  # an expression, or what it is
+Value = XmlElement | float | bool  # an expression, or what it is
 
 
 class SystemFields:
@@ -114,13 +113,13 @@ class SystemFields:
             )
         _refuse_unknown(system.name, program)
         self.is_inexact = any(step.operation in INEXACT for step in program.steps)
-        self.functions: dict[str, PmmlElement] = {}
-        self.fields: list[PmmlElement] = []
+        self.functions: dict[str, XmlElement] = {}
+        self.fields: list[XmlElement] = []
         self._prefix = _prefix(taken)
         values: list[list[Value]] = []
         for place, step in enumerate(program.steps):
             values.append(self._values(place, step, values))
-        self.outputs: list[PmmlElement] = []
+        self.outputs: list[XmlElement] = []
         for place in program.of("output"):
             (result,) = values[place]
             self.outputs.append(_expression(result))
@@ -162,13 +161,13 @@ class SystemFields:
 
     def _one(self, name: str, operation: str, operands: list[Value]) -> Value:
         """Return an operation on some values, as a field unless it is known now."""
-        if not any(isinstance(one, PmmlElement) for one in operands):
+        if not any(isinstance(one, XmlElement) for one in operands):
             known = NUMERIC.get(operation) or LOGICAL[operation]
             return known(*operands)
         kind = OPERATIONS[operation].gives
         if operation == "where":
             condition, *others = operands
-            if not isinstance(condition, PmmlElement):
+            if not isinstance(condition, XmlElement):
                 return others[0] if condition else others[1]
             expression = apply("if", condition, *map(_expression, others))
         else:
@@ -176,7 +175,7 @@ class SystemFields:
             expression = apply(_own(operation), *map(_expression, operands))
         return self._field(name, expression, kind)
 
-    def _field(self, name: str, expression: PmmlElement, kind: str) -> PmmlElement:
+    def _field(self, name: str, expression: XmlElement, kind: str) -> XmlElement:
         full = f"{self._prefix}{name}"
         how = TRUTH if kind == "truth" else NUMBER
         self.fields.append(element("DerivedField", expression, name=full, **how))
@@ -243,7 +242,7 @@ def _prefix(taken: set[str]) -> str:
     return f"{result} "
 
 
-def _body(operation: str, names: Iterable[str]) -> PmmlElement:
+def _body(operation: str, names: Iterable[str]) -> XmlElement:
     operands = [ref(name) for name in names]
     if operation in _LOGIC:
         return apply(_LOGIC[operation], *operands)
@@ -265,14 +264,14 @@ def _body(operation: str, names: Iterable[str]) -> PmmlElement:
     return apply("if", nothing, _MISSING, apply(_PLAIN[operation], *operands))
 
 
-def _truth(value: bool) -> PmmlElement:
-    return PmmlElement("Constant", {"dataType": "boolean"}, (), str(value).lower())
+def _truth(value: bool) -> XmlElement:
+    return XmlElement("Constant", {"dataType": "boolean"}, (), str(value).lower())
 
 
-def _expression(value: Value) -> PmmlElement:
+def _expression(value: Value) -> XmlElement:
     """Return a value as an expression; an infinity as what overflows to it."""
     match value:
-        case PmmlElement():
+        case XmlElement():
             return value
         case bool():
             return _truth(value)
@@ -285,7 +284,7 @@ def _expression(value: Value) -> PmmlElement:
             return constant(value)
 
 
-def _table(step: Step, value: Value) -> PmmlElement:
+def _table(step: Step, value: Value) -> XmlElement:
     """Return a number that is looked up by halving."""
     table, x = step.table, _expression(value)
     if step.operation == "pick":
