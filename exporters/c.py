@@ -16,7 +16,6 @@ from fuzzytree.exporters.c_selftest import examples_of, number_of, selftest_code
 from fuzzytree.exporters.c_steps import (
     SYSTEM_TYPES,
     system_code,
-    system_heading,
     system_selftest,
 )
 from fuzzytree.exporters.c_tables import CTreeTest, Tables, cut_tests, tables_of
@@ -35,7 +34,7 @@ from fuzzytree.exporters.c_text import (
     whole_lines,
     whole_table,
 )
-from fuzzytree.exporters.program_text import places_of
+from fuzzytree.exporters.program_text import places_of, title_of
 from fuzzytree.model import (
     Document,
     Format,
@@ -43,6 +42,8 @@ from fuzzytree.model import (
     FuzzyTree,
     Model,
     RuleBase,
+    SystemInput,
+    SystemOutput,
     Variable,
     Written,
     fingerprint,
@@ -196,7 +197,7 @@ def beginning(own: str, name: str | None) -> str:
 def _system_text(
     system: FuzzySystem, prefix: str, *, activations: bool
 ) -> Iterator[str]:
-    yield from system_heading(system)
+    yield from _heading(system)
     yield fill(_USE, prefix) + fill(_DECLARE, prefix)
     yield fill("typedef double name_real;\n\n", prefix)
     count = len(system.outputs) + activations * len(system.rules)
@@ -312,15 +313,20 @@ class CFile:
             )
 
 
-def _heading(model: Model) -> Iterator[str]:
-    is_rules = isinstance(model, RuleBase)
-    kind = "rule base" if is_rules else "tree"
-    yield f'/* A fuzzy {kind}, named "{remark(model.name)}". Written by fuzzytree.\n'
+def _heading(model: Document) -> Iterator[str]:
+    title = title_of(model, f'"{remark(model.name)}"')
+    yield f"/* {title}. Written by fuzzytree.\n"
     yield f" * Fingerprint: {fingerprint(model)}\n *\n * Inputs, in order:\n"
-    inputs = [variable for variable in model.variables if not variable.parts]
+    columns = model.columns if isinstance(model, FuzzySystem) else model.inputs
+    inputs = [one for one in model.variables if one.name in columns]
     for place, variable in enumerate(inputs):
-        unit = f" ({remark(variable.unit)})" if variable.unit else ""
-        yield f" *   x[{place}] {remark(variable.name)}{unit}\n"
+        yield f" *   x[{place}] {_described(variable)}\n"
+    if isinstance(model, FuzzySystem):
+        yield " * Outputs, in order:\n"
+        for place, output in enumerate(model.outputs):
+            yield f" *   outputs[{place}] {_described(output)}\n"
+        yield f" * Rules: {len(model.rules)}\n"
+        return
     for variable in model.variables:
         if variable.parts:
             parts = " + ".join(
@@ -335,6 +341,10 @@ def _heading(model: Model) -> Iterator[str]:
     else:
         for line in outline(model):
             yield f" * {remark(line)}\n"
+
+
+def _described(one: Variable | SystemInput | SystemOutput) -> str:
+    return remark(f"{one.name} ({one.unit})" if one.unit else one.name)
 
 
 _FINITE = """

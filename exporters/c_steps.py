@@ -6,9 +6,9 @@ import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.exporters.c_text import DOUBLE, fill, real_lines, remark
+from fuzzytree.exporters.c_text import DOUBLE, fill, real_lines
 from fuzzytree.exporters.program_text import StepText, SystemExample, system_examples
-from fuzzytree.model import FuzzySystem, SystemInput, SystemOutput, fingerprint
+from fuzzytree.model import FuzzySystem
 from fuzzytree.semantics import Program, Step, from_system, system_probes
 
 LIBRARY: Mapping[str, str] = {
@@ -397,23 +397,6 @@ int main(void)
 }
 #endif
 """
-
-
-def system_heading(system: FuzzySystem) -> Iterator[str]:
-    """Yield comments: the name of the system, and its variables."""
-    yield f'/* A fuzzy system, named "{remark(system.name)}". Written by fuzzytree.\n'
-    yield f" * Fingerprint: {fingerprint(system)}\n *\n * Inputs, in order:\n"
-    columns = [one for one in system.inputs if not one.parts]
-    for place, one in enumerate(columns):
-        yield f" *   x[{place}] {_described(one)}\n"
-    yield " * Outputs, in order:\n"
-    for place, output in enumerate(system.outputs):
-        yield f" *   outputs[{place}] {_described(output)}\n"
-    yield f" * Rules: {len(system.rules)}\n"
-
-
-def _described(one: SystemInput | SystemOutput) -> str:
-    return remark(f"{one.name} ({one.unit})" if one.unit else one.name)
 
 
 def system_code(

@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Iterator, Sequence
-from typing import Literal, assert_never
+from typing import Literal
 
-from fuzzytree.exporters.js_system import system_parts
+from fuzzytree.exporters.js_system import named, system_parts
 from fuzzytree.exporters.js_text import (
     AS_MODULE,
     AS_SCRIPT,
@@ -39,6 +39,7 @@ from fuzzytree.exporters.program_text import (
     digest_of,
     node_rows,
     places_of,
+    title_of,
 )
 from fuzzytree.model import (
     Document,
@@ -94,23 +95,10 @@ def write(
         body = f'(() => {{\n"use strict";\n{body}{ending}{MAIN}}})();\n'
     else:
         body += ending + MAIN
-    return Written(f"{_heading(model)}{body}".encode("ascii"))
-
-
-def _heading(model: Document) -> str:
-    match model:
-        case FuzzyTree():
-            kind = "tree"
-        case RuleBase():
-            kind = "rule base"
-        case FuzzySystem():
-            kind = "system"
-        case _:
-            assert_never(model)
-    return (
-        f"/* A fuzzy {kind}, named {text_of(model.name)}. Written by fuzzytree. */\n"
-        f"/* Fingerprint: {fingerprint(model)} */\n"
-    )
+    title = title_of(model, text_of(model.name))
+    heading = f"/* {title}. Written by fuzzytree. */\n"
+    heading += f"/* Fingerprint: {fingerprint(model)} */\n"
+    return Written(f"{heading}{body}".encode("ascii"))
 
 
 def _doors(model: Document) -> tuple[str, ...]:
@@ -131,7 +119,7 @@ def _body(model: Document) -> Iterator[str]:
     inputs = [variable for variable in model.variables if not variable.parts]
     mixed = [variable for variable in model.variables if variable.parts]
     places = places_of(model.variables)
-    yield from table("INPUTS", (f"{text_of(v.name)},{_unit(v)}" for v in inputs))
+    yield from table("INPUTS", map(named, inputs))
     yield from table("CLASSES", (f"{text_of(label)}," for label in model.classes))
     yield f"const WHEN_MISSING = {literal(model.semantics.missing)};\n"
     yield "\n/* Place of an input, weight and centre of each part. */"
@@ -150,10 +138,6 @@ def _body(model: Document) -> Iterator[str]:
     yield f"\n/* Inputs, and the {what} that they lead to. */"
     yield from table("EXAMPLES", _examples(model))
     yield TEST
-
-
-def _unit(variable: Variable) -> str:
-    return f" // {text_of(variable.unit)}" if variable.unit else ""
 
 
 def _combination(variable: Variable, places: dict[str, int]) -> str:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from fuzzytree.exporters.js_text import literal, number_text, table, text_of
 from fuzzytree.exporters.program_text import StepText, system_examples
-from fuzzytree.model import FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.model import FuzzySystem, SystemInput, SystemOutput, Variable
 from fuzzytree.semantics import OVER_SAMPLES, Program, Step, from_system, system_probes
 
 _EXAMPLES = 64
@@ -46,8 +46,8 @@ def system_parts(system: FuzzySystem, rows: str) -> Iterator[str]:
     activations = ", ".join(map(steps.value, program.of("activation")))
     (status,) = program.of("status")
     columns = [one for one in system.inputs if not one.parts]
-    yield from table("INPUTS", map(_named, columns))
-    yield from table("OUTPUTS", map(_named, system.outputs))
+    yield from table("INPUTS", map(named, columns))
+    yield from table("OUTPUTS", map(named, system.outputs))
     for numbers, name in steps.tables.items():
         yield f"\nconst {name} = {numbers};\n"
     yield rows
@@ -67,7 +67,8 @@ def system_parts(system: FuzzySystem, rows: str) -> Iterator[str]:
     yield _TEST
 
 
-def _named(one: SystemInput | SystemOutput) -> str:
+def named(one: Variable | SystemInput | SystemOutput) -> str:
+    """Return the entry of a variable in a table of names."""
     unit = f" // {text_of(one.unit)}" if one.unit else ""
     return f"{text_of(one.name)},{unit}"
 

@@ -30,6 +30,7 @@ from fuzzytree.exporters.pmml_elements import (
     schema,
 )
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
+from fuzzytree.exporters.program_text import title_of
 from fuzzytree.exporters.xml_text import XmlElement, element, text_of
 from fuzzytree.model import (
     Clause,
@@ -139,9 +140,7 @@ def _written_system(system: FuzzySystem) -> Written:
         derived(result, system_fields.outputs[0]),
     )
     data = element("DataDictionary", *_columns(system.inputs), target)
-    header = _heading(
-        f"A fuzzy system, named {system.name}.", {"fingerprint": fingerprint(system)}
-    )
+    header = _heading(system, {"fingerprint": fingerprint(system)})
     content = _content(header, data, dictionary, model)
     remark = "exp, powers and the like are good to a few last digits"
     return Written(content, (), (remark,) if system_fields.is_inexact else ())
@@ -175,22 +174,21 @@ class _Names:
 
 
 def _header(model: Model) -> XmlElement:
-    kind = "rule base" if isinstance(model, RuleBase) else "tree"
     facts = {
         "fingerprint": fingerprint(model),
         "uncovered": _answer(model.semantics.uncovered),
         "missing": _answer(model.semantics.missing),
         "and": model.semantics.conjunction,
     }
-    return _heading(f"A fuzzy {kind}, named {model.name}.", facts)
+    return _heading(model, facts)
 
 
-def _heading(description: str, facts: Mapping[str, str]) -> XmlElement:
+def _heading(model: Document, facts: Mapping[str, str]) -> XmlElement:
     return element(
         "Header",
         *(_extension(name, text) for name, text in facts.items()),
         element("Application", name="fuzzytree"),
-        description=description,
+        description=f"{title_of(model, model.name)}.",
     )
 
 

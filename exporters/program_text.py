@@ -11,6 +11,7 @@ import numpy as np
 from fuzzytree.model import (
     LR,
     Band,
+    Document,
     Flank,
     FuzzySystem,
     FuzzyTree,
@@ -63,6 +64,12 @@ class NumberType:
         """Return numbers of the type, never infinite; a divisor is never 0."""
         result: list[float] = rounded(values, self.kind, is_divisor=is_divisor).tolist()
         return result
+
+
+def title_of(model: Document, name: str) -> str:
+    """Return what a file is of, with the model's name as the file may write it."""
+    kinds = {FuzzyTree: "tree", RuleBase: "rule base", FuzzySystem: "system"}
+    return f"A fuzzy {kinds[type(model)]}, named {name}"
 
 
 def one_line(text: str, pairs: Sequence[str]) -> str:

@@ -19,6 +19,7 @@ from fuzzytree.exporters.program_text import (
     combination_row,
     node_rows,
     places_of,
+    title_of,
 )
 from fuzzytree.model import (
     Format,
@@ -232,9 +233,8 @@ def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
 
 
 def _heading(model: Model) -> Iterator[str]:
-    kind = "rule base" if isinstance(model, RuleBase) else "tree"
     yield "# -*- coding: utf-8 -*-\n"  # so that no name below can declare another
-    yield f"# A fuzzy {kind}, named {model.name!r}. Written by fuzzytree.\n"
+    yield f"# {title_of(model, repr(model.name))}. Written by fuzzytree.\n"
     yield f"# Fingerprint: {fingerprint(model)}\n"
     yield f"# Classes: {', '.join(map(repr, model.classes))}\n\n"
 

@@ -15,6 +15,7 @@ from fractions import Fraction
 from typing import Literal, get_args
 
 from fuzzytree.errors import LossError
+from fuzzytree.exporters.program_text import title_of
 from fuzzytree.model import (
     LR,
     Band,
@@ -133,8 +134,7 @@ def _refuse_deep(tree: FuzzyTree) -> None:
 
 
 def _heading(model: Model, dialect: str) -> Iterator[str]:
-    kind = "rule base" if isinstance(model, RuleBase) else "tree"
-    yield f"-- A fuzzy {kind}, named {model.name!r}, in SQL for {dialect}."
+    yield f"-- {title_of(model, repr(model.name))}, in SQL for {dialect}."
     yield f"-- Written by fuzzytree. Fingerprint: {fingerprint(model)}"
     yield f"-- Classes: {', '.join(map(repr, model.classes))}"
     yield "-- status: 0 decided, 1 tie, 2 uncovered, 3 missing"
