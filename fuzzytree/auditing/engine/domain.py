@@ -36,6 +36,11 @@ class DomainSide(Value, frozen=True):
     origin: Origin = "limits"
     is_open: bool = False
 
+    @property
+    def ends(self) -> tuple[Fraction, Fraction]:
+        """Both ends, exactly."""
+        return Fraction(self.low), Fraction(self.high)
+
 
 class Domain(Value, frozen=True):
     """A box: a side for each input, and for combinations that are limited besides."""
@@ -127,13 +132,13 @@ def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
     side = domain.side(variable.name)
     if not variable.parts:
         assert side is not None  # checked when the ground was made
-        return Fraction(side.low), Fraction(side.high)
+        return side.ends
     number = {one.variable: place for place, one in enumerate(domain.sides)}
     weights, low = linear_form(variable, number)
     high = low
     for place, weight in weights.items():
         of = domain.sides[place]
-        ends = [weight * Fraction(end) for end in (of.low, of.high)]
+        ends = [weight * end for end in of.ends]
         low, high = low + min(ends), high + max(ends)
     if side is not None:
         low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))

@@ -36,8 +36,8 @@ from fuzzytree.auditing.engine.contenders import (
     contenders_on,
     same_contenders,
 )
-from fuzzytree.auditing.engine.domain import Domain, linear_form, span
-from fuzzytree.auditing.engine.linear import ZERO, Row, feasible
+from fuzzytree.auditing.engine.domain import Domain, span
+from fuzzytree.auditing.engine.linear import feasible, holds, row_of
 from fuzzytree.auditing.engine.states import Bracket, Proved, Span, State, Witness
 from fuzzytree.model import RuleBase, Variable
 
@@ -64,12 +64,9 @@ class BoxPoints:
         if missing:
             raise ValueError(f"the domain has no side for {missing[0]!r}")
         self._place = {name: number for number, name in enumerate(self.inputs)}
-        self._ranges = [
-            (Fraction(sides[name].low), Fraction(sides[name].high))
-            for name in self.inputs
-        ]
+        self._ranges = [sides[name].ends for name in self.inputs]
         self._limits = [
-            _row(v.parts, self._place, AxisPart(Fraction(one.low), Fraction(one.high)))
+            row_of(v, self._place, one.ends)
             for model in models
             for v in model.variables
             if v.parts and (one := sides.get(v.name)) is not None
@@ -90,7 +87,12 @@ class BoxPoints:
     def solved(self, box: Sequence[AxisPart]) -> Point | None:
         """Return a point whose axes lie in a box, None if there is none."""
         rows = [
-            _row(key, self._place, one, is_open=not one.is_closed)
+            row_of(
+                Variable(key) if isinstance(key, str) else Variable("", parts=key),
+                self._place,
+                (one.low, one.high),
+                is_open_low=not one.is_closed,
+            )
             for key, one in zip(self.keys, box, strict=True)
         ]
         result = feasible(self._ranges, [*rows, *self._limits])
@@ -102,7 +104,7 @@ class BoxPoints:
         values = list(near.values())
         pairs = zip(values, self._ranges, strict=True)
         is_within = all(low <= value <= high for value, (low, high) in pairs)
-        is_within = is_within and all(_holds(row, values) for row in self._limits)
+        is_within = is_within and all(holds(row, values) for row in self._limits)
         return near if is_within else None
 
 
@@ -116,24 +118,6 @@ def middle(part: AxisPart) -> Fraction:
     exact = (part.low + part.high) / 2
     near = Fraction(float(exact))
     return near if part.low < near < part.high else exact
-
-
-def _row(
-    key: AxisKey, place: Mapping[str, int], part: AxisPart, *, is_open: bool = False
-) -> Row:
-    """Return that an axis lies on a stretch, as an inequality of the inputs."""
-    if isinstance(key, str):
-        weights = {place[key]: Fraction(1)}
-        return Row(weights, part.low, part.high, is_open)
-    weights, constant = linear_form(Variable("", parts=key), place)
-    return Row(weights, part.low - constant, part.high - constant, is_open)
-
-
-def _holds(row: Row, values: Sequence[Fraction]) -> bool:
-    total = sum((w * values[k] for k, w in row.weights.items()), ZERO)
-    return (row.low is None or row.low <= total) and (
-        row.high is None or total <= row.high
-    )
 
 
 # --- branch and bound

@@ -7,11 +7,12 @@ whole multiples of the others. Pivots follow Bland's rule, so that none comes ba
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.model import checkpoint
+from fuzzytree.auditing.engine.domain import Domain, linear_form
+from fuzzytree.model import Variable, checkpoint
 
 ZERO, ONE = Fraction(0), Fraction(1)
 
@@ -29,7 +30,43 @@ class Row(NamedTuple):
 
 
 Range = tuple[Fraction, Fraction]
+"""The least and the largest value of a variable."""
+
 _Bound = tuple[Fraction | None, Fraction | None]
+
+
+def row_of(
+    variable: Variable,
+    number: Mapping[str, int],
+    ends: Sequence[Fraction],
+    *,
+    is_open_low: bool = False,
+    is_open_high: bool = False,
+) -> Row:
+    """Return that a variable lies between two ends, as a row of the inputs."""
+    weights, constant = linear_form(variable, number)
+    low, high = ends
+    return Row(weights, low - constant, high - constant, is_open_low, is_open_high)
+
+
+def inequalities(
+    domain: Domain, inputs: Sequence[str], variables: Iterable[Variable]
+) -> tuple[list[Range], list[Row]]:
+    """Return a box: the range of each input; limits of combinations, and open ends."""
+    number = {name: place for place, name in enumerate(inputs)}
+    ranges: list[Range] = []
+    rows: list[Row] = []
+    for name in inputs:
+        side = domain.side(name)
+        assert side is not None  # checked when the rules were arranged
+        ranges.append(side.ends)
+        if side.is_open:
+            rows.append(Row({number[name]: ONE}, side.ends[0], is_open_low=True))
+    for variable in variables:
+        side = domain.side(variable.name)
+        if variable.parts and side is not None:
+            rows.append(row_of(variable, number, side.ends, is_open_low=side.is_open))
+    return ranges, rows
 
 
 def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | None:
@@ -49,32 +86,10 @@ def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | N
     """
     if any(low > high for low, high in ranges):
         return None
-    result = solved(ranges, rows)
-    return None if isinstance(result, Row) else result
-
-
-def solved(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | Row | None:
-    """Return a point that satisfies all inequalities, or why there is none.
-
-    Returns:
-        As `feasible`; but where the rows have nothing in common with the ranges, even
-        with their ends, a sum of multiples of rows that no point of the ranges
-        satisfies (Farkas), as a lower bound. It holds wherever the rows hold, so it
-        gives how much wider the ranges must be, at least.
-
-    Example:
-        >>> unit = (Fraction(0), Fraction(1))
-        >>> one = Row({0: Fraction(1), 1: Fraction(1)}, low=Fraction(3))
-        >>> two = Row({0: Fraction(1), 1: Fraction(-1)}, low=Fraction(0))
-        >>> result = solved([unit, unit], [one, two])
-        >>> {place: str(w) for place, w in result.weights.items()}, str(result.low)
-        ({0: '1', 1: '1'}, '3')
-    """
     reaches = [_reach(ranges, row) for row in rows]
     tableau = _Tableau(ranges, rows, reaches)
-    broken = tableau.repair()
-    if broken is not None:
-        return tableau.against(broken)
+    if not tableau.repair():
+        return None
     slack = ZERO
     if any(row.is_open_low or row.is_open_high for row in rows):
         slack = tableau.raise_slack()
@@ -86,6 +101,26 @@ def solved(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | Row
         for row, reach in zip(rows, reaches, strict=True)
     ]
     return _simplified(point, ranges, kept)
+
+
+def least(ranges: Sequence[Range], rows: Sequence[Row], place: int) -> Fraction | None:
+    """Return the least value of a variable that satisfies all inequalities.
+
+    Open ends count as closed ones. None if nothing satisfies the inequalities.
+
+    Example:
+        >>> unit = (Fraction(0), Fraction(1))
+        >>> both = Row({0: Fraction(1), 1: Fraction(2)}, low=Fraction(2))
+        >>> least([unit, unit], [both], 1)
+        Fraction(1, 2)
+    """
+    low, high = ranges[place]
+    goal = Row({place: ONE}, high=high, is_open_high=True)
+    every = [*(_closed(row, ZERO) for row in rows), goal]
+    tableau = _Tableau(ranges, every, [_reach(ranges, row) for row in every])
+    if not tableau.repair():
+        return None
+    return high - tableau.raise_slack() * (high - low)
 
 
 def holds(row: Row, values: Sequence[Fraction]) -> bool:
@@ -167,10 +202,9 @@ class _Tableau:
             (ZERO, ONE),
         ]
         self.values = [(low + high) / 2 for low, high in ranges]
-        self.sides = dict(enumerate(sides, len(ranges)))
         self.sums: dict[int, dict[int, int]] = {}
         self.scales: dict[int, int] = {}
-        for number, (weights, constant, share) in self.sides.items():
+        for number, (weights, constant, share) in enumerate(sides, len(ranges)):
             # The side's number is constant + sum - share * slack >= 0; the constant
             # moves into the bound.
             total = sum((w * self.values[i] for i, w in weights.items()), ZERO)
@@ -182,40 +216,20 @@ class _Tableau:
             self.sums[number] = {i: int(w * scale) for i, w in terms.items() if w}
         self.values.append(ZERO)
 
-    def repair(self) -> int | None:
-        """Bring every sum within its bounds; return one for which it is impossible."""
+    def repair(self) -> bool:
+        """Bring every sum within its bounds; return whether that is possible."""
         while True:
             checkpoint()
             broken = next((one for one in sorted(self.sums) if self._gap(one)), None)
             if broken is None:
-                return None
+                return True
             gap = self._gap(broken)
             entering = self._helpful(broken, is_up=gap > 0)
             if entering is None:
-                return broken
+                return False
             step = gap * self.scales[broken] / self.sums[broken][entering]
             self._move(entering, step)
             self._pivot(broken, entering)
-
-    def against(self, broken: int) -> Row:
-        """Return the sum of sides of rows that keeps a variable out of its bounds.
-
-        The variable is a sum of others, all of which are at the end that helps it most.
-        Sides have a lower end only, so that those in the sum have the sign that makes
-        the multiples of all of them, the broken one's too, be 0 or more.
-        """
-        sign = 1 if self._gap(broken) > 0 else -1
-        terms, scale = self.sums[broken], self.scales[broken]
-        multiples = {i: Fraction(-sign * w, scale) for i, w in terms.items()}
-        multiples[broken] = Fraction(sign)
-        weights: dict[int, Fraction] = {}
-        low = ZERO
-        for number, (sums_of, constant, _) in self.sides.items():
-            times = multiples.get(number, ZERO)
-            low -= times * constant
-            for place, weight in sums_of.items():
-                weights[place] = weights.get(place, ZERO) + times * weight
-        return Row({place: w for place, w in weights.items() if w}, low)
 
     def raise_slack(self) -> Fraction:
         """Make the slack as large as possible, from a point that satisfies all."""

@@ -5,10 +5,8 @@ So all points within a radius are a box, and an exact decision procedure for box
 the distance by bisection: the lower bound is a radius within which none was proved to
 exist, the upper one is the distance of a point that was evaluated.
 
-A polytope is a box of the inputs cut by half-spaces. Each half-space alone gives, in
-closed form, a radius within which the polytope cannot be. If nothing of the polytope is
-just beyond that radius, some sum of multiples of its half-spaces proves so, and gives
-a larger radius: each step is a vertex of the dual problem, none of which comes twice.
+A polytope is a box of the inputs cut by half-spaces. The radius of a ball that meets it is
+the least value of a linear program; bounds by doubles say which polytope is first.
 """
 
 from __future__ import annotations
@@ -20,15 +18,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, Point, linear_form
+from fuzzytree.auditing.engine.domain import Domain, DomainSide, Point
 from fuzzytree.auditing.engine.linear import (
+    ONE,
     ZERO,
     Range,
     Row,
     feasible,
     holds,
+    inequalities,
+    least,
     simple,
-    solved,
 )
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -166,8 +166,7 @@ def nearest_box(
 ) -> Nearest:
     """Return how far the nearest of some boxes of the inputs is, exactly.
 
-    The lower bound is the distance itself; where a box is open at that end, no point of
-    it has just this distance, and the point is a little farther.
+    The lower bound is the distance itself, and the point is a little farther.
 
     `domain`: in whose widths distance is measured.
 
@@ -178,42 +177,9 @@ def nearest_box(
         >>> str(result.low), 2 < result.point["x"] < Fraction("2.01")
         ('1/4', True)
     """
-    best: tuple[Fraction, int] | None = None
-    chosen: Domain | None = None
-    wholes = {side.variable: side for side in domain.sides}
-    for target in targets:
-        gaps = [_gap(side, wholes[side.variable], centre) for side in target.sides]
-        rank = max(gaps, default=Fraction(0)), sum(1 for gap in gaps if gap)
-        if best is None or rank < best:
-            best, chosen = rank, target
-    if best is None or chosen is None:
-        return Nearest(Fraction(1), is_none=True)
-    slack = max(best[0] * NARROW, LEAST) / 2
-    point = {
-        side.variable: _closest(side, centre[side.variable], slack * width_of(whole))
-        for side in chosen.sides
-        if (whole := wholes[side.variable])
-    }
-    return Nearest(best[0], distance(domain, centre, point), point)
-
-
-def _gap(
-    side: DomainSide, whole: DomainSide, centre: Mapping[str, Fraction]
-) -> Fraction:
-    """Return how far a value is from a side, in shares of the whole side's width."""
-    at = centre[side.variable]
-    gap = max(Fraction(side.low) - at, at - Fraction(side.high), Fraction(0))
-    return gap / width_of(whole) if gap else gap
-
-
-def _closest(side: DomainSide, at: Fraction, slack: Fraction) -> Fraction:
-    """Return a plain value of a side that is all but the closest to another."""
-    low, high = Fraction(side.low), Fraction(side.high)
-    if low < at <= high or (at == low and not side.is_open):
-        return at
-    if at <= low:
-        return simple(low, min(high, low + slack))
-    return simple(max(low, high - slack), high)
+    inputs = [side.variable for side in domain.sides]
+    parts = [polytope_of(target, inputs, {}) for target in targets]
+    return Polytopes(domain, inputs, parts).nearest(centre, range(len(parts)))
 
 
 class _Search:
@@ -334,24 +300,12 @@ def polytope_of(
     box: Domain, inputs: Sequence[str], variables: Mapping[str, Variable]
 ) -> Polytope:
     """Return a box of inputs and combinations as a polytope."""
-    number = {name: place for place, name in enumerate(inputs)}
-    sides = {side.variable: side for side in box.sides}
-    ranges = tuple(
-        (Fraction(sides[name].low), Fraction(sides[name].high)) for name in inputs
-    )
-    rows: list[Row] = []
+    ranges, rows = inequalities(box, inputs, variables.values())
     halves: list[Half] = []
-    for name, side in sides.items():
-        low, high = Fraction(side.low), Fraction(side.high)
-        if name not in number:
-            weights, constant = linear_form(variables[name], number)
-            low, high = low - constant, high - constant
-            rows.append(Row(weights, low, high, side.is_open))
-            halves.append((weights, low))
-            halves.append(({place: -w for place, w in weights.items()}, -high))
-        elif side.is_open:
-            rows.append(Row({number[name]: Fraction(1)}, low, is_open_low=True))
-    return Polytope(ranges, tuple(rows), tuple(halves))
+    for row in (row for row in rows if row.high is not None):
+        halves.append((row.weights, row.low or ZERO))
+        halves.append(({place: -w for place, w in row.weights.items()}, -row.high))
+    return Polytope(tuple(ranges), tuple(rows), tuple(halves))
 
 
 class Polytopes:
@@ -368,7 +322,6 @@ class Polytopes:
         wholes = {side.variable: side for side in domain.sides}
         self.wholes: list[DomainSide] = [wholes[name] for name in inputs]
         self.widths = [width_of(side) for side in self.wholes]
-        self._empty: dict[int, bool] = {}
         self._bound = _Bound(parts, self.widths)
 
     def nearest(
@@ -430,35 +383,37 @@ class Polytopes:
             None if the polytope has no point.
         """
         part = self.parts[place]
-        low = self._gap(part, at)
-        for half in part.halves:
-            radius = self._radius(part, at, half, low)
-            if radius is None:
-                return None
-            low = max(low, radius)
-        beyond = low
-        while enough is None or low < enough:
-            step = max(beyond * NARROW, LEAST) / 2
-            beyond = simple(beyond + step / 2, beyond + step)
-            result = solved(self._ball(part, at, beyond), part.rows)
-            if isinstance(result, Row):
-                goal = result.low if result.low is not None else ZERO
-                radius = self._radius(part, at, (result.weights, goal), low)
-                if radius is None:
-                    return None
-                low = beyond = max(low, radius)
-            elif result is not None:
-                return low, _plainer(result, at, part)
-            elif self._is_empty(place):
-                return None
-        return low, None
+        low = self._least(part, at)
+        if low is None:
+            return None
+        if enough is not None and low >= enough:
+            return low, None
+        step = max(low * NARROW, LEAST) / 2
+        ball = self._ball(part, at, simple(low + step / 2, low + step))
+        result = feasible(ball, part.rows)
+        if result is None:
+            return None
+        return low, _plainer(result, at, part, [step * w for w in self.widths])
 
-    def _is_empty(self, place: int) -> bool:
-        """Return whether a polytope that is not empty with its ends is so without."""
-        if place not in self._empty:
-            part = self.parts[place]
-            self._empty[place] = feasible(part.ranges, part.rows) is None
-        return self._empty[place]
+    def _least(self, part: Polytope, at: Sequence[Fraction]) -> Fraction | None:
+        """Return how far a polytope is, with its open ends; None if it is empty."""
+        low = self._gap(part, at)
+        used = sorted({place for weights, _ in part.halves for place in weights})
+        if not used:
+            return low
+        number = {place: n for n, place in enumerate(used)}
+        radius = len(used)
+        rows = [
+            row._replace(weights={number[p]: w for p, w in row.weights.items()})
+            for row in part.rows
+            if number.keys() >= row.weights.keys()
+        ]
+        for place, n in number.items():
+            x, width = at[place], self.widths[place]
+            rows.append(Row({n: ONE, radius: width}, low=x))
+            rows.append(Row({n: ONE, radius: -width}, high=x))
+        ranges = [*(part.ranges[place] for place in used), (low, max(low, ONE))]
+        return least(ranges, rows, radius)
 
     def _gap(self, part: Polytope, at: Sequence[Fraction]) -> Fraction:
         """Return how far a polytope's box is from a point."""
@@ -476,49 +431,27 @@ class Polytopes:
             for x, (low, high), width in zip(at, part.ranges, self.widths, strict=True)
         ]
 
-    def _radius(
-        self, part: Polytope, at: Sequence[Fraction], half: Half, start: Fraction
-    ) -> Fraction | None:
-        """Return the least radius, at least `start`, at which a half-space is met.
-
-        Within a radius r an input adds at most |w| min(r width, room) to the sum.
-        """
-        weights, goal = half
-        lack = goal
-        moving: list[tuple[Fraction, Fraction]] = []
-        for place, weight in weights.items():
-            low, high = part.ranges[place]
-            x, width, size = at[place], self.widths[place], abs(weight)
-            room = high - x if weight > 0 else x - low
-            lack -= weight * x
-            if room > 0 and width:
-                moving.append((room / width, size * width))
-            else:
-                lack -= size * room
-        slope = sum((rate for _, rate in moving), ZERO)
-        radius = ZERO
-        for end, rate in sorted(moving):
-            if lack <= slope * (end - radius):
-                break
-            lack -= slope * (end - radius)
-            slope -= rate
-            radius = end
-        if lack > 0:
-            if not slope:
-                return None
-            radius += lack / slope
-        return max(radius, start)
-
 
 def _plainer(
-    values: Sequence[Fraction], at: Sequence[Fraction], part: Polytope
+    values: Sequence[Fraction],
+    at: Sequence[Fraction],
+    part: Polytope,
+    slack: Sequence[Fraction],
 ) -> list[Fraction]:
-    """Return a point of a polytope with as many values of the centre as may be."""
+    """Return a point of a polytope, each value as near to the centre as may be.
+
+    `slack`: how much farther than needed a value may be, to have fewer digits.
+    """
     result = list(values)
-    for place, (low, high) in enumerate(part.ranges):
-        other = [*result[:place], at[place], *result[place + 1 :]]
+    for place, ((low, high), x) in enumerate(zip(part.ranges, at, strict=True)):
+        near = x
+        if x < low:
+            near = simple(low, min(high, low + slack[place]))
+        elif x > high:
+            near = simple(max(low, high - slack[place]), high)
+        other = [*result[:place], near, *result[place + 1 :]]
         touched = (row for row in part.rows if row.weights.get(place))
-        if low <= at[place] <= high and all(holds(row, other) for row in touched):
+        if all(holds(row, other) for row in touched):
             result = other
     return result
 

@@ -16,11 +16,10 @@ from fractions import Fraction
 from fuzzytree.auditing.engine.domain import (
     Domain,
     DomainSide,
-    linear_form,
     span,
     variable_value,
 )
-from fuzzytree.auditing.engine.linear import Row, feasible
+from fuzzytree.auditing.engine.linear import Row, feasible, row_of
 from fuzzytree.model import Branch, FuzzyTree, Value, Variable, intervals
 from fuzzytree.numerics import outwards
 
@@ -156,18 +155,18 @@ def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
     ranges: dict[str, tuple[Fraction, Fraction]] = {}
     rows: list[Row] = []
     for side in box.sides:
-        low, high = Fraction(side.low), Fraction(side.high)
-        ranges[side.variable] = low, high
-        weights, constant = linear_form(variables[side.variable], number)
-        rows.append(Row(weights, low - constant, high - constant, side.is_open))
+        ranges[side.variable] = side.ends
+        variable = variables[side.variable]
+        rows.append(row_of(variable, number, side.ends, is_open_low=side.is_open))
     wanted = [ranges[name] for name in tree.inputs]
-    inner = [row if row.low == row.high else _strict(row) for row in rows]
+    inner = [
+        row
+        if row.low == row.high
+        else row._replace(is_open_low=True, is_open_high=True)
+        for row in rows
+    ]
     result = feasible(wanted, inner) or feasible(wanted, rows)
     return None if result is None else dict(zip(tree.inputs, result, strict=True))
-
-
-def _strict(row: Row) -> Row:
-    return row._replace(is_open_low=True, is_open_high=True)
 
 
 def leaf_at(tree: FuzzyTree, point: Mapping[str, Fraction]) -> int:

@@ -13,15 +13,15 @@ from __future__ import annotations
 import functools
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
-from fuzzytree.auditing.engine.domain import Domain, DomainSide, linear_form
-from fuzzytree.auditing.engine.linear import Row, feasible
+from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.linear import feasible, row_of
 from fuzzytree.auditing.engine.ranges import bends, clause_ranges
 from fuzzytree.model import Clause, RuleBase, Shape, Variable, checkpoint, shapes_of
 from fuzzytree.numerics import LEAST, Enclosure, U, outwards
@@ -445,8 +445,11 @@ class Space:
             )
             for v in mixed
         ]
-
-        self.limits = [*_limits(mixed, domain, number)]
+        self.limits = [
+            row_of(v, number, side.ends, is_open_low=side.is_open)
+            for v in mixed
+            if (side := domain.side(v.name)) is not None
+        ]
 
     @property
     def root_count(self) -> int:
@@ -603,17 +606,6 @@ def _spans(grid: AxisGrid, one: IntArray, other: IntArray) -> Intervals:
     lows = [outwards(low)[1] for low, _ in ends]
     highs = [outwards(high)[0] for _, high in ends]
     return Intervals(np.array(lows), np.array(highs))
-
-
-def _limits(
-    mixed: Sequence[Variable], domain: Domain, number: Mapping[str, int]
-) -> Iterator[Row]:
-    for variable in mixed:
-        side = domain.side(variable.name)
-        if side is not None:
-            weights, constant = linear_form(variable, number)
-            low, high = Fraction(side.low) - constant, Fraction(side.high) - constant
-            yield Row(weights, low, high, side.is_open)
 
 
 def _mix(

@@ -20,7 +20,13 @@ from fuzzytree.auditing.engine.domain import (
     linear_form,
     variable_value,
 )
-from fuzzytree.auditing.engine.linear import Row, feasible, simple
+from fuzzytree.auditing.engine.linear import (
+    Row,
+    feasible,
+    inequalities,
+    row_of,
+    simple,
+)
 from fuzzytree.auditing.engine.pieces import ONE, RuleCurve, piece_at, pieces
 from fuzzytree.auditing.engine.polynomials import (
     difference,
@@ -222,25 +228,13 @@ def point_with(base: Arrangement, wanted: Mapping[int, AxisStretch]) -> Point | 
     """
     names = base.rules.inputs
     number = {name: place for place, name in enumerate(names)}
-    ranges: list[tuple[Fraction, Fraction]] = []
-    rows: list[Row] = []
-    for name in names:
-        side = base.domain.side(name)
-        assert side is not None  # checked when the ground was made
-        ranges.append((Fraction(side.low), Fraction(side.high)))
-        if side.is_open:
-            start = ranges[-1][0]
-            rows.append(Row({number[name]: Fraction(1)}, start, is_open_low=True))
-    for variable in base.rules.variables:
-        side = base.domain.side(variable.name)
-        if variable.parts and side is not None:
-            weights, constant = linear_form(variable, number)
-            low, high = Fraction(side.low) - constant, Fraction(side.high) - constant
-            rows.append(Row(weights, low, high, is_open_low=side.is_open))
+    ranges, rows = inequalities(base.domain, names, base.rules.variables)
     for axis, part in wanted.items():
-        weights, constant = linear_form(base.axes[axis].variable, number)
-        low, high = part.low - constant, part.high - constant
-        rows.append(Row(weights, low, high, part.is_open, part.is_open))
+        variable, ends = base.axes[axis].variable, (part.low, part.high)
+        is_open = part.is_open
+        rows.append(
+            row_of(variable, number, ends, is_open_low=is_open, is_open_high=is_open)
+        )
     if not all(_may_hold(row) for row in rows if not row.weights):
         return None
     joined = {place for row in rows if len(row.weights) > 1 for place in row.weights}

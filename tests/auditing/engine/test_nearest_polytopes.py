@@ -9,7 +9,6 @@ import pytest
 
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, variable_value
-from fuzzytree.auditing.engine.linear import Row, holds, solved
 from fuzzytree.auditing.engine.nearest import Nearest, Polytopes, distance, polytope_of
 from fuzzytree.model.rulebase import Part, Variable
 
@@ -120,28 +119,3 @@ def test_no_point_that_is_drawn_is_nearer(seed: int) -> None:
             for name, x in centre.items()
         }
         assert not is_inside(point) or distance(UNIT, centre, point) >= found.low
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_what_follows_from_rows_holds_wherever_they_do(seed: int) -> None:
-    draw = random.Random(seed)
-    rows = [
-        Row(
-            {n: Fraction(draw.randint(-3, 3)) for n in range(3)},
-            Fraction(draw.randint(-2, 4), 2),
-            None if draw.random() < 0.5 else Fraction(9, 2),
-        )
-        for _ in range(4)
-    ]
-    ranges = [(Fraction(0), Fraction(1))] * 3
-    found = solved(ranges, rows)
-    if not isinstance(found, Row):
-        assert found is None or all(holds(row, found) for row in rows)
-        return
-    assert found.low is not None
-    most = sum(max(w, Fraction(0)) for w in found.weights.values())
-    assert most < found.low
-    for _ in range(60):
-        point = [Fraction(draw.uniform(-9.0, 9.0)) for _ in range(3)]
-        if all(holds(row, point) for row in rows):
-            assert holds(found, point)
