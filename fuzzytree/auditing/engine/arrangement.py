@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.axes import Cells, crossings, cut
+from fuzzytree.auditing.engine.axes import Cells, cut
 from fuzzytree.auditing.engine.domain import Domain, span, variable_value
 from fuzzytree.auditing.engine.levels import AlgebraicLevel, level_at, separate_levels
 from fuzzytree.auditing.engine.linear import ZERO
@@ -63,13 +63,13 @@ class RuleAxis(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     @functools.cached_property
     def places(self) -> tuple[ChangePoint, ...]:
-        """All places where something changes."""
-        return _places(self.elements)
+        """All places where something changes; only some of them if too many."""
+        return _places(self.elements, MOST_NUMBERS // self.width)
 
-    @functools.cached_property
-    def crossings(self) -> int:
-        """How often curves cross at least."""
-        return crossings(self.elements)
+    @property
+    def width(self) -> int:
+        """How many values are kept for each cell."""
+        return len(self.elements) + len(self.clauses)
 
 
 class AxisGrid(NamedTuple):
@@ -168,19 +168,12 @@ class Arrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
     def is_kept(self) -> bool:
         """Whether all values of curves and rules in cells can be kept."""
         most = MOST_FRACTIONS if self.is_fine else MOST_NUMBERS
-
-        def is_within(counts: Iterator[int]) -> bool:
-            size = 0
-            for axis, count in zip(self.axes, counts, strict=False):
-                size += (count + 1) * (len(axis.elements) + len(axis.clauses))
-                if size > most:  # the rest is not counted
-                    return False
-            return True
-
-        # Counting takes much less time than finding.
-        return is_within(axis.crossings for axis in self.axes) and is_within(
-            len(axis.places) for axis in self.axes
-        )
+        size = 0
+        for axis in self.axes:
+            size += (len(axis.places) + 1) * axis.width
+            if size > most:  # the rest is not counted
+                return False
+        return True
 
     @functools.cached_property
     def near_levels(self) -> tuple[list[float], list[float]]:

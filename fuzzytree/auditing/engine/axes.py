@@ -18,18 +18,17 @@ import functools
 import itertools
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from fuzzytree.auditing.engine.pieces import ONE, ZERO, ChangePoint, RuleCurve, pieces
 from fuzzytree.auditing.engine.polynomials import (
     Root,
-    composed,
-    integers,
     magnitude,
     refined,
     value_at,
+    values_near,
 )
 from fuzzytree.model import Clause, Shape, checkpoint
 from fuzzytree.numerics import (
@@ -304,54 +303,7 @@ def _range(
         b = high if piece.high is None else min(high, piece.high)
         if a > b:
             continue
-        numbers, common = integers(composed(piece.polynomial, (a + b) / 2, (b - a) / 2))
-        middle = Fraction(numbers[0], common)
-        off = Fraction(sum(map(abs, numbers[1:])), common)
-        ends += [min(max(one, ZERO), piece.cap) for one in (middle - off, middle + off)]
+        values = values_near(piece.polynomial, a, b)
+        ends += [min(max(one, ZERO), piece.cap) for one in values]
     least, most = min(ends), max(ends)
     return (1 - most, 1 - least) if element.is_complement else (least, most)
-
-
-# --- how often curves cross
-
-_FEW: Final = 64  # curves, which are not worth counting
-_NEAR = 1e-12  # degrees that may be equal, but for rounding
-_STEPS = 256  # between the first and the last end of a piece
-
-
-def crossings(elements: Sequence[RuleCurve]) -> int:
-    """Return how often curves cross at least, as far as some points show it.
-
-    Pairs that change their order from one point to the next are counted. Few curves are
-    not looked at, and give 0.
-
-    Example:
-        >>> from fuzzytree.model.rulebase import Points
-        >>> lines = [Points((0.0, 1.0), (k / 98, 1.0 - k / 98)) for k in range(99)]
-        >>> crossings([RuleCurve(line) for line in lines])
-        4851
-    """
-    if len(elements) < _FEW:
-        return 0
-    ends = {
-        float(end)
-        for element in elements
-        for piece in pieces(element.shape)
-        for end in (piece.low, piece.high)
-        if end is not None
-    }
-    if len(ends) < 2:
-        return 0
-    # Quantiles: where ends are close, curves change fast.
-    x = np.quantile(sorted(ends), np.linspace(0.0, 1.0, _STEPS))
-    degrees = np.empty((len(elements), len(x)))
-    for row, element in enumerate(elements):
-        result = degree_enclosure(element.shape, EnclosedValue(x, None)).low
-        degrees[row] = 1.0 - result if element.is_complement else result
-    count = 0
-    for row in range(1, len(elements)):
-        checkpoint()
-        apart = degrees[:row] - degrees[row]
-        order = np.where(np.abs(apart) < _NEAR, 0.0, np.sign(apart))
-        count += int((order[:, 1:] * order[:, :-1] < 0.0).sum())
-    return count

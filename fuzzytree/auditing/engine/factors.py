@@ -20,7 +20,6 @@ from fuzzytree.auditing.engine.measures import (
     Bounds,
     local_polynomial,
     sizes,
-    values_near,
 )
 from fuzzytree.auditing.engine.pieces import ONE, ZERO, RuleCurve
 from fuzzytree.auditing.engine.polynomials import (
@@ -32,6 +31,7 @@ from fuzzytree.auditing.engine.polynomials import (
     multiplied,
     roots,
     value_at,
+    values_near,
 )
 from fuzzytree.model import Clause, Shape, checkpoint, shapes_of
 
@@ -358,10 +358,10 @@ def quotient(
     for root in roots(slope, low, high):
         above = values_near(top, root.low, root.high)
         below = values_near(bottom, root.low, root.high)
-        if below.low <= 0:
+        if below[0] <= 0:
             return Bounds(least, UNKNOWN)
-        least = max(least, above.low / below.high)
-        most = max(most, above.high / below.low)
+        least = max(least, above[0] / below[1])
+        most = max(most, above[1] / below[0])
     return Bounds(least, most)
 
 

@@ -10,7 +10,6 @@ them, and that ends because numbers that differ are some distance apart.
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -26,15 +25,14 @@ from fuzzytree.auditing.engine.pieces import (
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     Root,
-    composed,
     difference,
     division,
-    integers,
     magnitude,
     multiplied,
     refined,
     roots,
     squarefree,
+    values_near,
 )
 from fuzzytree.model import checkpoint
 
@@ -70,11 +68,7 @@ class AlgebraicLevel(NamedTuple):
         if bits:
             size = max(abs(at.low), abs(at.high)) or ONE
             at = refined(self.of, at, bits - magnitude(size))
-        middle, half = (at.low + at.high) / 2, (at.high - at.low) / 2
-        numbers, common = integers(composed(self.polynomial, middle, half))
-        about = Fraction(numbers[0], common)
-        off = Fraction(sum(map(abs, numbers[1:])), common)
-        return about - off, about + off
+        return values_near(self.polynomial, at.low, at.high)
 
 
 @functools.lru_cache(maxsize=1 << 14)
@@ -118,9 +112,7 @@ def _compared(one: AlgebraicLevel, other: AlgebraicLevel | Fraction) -> int | No
     for bits in _BITS:
         checkpoint()
         low, high = one.between(bits)
-        least, most = (
-            (other, other) if isinstance(other, Fraction) else other.between(bits)
-        )
+        least, most = _span(other, bits)
         if high < least:
             return -1
         if low > most:
@@ -183,66 +175,6 @@ def relation(polynomial: Polynomial, of: Polynomial) -> Polynomial:
 
 # --- many levels
 
-LevelSpan = tuple[Fraction, Fraction]
-
-
-def parted(levels: Sequence[AlgebraicLevel | Fraction]) -> list[LevelSpan] | None:
-    """Return bounds of levels: the same for equal ones, apart for others.
-
-    None if some are too near to tell.
-
-    Example:
-        >>> two = (Fraction(-2), Fraction(0), Fraction(1))
-        >>> root = roots(two, Fraction(1), Fraction(2))[0]
-        >>> side, square = (ZERO, Fraction(1, 2)), (ZERO, ZERO, Fraction(1, 4))
-        >>> a, b = (AlgebraicLevel(one, two, root) for one in (side, square))
-        >>> result = parted([a, b, Fraction(1, 2), a])
-        >>> result[0] == result[3], result[1] == result[2], result[0][0] > result[1][1]
-        (True, True, True)
-    """
-    unlike: list[AlgebraicLevel | Fraction] = []
-    member: list[int] = []
-    known: dict[AlgebraicLevel | Fraction, int] = {}
-    # Rational levels first: they represent those that equal them.
-    order = sorted(
-        range(len(levels)), key=lambda n: isinstance(levels[n], AlgebraicLevel)
-    )
-    for number in order:
-        level = levels[number]
-        if level not in known:
-            result = _place_of(level, unlike)
-            if result is None:
-                return None
-            known[level] = result
-        member.append(known[level])
-    for bits in _BITS:
-        spans = [
-            (one, one) if isinstance(one, Fraction) else one.between(bits)
-            for one in unlike
-        ]
-        inner = sorted(spans)
-        if all(a[1] < b[0] for a, b in itertools.pairwise(inner)):
-            by_number = dict(zip(order, member, strict=True))
-            return [spans[by_number[number]] for number in range(len(levels))]
-    return None
-
-
-def _place_of(
-    level: AlgebraicLevel | Fraction, unlike: list[AlgebraicLevel | Fraction]
-) -> int | None:
-    """Return the number of what a level equals among unlike ones; it may be added."""
-    for number, other in enumerate(unlike):
-        if isinstance(level, Fraction):
-            order: int | None = int(level != other)
-        else:
-            order = _compared(level, other)
-        if order is None:
-            return None
-        if order == 0:
-            return number
-    unlike.append(level)
-    return len(unlike) - 1
-
 
 def separate_levels(
     band: IntArray,
@@ -267,13 +199,55 @@ def separate_levels(
         checkpoint()
         levels = [level_of(number) for number in numbers]
         known = [level for level in levels if level is not None]
-        spans = parted(known) if len(known) == len(levels) else None
-        if spans is None:
-            continue
-        # All bounds of equal ones hold, and none leaves the band.
-        for span in set(spans):
-            equal = [n for n, own in zip(numbers, spans, strict=True) if own == span]
-            least, most = max(span[0], *low[equal]), min(span[1], *high[equal])
-            low[equal], high[equal] = least, most
-        sure += numbers
+        groups = equal_levels(known) if len(known) == len(levels) else None
+        for span, places in (groups or {}).items():
+            # All bounds of equal ones hold, and none leaves the band.
+            equal = [numbers[place] for place in places]
+            low[equal] = max(span[0], *low[equal])
+            high[equal] = min(span[1], *high[equal])
+            sure += equal
     return sure
+
+
+def equal_levels(
+    levels: Sequence[AlgebraicLevel | Fraction],
+) -> dict[tuple[Fraction, Fraction], list[int]] | None:
+    """Return levels, by position, that are one number, by bounds that are apart.
+
+    None if some are too near to tell.
+
+    Example:
+        >>> two = (Fraction(-2), Fraction(0), Fraction(1))
+        >>> root = roots(two, Fraction(1), Fraction(2))[0]
+        >>> side, square = (ZERO, Fraction(1, 2)), (ZERO, ZERO, Fraction(1, 4))
+        >>> a, b = (AlgebraicLevel(one, two, root) for one in (side, square))
+        >>> list(equal_levels([a, b, Fraction(1, 2), a]).values())
+        [[1, 2], [0, 3]]
+    """
+    for bits in _BITS:
+        groups: list[tuple[Fraction, Fraction, list[int]]] = []
+        spans = sorted((*_span(level, bits), n) for n, level in enumerate(levels))
+        for low, high, number in spans:
+            if groups and low <= groups[-1][1]:
+                first, last, places = groups.pop()
+                groups.append((min(first, low), max(last, high), [*places, number]))
+            else:
+                groups.append((low, high, [number]))
+        if all(_are_one([levels[n] for n in places]) for _, _, places in groups):
+            return {(low, high): places for low, high, places in groups}
+    return None
+
+
+def _span(level: AlgebraicLevel | Fraction, bits: int) -> tuple[Fraction, Fraction]:
+    return (level, level) if isinstance(level, Fraction) else level.between(bits)
+
+
+def _are_one(levels: Sequence[AlgebraicLevel | Fraction]) -> bool:
+    """Return whether levels are known to be one number."""
+    first, *others = sorted(
+        dict.fromkeys(levels), key=lambda one: isinstance(one, Fraction)
+    )
+    return not others or (
+        isinstance(first, AlgebraicLevel)
+        and all(_compared(first, other) == 0 for other in others)
+    )

@@ -25,13 +25,12 @@ from fuzzytree.auditing.engine.pieces import (
 )
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
-    composed,
     derivative,
     difference,
-    integers,
     integral,
     roots,
     value_at,
+    values_near,
 )
 from fuzzytree.auditing.engine.ranges import shape_ranges
 from fuzzytree.model import Shape, checkpoint
@@ -122,17 +121,6 @@ def local_polynomial(element: RuleCurve, at: Fraction) -> Polynomial:
     return difference((ONE,), polynomial) if element.is_complement else polynomial
 
 
-def values_near(polynomial: Polynomial, low: Fraction, high: Fraction) -> Bounds:
-    """Return bounds of a polynomial's values on a narrow closed interval."""
-    if low == high:
-        value = value_at(polynomial, low)
-        return Bounds(value, value)
-    numbers, common = integers(composed(polynomial, (low + high) / 2, (high - low) / 2))
-    middle = Fraction(numbers[0], common)
-    off = Fraction(sum(map(abs, numbers[1:])), common)
-    return Bounds(middle - off, middle + off)
-
-
 def extremes(
     polynomial: Polynomial, low: Fraction, high: Fraction
 ) -> Iterator[tuple[Fraction, Bounds]]:
@@ -145,12 +133,12 @@ def extremes(
         >>> [float(b.high) for _, b in extremes(bump, Fraction(0), Fraction(1))]
         [0.0, 0.25, 0.0]
     """
-    yield low, values_near(polynomial, low, low)
+    yield low, Bounds(*values_near(polynomial, low, low))
     if low < high:
         if len(polynomial) > 2:
             for root in roots(derivative(polynomial), low, high):
-                yield root.low, values_near(polynomial, root.low, root.high)
-        yield high, values_near(polynomial, high, high)
+                yield root.low, Bounds(*values_near(polynomial, root.low, root.high))
+        yield high, Bounds(*values_near(polynomial, high, high))
 
 
 def sizes(

@@ -5,8 +5,8 @@ So all points within a radius are a box, and an exact decision procedure for box
 the distance by bisection: the lower bound is a radius within which none was proved to
 exist, the upper one is the distance of a point that was evaluated.
 
-A polytope is a box of the inputs cut by half-spaces. The radius of a ball that meets it is
-the least value of a linear program; bounds by doubles say which polytope is first.
+A polytope is a box of the inputs cut by half-spaces. A linear program gives the radius
+of the ball that meets it; bounds by doubles say which polytope is first.
 """
 
 from __future__ import annotations

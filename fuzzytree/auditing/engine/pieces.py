@@ -236,8 +236,13 @@ class ChangePoint(NamedTuple):
     of: tuple[Polynomial, Root] | None = None
 
 
-def places(elements: Sequence[RuleCurve]) -> tuple[ChangePoint, ...]:
-    """Return all places where the order or direction of some curves can change."""
+def places(
+    elements: Sequence[RuleCurve], most: float = math.inf
+) -> tuple[ChangePoint, ...]:
+    """Return all places where the order or direction of some curves can change.
+
+    `most`: beyond so many places the search ends, and more than that are returned.
+    """
     result: set[Fraction] = set()
     irrational: list[ChangePoint] = []
     parts = [element.pieces() for element in elements]
@@ -266,6 +271,8 @@ def places(elements: Sequence[RuleCurve]) -> tuple[ChangePoint, ...]:
                         _solve(met, *ends, result, irrational)
     for one, other in itertools.combinations(parts, 2):
         checkpoint()
+        if len(result) + len(irrational) > most:
+            return (*(ChangePoint(x, x) for x in result), *irrational)
         for low, high, p, q in _overlaps(one, other):
             is_asked = p in _ENDS or q in _ENDS  # where one meets 0 or 1 is known
             if (len(p) > 1 or len(q) > 1) and not is_asked:

@@ -2,8 +2,7 @@
 
 A polynomial is a tuple of fractions, the constant first. Roots are isolated by the
 signs of Bernstein coefficients (Descartes' rule: no change of sign, no root; one
-change, exactly one) and halving; nothing is rounded. A float only guesses where a root
-is: signs in integers decide.
+change, exactly one) and halving; nothing is rounded.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from fuzzytree.model import Value, checkpoint
 Polynomial = tuple[Fraction, ...]
 
 _DEEPEST = 96  # halvings, after which roots that are not apart stay one place
-_FINE = 52  # bits of the place of a root within its interval, at first
+_FINE = 48  # bits of the place of a root within its interval
 
 
 class Root(Value, frozen=True):
@@ -218,7 +217,7 @@ def integer_roots(
 
 def _unit_roots(numbers: list[int]) -> list[tuple[Fraction, Fraction, bool]]:
     """Return the places in (0, 1) where a polynomial with integer coefficients is 0."""
-    degree = len(numbers) - 1
+    degree, polynomial = len(numbers) - 1, tuple(map(Fraction, numbers))
     result: list[tuple[Fraction, Fraction, bool]] = []
     todo = [(0, 0, _bernstein(numbers))]
     while todo:
@@ -228,7 +227,9 @@ def _unit_roots(numbers: list[int]) -> list[tuple[Fraction, Fraction, bool]]:
             continue
         size = Fraction(1, 1 << level)
         if changes == 1:
-            result.append(_single(numbers, bends, level, index))
+            place = Root(index * size, (index + 1) * size)
+            root = refined(polynomial, place, _FINE)
+            result.append((root.low, root.high, True))
             continue
         if level == _DEEPEST:
             result.append((index * size, (index + 1) * size, False))
@@ -262,11 +263,6 @@ def _weights(degree: int) -> tuple[int, ...]:
     )
 
 
-@functools.cache
-def _choices(degree: int) -> tuple[int, ...]:
-    return tuple(math.comb(degree, i) for i in range(degree + 1))
-
-
 def _bernstein(numbers: Sequence[int]) -> list[int]:
     """Return degree! times the Bernstein coefficients: sums of C(j, i) over C(n, i)."""
     degree = len(numbers) - 1
@@ -291,103 +287,6 @@ def _halves(bends: Sequence[int], degree: int) -> tuple[list[int], list[int]]:
         left.append(row[0] << (degree - step))
         right.append(row[-1] << (degree - step))
     return left, right[::-1]
-
-
-def _single(
-    numbers: Sequence[int], bends: Sequence[int], level: int, index: int
-) -> tuple[Fraction, Fraction, bool]:
-    """Return a narrow place of the one root in a dyadic interval."""
-    guess = _guess(bends)
-    rising = next(one for one in reversed(bends) if one) > 0
-    shift = max(level, 0) + _FINE
-    base = index << _FINE
-    for width in (8, 256, 1 << 16, 1 << 32):
-        middle = base + round(guess * (1 << _FINE))
-        low = max(middle - width, base)
-        high = min(middle + width, base + (1 << _FINE))
-        below, above = _sign(numbers, low, shift), _sign(numbers, high, shift)
-        if below == 0 and low > base:
-            return Fraction(low, 1 << shift), Fraction(low, 1 << shift), True
-        if above == 0 and high < base + (1 << _FINE):
-            return Fraction(high, 1 << shift), Fraction(high, 1 << shift), True
-        starts_well = low == base or (below < 0) == rising
-        ends_well = high == base + (1 << _FINE) or (above > 0) == rising
-        if starts_well and ends_well:
-            return _bisected(numbers, low, high, shift, 16, is_rising=rising)
-    return _bisected(numbers, base, base + (1 << _FINE), shift, 16, is_rising=rising)
-
-
-def _bisected(
-    numbers: Sequence[int],
-    low: int,
-    high: int,
-    shift: int,
-    width: int,
-    *,
-    is_rising: bool,
-) -> tuple[Fraction, Fraction, bool]:
-    """Halve the place of a root, in steps of 2**-shift, until it is narrow."""
-    while high - low > width:
-        middle = (low + high) // 2
-        sign = _sign(numbers, middle, shift)
-        if sign == 0:
-            return Fraction(middle, 1 << shift), Fraction(middle, 1 << shift), True
-        if (sign > 0) == is_rising:
-            high = middle
-        else:
-            low = middle
-    return Fraction(low, 1 << shift), Fraction(high, 1 << shift), True
-
-
-def _sign(numbers: Sequence[int], at: int, shift: int) -> int:
-    """Return the sign of a polynomial at at / 2**shift."""
-    total = numbers[-1]
-    moved = 0
-    for number in reversed(numbers[:-1]):
-        moved += shift
-        total = total * at + (number << moved)
-    return (total > 0) - (total < 0)
-
-
-def _guess(bends: Sequence[int]) -> float:
-    """Return about where the one root in [0, 1] is, in floats (Illinois' method)."""
-    weighted = [a * b for a, b in zip(bends, _choices(len(bends) - 1), strict=True)]
-    most = max(map(abs, weighted))
-    drop = max(most.bit_length() - 1000, 0)
-    scale = float(most >> drop)
-    row = [(one >> drop) / scale for one in weighted]
-    low, high = 0.0, 1.0
-    below, above = row[0], row[-1]
-    if below * above >= 0.0:  # an end is a root, or too near to tell
-        below = below or -math.copysign(1e-9, above)
-        above = above or -math.copysign(1e-9, below)
-    last = 0
-    for _ in range(40):
-        middle = high - above * (high - low) / (above - below)
-        if not low < middle < high:
-            middle = (low + high) / 2
-        result = _weighted_value(row, middle)
-        if result == 0.0 or high - low < 2.0**-_FINE:
-            return middle
-        if (result > 0.0) == (above > 0.0):
-            high, above = middle, result
-            below = below / 2 if last > 0 else below
-            last = 1
-        else:
-            low, below = middle, result
-            above = above / 2 if last < 0 else above
-            last = -1
-    return (low + high) / 2
-
-
-def _weighted_value(row: Sequence[float], at: float) -> float:
-    """Return the sum of row[i] at**i (1 - at)**(n - i), by Horner's scheme."""
-    near, rest = (row, at) if at > 0.5 else (row[::-1], 1.0 - at)
-    ratio = (1.0 - rest) / rest
-    total = 0.0
-    for one in near:
-        total = total * ratio + one
-    return float(total * rest ** (len(row) - 1))
 
 
 def magnitude(number: Fraction) -> int:
@@ -438,6 +337,25 @@ def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
             low, below = at, result
         power = power * 2 if high - low <= part else power // 2
     return Root(low, high, root.is_sure)
+
+
+def values_near(
+    polynomial: Polynomial, low: Fraction, high: Fraction
+) -> tuple[Fraction, Fraction]:
+    """Return bounds of a polynomial's values on a narrow closed interval.
+
+    Example:
+        >>> square = (Fraction(0), Fraction(0), Fraction(1))
+        >>> [str(one) for one in values_near(square, Fraction(1), Fraction(2))]
+        ['1/2', '4']
+    """
+    if low == high:
+        value = value_at(polynomial, low)
+        return value, value
+    numbers, common = integers(composed(polynomial, (low + high) / 2, (high - low) / 2))
+    middle = Fraction(numbers[0], common)
+    off = Fraction(sum(map(abs, numbers[1:])), common)
+    return middle - off, middle + off
 
 
 def common_factor(one: Polynomial, other: Polynomial) -> Polynomial:

@@ -11,7 +11,7 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.dominance import RulePairs
 from fuzzytree.auditing.engine.duels import LevelQuestion, search_level
-from fuzzytree.auditing.engine.levels import AlgebraicLevel, parted, relation
+from fuzzytree.auditing.engine.levels import AlgebraicLevel, equal_levels, relation
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.polynomials import roots, value_at
 from fuzzytree.auditing.engine.states import Proved, Witness
@@ -83,10 +83,11 @@ def test_values_of_two_polynomials_at_two_places_are_one_number() -> None:
     square = AlgebraicLevel((ZERO, ZERO, ONE), GOLDEN, place)
     line = AlgebraicLevel((ZERO, ONE), mirrored, beside)
     near = AlgebraicLevel((Fraction(1, 2**90), ONE), mirrored, beside)
-    found = parted([square, near, line])
-    assert found is not None
-    assert found[0] == found[2]
-    assert found[0][1] < found[1][0]
+    groups = equal_levels([square, near, line])
+    assert groups is not None
+    assert list(groups.values()) == [[0, 2], [1]]
+    (_, high), (low, _) = groups
+    assert high < low
 
 
 def test_a_value_that_is_rational_at_an_irrational_place_is_that_number() -> None:
@@ -94,7 +95,9 @@ def test_a_value_that_is_rational_at_an_irrational_place_is_that_number() -> Non
     place = roots(two, ONE, Fraction(2))[0]
     half = Fraction(1, 2)
     sides = AlgebraicLevel((ZERO, ZERO, Fraction(1, 4)), two, place), half
-    assert parted(sides) == [(half, half), (half, half)]
+    groups = equal_levels(sides)
+    assert groups is not None
+    assert list(groups.values()) == [[0, 1]]
     fourth = relation((ZERO, ONE, ZERO, ONE), two)  # x**3 + x is 3 x there
     assert [int(one) for one in fourth] == [-18, 0, 1]
     assert value_at(fourth, Fraction(3)) < 0
