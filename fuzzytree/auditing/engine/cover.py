@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from fractions import Fraction
 
@@ -11,34 +10,32 @@ import numpy as np
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, strengths_at
 from fuzzytree.auditing.engine.bounding import below_by_boxes, least_cover_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.domain import Point, variable_value
+from fuzzytree.auditing.engine.domain import Point
 from fuzzytree.auditing.engine.duels import LevelQuestion, search_level
 from fuzzytree.auditing.engine.options import (
     Duel,
     Part,
     at_most,
-    choices,
     cover,
     maximal,
-    union,
+    selections,
 )
+from fuzzytree.auditing.engine.pieces import ZERO
 from fuzzytree.auditing.engine.probes import leader
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
     Proved,
-    Span,
     State,
     Witness,
     coordinates,
 )
 from fuzzytree.auditing.engine.witnesses import (
     AxisStretch,
-    cell_of,
     coupled,
     is_within,
     point_with,
-    zone_of,
+    region_around,
 )
 from fuzzytree.numerics import outwards
 
@@ -124,10 +121,9 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
     ]
     cells = sum(map(len, sure))
     how = f"{cells} parts of {len(sure)} axes where rules are 0 visited"
-    point_of = _shared_point if coupled(base) else _bare_point
     try:
         if cover([maximal(m for m, _ in of) for of in sure], duel.full, clock):
-            point = point_of(base, sure, duel.full, clock)
+            point = _bare_point(base, sure, duel.full, clock)
             if point is not None:
                 return _bare_witness(base, point)
         vague = [
@@ -135,7 +131,7 @@ def uncovered(base: Arrangement, clock: Clock | None = None) -> State:
         ]
         if (
             cover([maximal(m for m, _ in of) for of in vague], duel.full, clock)
-            and point_of(base, vague, duel.full, clock) is not None
+            and _bare_point(base, vague, duel.full, clock) is not None
         ):
             why = "a curve may touch 0 where it is not known exactly"
             return Bracket("how many rules fire at least", 0.0, 1.0, why)
@@ -188,41 +184,24 @@ def _bare_point(
     full: int,
     clock: Clock,
 ) -> Point | None:
-    """Return a point at which all rules are 0, on free axes, if there is one."""
-    # Open parts first: a point there has others around it.
-    ways = [
-        _first_of_each(sorted(of, key=lambda one: not one[1].is_open)) for of in options
-    ]
-    chosen = cover([maximal(of) for of in ways], full, clock)
-    if chosen is None:
-        return None
-    return point_with(base, {n: ways[n][mask] for n, mask in enumerate(chosen)})
-
-
-def _shared_point(
-    base: Arrangement,
-    options: list[list[tuple[int, AxisStretch]]],
-    full: int,
-    clock: Clock,
-) -> Point | None:
-    """Return a point at which all rules are 0, where axes share inputs, if any is."""
+    """Return a point at which all rules are 0, if there is one."""
     joined = sorted({axis for group in coupled(base) for axis in group})
     parts = {axis: _joined(base.grids[axis], options[axis]) for axis in joined}
-    free = [axis for axis in range(len(options)) if axis not in parts]
-    ways = [_first_of_each(options[axis]) for axis in free]
-    families = [maximal(of) for of in ways]
-    rest = union(mask for of in ways for mask in of)
-    tell = at_most(_MOST_CHOICES, clock)
-    for wanted, covered in choices(base, parts, full, rest, {}, tell):
-        chosen = cover(families, full & ~covered, clock)
-        if chosen is None:
-            continue
-        others = zip(free, ways, chosen, strict=True)
-        result = {axis: of[mask] for axis, of, mask in others}
-        point = point_with(base, wanted | result)
-        if point is not None:
-            return point
-    return None
+    # Open parts first: a point there has others around it.
+    ways = {
+        axis: sorted(of, key=lambda one: not one[1].is_open)
+        for axis, of in enumerate(options)
+        if axis not in parts
+    }
+
+    def realize(axis: int, mask: int) -> AxisStretch:
+        return next(part for bare, part in ways[axis] if mask & ~bare == 0)
+
+    families = {axis: maximal(mask for mask, _ in of) for axis, of in ways.items()}
+    count = at_most(_MOST_CHOICES, clock)
+    every = selections(base, parts, families, full, count, clock, realize)
+    points = (point_with(base, wanted) for wanted in every)
+    return next((point for point in points if point is not None), None)
 
 
 def _joined(grid: AxisGrid, options: list[tuple[int, AxisStretch]]) -> list[Part]:
@@ -249,14 +228,6 @@ def _joined(grid: AxisGrid, options: list[tuple[int, AxisStretch]]) -> list[Part
     return [*(one for one in result if one[1]), (whole, 0)]
 
 
-def _first_of_each(ways: list[tuple[int, AxisStretch]]) -> dict[int, AxisStretch]:
-    """Return the first way to each mask."""
-    kept: dict[int, AxisStretch] = {}
-    for mask, part in ways:
-        kept.setdefault(mask, part)
-    return kept
-
-
 def _bare_witness(base: Arrangement, point: Point) -> State:
     strengths = strengths_at(base, point)
     if any(strengths) or not is_within(base, point):
@@ -267,67 +238,5 @@ def _bare_witness(base: Arrangement, point: Point) -> State:
         Claim("below", rules=every, level="0"),
         Claim("decides", label=base.rules.semantics.uncovered),
     )
-    return Witness(coordinates(point), claims, _bare_region(base, point))
-
-
-def _bare_region(base: Arrangement, point: Point) -> tuple[Span, ...]:
-    """Return the box around a point on which what is 0 at the point is 0."""
-    missing = set(range(len(base.rules.rules)))
-    at = [variable_value(axis.variable, point) for axis in base.axes]
-    zero: list[set[int]] = []
-    for axis, value in zip(base.axes, at, strict=True):
-        bare = [element.degree(value) == 0 for element in axis.elements]
-        zero.append(
-            {
-                rule
-                for rule, groups in enumerate(axis.clauses)
-                if any(all(bare[one] for one in group) for group in groups)
-            }
-        )
-    spans: list[Span] = []
-    while missing:
-        best = max(range(len(zero)), key=lambda place: len(zero[place] & missing))
-        span = _bare_span(base.grids[best], at[best], sorted(zero[best] & missing))
-        if span is not None:
-            if not (span.low or 0.0) <= at[best] <= (span.high or 0.0):
-                return ()  # narrower than doubles tell
-            spans.append(span)
-        missing -= zero[best]
-    return tuple(spans)
-
-
-def _bare_span(grid: AxisGrid, x: Fraction, rules: list[int]) -> Span | None:
-    """Return from where to where some rules are 0 along an axis; None if all along."""
-    zones, cells = grid.cells.zones, grid.cells.between
-    low = high = x
-    place = zone_of(zones, x)
-
-    def is_bare(cell: int) -> bool:
-        return all(bool(grid.is_zero[grid.of[rule, cell], cell]) for rule in rules)
-
-    def is_bare_at(zone: int) -> bool:
-        at = _zero_at(grid, grid.is_zero_at[:, zone])
-        return all(at[rule] for rule in rules)
-
-    up = cell_of(zones, x) if place is None else place
-    down = up if place is None else place - 1
-    while up < len(cells) and is_bare(up):
-        high = cells[up][1]
-        up += 1
-        if not is_bare_at(up):
-            break
-        high = zones[up][1]
-    is_step = False  # only from below curves are not continuous
-    while down >= 0 and is_bare(down):
-        low = cells[down][0]
-        if not is_bare_at(down):
-            is_step = low == zones[down][0]
-            break
-        low = zones[down][0]
-        down -= 1
-    if low <= zones[0][0] and high >= zones[-1][1] and not is_step:
-        return None
-    first, last = outwards(low)[1], outwards(high)[0]
-    if is_step and first == low:
-        first = math.nextafter(first, math.inf)
-    return Span(grid.axis.variable.name, first, last)
+    region = region_around(base, point, (), every, between=(ZERO, ZERO))
+    return Witness(coordinates(point), claims, region)

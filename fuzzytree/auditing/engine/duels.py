@@ -15,7 +15,7 @@ nothing; otherwise linear inequalities in fractions look for values of the input
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from functools import partial
 from typing import Final, NamedTuple
@@ -32,11 +32,12 @@ from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import Point
 from fuzzytree.auditing.engine.options import (
     Duel,
-    choices,
+    Levels,
     cover,
     parts_of,
-    union,
+    selections,
     weakest,
+    witness_between,
 )
 from fuzzytree.auditing.engine.probes import leader, plainer
 from fuzzytree.auditing.engine.states import (
@@ -203,14 +204,16 @@ class _Search:
             if families not in known:
                 known[families] = cover(families, duel.full, self.clock)
             chosen = known[families]
-            result = None
-            if chosen is not None:
-                levels = duel.bands.high[band], above
-                result = (
-                    self._among_inputs(duel, band, levels)
-                    if self.groups
-                    else self._witness(duel, band, levels, chosen)
-                )
+            if chosen is None:
+                continue
+            result, is_open = witness_between(
+                base,
+                (duel.bands.high[band], above),
+                partial(self._select, duel, band),
+                partial(self._checked, base),
+                _DEEPEST if self.groups else None,
+            )
+            self.is_open |= is_open
             if result is not None:
                 return result
         return None
@@ -230,37 +233,46 @@ class _Search:
 
     # --- witnesses
 
-    def _witness(
-        self,
-        duel: Duel,
-        band: int,
-        levels: tuple[Fraction, Fraction],
-        chosen: Sequence[int],
-    ) -> Witness | None:
-        level = between(*levels)
-        wanted: dict[int, AxisStretch] = {}
-        missing = duel.full
-        # Axes that leave many rivals below come first: few axes then matter.
-        order = sorted(range(len(chosen)), key=lambda a: -chosen[a].bit_count())
-        for axis in order:
-            part = self._part(duel, axis, band, level, chosen[axis] & missing)
-            if part is None:
-                self._lost()
-                return None
-            wanted[axis] = part
-            missing &= ~chosen[axis]
-        point = point_with(duel.base, wanted)
-        result = None if point is None else self._checked(duel.base, point)
-        if result is None:
-            self._lost()
-        return result
+    def _select(
+        self, duel: Duel, band: int, levels: Levels, is_outer: bool
+    ) -> Iterator[dict[int, AxisStretch]]:
+        """Yield values of the axes that leave all rivals below at some levels."""
+        if not is_outer:
+            level = between(*levels)
+            levels = level, level
+        joined = sorted({axis for group in self.groups for axis in group})
+        parts = {
+            axis: [
+                *parts_of(
+                    duel, duel.all_options[axis], axis, band, levels, is_outer=is_outer
+                )
+            ]
+            for axis in joined
+        }
+        families = {
+            axis: options.at_gap(band)
+            for axis, options in enumerate(duel.options)
+            if axis not in parts
+        }
+        return selections(
+            duel.base,
+            parts,
+            families,
+            duel.full,
+            self._tell,
+            self.clock,
+            None if is_outer else partial(self._part, duel, band, levels[0]),
+        )
 
-    def _lost(self) -> None:
-        """Note that an option that is open could not be made a point."""
-        self.is_open = True
+    def _tell(self) -> None:
+        """Count a choice of inputs, and end the search where they are too many."""
+        self.clock.check()
+        self.choices += 1
+        if self.choices > _MOST_CHOICES:
+            raise OutOfTimeError
 
     def _part(
-        self, duel: Duel, axis: int, band: int, level: Fraction, mask: int
+        self, duel: Duel, band: int, level: Fraction, axis: int, mask: int
     ) -> AxisStretch | None:
         """Return values of an axis that leave some rivals below a level."""
         options, grid = duel.options[axis], duel.base.grids[axis]
@@ -304,84 +316,6 @@ class _Search:
             )
         region = region_around(base, point, ours, rivals, between=(best, mine))
         return Witness(coordinates(point), claims, region)
-
-    # --- axes that share inputs
-
-    def _among_inputs(
-        self, duel: Duel, band: int, levels: tuple[Fraction, Fraction]
-    ) -> Witness | None:
-        """Return a witness at levels between two, where options do not change.
-
-        What the axes may be at any of the levels is closed off first; where inputs
-        remain that may do, the levels are halved.
-        """
-        todo = [(levels, 0)]
-        while todo:
-            (low, high), depth = todo.pop()
-            if not any(self._choices(duel, band, (low, high), is_outer=True)):
-                continue
-            middle = (low + high) / 2
-            for wanted in self._choices(duel, band, (middle, middle), is_outer=False):
-                point = point_with(duel.base, wanted)
-                result = None if point is None else self._checked(duel.base, point)
-                if result is not None:
-                    return result
-            if depth == _DEEPEST:
-                self._lost()
-                continue
-            todo += [((low, middle), depth + 1), ((middle, high), depth + 1)]
-        return None
-
-    def _tell(self) -> None:
-        """Count a choice of inputs, and end the search where they are too many."""
-        self.clock.check()
-        self.choices += 1
-        if self.choices > _MOST_CHOICES:
-            raise OutOfTimeError
-
-    def _choices(
-        self,
-        duel: Duel,
-        band: int,
-        levels: tuple[Fraction, Fraction],
-        *,
-        is_outer: bool,
-    ) -> Iterator[dict[int, AxisStretch]]:
-        """Yield values of the axes that leave all rivals below, and some point has.
-
-        `levels`: the rule must reach the lower one, the rivals stay below the upper;
-        `is_outer`: whether what may suffice at some level between counts; the free axes
-        are then left out.
-        """
-        joined = sorted({axis for group in self.groups for axis in group})
-        free = [a for a in range(len(duel.options)) if a not in joined]
-        families = [duel.options[axis].at_gap(band) for axis in free]
-        parts = {
-            axis: [
-                *parts_of(
-                    duel, duel.all_options[axis], axis, band, levels, is_outer=is_outer
-                )
-            ]
-            for axis in joined
-        }
-        rest = union(mask for family in families for mask in family)
-        for wanted, covered in choices(
-            duel.base, parts, duel.full, rest, {}, self._tell
-        ):
-            missing = duel.full & ~covered
-            chosen = cover(families, missing, self.clock)
-            if chosen is None:
-                continue
-            if is_outer:
-                yield wanted
-                continue
-            result = {
-                axis: self._part(duel, axis, band, levels[0], mask & missing)
-                for axis, mask in zip(free, chosen, strict=True)
-            }
-            whole = {axis: part for axis, part in result.items() if part is not None}
-            if len(whole) == len(result):
-                yield wanted | whole
 
 
 # --- does a rule win

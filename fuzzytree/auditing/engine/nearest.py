@@ -302,9 +302,10 @@ def polytope_of(
     """Return a box of inputs and combinations as a polytope."""
     ranges, rows = inequalities(box, inputs, variables.values())
     halves: list[Half] = []
-    for row in (row for row in rows if row.high is not None):
-        halves.append((row.weights, row.low or ZERO))
-        halves.append(({place: -w for place, w in row.weights.items()}, -row.high))
+    for weights, low, high, *_ in rows:
+        if low is not None and high is not None:
+            halves.append((weights, low))
+            halves.append(({place: -w for place, w in weights.items()}, -high))
     return Polytope(tuple(ranges), tuple(rows), tuple(halves))
 
 

@@ -27,6 +27,8 @@ import numpy as np
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, Bands
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.domain import Point
+from fuzzytree.auditing.engine.states import Witness
 from fuzzytree.auditing.engine.witnesses import (
     START,
     AxisStretch,
@@ -385,6 +387,92 @@ def choices(
             (place + 1, {**wanted, axis: part}, covered | mask)
             for part, mask in parts[axis]
         ]
+
+
+def selections(
+    base: Arrangement,
+    parts: Mapping[int, Sequence[Part]],
+    families: Mapping[int, Sequence[int]],
+    goal: int,
+    count: Callable[[], None],
+    clock: Clock,
+    realize: Callable[[int, int], AxisStretch | None] | None,
+    extra: Mapping[int, AxisStretch] | None = None,
+) -> Iterator[dict[int, AxisStretch]]:
+    """Yield values of the axes that leave all of a goal below, and that some point has.
+
+    Args:
+        base: The rules and the box.
+        parts: What each axis that shares inputs can be.
+        families: What each free axis can leave below.
+        goal: What must be left below.
+        count: Called before inequalities are solved; it may raise.
+        clock: Checked between two axes.
+        realize: Returns values of a free axis that leave some rivals below, None if it
+            finds none; without it the free axes are left out.
+        extra: The required values of further axes.
+    """
+    rest = union(mask for family in families.values() for mask in family)
+    for wanted, covered in choices(base, parts, goal, rest, extra or {}, count):
+        missing = goal & ~covered
+        chosen = cover([*families.values()], missing, clock)
+        if chosen is None:
+            continue
+        result = dict(wanted)
+        # Axes that leave many rivals below come first: few axes then matter.
+        order = sorted(zip(families, chosen, strict=True), key=_size)
+        for axis, mask in order if realize else ():
+            assert realize is not None  # there is no order without it
+            part = realize(axis, mask & missing)
+            if part is None:
+                break
+            result[axis] = part
+            missing &= ~mask
+        else:
+            yield result
+
+
+def _size(chosen: tuple[int, int]) -> int:
+    return -chosen[1].bit_count()
+
+
+Levels = tuple[Fraction, Fraction]
+"""Two levels: what lies between them is meant."""
+
+
+def witness_between(
+    base: Arrangement,
+    levels: Levels,
+    select: Callable[[Levels, bool], Iterator[dict[int, AxisStretch]]],
+    check: Callable[[Point], Witness | None],
+    deepest: int | None,
+) -> tuple[Witness | None, bool]:
+    """Return a witness at one of some levels, and whether there may be one unfound.
+
+    Args:
+        base: The rules and the box.
+        levels: From where to where.
+        select: Returns values of the axes for levels: all that may do at any of them if
+            the second argument is true, and otherwise some that do at one of them.
+        check: Returns a point as a witness, if it is one.
+        deepest: How often levels are halved; None where axes share no inputs.
+    """
+    todo, is_open = [(levels, 0)], False
+    while todo:
+        (low, high), depth = todo.pop()
+        if deepest is not None and not any(select((low, high), True)):
+            continue
+        for wanted in select((low, high), False):
+            point = point_with(base, wanted)
+            result = None if point is None else check(point)
+            if result is not None:
+                return result, False
+        if depth >= (deepest or 0):
+            is_open = True
+            continue
+        middle = (low + high) / 2
+        todo += [((low, middle), depth + 1), ((middle, high), depth + 1)]
+    return None, is_open
 
 
 def parts_of(

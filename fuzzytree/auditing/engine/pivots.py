@@ -375,7 +375,7 @@ def stays(duel: Duel, grid: AxisGrid, cell: int, rival: int, band: int) -> bool:
 
 
 def part_at(
-    duel: Duel, axis: int, level: Fraction, mask: int, flat: int | None
+    duel: Duel, level: Fraction, flat: int | None, axis: int, mask: int
 ) -> AxisStretch | None:
     """Return where on an axis ours reach a level and some rivals stay below it.
 

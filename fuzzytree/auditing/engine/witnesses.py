@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.domain import (
     Domain,
@@ -39,7 +41,7 @@ from fuzzytree.auditing.engine.states import Span
 from fuzzytree.numerics import outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.axes import Values
+    from fuzzytree.auditing.engine.axes import BoolArray, Values
 
 
 START = -1  # the number of the option at an axis's lower end itself
@@ -345,8 +347,8 @@ def region_around(
     """Return a box around a point on which rules keep to two sides of a level.
 
     On all of it each of `above` is at least as strong as some level, and each of
-    `below` is weaker than it, under the minimum. Only variables that matter have a
-    span; the ends of spans are doubles. It is empty where no doubles are around.
+    `below` is weaker than it, or 0, under the minimum. Only variables that matter have
+    a span; the ends of spans are doubles. It is empty where no doubles are around.
     """
     level = simple(*between)
     missing = {number - 1 for number in below}
@@ -358,7 +360,9 @@ def region_around(
             min((max(of[one] for one in group) for group in groups), default=ONE)
             for groups in axis.clauses
         ]
-        low_at.append({rule for rule in missing if degrees[rule] < level})
+        low_at.append(
+            {rule for rule in missing if degrees[rule] < level or not degrees[rule]}
+        )
     wanted: dict[int, set[int]] = {}
     while missing:
         best = _widest(low_at, missing)
@@ -390,9 +394,8 @@ def _span(grid: AxisGrid, x: Fraction, sides: LevelSides) -> Span | None:
     zones = grid.cells.zones
     low, high = _walked(grid, x, sides, -1), _walked(grid, x, sides, 1)
     # It may not hold at the ends themselves, be they the axis's own.
-    is_from = low <= zones[0][0] and _holds_at(grid, 0, sides)
-    is_to = high >= zones[-1][1] and _holds_at(grid, len(zones) - 1, sides)
-    if is_from and is_to:
+    is_from, is_to = (_holds_there(grid, end, sides) for end in (low, high))
+    if low <= zones[0][0] and high >= zones[-1][1] and is_from and is_to:
         return None
     first, last = outwards(low)[1], outwards(high)[0]
     if first == low and low != x and not is_from:
@@ -400,6 +403,12 @@ def _span(grid: AxisGrid, x: Fraction, sides: LevelSides) -> Span | None:
     if last == high and high != x and not is_to:
         last = math.nextafter(last, -math.inf)
     return Span(grid.axis.variable.name, first, last)
+
+
+def _holds_there(grid: AxisGrid, x: Fraction, sides: LevelSides) -> bool:
+    """Return whether it holds at a value for sure; False for one within a cell."""
+    place = zone_of(grid.cells.zones, x)
+    return place is not None and _holds_at(grid, place, sides)
 
 
 def zone_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int | None:
@@ -476,20 +485,27 @@ def _is_sure(
     first, last = grid.cells.right[:, one, cell], grid.cells.left[:, one, cell + 1]
     if is_high:
         return bool(min(first[0], last[0]) >= bound)
-    return bool(max(first[1], last[1]) < bound)
+    return bool(max(first[1], last[1]) < bound or grid.is_zero[one, cell])
 
 
 def _holds_at(grid: AxisGrid, place: int, sides: LevelSides) -> bool:
-    return _holds(grid, place, sides, grid.cells.left)
+    return _holds(grid, place, sides, grid.cells.left, grid.is_zero_at)
 
 
 def _holds_after(grid: AxisGrid, place: int, sides: LevelSides) -> bool:
-    return _holds(grid, place, sides, grid.cells.right)
+    is_last = place == len(grid.cells.between)
+    is_zero = grid.is_zero_at if is_last else grid.is_zero
+    return _holds(grid, place, sides, grid.cells.right, is_zero)
 
 
-def _holds(grid: AxisGrid, place: int, sides: LevelSides, values: Values) -> bool:
+def _holds(
+    grid: AxisGrid, place: int, sides: LevelSides, values: Values, is_zero: BoolArray
+) -> bool:
     """Return whether it holds at a zone for sure, by the bounds of values there."""
-    low, high = values[0][:, place].tolist(), values[1][:, place].tolist()
+    low = values[0][:, place].tolist()
+    high = np.where(is_zero[:, place], 0.0, values[1][:, place]).tolist()
+    # A level is above 0, or what stays below it is 0.
+    bound = sides.bound or math.ulp(0.0)
 
     def degree(rule: int, of: Sequence[float]) -> float:
         groups = grid.axis.clauses[rule]
@@ -498,5 +514,5 @@ def _holds(grid: AxisGrid, place: int, sides: LevelSides, values: Values) -> boo
         )
 
     return all(degree(rule, low) >= sides.bound for rule in sides.above) and all(
-        degree(rule, high) < sides.bound for rule in sides.below
+        degree(rule, high) < bound for rule in sides.below
     )
