@@ -9,9 +9,8 @@ within a cell an element counts by the bands of its least and largest value.
 from __future__ import annotations
 
 import functools
-import math
 from bisect import bisect_right
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -412,26 +411,50 @@ def rule_strengths(
 ) -> list[Fraction]:
     """Return every rule's exact strength, or that of some rules, without a domain."""
     checkpoint()
-    every = rules.rules if of is None else of
+    strength = _strength_at(rules, point)
+    return [strength(rule, ZERO) for rule in (rules.rules if of is None else of)]
+
+
+def strength_above(
+    base: Arrangement, point: Mapping[str, Fraction], rule: int, rivals: Iterable[int]
+) -> Fraction | None:
+    """Return a rule's exact strength if it is above that of each of some others.
+
+    The clauses of a rival are evaluated until it is known to be weaker.
+    """
+    every, strength = base.rules.rules, _strength_at(base.rules, point)
+    mine = strength(every[rule - 1], ZERO)
+    is_above = all(strength(every[n - 1], mine) < mine for n in rivals)
+    return mine if mine and is_above else None
+
+
+def _strength_at(
+    rules: RuleBase, point: Mapping[str, Fraction]
+) -> Callable[[Rule, Fraction], Fraction]:
+    """Return what evaluates a rule at a point, until it is below some number."""
     is_product = rules.semantics.conjunction == "product"
     shapes = shapes_of(rules.variables)
-    clauses = dict.fromkeys(c for rule in every for c in rule.when)
-    used = {clause.variable for clause in clauses}
-    values = {
-        v.name: variable_value(v, point) for v in rules.variables if v.name in used
-    }
-    degrees: dict[Clause, Fraction] = {}
-    for clause in clauses:
-        value = values[clause.variable]
-        result = max(
-            exact_degree(shapes[clause.variable, t], value) for t in clause.terms
-        )
-        degrees[clause] = 1 - result if clause.negated else result
-    one = Fraction(1)
-    each = [[degrees[clause] for clause in rule.when] for rule in every]
-    if is_product:
-        return [math.prod(of_rule, start=one) for of_rule in each]
-    return [min(of_rule, default=one) for of_rule in each]
+    variables = {variable.name: variable for variable in rules.variables}
+
+    @functools.cache
+    def value(variable: str) -> Fraction:
+        return variable_value(variables[variable], point)
+
+    @functools.cache
+    def degree(variable: str, term: str) -> Fraction:
+        return exact_degree(shapes[variable, term], value(variable))
+
+    def strength(rule: Rule, enough: Fraction) -> Fraction:
+        result = Fraction(1)
+        for clause in rule.when:
+            one = max(degree(clause.variable, term) for term in clause.terms)
+            one = 1 - one if clause.negated else one
+            result = result * one if is_product else min(result, one)
+            if result < enough or not result:
+                break
+        return result
+
+    return strength
 
 
 # --- predictions at a point

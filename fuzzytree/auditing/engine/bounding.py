@@ -26,6 +26,7 @@ from fuzzytree.auditing.engine.arrangement import (
 )
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Point
+from fuzzytree.auditing.engine.pieces import ZERO
 from fuzzytree.auditing.engine.space import BoxReach, RivalPair, Space
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -185,6 +186,16 @@ def simplified(
     return dict(point)
 
 
+def plainer(
+    base: Arrangement, point: Point, ours: Collection[int], rivals: Collection[int]
+) -> Point:
+    """Return a point of fewer digits at which rules still lead by half as much."""
+    goal = lead_at(base, point, ours, rivals) / 2
+    return simplified(
+        base, point, lambda near: lead_at(base, near, ours, rivals) > max(goal, ZERO)
+    )
+
+
 # --- the questions
 
 _EASY = 2_000  # boxes that are looked at without knowing the order of curves
@@ -311,8 +322,7 @@ class _Lead:
         return (Claim("beats", rules=(self.rule,), rivals=self.rivals),)
 
     def witness(self, point: Point) -> Witness:
-        least = self.lead(point) / 2
-        plain = simplified(self.base, point, lambda p: self.lead(p) >= least)
+        plain = plainer(self.base, point, (self.rule,), self.rivals)
         return Witness(coordinates(plain), self.claims())
 
     def bracket(self, result: SearchResult) -> Bracket:

@@ -22,14 +22,16 @@ from fuzzytree.auditing.engine.pieces import (
     ONE,
     ZERO,
     PolynomialPiece,
+    RuleCurve,
     piece_at,
     pieces,
+    places,
 )
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
+    bernstein,
     composed,
     difference,
-    roots,
 )
 from fuzzytree.model import Conjunction, Part, RuleBase, Shape, checkpoint, shapes_of
 from fuzzytree.numerics import outwards
@@ -49,7 +51,7 @@ Bounds = tuple[Fraction, Fraction]
 NEVER, ALWAYS = 0, 1
 """The numbers of the forms that are 0 and 1 throughout."""
 
-_MOST_CROSSED = 400  # pairs of pieces, of which crossings are looked for
+_MOST_MARKS = 4_000  # places of an axis at which stretches are cut
 
 
 class AxisPart(NamedTuple):
@@ -142,13 +144,13 @@ class SharedAxis:
 
     @functools.cached_property
     def marks(self) -> tuple[Fraction, ...]:
-        """Where a curve changes its formula or crosses another, within the whole."""
-        shapes = list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
-        result = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
-        for one, other in itertools.combinations(shapes, 2):
-            if len(pieces(one)) * len(pieces(other)) <= _MOST_CROSSED:
-                result.update(_crossings(one, other, self.whole))
-        return self._inside(result)
+        """Where a curve changes its direction or crosses another, within the whole."""
+        shapes = dict.fromkeys(s for _, curves in self.clauses for s in curves)
+        every = places([RuleCurve(shape) for shape in shapes], _MOST_MARKS)
+        return self._inside(
+            one.low if one.low == one.high else Fraction(float(one.low))
+            for one in every
+        )
 
     def _inside(self, marks: Iterable[Fraction]) -> tuple[Fraction, ...]:
         low, high = self.whole.low, self.whole.high
@@ -173,7 +175,7 @@ def common_axes(
         The axes; and for each model the clauses of each of its rules.
     """
     axes = [SharedAxis(key, whole) for key, whole in ends]
-    places = {axis.key: place for place, axis in enumerate(axes)}
+    numbers = {axis.key: place for place, axis in enumerate(axes)}
     rules: list[list[tuple[ClauseNumber, ...]]] = []
     for model in models:
         keys = {v.name: v.parts or v.name for v in model.variables}
@@ -182,7 +184,7 @@ def common_axes(
         for rule in model.rules:
             when: list[ClauseNumber] = []
             for clause in rule.when:
-                place = places[keys[clause.variable]]
+                place = numbers[keys[clause.variable]]
                 curves = {shapes[clause.variable, t] for t in clause.terms}
                 curves_of = (clause.negated, tuple(sorted(curves, key=repr)))
                 when.append((place, axes[place].number(curves_of)))
@@ -282,18 +284,7 @@ def _bends(
     if len(polynomial) == 2:
         constant, slope = polynomial
         return constant + slope * low, constant + slope * high
-    unit = composed(polynomial, low, high - low)
-    last = len(unit) - 1
-    return tuple(
-        sum(
-            (
-                Fraction(math.comb(j, i), math.comb(last, i)) * unit[i]
-                for i in range(j + 1)
-            ),
-            start=ZERO,
-        )
-        for j in range(last + 1)
-    )
+    return bernstein(composed(polynomial, low, high - low))
 
 
 def _clause_is_above(one: ClauseCurves, other: ClauseCurves, stretch: AxisPart) -> bool:
@@ -307,16 +298,19 @@ def _clause_is_above(one: ClauseCurves, other: ClauseCurves, stretch: AxisPart) 
 
 
 def _curve_is_above(upper: Shape, lower: Shape, stretch: AxisPart) -> bool:
-    if stretch.is_closed and _degree(upper, stretch.low) < _degree(lower, stretch.low):
+    at = stretch.low
+    if stretch.is_closed and RuleCurve(upper).degree(at) < RuleCurve(lower).degree(at):
         return False
     return all(
-        _formula_is_above(above, below, low, high)
-        for above, below, low, high in _overlaps(upper, lower, stretch)
+        _piece_is_above(above, below, low, high)
+        for above in _clipped(upper, stretch)
+        for below in _clipped(lower, stretch)
+        if (low := max(above.low, below.low)) < (high := min(above.high, below.high))
     )
 
 
-def _formula_is_above(
-    above: PolynomialPiece, below: PolynomialPiece, low: Fraction, high: Fraction
+def _piece_is_above(
+    above: ClippedPiece, below: ClippedPiece, low: Fraction, high: Fraction
 ) -> bool:
     _, most = spread(below.polynomial, low, high)
     if most <= 0:
@@ -328,40 +322,6 @@ def _formula_is_above(
         return False
     gap, _ = spread(difference(above.polynomial, below.polynomial), low, high)
     return gap >= 0
-
-
-def _degree(shape: Shape, at: Fraction) -> Fraction:
-    return piece_at(pieces(shape), at).degree(at)
-
-
-def _overlaps(
-    one: Shape, other: Shape, stretch: AxisPart
-) -> Iterator[tuple[PolynomialPiece, PolynomialPiece, Fraction, Fraction]]:
-    """Yield the pieces of two curves that meet on a stretch, with where they do."""
-    others = pieces(other)
-    for piece in pieces(one):
-        low = stretch.low if piece.low is None else max(piece.low, stretch.low)
-        high = stretch.high if piece.high is None else min(piece.high, stretch.high)
-        if low >= high:
-            continue
-        for match in others:
-            start = low if match.low is None else max(match.low, low)
-            end = high if match.high is None else min(match.high, high)
-            if start < end:
-                yield piece, match, start, end
-
-
-def _crossings(one: Shape, other: Shape, stretch: AxisPart) -> Iterator[Fraction]:
-    """Yield a point at, or beside, each crossing of two curves within a stretch."""
-    for first, second, low, high in _overlaps(one, other, stretch):
-        gap = difference(first.polynomial, second.polynomial)
-        if len(gap) > 1:
-            for root in roots(gap, low, high):
-                yield root.low if root.low == root.high else _near(root.low)
-
-
-def _near(value: Fraction) -> Fraction:
-    return Fraction(float(value))
 
 
 # --- rules on a box

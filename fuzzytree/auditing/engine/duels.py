@@ -27,7 +27,11 @@ from fuzzytree.auditing.engine.arrangement import (
     strengths_at,
 )
 from fuzzytree.auditing.engine.axes import between
-from fuzzytree.auditing.engine.bounding import largest_lead_by_boxes, wins_by_boxes
+from fuzzytree.auditing.engine.bounding import (
+    largest_lead_by_boxes,
+    plainer,
+    wins_by_boxes,
+)
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import Point
 from fuzzytree.auditing.engine.options import (
@@ -39,7 +43,7 @@ from fuzzytree.auditing.engine.options import (
     weakest,
     witness_between,
 )
-from fuzzytree.auditing.engine.probes import leader, plainer
+from fuzzytree.auditing.engine.probes import leader
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,

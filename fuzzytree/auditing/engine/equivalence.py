@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import heapq
 from bisect import bisect_left
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, Literal, NamedTuple
@@ -188,9 +187,8 @@ class _Queue:
     """The boxes that are open, in two orders."""
 
     def __init__(self, first: _OpenBox) -> None:
-        self._open: dict[int, _OpenBox] = {}
+        self._open: dict[int, _OpenBox] = {}  # the oldest comes first
         self._by_margin: list[tuple[float, int]] = []
-        self._by_age: deque[int] = deque()
         self._count = 0
         self.put(first)
 
@@ -207,29 +205,21 @@ class _Queue:
     @property
     def is_touching(self) -> bool:
         """Whether all open boxes are small, and classes as good as tie on them."""
-        return self.margin <= TOUCHING and self._oldest.depth > _DEEP
-
-    @property
-    def _oldest(self) -> _OpenBox:
-        while self._by_age[0] not in self._open:
-            self._by_age.popleft()
-        return self._open[self._by_age[0]]
+        oldest = next(iter(self._open.values()))
+        return self.margin <= TOUCHING and oldest.depth > _DEEP
 
     def put(self, box: _OpenBox) -> None:
         """Add a box."""
         self._open[self._count] = box
         heapq.heappush(self._by_margin, (-box.margin, self._count))
-        self._by_age.append(self._count)
         self._count += 1
 
     def take(self) -> _OpenBox:
         """Remove the oldest box, or the one with the largest margin, by turns."""
-        margin, number = -self.margin, self._by_margin[0][1]
-        if self._count % 4 or not margin:
-            box = self._oldest
-            del self._open[self._by_age.popleft()]
-            return box
-        return self._open.pop(number)
+        by_age = self._count % 4 or not self.margin
+        return self._open.pop(
+            next(iter(self._open)) if by_age else self._by_margin[0][1]
+        )
 
 
 class _Search:

@@ -263,6 +263,21 @@ def _weights(degree: int) -> tuple[int, ...]:
     )
 
 
+def bernstein(polynomial: Polynomial) -> Polynomial:
+    """Return the Bernstein coefficients of a polynomial on [0, 1].
+
+    The least and the largest bound it there; the first and the last are its values at
+    0 and 1.
+
+    Example:
+        >>> [str(one) for one in bernstein((Fraction(1), Fraction(2), Fraction(0)))]
+        ['1', '2', '3']
+    """
+    numbers, common = integers(polynomial)
+    common *= math.factorial(len(numbers) - 1)
+    return tuple(Fraction(one, common) for one in _bernstein(numbers))
+
+
 def _bernstein(numbers: Sequence[int]) -> list[int]:
     """Return degree! times the Bernstein coefficients: sums of C(j, i) over C(n, i)."""
     degree = len(numbers) - 1

@@ -14,17 +14,15 @@ from typing import TYPE_CHECKING, Final
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Arrangement, lead_at
-from fuzzytree.auditing.engine.domain import Domain, Point, variable_value
-from fuzzytree.auditing.engine.linear import simple
+from fuzzytree.auditing.engine.arrangement import Arrangement, strength_above
+from fuzzytree.auditing.engine.domain import Domain, Point
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
 from fuzzytree.auditing.engine.witnesses import is_within, point_with
-from fuzzytree.model import Rule, RuleBase, checkpoint, shapes_of
+from fuzzytree.model import RuleBase, checkpoint, shapes_of
 from fuzzytree.numerics import (
     axis_value,
     clause_enclosure,
     degree_enclosure,
-    exact_degree,
 )
 
 if TYPE_CHECKING:
@@ -151,29 +149,6 @@ def leader(
     }
 
 
-def plainer(
-    base: Arrangement, point: Point, ours: Sequence[int], rivals: Sequence[int]
-) -> Point:
-    """Return a point of fewer digits at which rules still lead by half as much."""
-    goal = lead_at(base, point, ours, rivals) / 2
-    result = dict(point)
-    for name in base.rules.inputs:
-        side = base.domain.side(name)
-        assert side is not None  # checked when the ground was made
-        width = Fraction(side.high) - Fraction(side.low)
-        for share in (Fraction(1, 50), Fraction(1, 1000), Fraction(1, 10**5)):
-            low = max(result[name] - width * share, Fraction(side.low))
-            high = min(result[name] + width * share, Fraction(side.high))
-            if not low < high:
-                break
-            tried = {**result, name: simple(low, high)}
-            is_good = lead_at(base, tried, ours, rivals) > max(goal, Fraction(0))
-            if is_good and is_within(base, tried):
-                result = tried
-                break
-    return result
-
-
 # --- random probes
 
 _MOST_POINTS: Final = 4096
@@ -266,46 +241,3 @@ class RandomProbes(msgspec.Struct, frozen=True, eq=False, dict=True):
             Claim("strength", rules=(rule,), level=str(strength)),
         )
         return Witness(coordinates(point), claims)
-
-
-def strength_above(
-    base: Arrangement, point: Point, rule: int, rivals: Sequence[int]
-) -> Fraction | None:
-    """Return a rule's exact strength if it is above that of each of some others.
-
-    The clauses of a rival are evaluated until it is known to be weaker.
-    """
-    rules = base.rules
-    is_product = rules.semantics.conjunction == "product"
-    shapes = shapes_of(rules.variables)
-    variables = {variable.name: variable for variable in rules.variables}
-    known: dict[tuple[str, str], Fraction] = {}
-    values: dict[str, Fraction] = {}
-
-    def degree(variable: str, term: str) -> Fraction:
-        if (variable, term) not in known:
-            if variable not in values:
-                values[variable] = variable_value(variables[variable], point)
-            known[variable, term] = exact_degree(
-                shapes[variable, term], values[variable]
-            )
-        return known[variable, term]
-
-    def strength(of: Rule, enough: Fraction) -> Fraction:
-        """Return a rule's strength, or some number below `enough` if it is."""
-        result = Fraction(1)
-        for clause in of.when:
-            one = max(degree(clause.variable, term) for term in clause.terms)
-            one = 1 - one if clause.negated else one
-            result = result * one if is_product else min(result, one)
-            if result < enough:
-                break
-        return result
-
-    mine = strength(rules.rules[rule - 1], Fraction(0))
-    if not mine:
-        return None
-    for rival in rivals:
-        if strength(rules.rules[rival - 1], mine) >= mine:
-            return None
-    return mine
