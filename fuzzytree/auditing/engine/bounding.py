@@ -72,31 +72,28 @@ class SearchResult(NamedTuple):
     why: str  # what stopped the search; empty if no box is left
 
 
+class SearchGoal(NamedTuple):
+    """What ends a search, besides that no box is left."""
+
+    floor: Fraction  # boxes that cannot be above this are put away
+    tolerance: float  # how near to each other the two bounds must come
+    patience: int = 0  # how many boxes are looked at before that is enough
+    limit: float = math.inf  # how many boxes are looked at before it gives up
+    is_first_enough: bool = False  # whether any value above the floor ends it
+
+
 def search(
     space: Space,
     judge: Callable[[BoxReach, IntArray], BoxVerdict],
-    exact: Callable[[Point], tuple[Fraction, Point] | None],
+    value: Callable[[Point], Fraction | None],
+    goal: SearchGoal,
     clock: Clock,
-    *,
-    floor: Fraction,
-    tolerance: float,
-    patience: int = 0,
-    limit: float = math.inf,
-    is_first_enough: bool = False,
 ) -> SearchResult:
     """Return the largest value of something on a domain, within bounds.
 
-    Args:
-        space: The domain.
-        judge: Bounds it on boxes.
-        exact: Its value at a point, or at a better one near it; None where it has none.
-        clock: How much time there is.
-        floor: Boxes that cannot be above this are put away.
-        tolerance: How near to each other the two bounds must come.
-        patience: How many boxes are looked at, at least, before that is enough.
-        limit: How many boxes are looked at before it gives up.
-        is_first_enough: Whether any value above the floor ends the search.
+    `judge`: bounds it on boxes; `value`: returns it at a point, None if it has none.
     """
+    floor, tolerance, patience, limit, is_first_enough = goal
     best, point = floor, None
     most = min(_MOST_BOXES, _MOST_PARTS // len(space.lines))
     if space.root_count > most:
@@ -111,9 +108,10 @@ def search(
         for row in np.argsort(-verdict.value[:new], kind="stable")[:_TRIES].tolist():
             if not verdict.value[row] >= float(best):
                 break
-            result = exact(space.point(boxes[row]))
-            if result is not None and result[0] > best:
-                best, point = result
+            whole = filled(space.base, space.point(boxes[row]))
+            result = value(whole) if is_within(space.base, whole) else None
+            if result is not None and result > best:
+                best, point = result, whole
         threshold = outwards(best)[0]
         kept = verdict.bound > threshold
         boxes, verdict = boxes[kept], BoxVerdict(*(one[kept] for one in verdict))
@@ -263,17 +261,9 @@ class _Lead:
         self, clock: Clock, tolerance: float, *, is_first_enough: bool = False
     ) -> SearchResult:
         def run(limit: float) -> SearchResult:
-            return search(
-                self.space,
-                self._judge,
-                self._exact,
-                clock,
-                floor=Fraction(0),
-                tolerance=tolerance,
-                patience=_PATIENCE if is_first_enough else 0,
-                limit=limit,
-                is_first_enough=is_first_enough,
-            )
+            patience = _PATIENCE if is_first_enough else 0
+            goal = SearchGoal(ZERO, tolerance, patience, limit, is_first_enough)
+            return search(self.space, self._judge, self.lead, goal, clock)
 
         first = run(_EASY)
         if first.why != TOO_MANY:
@@ -313,10 +303,6 @@ class _Lead:
 
     def lead(self, point: Mapping[str, Fraction]) -> Fraction:
         return lead_at(self.base, point, (self.rule,), self.rivals)
-
-    def _exact(self, point: Point) -> tuple[Fraction, Point] | None:
-        whole = filled(self.base, point)
-        return (self.lead(whole), whole) if is_within(self.base, whole) else None
 
     def claims(self) -> tuple[Claim, ...]:
         return (Claim("beats", rules=(self.rule,), rivals=self.rivals),)
@@ -360,7 +346,9 @@ def least_cover_by_boxes(
         A bracket; its point is where the strongest rule is as weak as `high`.
     """
     cover = _Cover(rules, domain)
-    return cover.bracket(cover.search(clock or Clock(), Fraction(-1), tolerance))
+    return cover.bracket(
+        cover.search(clock or Clock(), SearchGoal(Fraction(-1), tolerance))
+    )
 
 
 def below_by_boxes(
@@ -373,7 +361,8 @@ def below_by_boxes(
     level = Fraction(epsilon)
     cover = _Cover(rules, domain, is_zero_wanted=not level)
     floor = -level if level else Fraction(-1, 2**1100)
-    result = cover.search(clock or Clock(), floor, 0.0, is_first_enough=True)
+    goal = SearchGoal(floor, 0.0, is_first_enough=True)
+    result = cover.search(clock or Clock(), goal)
     if result.point is not None:
         return cover.witness(result.point, level)
     if not result.why:
@@ -392,23 +381,8 @@ class _Cover:
         self.space = Space(self.base, range(len(rules.rules)))
         self.is_zero_wanted = is_zero_wanted
 
-    def search(
-        self,
-        clock: Clock,
-        floor: Fraction,
-        tolerance: float,
-        *,
-        is_first_enough: bool = False,
-    ) -> SearchResult:
-        return search(
-            self.space,
-            self._judge,
-            self._exact,
-            clock,
-            floor=floor,
-            tolerance=tolerance,
-            is_first_enough=is_first_enough,
-        )
+    def search(self, clock: Clock, goal: SearchGoal) -> SearchResult:
+        return search(self.space, self._judge, self._value, goal, clock)
 
     def _judge(self, reach: BoxReach, boxes: IntArray) -> BoxVerdict:
         rows = np.arange(len(boxes))
@@ -420,12 +394,9 @@ class _Cover:
     def strongest(self, point: Mapping[str, Fraction]) -> Fraction:
         return max(strengths_at(self.base, point))
 
-    def _exact(self, point: Point) -> tuple[Fraction, Point] | None:
-        whole = filled(self.base, point)
-        if not is_within(self.base, whole):
-            return None
-        result = self.strongest(whole)
-        return None if self.is_zero_wanted and result else (-result, whole)
+    def _value(self, point: Point) -> Fraction | None:
+        result = self.strongest(point)
+        return None if self.is_zero_wanted and result else -result
 
     def witness(self, point: Point, level: Fraction) -> Witness:
         def holds(near: Point) -> bool:
@@ -476,15 +447,12 @@ def highest_by_boxes(
         worth = np.stack([width.sum(axis=1) for width in reach.widths], axis=1)
         return BoxVerdict(bound, reach.table.at.min(axis=1), worth)
 
-    def exact(point: Point) -> tuple[Fraction, Point] | None:
-        whole = filled(base, point)
-        strengths = strengths_at(base, whole)
-        both = min(strengths[one - 1], strengths[other - 1])
-        return (both, whole) if is_within(base, whole) else None
+    def value(point: Point) -> Fraction:
+        strengths = strengths_at(base, point)
+        return min(strengths[one - 1], strengths[other - 1])
 
-    result = search(
-        space, judge, exact, clock or Clock(), floor=Fraction(0), tolerance=tolerance
-    )
+    goal = SearchGoal(ZERO, tolerance)
+    result = search(space, judge, value, goal, clock or Clock())
     reached = Claim("reaches", rules=(one, other), level=str(result.value))
     return Bracket(
         f"the highest level that rules {one} and {other} both reach",

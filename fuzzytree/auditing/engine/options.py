@@ -170,11 +170,14 @@ class Duel(msgspec.Struct, frozen=True, eq=False, dict=True):
         base: Where.
         ours: The positions of the rules; without any, a rule without clauses.
         rivals: The positions of the rivals.
+        is_inner: Whether lower ends are left out: these are surfaces, but where an axis
+            is one value.
     """
 
     base: Arrangement
     ours: tuple[int, ...]
     rivals: tuple[int, ...]
+    is_inner: bool = False
 
     @property
     def full(self) -> int:
@@ -192,29 +195,15 @@ class Duel(msgspec.Struct, frozen=True, eq=False, dict=True):
         return tuple(map(_undominated, self.all_options))
 
     @functools.cached_property
-    def all_inner(self) -> tuple[AxisOptions, ...]:
-        """All but lower ends: these are surfaces, but where an axis is one value."""
-        return tuple(map(_inner, self.all_options))
-
-    @functools.cached_property
-    def inner_options(self) -> tuple[AxisOptions, ...]:
-        """Of these the ones that no other one makes useless."""
-        return tuple(map(_undominated, self.all_inner))
-
-    @functools.cached_property
     def all_options(self) -> tuple[AxisOptions, ...]:
         """The options on each axis."""
-        return tuple(_options(self, grid) for grid in self.base.grids)
+        every = (_options(self, grid) for grid in self.base.grids)
+        return tuple(map(_inner, every) if self.is_inner else every)
 
     @functools.cached_property
     def events(self) -> tuple[int, ...]:
         """The bands at which options come or go, the highest first."""
         return _events(self.options)
-
-    @functools.cached_property
-    def inner_events(self) -> tuple[int, ...]:
-        """The same without lower ends."""
-        return _events(self.inner_options)
 
     @functools.cached_property
     def all_events(self) -> tuple[int, ...]:

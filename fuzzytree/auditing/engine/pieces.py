@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple, assert_never
@@ -158,30 +159,17 @@ def _points(points: Points) -> Iterator[PolynomialPiece]:
     yield _flat(values[-1], None, degrees[-1])
 
 
-def piece_at(parts: tuple[PolynomialPiece, ...], x: Fraction) -> PolynomialPiece:
-    """Return the piece that x belongs to."""
-    low, high = 0, len(parts) - 1
-    while low < high:
-        middle = (low + high) // 2
-        end = parts[middle].high
-        if end is None or x <= end:
-            high = middle
-        else:
-            low = middle + 1
-    return parts[low]
+def piece_at(
+    parts: tuple[PolynomialPiece, ...], x: Fraction, *, is_after: bool = False
+) -> PolynomialPiece:
+    """Return the piece that x belongs to, or the one just behind x."""
+    find = bisect_right if is_after else bisect_left
+    return parts[find(parts, x, 0, len(parts) - 1, key=_end)]
 
 
-def degree_after(parts: tuple[PolynomialPiece, ...], x: Fraction) -> Fraction:
-    """Return the limit of the degree from the right: it differs from it at a step."""
-    low, high = 0, len(parts) - 1
-    while low < high:
-        middle = (low + high) // 2
-        end = parts[middle].high
-        if end is None or x < end:
-            high = middle
-        else:
-            low = middle + 1
-    return parts[low].degree(x)
+def _end(piece: PolynomialPiece) -> Fraction:
+    assert piece.high is not None  # only the last one has no end
+    return piece.high
 
 
 # --- the curves of one axis
@@ -206,7 +194,7 @@ class RuleCurve(NamedTuple):
 
     def degree_after(self, x: Fraction) -> Fraction:
         """Return the exact limit of the degree from the right."""
-        result = degree_after(pieces(self.shape), x)
+        result = piece_at(pieces(self.shape), x, is_after=True).degree(x)
         return 1 - result if self.is_complement else result
 
     def pieces(self) -> tuple[tuple[PolynomialPiece, Polynomial], ...]:

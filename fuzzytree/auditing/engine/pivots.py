@@ -264,7 +264,7 @@ def levels_of(duel: Duel, least: int, most: int, *, is_each: bool) -> list[int]:
     """
     if is_each:
         return [*range(least, most)] or [least]
-    inner = {band for band in duel.inner_events if least < band < most}
+    inner = {band for band in duel.events if least < band < most}
     return sorted({least, *inner})
 
 
@@ -345,7 +345,7 @@ def flat_family(
 
     `is_within`: of a band that is not sharp, what is possible somewhere in it.
     """
-    options, grid = duel.all_inner[axis], duel.base.grids[axis]
+    options, grid = duel.all_options[axis], duel.base.grids[axis]
     masks: list[int] = []
     limit = band + 1 if is_within else band  # below which rivals are left
     least = -np.iinfo(np.int64).max if is_within else START
@@ -381,7 +381,7 @@ def part_at(
 
     Where the level is a band, `flat`, rivals may also stay in it.
     """
-    options, grid = duel.all_inner[axis], duel.base.grids[axis]
+    options, grid = duel.all_options[axis], duel.base.grids[axis]
     every = [n for n in range(len(duel.rivals)) if mask >> n & 1]
     order = np.argsort(-options.top, kind="stable")
     for number in order[options.where[order] >= START].tolist():

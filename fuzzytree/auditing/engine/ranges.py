@@ -26,7 +26,7 @@ from fuzzytree.numerics import (
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
+    from fuzzytree.model import FloatArray
 
 _ZERO = Fraction(0)
 
@@ -36,13 +36,10 @@ _Bend = tuple[float, float, float, float]
 class Bends(NamedTuple):
     """The places where a shape may stop rising or falling, from left to right.
 
-    A cell `a < x <= b` holds a place if `low < b` and `high > a`.
+    A cell `a < x <= b` holds a place if its first end is below b and its last above a.
     """
 
-    low: FloatArray  # where each place begins
-    high: FloatArray  # where it ends
-    depths: FloatArray  # above minus the degree, for 2**k neighbours: shape (k, places)
-    heights: FloatArray  # above the degree, the same
+    places: tuple[_Bend, ...]  # the ends of each, and the least and the largest degree
     steps: FloatArray  # where the degree jumps
     after: Enclosure  # the degrees just behind each step
 
@@ -63,16 +60,8 @@ def bends(shape: Shape) -> Bends:
         if here != after:
             jumps.append((at[0], *_pair(after, after)))
             result.append((at[0], np.nextafter(at[1], np.inf), *_pair(after, after)))
-    low, high, least, most = np.array(sorted(result)).reshape(-1, 4).T
     steps, after_low, after_high = np.array(jumps).reshape(-1, 3).T
-    return Bends(
-        np.minimum.accumulate(low[::-1])[::-1],
-        np.maximum.accumulate(high),
-        _windows(-least),
-        _windows(most),
-        steps,
-        Enclosure(after_low, after_high),
-    )
+    return Bends(tuple(sorted(result)), steps, Enclosure(after_low, after_high))
 
 
 def _turns(piece: PolynomialPiece) -> Iterator[_Bend]:
@@ -90,28 +79,6 @@ def _turns(piece: PolynomialPiece) -> Iterator[_Bend]:
 
 def _pair(low: Fraction, high: Fraction) -> tuple[float, float]:
     return outwards(low)[0], outwards(high)[1]
-
-
-def _windows(values: FloatArray) -> FloatArray:
-    """Return the largest of 2**k neighbours from each place on, for each k."""
-    rows = [values]
-    width = 1
-    while 2 * width <= len(values):
-        row = rows[-1].copy()
-        row[:-width] = np.maximum(rows[-1][:-width], rows[-1][width:])
-        rows.append(row)
-        width *= 2
-    return np.array(rows)
-
-
-def _largest(windows: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
-    """Return the largest of places first to last - 1; minus infinity of none."""
-    count = last - first
-    level = np.frexp(np.maximum(count, 1))[1] - 1
-    start = np.minimum(first, windows.shape[1] - 1)
-    end = np.maximum(last - (1 << level), 0)
-    result = np.maximum(windows[level, start], windows[level, end])
-    return np.where(count > 0, result, -np.inf)
 
 
 def shape_ranges(shape: Shape, edges: FloatArray) -> tuple[Enclosure, Enclosure]:
@@ -140,11 +107,10 @@ def shape_ranges(shape: Shape, edges: FloatArray) -> tuple[Enclosure, Enclosure]
         low = np.where(is_behind, turning.after.low[place], low)
         high = np.where(is_behind, turning.after.high[place], high)
     low, high = np.minimum(low, at.low[..., 1:]), np.maximum(high, at.high[..., 1:])
-    if len(turning.low):
-        first = np.searchsorted(turning.high, a, side="right")
-        last = np.searchsorted(turning.low, b, side="left")
-        low = np.minimum(low, -_largest(turning.depths, first, last))
-        high = np.maximum(high, _largest(turning.heights, first, last))
+    for first, last, least, most in turning.places:
+        is_inside = (first < b) & (last > a)
+        low = np.where(is_inside, np.minimum(low, least), low)
+        high = np.where(is_inside, np.maximum(high, most), high)
     return at, Enclosure(low, high)
 
 

@@ -133,7 +133,7 @@ class VariableUse:
         turns = [bends(shape) for shape in dict.fromkeys(self.shapes.values())]
         nothing = np.empty(0)
         self.steps = np.unique(np.concatenate([nothing, *(t.steps for t in turns)]))
-        self.marks = np.unique(np.concatenate([nothing, *(t.low for t in turns)]))
+        self.marks = np.unique([place[0] for t in turns for place in t.places])
 
     def table(self, edges: FloatArray, middle: FloatArray) -> BoundTable:
         """Return what is known on intervals.
@@ -413,7 +413,7 @@ class Space:
     ) -> None:
         rules, domain = base.rules, base.domain
         self.is_product = rules.semantics.conjunction == "product"
-        self.domain = domain
+        self.base = base
         used = {c.variable for n in chosen for c in rules.rules[n].when}
         mixed = [
             v

@@ -112,7 +112,7 @@ class _Search:
     def __init__(self, base: Arrangement, question: TieQuestion, clock: Clock) -> None:
         self.base, self.question, self.clock = base, question, clock
         ours, rivals = ([n - 1 for n in of] for of in (question.ours, question.rivals))
-        self.duel = Duel(base, tuple(ours), tuple(rivals))
+        self.duel = Duel(base, tuple(ours), tuple(rivals), is_inner=True)
         self.joined = sorted({axis for group in coupled(base) for axis in group})
         self.count = at_most(_MOST_CHOICES, clock)
 
@@ -183,7 +183,7 @@ class _Search:
             axis: flat_family(duel, self.question, axis, band, is_within=is_within)
             if is_flat
             else options.at_gap(band)
-            for axis, options in enumerate(duel.inner_options)
+            for axis, options in enumerate(duel.options)
             if axis not in fixed
         }
 
@@ -265,7 +265,7 @@ class _Search:
     ) -> Iterator[Part]:
         """Yield where ours reach a level on an axis, with the rivals left below."""
         duel = self.duel
-        options = duel.all_inner[axis]
+        options = duel.all_options[axis]
         if not is_flat:
             yield from parts_of(duel, options, axis, band, levels, is_outer=is_outer)
             return

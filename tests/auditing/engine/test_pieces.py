@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.pieces import degree_after, piece_at, pieces
+from fuzzytree.auditing.engine.pieces import piece_at, pieces
 from fuzzytree.model.rulebase import Band, Flank, Points, RuleBase
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -38,7 +38,7 @@ def test_a_step_has_two_degrees() -> None:
     laid = pieces(Points((1.0, 2.0, 2.0, 3.0), (0.0, 1.0, 0.25, 0.0)))
     two = Fraction(2)
     assert piece_at(laid, two).degree(two) == 1
-    assert degree_after(laid, two) == Fraction(1, 4)
+    assert piece_at(laid, two, is_after=True).degree(two) == Fraction(1, 4)
 
 
 @pytest.mark.parametrize(("start", "end"), [(1.0, 4.0), (-1.0, 4.0), (3.0, -2.0)])
