@@ -11,25 +11,25 @@ Terms
 
 Curves, in fractions
     - `polynomials`, `pieces`: roots, isolated in integers; membership functions as
-      polynomials on intervals
-    - `axes`, `levels`: an axis cut into cells; irrational levels that coincide
-    - `measures`, `ranges`: heights, areas, overlaps; bounds of degrees, by doubles
+      polynomials on intervals, and bounds of degrees by doubles
+    - `axes`: an axis cut into cells; irrational levels that coincide
+    - `measures`: heights, areas, overlaps
 
 Points
     - `linear`, `witnesses`: linear inequalities; from cells to points of the inputs
     - `probes`: random points and local search, by doubles
 
 Rules under the minimum: levels of cells
-    - `arrangement`, `options`: the axes on a box; the contribution of each axis
-    - `pivots`: curves at which rules can tie
+    - `arrangement`: the axes on a box
+    - `duels`: the contribution of each axis; is a rule stronger
+    - `pivots`, `ties`: curves at which rules can tie; are rules equally strong
 
 Rules under the product, and any other: boxes
     - `space`, `bounding`: boxes of inputs; branch and bound
     - `factors`, `product_ties`: degrees as products of polynomials; ties
 
 Questions, for each AND operator
-    - `duels`, `ties`, `cover`: is a rule stronger; equally strong; does any rule fire
-    - `dominance`, `joint_maximum`: two rules compared; the level that both reach
+    - `cover`, `dominance`: does any rule fire; two rules compared
     - `decisions`, `nearest`, `regions`: does one class decide a box; the distance to
       another decision; the crisp regions of a tree
     - `contenders`, `equivalence`: do two models predict the same class everywhere

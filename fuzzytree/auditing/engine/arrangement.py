@@ -18,9 +18,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.axes import Cells, cut
+from fuzzytree.auditing.engine.axes import (
+    AlgebraicLevel,
+    Cells,
+    cut,
+    level_at,
+    separate_levels,
+)
 from fuzzytree.auditing.engine.domain import Domain, span, variable_value
-from fuzzytree.auditing.engine.levels import AlgebraicLevel, level_at, separate_levels
 from fuzzytree.auditing.engine.linear import ZERO
 from fuzzytree.auditing.engine.pieces import ALWAYS, ChangePoint, RuleCurve, places
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates

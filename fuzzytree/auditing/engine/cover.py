@@ -11,13 +11,14 @@ from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, strengt
 from fuzzytree.auditing.engine.bounding import below_by_boxes, least_cover_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import Point
-from fuzzytree.auditing.engine.duels import LevelQuestion, search_level
-from fuzzytree.auditing.engine.options import (
+from fuzzytree.auditing.engine.duels import (
     Duel,
+    LevelQuestion,
     Part,
     at_most,
     cover,
     maximal,
+    search_level,
     selections,
 )
 from fuzzytree.auditing.engine.pieces import ZERO

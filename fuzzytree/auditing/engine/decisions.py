@@ -23,8 +23,8 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import uncovered
 from fuzzytree.auditing.engine.domain import Domain, Point
 from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.pieces import clause_ranges
 from fuzzytree.auditing.engine.probes import drawn_in, ends_of, near_strengths
-from fuzzytree.auditing.engine.ranges import clause_ranges
 from fuzzytree.auditing.engine.states import (
     Claim,
     Proved,

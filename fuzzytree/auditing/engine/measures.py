@@ -22,6 +22,7 @@ from fuzzytree.auditing.engine.pieces import (
     piece_at,
     pieces,
     places,
+    shape_ranges,
 )
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
@@ -32,7 +33,6 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
     values_near,
 )
-from fuzzytree.auditing.engine.ranges import shape_ranges
 from fuzzytree.model import Shape, checkpoint
 
 if TYPE_CHECKING:

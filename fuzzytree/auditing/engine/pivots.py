@@ -19,9 +19,9 @@ import numpy as np
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, strengths_at
 from fuzzytree.auditing.engine.domain import Point
+from fuzzytree.auditing.engine.duels import Duel, maximal, weakest
 from fuzzytree.auditing.engine.linear import simple
 from fuzzytree.auditing.engine.measures import local_polynomial
-from fuzzytree.auditing.engine.options import Duel, maximal, weakest
 from fuzzytree.auditing.engine.states import Bracket, Claim, Witness, coordinates
 from fuzzytree.auditing.engine.witnesses import (
     START,

@@ -22,7 +22,7 @@ import numpy as np
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.linear import feasible, row_of
-from fuzzytree.auditing.engine.ranges import bends, clause_ranges
+from fuzzytree.auditing.engine.pieces import bends, clause_ranges
 from fuzzytree.model import Clause, RuleBase, Shape, Variable, checkpoint, shapes_of
 from fuzzytree.numerics import LEAST, Enclosure, U, outwards
 

@@ -18,7 +18,7 @@ from typing import Final
 from fuzzytree.auditing.engine.arrangement import Arrangement, TooManyCellsError
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
 from fuzzytree.auditing.engine.domain import variable_value
-from fuzzytree.auditing.engine.options import (
+from fuzzytree.auditing.engine.duels import (
     Duel,
     Levels,
     Part,

@@ -25,14 +25,15 @@ from fuzzytree.auditing.engine.arrangement import Arrangement, arrange
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
 from fuzzytree.auditing.engine.domain import Domain, span
-from fuzzytree.auditing.engine.dominance import Dominance, RulePairs
-from fuzzytree.auditing.engine.duels import wins
-from fuzzytree.auditing.engine.factors import RuleDistance, rule_distance
-from fuzzytree.auditing.engine.joint_maximum import (
+from fuzzytree.auditing.engine.dominance import (
+    Dominance,
     JointMaximum,
+    RulePairs,
     joint_bounds,
     joint_maximum,
 )
+from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.factors import RuleDistance, rule_distance
 from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.dominance import Dominance
+from fuzzytree.auditing.engine.dominance import Dominance, JointMaximum
 from fuzzytree.auditing.engine.factors import RuleDistance
-from fuzzytree.auditing.engine.joint_maximum import JointMaximum
 from fuzzytree.auditing.engine.states import (
     Declined,
     Proved,

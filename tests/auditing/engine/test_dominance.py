@@ -10,10 +10,9 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.dominance import RulePairs
+from fuzzytree.auditing.engine.dominance import RulePairs, joint_bounds, joint_maximum
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.factors import largest_ratio, quotient, rule_distance
-from fuzzytree.auditing.engine.joint_maximum import joint_bounds, joint_maximum
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.model.rulebase import (

@@ -7,11 +7,11 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange
+from fuzzytree.auditing.engine.axes import AlgebraicLevel, equal_levels, relation
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.dominance import RulePairs
 from fuzzytree.auditing.engine.duels import LevelQuestion, search_level
-from fuzzytree.auditing.engine.levels import AlgebraicLevel, equal_levels, relation
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.polynomials import roots, value_at
 from fuzzytree.auditing.engine.states import Proved, Witness

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.ranges import clause_ranges, shape_ranges
+from fuzzytree.auditing.engine.pieces import clause_ranges, shape_ranges
 from fuzzytree.model.rulebase import LR, Band, Clause, Flank, Points, Shape, Side
 from fuzzytree.numerics.exact import exact_degree
 from tests.auditing.engine.bases import random_shape

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import prediction_at
-from fuzzytree.auditing.engine.joint_maximum import JointMaximum
+from fuzzytree.auditing.engine.dominance import JointMaximum
 from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import (
     Bracket,
