@@ -199,14 +199,6 @@ class Case:
         """Return the class of a rule."""
         return self.rules.rules[number - 1].then
 
-    @property
-    def default(self) -> str:
-        """How sentences call the answer where no rule fires."""
-        if self.view is not None:
-            return "what the outputs have by default"
-        label = self.rules.semantics.uncovered
-        return "no class" if label is None else repr(label)
-
     def placed(self, answer: Answer) -> list[Place]:
         """Return where the rules and terms of an answer stand, in that order."""
         owners = self.view.owners if self.view else ()

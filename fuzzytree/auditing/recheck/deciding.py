@@ -23,7 +23,7 @@ from fuzzytree.auditing.recheck.cases import (
 )
 from fuzzytree.auditing.recheck.cells import FINE
 from fuzzytree.auditing.recheck.claims import point_of
-from fuzzytree.auditing.recheck.forms import clause_text
+from fuzzytree.auditing.recheck.forms import clause_text, clauses_of
 from fuzzytree.auditing.recheck.grid import RuleBits
 from fuzzytree.auditing.recheck.meaning import Point, answer_of, leaf_of, strengths
 from fuzzytree.auditing.recheck.model_records import Clause, Rules, Tree, Variable
@@ -263,11 +263,9 @@ def _union(one: RuleBits, other: RuleBits) -> RuleBits:
 
 def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:
     """Return a rule's clauses without the one that an answer is about."""
-    when = case.rules.rules[answer.rules[0] - 1].when
-    used = {c: tuple(Label(c.variable, term) for term in c.terms) for c in when}
-    result = {clause for clause, labels in used.items() if labels == answer.terms}
+    when, result = case.rules.rules[answer.rules[0] - 1].when, clauses_of(case, answer)
     if len(result) > 1:  # one of them is negated: only the subject says which
-        result = {c for c in result if answer.subject.endswith(repr(clause_text(c)))}
+        result = [c for c in result if answer.subject.endswith(repr(clause_text(c)))]
     require(len(result) == 1, "it is of no clause of the rule")
     place = when.index(result.pop())
     return (*when[:place], *when[place + 1 :])

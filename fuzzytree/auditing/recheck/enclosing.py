@@ -6,9 +6,10 @@ Both ends are rounded outwards, to 2**-160 or 60 decimal digits, so they are cer
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 from fuzzytree.auditing.recheck.model_records import Curve, Scaled, Shape
@@ -239,6 +240,9 @@ NORMS: dict[str, Norm] = {
 """What joins two degrees; each rises with both."""
 
 
-def joined(norm: str, one: Between, other: Between) -> Between:
-    """Return what a norm makes of two degrees, each between two numbers."""
-    return NORMS[norm](one[0], other[0]), NORMS[norm](one[1], other[1])
+def joined(norm: str | None, degrees: Sequence[Between]) -> Between:
+    """Return what a norm makes of degrees, each between two numbers; 1 of none."""
+    lows, highs = zip(*degrees, strict=True) if degrees else ((ONE,), (ONE,))
+    if len(degrees) < 2:
+        return lows[0], highs[0]
+    return reduce(NORMS[norm or ""], lows), reduce(NORMS[norm or ""], highs)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import functools
 import re
 import string
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from fuzzytree.auditing.recheck.audit_records import Answer, Bracket, Declined, Sampled
+from fuzzytree.auditing.recheck.audit_records import Answer, Declined, Sampled
 from fuzzytree.auditing.recheck.cases import Case
 from fuzzytree.auditing.recheck.model_records import Clause
 
@@ -69,14 +69,10 @@ FT104 P +warning | {1} | rules that subsume it
 FT105 P +error | {1} | rules that mask it
   {1} is never answered: wherever it fires, {2} of class {then2} is <at least as strong
   and stands before it|stronger>
-FT104 P -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
-  no [other ]rule is subsumed, among {pairs:n pair} of one {noun}
-FT104 D -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
-  no [other ]rule is shown to be subsumed, among {pairs:n pair} of one {noun}: {reason}
-FT105 P -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
-  no [other ]rule is masked, among {pairs:n pair} of two classes
-FT105 D -info | pairs of rules | pairs; pairs too near to compare; rules that never fire
-  no [other ]rule is shown to be masked, among {pairs:n pair} of two classes: {reason}
+FT104 PD -info | pairs of rules | pairs; * too near to compare; rules that never fire
+  no [other ]rule is {shown to be}subsumed, among {pairs:n pair} of one {noun}{why}
+FT105 PD -info | pairs of rules | pairs; * too near to compare; rules that never fire
+  no [other ]rule is {shown to be}masked, among {pairs:n pair} of two classes{why}
 FT106 P +warning | {1} and {2} | largest distance; place of it
   {1} and {2} have [nearly ]the same antecedent and the same {noun} {then1}[; degrees
   differ by at most {largest distance:s}, at {...} = {place of it:s}]
@@ -86,11 +82,8 @@ FT106 P +error | {1} and {2} | largest distance; place of it
 FT106 P +info | {1} and {2} | largest distance; place of it
   {1} and {2} have [nearly ]the same antecedent and different conclusions: {then1} and
   {then2}[; degrees differ by at most {largest distance:s}, at {...} = {place of it:s}]
-FT106 P -info | pairs of rules | pairs
-  no [other ]two rules have nearly the same antecedent, among {pairs:n pair}
-FT106 D -info | pairs of rules | pairs
-  no [other ]two rules are shown to have nearly the same antecedent, among
-  {pairs:n pair}: {reason}
+FT106 PD -info | pairs of rules | pairs
+  no [other ]two rules {have}nearly the same antecedent, among {pairs:n pair}{why}
 FT107 W -info | {1}, {clause}
   {1} needs {clause}: without it {...} becomes {then1} at some input
 FT107 P +info | {1}, {clause}
@@ -232,7 +225,7 @@ class Form(NamedTuple):
 
     code: str
     states: str
-    grades: tuple[str, ...]
+    grade: str
     subject: str
     measures: str
     sentence: str
@@ -245,57 +238,42 @@ def forms() -> tuple[Form, ...]:
     for entry in re.split(r"\n(?=FT)", TABLE.strip()):
         head, *lines = entry.split("\n")
         start, subject, *measures = head.split(" | ")
-        code, states, grades = start.split(" ")
-        names = "|".join(_escaped(name) for name in ";".join(measures).split(";"))
+        names = re.escape("; ".join(measures)).replace(r";\ ", "|").replace(r"\*", ".*")
         sentence = " ".join(line.strip() for line in lines)
-        whole = Form(code, states, tuple(grades.split("/")), subject, names, sentence)
-        result.append(whole)
+        code, states, grade = start.split(" ")
+        result.append(Form(code, states, grade, subject, names, sentence))
     return tuple(result)
-
-
-def _escaped(measure: str) -> str:
-    return re.escape(measure.strip()).replace(r"\*", ".*")
 
 
 _ANY = {"_": r"[-+0-9.e,]+", "...": r".*"}
 _SIGNS = {"[": "(?:", "]": ")?", "<": "(?:", ">": ")", "|": "|"}
+Facts = Mapping[str, float | str]
 
 
-class _Shown:
-    """A fact, as a sentence shows it."""
-
-    def __init__(self, value: float | str) -> None:
-        self.value = value
-
-    def shown(self, spec: str) -> str:
-        """Return the fact in a format."""
-        if isinstance(self.value, str):
-            return self.value
-        if spec == "s":
-            return f"{self.value:.4g}"
-        if spec == "p":
-            return f"{100.0 * self.value:.3g} %"
-        if spec[:2] == "n ":
-            noun = spec[2:] if self.value == 1 else f"{spec[2:]}s"
-            return f"{self.value:.0f} {noun}"
-        return f"{self.value:.0f}" if spec == "d" else format(self.value, spec)
+def _shown(value: float | str, spec: str) -> str:
+    """Return a fact as a sentence shows it."""
+    if isinstance(value, str):
+        return value
+    if spec == "s":
+        return f"{value:.4g}"
+    if spec == "p":
+        return f"{100.0 * value:.3g} %"
+    if spec[:2] == "n ":
+        return f"{value:.0f} {spec[2:]}{'s' * (value != 1)}"
+    return f"{value:.0f}" if spec == "d" else format(value, spec)
 
 
-def _pattern(text: str, facts: Mapping[str, _Shown] | None) -> str:
-    """Return a form as a pattern: with the facts, or with anything in their places."""
+def _matches(text: str, form: str, facts: Facts | None) -> bool:
+    """Return whether a text has a form: with the facts, or with any in their places."""
     result = ""
-    for literal, name, spec, _ in string.Formatter().parse(text):
-        for sign in literal:
-            result += _SIGNS.get(sign, re.escape(sign))
-        if name is None:
-            continue
-        if name in _ANY or facts is None:
-            result += _ANY.get(name, r".+")
-        elif name in facts:
-            result += re.escape(facts[name].shown(spec or ""))
-        else:
-            result += "(?!)"  # no such fact: it must be missing
-    return result
+    for literal, name, spec, _ in string.Formatter().parse(form):
+        result += "".join(_SIGNS.get(sign, re.escape(sign)) for sign in literal)
+        if name is not None and (name in _ANY or facts is None):
+            result += _ANY.get(name, r".*")
+        elif name is not None and facts is not None:  # without it, it must be missing
+            known = name in facts
+            result += re.escape(_shown(facts[name], spec or "")) if known else "(?!)"
+    return re.fullmatch(result, text, re.DOTALL) is not None
 
 
 def clause_text(clause: Clause) -> str:
@@ -304,24 +282,23 @@ def clause_text(clause: Clause) -> str:
     return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
 
 
-def _facts(case: Case, answer: Answer) -> dict[str, _Shown]:
+def _facts(case: Case, answer: Answer) -> Facts:
     """Return what a sentence about an answer can show."""
-    settings, state = case.audit.settings, answer.state
+    state, count, is_view = answer.state, len(case.numbers), case.view is not None
+    dead = sum(one.is_finding for one in case.coded("FT101") if one.rules)
+    uncovered = case.rules.semantics.uncovered
+    default = "no class" if uncovered is None else repr(uncovered)
     result: dict[str, float | str] = {
-        "epsilon": settings.epsilon,
-        "margin": settings.margin,
-        "lead": settings.lead,
-        "level": settings.level,
-        "overlap": settings.overlap,
+        **case.audit.settings._asdict(),
         "subject": answer.subject,
         "rows of the audit": case.audit.rows,
-        "rules": len(case.numbers),
-        "live": len(case.numbers)
-        - sum(one.is_finding for one in case.coded("FT101") if one.rules),
-        "noun": "class" if case.view is None else "conclusion",
-        "nouns": "classes" if case.view is None else "conclusions",
-        "default": case.default,
-        "gap": "warning" if case.rules.semantics.uncovered is None else "info",
+        "rules": count,
+        "live": count - dead,
+        "noun": "conclusion" if is_view else "class",
+        "nouns": "conclusions" if is_view else "classes",
+        "default": "what the outputs have by default" if is_view else default,
+        "gap": "warning" if uncovered is None else "info",
+        **{"shown to be": "", "have": "have ", "why": ""},
     }
     for place, number in enumerate(answer.rules[:2], 1):
         result |= {str(place): case.name(number), f"n{place}": number}
@@ -331,55 +308,45 @@ def _facts(case: Case, answer: Answer) -> dict[str, _Shown]:
     if len(answer.terms) == 2:
         one, other = answer.terms
         result["terms"] = f"terms {one.term!r} and {other.term!r} of {one.variable!r}"
-    for measure in answer.measures:
-        result[measure.name] = measure.value
+    for number in answer.rules[:1]:
+        for text in map(clause_text, clauses_of(case, answer)):
+            if answer.subject == f"{case.name(number)}, {text!r}":
+                result["clause"] = repr(text)
+    result |= {measure.name: measure.value for measure in answer.measures}
     if isinstance(state, Declined):
-        result["reason"] = state.reason
+        result |= {"reason": state.reason, "why": f": {state.reason}"}
+        result |= {"shown to be": "shown to be ", "have": "are shown to have "}
     if isinstance(state, Sampled):
         result |= {"hits": state.hits, "rows": state.rows}
         won = result.get("rows won", result.get("rows fired"))
         result |= {"seen": "+" if state.hits else "-", "idle": "-" if won else "+"}
-    if isinstance(state, Bracket):
-        result |= {"low": state.low, "high": state.high}
-    return {name: _Shown(value) for name, value in result.items()}
+    return result
 
 
-def _fits(form: Form, answer: Answer, facts: Mapping[str, _Shown]) -> bool:
-    """Return whether everything else of an answer is as its sentence says."""
-    grade = f"{'+' if answer.is_finding else '-'}{answer.severity}"
-    subject = _pattern(form.subject, facts)
-    return (
-        type(answer.state).__name__[0] in form.states
-        and any(re.fullmatch(_pattern(one, facts), grade) for one in form.grades)
-        and re.fullmatch(subject, answer.subject) is not None
-        and all(re.fullmatch(form.measures, one.name) for one in answer.measures)
-    )
-
-
-def _clauses(case: Case, answer: Answer) -> Iterator[str]:
-    """Yield the clauses that a sentence can be about."""
-    for number in answer.rules[:1]:
-        for clause in case.rules.rules[number - 1].when:
-            if tuple((clause.variable, term) for term in clause.terms) == answer.terms:
-                yield repr(clause_text(clause))
+def clauses_of(case: Case, answer: Answer) -> list[Clause]:
+    """Return the clauses of a rule that have the terms of an answer."""
+    when = case.rules.rules[answer.rules[0] - 1].when
+    of = {c: tuple((c.variable, term) for term in c.terms) for c in when}
+    return [clause for clause, labels in of.items() if labels == answer.terms]
 
 
 def matches_facts(case: Case, answer: Answer) -> bool | None:
     """Return whether a sentence says what stands beside it; None if nobody can tell."""
-    facts = _facts(case, answer)
-    ways = [facts]
-    if answer.code == "FT107" and answer.terms:
-        ways = [facts | {"clause": _Shown(text)} for text in _clauses(case, answer)]
-    is_known = False
-    for form in forms():
-        if form.code not in (answer.code, answer.code[:3]):
-            continue
-        if not re.fullmatch(_pattern(form.sentence, None), answer.sentence, re.DOTALL):
-            continue
-        is_known = True
-        for known in ways:
-            strict = _pattern(form.sentence, known)
-            is_same = re.fullmatch(strict, answer.sentence, re.DOTALL)
-            if is_same and _fits(form, answer, known):
-                return True
-    return False if is_known else None
+    facts, text = _facts(case, answer), answer.sentence
+    grade = f"{'+' if answer.is_finding else '-'}{answer.severity}"
+    known = [
+        form
+        for form in forms()
+        if form.code in (answer.code, answer.code[:3])
+        and _matches(text, form.sentence, None)
+    ]
+    if not known:
+        return None
+    return any(
+        type(answer.state).__name__[0] in form.states
+        and _matches(text, form.sentence, facts)
+        and _matches(grade, form.grade, facts)
+        and _matches(answer.subject, form.subject, facts)
+        and all(re.fullmatch(form.measures, one.name) for one in answer.measures)
+        for form in known
+    )

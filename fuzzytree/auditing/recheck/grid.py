@@ -8,7 +8,6 @@ function, and a constant one has the same level at both ends.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
@@ -27,20 +26,12 @@ Span = list[tuple[int, int, int, int]]
 """Of a cell the rank of each function, the highest first; its bands; its bit."""
 
 
-class Cuts(NamedTuple):
-    """The bands of a cell's own levels, and the sets between two of them."""
-
-    bands: list[int]
-    known: dict[int, list[int]]
-
-
 class Axis(NamedTuple):
     """A variable: the numbers of the functions of the rules, and its cells."""
 
     numbers: dict[tuple[Clause, Fraction], int]
     cells: list[Cell]
     spans: list[Span]
-    cuts: list[Cuts]
 
 
 class Grid:
@@ -72,13 +63,10 @@ class Grid:
                 }
                 numbers = {c: known[f] for c, f in zip(clauses, functions, strict=True)}
                 result = cells([*known], lines[variable.name], self.levels)
-                self.axes.append(Axis(numbers, result, [], []))
+                self.axes.append(Axis(numbers, result, []))
         self.levels.sort()
         for axis in self.axes:
             axis.spans.extend(map(self._spans, axis.cells))
-            for span in axis.spans:
-                bands = {band for _, least, most, _ in span for band in (least, most)}
-                axis.cuts.append(Cuts(sorted(bands), {}))
         pairs = zip(rules.rules, weights, strict=True)
         self.of = [self.bits_of(rule.when, weight) for rule, weight in pairs]
         self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
@@ -118,22 +106,10 @@ class Grid:
         key = (band, is_gap)
         if key not in self.patterns:
             self.patterns[key] = [
-                self._of_axis(axis, band, is_gap) for axis in self.axes
+                {one for cell in axis.spans for one in _of_cell(cell, band, is_gap)}
+                for axis in self.axes
             ]
         return self.patterns[key]
-
-    def _of_axis(self, axis: Axis, band: int, is_gap: bool) -> set[int]:
-        result: set[int] = set()
-        for cell, cuts in zip(axis.spans, axis.cuts, strict=True):
-            if not is_gap:
-                result.update(_of_cell(cell, band, is_gap))
-                continue
-            # Between two levels of its own a cell has the same sets at every band.
-            place = bisect_right(cuts.bands, band)
-            if place not in cuts.known:
-                cuts.known[place] = _of_cell(cell, band, is_gap)
-            result.update(cuts.known[place])
-        return result
 
     def wins(self, mine: RuleBits, rivals: Sequence[RuleBits]) -> bool:
         """Return whether a rule is somewhere stronger than each rival.

@@ -78,6 +78,15 @@ def divided(poly: Poly, divisor: Poly) -> tuple[Poly, Poly]:
     return tuple(out), trimmed(rest)
 
 
+def shifted(poly: Poly, x: Fraction) -> list[Fraction]:
+    """Return a polynomial of the distance from x."""
+    result = [*poly]
+    for start in range(len(poly)):
+        for place in range(len(poly) - 2, start - 1, -1):
+            result[place] += x * result[place + 1]
+    return result
+
+
 def common(one: Poly, other: Poly) -> Poly:
     """Return the greatest common divisor of two polynomials."""
     while other:
@@ -151,13 +160,15 @@ def roots(poly: Poly, low: Fraction, high: Fraction) -> list[Root]:
         x = -poly[0] / poly[1]
         return [Root(poly, x, x)] if low < x < high else []
     result: list[Root] = []
-    todo = [(low, high)] if len(poly) > 2 else []
-    if todo:  # several times the same root: once is enough
-        poly = divided(poly, common(poly, derivative(poly)))[0]
+    todo, least = [(low, high)] if len(poly) > 2 else [], (high - low) / 2**16
     while todo:
         a, b = todo.pop()
         middle, half = (a + b) / 2, (b - a) / 2
-        around = within(poly, (middle, ONE))  # of the distance from the middle
+        if half < least:
+            shared, least = common(poly, derivative(poly)), ZERO
+            if len(shared) > 1:  # several times the same root: once is enough
+                return roots(divided(poly, shared)[0], low, high)
+        around = shifted(poly, middle)
         most = [abs(c) * half**place for place, c in enumerate(around)]
         if 2 * most[0] > sum(most):  # it keeps its sign
             continue

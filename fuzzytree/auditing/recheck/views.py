@@ -51,6 +51,7 @@ class Owner(NamedTuple):
     name: str
     block: Block
     when: Condition | None
+    then: tuple[Conclusion, ...]
     weight: Fraction
 
 
@@ -64,35 +65,29 @@ class View:
         names: What answers call each rule.
         silent: The names of the rules that never fire, as their text says.
         labels: The terms of the audit.
-        is_whole: Whether no rule is left out.
     """
 
     def __init__(self, system: System, audit: Audit) -> None:
         self.system = system
-        self.left_out = {
-            (one.subject, *one.terms): one
-            for one in audit.answers
-            if isinstance(one.state, Declined) and one.code.startswith("FTD")
-        }
+        answers = [one for one in audit.answers if one.code.startswith("FTD")]
+        answers = [one for one in answers if isinstance(one.state, Declined)]
+        self.left_out = {(one.subject, *one.terms) for one in answers}
         self.inputs = {one.name: one for one in system.inputs}
         self.conjunction = _conjunction(system)
-        self.is_whole, self.is_plain = True, True
+        self.is_plain = True
         self.owners: list[Owner] = []
         self.names: list[str] = []
         self.silent: list[str] = []
         items: list[Rule] = []
-        for owner, then in _owners(system):
-            for way in self._ways_of(owner):
-                items.append(Rule(way, then, None))
-                self.owners.append(owner)
-        self.ways = {
-            owner: [n for n, one in enumerate(self.owners, 1) if one is owner]
-            for owner in dict.fromkeys(self.owners)
-        }
-        for owner, ways in self.ways.items():
-            of_one = [owner.name]
-            several = [f"way {n} of {owner.name}" for n in range(1, len(ways) + 1)]
-            self.names += several if len(ways) > 1 else of_one
+        self.ways: dict[Owner, range] = {}
+        for owner in _owners(system):
+            ways, name = self._ways_of(owner), owner.name
+            if ways:
+                self.ways[owner] = range(len(items) + 1, len(items) + len(ways) + 1)
+            items += [Rule(way, _text(owner.then)) for way in ways]
+            self.owners += [owner] * len(ways)
+            several = [f"way {n} of {name}" for n in range(1, len(ways) + 1)]
+            self.names += several if len(ways) > 1 else [name] * len(ways)
         self.labels = [
             Label(one.name, label.name)
             for one in system.inputs
@@ -106,10 +101,7 @@ class View:
             tuple(_variable(one, kept) for one in system.inputs),
             tuple(items),
             Semantics(self.conjunction, None, None),
-            None,
-            (),
         )
-
         self.shapes = {
             (v.name, t.name): t.shape for v in self.rules.variables for t in v.terms
         }
@@ -140,7 +132,6 @@ class View:
             text = f"{owner.name} is left out, and can be audited"
             require(not (is_left_out and is_easy), text)
         if is_left_out:
-            self.is_whole = False
             return []
         if not ways:
             self.silent.append(owner.name)
@@ -208,56 +199,35 @@ class View:
         self, parts: tuple[Condition, ...], block: Block, *, negated: bool
     ) -> Clause | None:
         """Return `x is a or b` as one clause, if it is that and a maximum."""
-        clause = [*_plain(parts)]
-        if block.disjunction != "maximum" or None in clause:
+        every = [one for one in _walk(Or(parts)) if not isinstance(one, Or)]
+        plain = [one for one in every if isinstance(one, Is) and one.label is not None]
+        is_plain = plain == every and not any(one.hedges for one in plain)
+        if block.disjunction != "maximum" or not is_plain:
             return None
-        result = [
-            way[0]
-            for one in clause
-            if one
-            for way in self._ways_of_clause(one, negated=False)
-        ]
-        if len({clause.variable for clause in result}) > 1:
+        clauses = [self._ways_of_clause(one, negated=False)[0][0] for one in plain]
+        if len({clause.variable for clause in clauses}) > 1:
             return None
-        terms = dict.fromkeys(term for clause in result for term in clause.terms)
-        return Clause(result[0].variable, tuple(terms), negated)
+        terms = dict.fromkeys(term for clause in clauses for term in clause.terms)
+        return Clause(clauses[0].variable, tuple(terms), negated)
 
     def questions(self) -> set[tuple[str, str]]:
         """Return the variable and term of every proposition of the rules."""
-        result: set[tuple[str, str]] = set()
-        todo = [rule.when for block in self.system.blocks for rule in block.rules]
-        while todo:
-            match todo.pop():
-                case Is(variable=variable, label=label):
-                    result.add((variable, label or ""))
-                case And(parts=parts) | Or(parts=parts):
-                    todo += parts
-                case Not(part=part):
-                    todo.append(part)
-                case None:
-                    pass
-        return result
+        rules = [rule for block in self.system.blocks for rule in block.rules]
+        every = [one for rule in rules for one in _walk(rule.when)]
+        return {(one.variable, one.label or "") for one in every if isinstance(one, Is)}
 
     def absent(self, name: str) -> list[int]:
         """Return the number, from 0, of a rule of which no way is taken over."""
         if any(owner.name == name for owner in self.owners):
             return []
-        return [one.number for one, _ in _owners(self.system) if one.name == name]
+        return [one.number for one in _owners(self.system) if one.name == name]
 
     def may_conflict(self, one: int, other: int) -> bool:
         """Return whether two rules say different things of one output."""
-        entries = [
-            {(c.output, _text((c,))) for c in self._then(number)}
-            for number in (one, other)
-        ]
-        shared = {name for name, _ in entries[0]} & {name for name, _ in entries[1]}
-        return any(name in shared for name, _ in entries[0] ^ entries[1])
-
-    def _then(self, number: int) -> tuple[Conclusion, ...]:
-        place = self.owners[number - 1].number
-        return [rule for block in self.system.blocks for rule in block.rules][
-            place
-        ].then
+        thens = [self.owners[number - 1].then for number in (one, other)]
+        entries = [{(c.output, _text((c,))) for c in then} for then in thens]
+        shared = {c.output for c in thens[0]} & {c.output for c in thens[1]}
+        return any(entry[0] in shared for entry in entries[0] ^ entries[1])
 
     def strengths(self, point: Point, numbers: Iterable[int]) -> dict[int, Between]:
         """Return between which numbers the strengths of some rules lie.
@@ -275,12 +245,10 @@ class View:
                 result[ways[0]] = own  # of no clauses, or not of ways alone
                 continue
             for number in ways:
-                one = (ONE, ONE)
-                for clause in self.rules.rules[number - 1].when:
-                    if clause not in known:
-                        known[clause] = self._degree(clause, values[clause.variable])
-                    join = "minimum" if self.conjunction == "min" else "product"
-                    one = joined(join, one, known[clause])
+                when = self.rules.rules[number - 1].when
+                for clause in {*when} - known.keys():
+                    known[clause] = self._degree(clause, values[clause.variable])
+                one = joined(_NORMS[self.conjunction], [known[c] for c in when])
                 result[number] = _times(owner.weight, one)
             best = [max(result[number][end] for number in ways) for end in (0, 1)]
             if own[1] < best[0] or best[1] < own[0]:
@@ -317,20 +285,16 @@ class View:
                     one = hedged(hedge, one)
                 return one
             case And(parts=parts) | Or(parts=parts):
-                norm = block.conjunction
-                if isinstance(condition, Or):
-                    norm = block.disjunction
-                result = [self.condition(part, block, values) for part in parts]
-                whole_of = result[0]
-                for other in result[1:]:
-                    whole_of = joined(norm or "", whole_of, other)
-                return whole_of
+                is_or = isinstance(condition, Or)
+                norm = block.disjunction if is_or else block.conjunction
+                return joined(norm, [self.condition(p, block, values) for p in parts])
 
 
 _NAMES: dict[str | None, Literal["min", "product"]] = {
     "minimum": "min",
     "product": "product",
 }
+_NORMS = {"min": "minimum", "product": "product"}
 
 
 def _times(weight: Fraction, one: Between) -> Between:
@@ -343,31 +307,29 @@ def _conjunction(system: System) -> Literal["min", "product"]:
     for block in system.blocks:
         norm = _NAMES.get(block.conjunction)
         if norm:
-            counts[norm] += sum(_has_and(rule.when) for rule in block.rules)
+            parts = [[*_walk(rule.when)] for rule in block.rules]
+            counts[norm] += sum(any(isinstance(p, And) for p in ps) for ps in parts)
     return "product" if counts["product"] > counts["min"] else "min"
 
 
-def _has_and(condition: Condition | None) -> bool:
-    match condition:
-        case And():
-            return True
-        case Or(parts=parts):
-            return any(map(_has_and, parts))
-        case Not(part=part):
-            return _has_and(part)
-        case _:
-            return False
+def _walk(condition: Condition | None) -> Iterator[Condition]:
+    """Yield a condition and all of its parts."""
+    if condition is not None:
+        yield condition
+    if isinstance(condition, Not):
+        yield from _walk(condition.part)
+    for part in condition.parts if isinstance(condition, And | Or) else ():
+        yield from _walk(part)
 
 
-def _owners(system: System) -> Iterator[tuple[Owner, str]]:
-    """Yield every rule of a system with the text of what it concludes."""
-    number = 0
+def _owners(system: System) -> Iterator[Owner]:
+    """Yield every rule of a system."""
+    number = itertools.count()
     for position, block in enumerate(system.blocks, 1):
-        of_block = f" of block {position}" if len(system.blocks) > 1 else ""
+        end = f" of block {position}" if len(system.blocks) > 1 else ""
         for index, rule in enumerate(block.rules, 1):
-            name, weight = f"rule {index}{of_block}", Fraction(rule.weight)
-            yield Owner(number, name, block, rule.when, weight), _text(rule.then)
-            number += 1
+            weight, name = Fraction(rule.weight), f"rule {index}{end}"
+            yield Owner(next(number), name, block, rule.when, rule.then, weight)
 
 
 def _text(then: Iterable[Conclusion]) -> str:
@@ -375,27 +337,12 @@ def _text(then: Iterable[Conclusion]) -> str:
     return " and ".join(texts)
 
 
-def _plain(parts: tuple[Condition, ...]) -> Iterator[Is | None]:
-    """Yield the questions that parts join by OR alone; None for anything else."""
-    for part in parts:
-        match part:
-            case Or(parts=inner):
-                yield from _plain(inner)
-            case Is(hedges=(), label=str()):
-                yield part
-            case _:
-                yield None
-
-
 def _variable(one: Input, clauses: dict[Clause, None]) -> Variable:
     """Return an input with the terms of its propositions, hedged ones by both names."""
     curves = {label.name: label for label in one.labels}
-    names = dict.fromkeys(curves)
-    names |= dict.fromkeys(
-        t for c in clauses if c.variable == one.name for t in c.terms
-    )
+    used = [t for c in clauses if c.variable == one.name for t in c.terms]
     terms: list[Term] = []
-    for name in names:
+    for name in dict.fromkeys([*curves, *used]):
         label, *hedges = name.split("\0")
         shape = curves[label].curve
         if curves[label].height != 1 or hedges:
