@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import functools
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Final, TypeVar
 
 from msgspec import inspect
@@ -23,6 +23,7 @@ from fuzzytree.formats.yaml.nodes import (
 from fuzzytree.model import Mistake, Path
 
 R = TypeVar("R", bound=FileRecord)
+V = TypeVar("V")
 Entries = dict[str, Node]
 _LONGEST_DIGITS: Final = 18
 
@@ -215,13 +216,7 @@ def _integer(
         _add(mistakes, node, f"{what} has more than {_LONGEST_DIGITS} digits")
         return None
     value = _read_integer(text)
-    if kind.ge is not None and value < kind.ge:
-        _add(mistakes, node, f"{what} must be at least {kind.ge}, not {value}")
-        return None
-    if kind.le is not None and value > kind.le:
-        _add(mistakes, node, f"{what} must be at most {kind.le}, not {value}")
-        return None
-    return value
+    return value if _is_in_range(value, node, what, kind, mistakes) else None
 
 
 def _number(
@@ -242,14 +237,23 @@ def _number(
         value = float(_read_integer(text))
     else:
         value = float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
-    # Not a number is neither.
-    if kind.ge is not None and not value >= kind.ge:
-        _add(mistakes, node, f"{what} must be at least {kind.ge:g}, not {value:g}")
-        return None
-    if kind.le is not None and not value <= kind.le:
-        _add(mistakes, node, f"{what} must be at most {kind.le:g}, not {value:g}")
-        return None
-    return value
+    return value if _is_in_range(value, node, what, kind, mistakes) else None
+
+
+def _is_in_range(
+    value: float,
+    node: Node,
+    what: str,
+    kind: inspect.IntType | inspect.FloatType,
+    mistakes: list[FileMistake],
+) -> bool:
+    """Return whether a number is in its range; NaN is in none that has an end."""
+    is_large = kind.ge is None or value >= kind.ge
+    is_small = kind.le is None or value <= kind.le
+    if not (is_large and is_small):
+        bound = f"least {kind.ge}" if not is_large else f"most {kind.le}"
+        _add(mistakes, node, f"{what} must be at {bound}, not {value}")
+    return is_large and is_small
 
 
 def _read_integer(text: str) -> int:
@@ -349,6 +353,54 @@ def records_at(
         not_a_list(node, key, mistakes)
         return None
     return [bind(item, kind, mistakes) for item in node.items]
+
+
+def variables_at(
+    kept: Entries,
+    key: str,
+    kind: type[R],
+    mistakes: list[FileMistake],
+    build: Callable[[Path, R], V],
+    bare: Callable[[str, Sequence[str]], V],
+    broken: set[Path],
+) -> tuple[V, ...] | None:
+    """Return the variables under a key; None if it is no list or a name is unknown.
+
+    In the place of a broken variable stands one of its name and its terms' names, so
+    that what speaks of it can be checked.
+
+    Args:
+        kept: The entries.
+        key: Of the list.
+        kind: The record of a variable.
+        mistakes: Where mistakes are added.
+        build: Makes a variable of its path and its record.
+        bare: Makes one of its name and those of its terms.
+        broken: Where the paths of broken variables are added.
+    """
+    bound = records_at(kept, key, kind, mistakes)
+    variables: list[V] = []
+    for position, one in enumerate(bound or ()):
+        path: Path = (key, position)
+        if one is not None:
+            variables.append(build(path, one))
+            continue
+        names = _names(kept[key], position)
+        if names is None:
+            return None
+        broken.add(path)
+        variables.append(bare(names[0], names[1:]))
+    return None if bound is None else tuple(variables)
+
+
+def _names(variables: Node, position: int) -> list[str] | None:
+    """Return the name of a variable and of its terms, as far as they can be read."""
+    node = variables.items[position] if isinstance(variables, ListNode) else variables
+    terms = value_of(node, "terms")
+    items = terms.items if isinstance(terms, ListNode) else ()
+    named = [value_of(node, "name"), *(value_of(term, "name") for term in items)]
+    texts = [one.text for one in named if isinstance(one, Scalar)]
+    return texts if len(texts) == len(named) else None
 
 
 def located(

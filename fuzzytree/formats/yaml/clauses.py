@@ -103,45 +103,23 @@ def _lists(text: str, known: TermWords) -> list[tuple[str, ...]]:
         return [terms] if known.terms.issuperset(terms) else []
     ors = _places(text)
     starts, ends = [0, *(place + len(_OR) for place in ors)], [*ors, len(text)]
-    # steps[i]: the pairs (term, next i) with which the rest from starts[i] can be read.
-    steps: list[list[tuple[str, int]]] = [[] for _ in starts]
+    # rests[i]: two lists at most that the rest from starts[i] can mean.
+    rests: list[list[tuple[str, ...]]] = [[] for _ in starts]
+    rests.append([()])
     for start in range(len(starts) - 1, -1, -1):
         # A term can share a blank with the ` or ` before it and with the one behind.
         furthest = min(start + known.most_ors + 2, len(ends) - 1)
         for end in range(start, furthest + 1):
             term = text[starts[start] : ends[end]]
-            is_last = end == len(ends) - 1
-            if term in known.terms and (is_last or steps[end + 1]):
-                steps[start].append((term, end + 1))
-    return [*_two_walks(steps)] if steps[0] else []
+            if term in known.terms:
+                rests[start] += [(term, *rest) for rest in rests[end + 1]]
+        del rests[start][2:]
+    return rests[0]
 
 
 def _places(text: str) -> list[int]:
     """Return where ` or ` stands, also where one begins with the end of another."""
     return [match.start() for match in re.finditer("(?= or )", text)]
-
-
-def _two_walks(steps: list[list[tuple[str, int]]]) -> Iterator[tuple[str, ...]]:
-    """Yield the first list of terms, and one that turns off where that is possible."""
-    first: list[str] = []
-    turn: list[str] | None = None
-    position = 0
-    while position < len(steps):
-        if turn is None and len(steps[position]) > 1:
-            turn = [*first, *_walk(steps, *steps[position][1])]
-        term, position = steps[position][0]
-        first.append(term)
-    yield tuple(first)
-    if turn is not None:
-        yield tuple(turn)
-
-
-def _walk(steps: list[list[tuple[str, int]]], term: str, position: int) -> list[str]:
-    terms = [term]
-    while position < len(steps):
-        term, position = steps[position][0]
-        terms.append(term)
-    return terms
 
 
 _MOST_COMPARED: Final = 200_000

@@ -20,7 +20,7 @@ from fuzzytree.formats.yaml.binding import (
     record_at,
     records_at,
     shortened,
-    value_of,
+    variables_at,
 )
 from fuzzytree.formats.yaml.clauses import is_flood
 from fuzzytree.formats.yaml.conditions import (
@@ -28,7 +28,7 @@ from fuzzytree.formats.yaml.conditions import (
     parse_conclusions,
     parse_condition,
 )
-from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar
+from fuzzytree.formats.yaml.nodes import ListNode, MappingNode
 from fuzzytree.model import (
     Activation,
     Arc,
@@ -83,8 +83,26 @@ def read_system(
     record_at(kept, "semantics", layout.SystemSemantics, file_mistakes)
     mistakes: list[Mistake] = []
     broken: set[Path] = set()
-    inputs = _inputs(kept, file_mistakes, mistakes, broken)
-    outputs = _outputs(kept, file_mistakes, mistakes, broken)
+    inputs = variables_at(
+        kept,
+        "inputs",
+        layout.InputOfSystem,
+        file_mistakes,
+        lambda path, one: _input(path, one, mistakes),
+        lambda name, terms: SystemInput(name, _bare(terms)),
+        broken,
+    )
+    outputs = variables_at(
+        kept,
+        "outputs",
+        layout.OutputOfSystem,
+        file_mistakes,
+        lambda path, one: _output(path, one, mistakes),
+        lambda name, terms: SystemOutput(
+            name, _bare(terms), None, None, Defuzzifier("weighted sum")
+        ),
+        broken,
+    )
     blocks = _blocks(kept, file_mistakes, mistakes, broken, _spare(outputs or ()))
     file_mistakes += located(root, mistakes)
     if head is None or inputs is None or outputs is None or blocks is None:
@@ -101,72 +119,26 @@ def read_system(
         return None
 
 
-def _inputs(
-    kept: Entries,
-    file_mistakes: list[FileMistake],
-    mistakes: list[Mistake],
-    broken: set[Path],
-) -> tuple[SystemInput, ...] | None:
-    """Return the inputs; a broken one has its name and those of its terms only."""
-    inputs: list[SystemInput] = []
-    bound = records_at(kept, "inputs", layout.InputOfSystem, file_mistakes)
-    for position, one in enumerate(bound or ()):
-        path: Path = ("inputs", position)
-        if one is None:
-            names = _names(kept["inputs"], position)
-            if names is None:
-                return None
-            broken.add(path)
-            inputs.append(SystemInput(names[0], _bare(names[1:])))
-            continue
-        low, high, clips = _range(one.range)
-        parts = tuple(Part(p.input, p.weight, p.centre) for p in one.sum_of)
-        labels = _labels(path, one.terms, mistakes)
-        result = SystemInput(one.name, labels, low, high, clips, one.unit or "", parts)
-        inputs.append(result)
-    return None if bound is None else tuple(inputs)
+def _input(
+    path: Path, one: layout.InputOfSystem, mistakes: list[Mistake]
+) -> SystemInput:
+    low, high, clips = _range(one.range)
+    parts = tuple(Part(p.input, p.weight, p.centre) for p in one.sum_of)
+    labels = _labels(path, one.terms, mistakes)
+    return SystemInput(one.name, labels, low, high, clips, one.unit or "", parts)
 
 
-def _outputs(
-    kept: Entries,
-    file_mistakes: list[FileMistake],
-    mistakes: list[Mistake],
-    broken: set[Path],
-) -> tuple[SystemOutput, ...] | None:
-    """Return the outputs; a broken one has its name and those of its terms only."""
-    outputs: list[SystemOutput] = []
-    bound = records_at(kept, "outputs", layout.OutputOfSystem, file_mistakes)
-    for position, one in enumerate(bound or ()):
-        path: Path = ("outputs", position)
-        if one is None:
-            names = _names(kept["outputs"], position)
-            if names is None:
-                return None
-            broken.add(path)
-            how, labels = Defuzzifier("weighted sum"), _bare(names[1:])
-            outputs.append(SystemOutput(names[0], labels, None, None, how))
-            continue
-        low, high, clips = _range(one.range)
-        how = Defuzzifier(one.defuzzifier, one.samples, one.grid)
-        labels = _labels(path, one.terms, mistakes)
-        outputs.append(
-            SystemOutput(
-                *(one.name, labels, low, high, how, one.aggregation, one.default),
-                clips=clips,
-                unit=one.unit or "",
-            )
-        )
-    return None if bound is None else tuple(outputs)
-
-
-def _names(variables: Node, position: int) -> list[str] | None:
-    """Return the name of a variable and of its terms, as far as they can be read."""
-    node = variables.items[position] if isinstance(variables, ListNode) else variables
-    terms = value_of(node, "terms")
-    items = terms.items if isinstance(terms, ListNode) else ()
-    named = [value_of(node, "name"), *(value_of(term, "name") for term in items)]
-    texts = [one.text for one in named if isinstance(one, Scalar)]
-    return texts if len(texts) == len(named) else None
+def _output(
+    path: Path, one: layout.OutputOfSystem, mistakes: list[Mistake]
+) -> SystemOutput:
+    low, high, clips = _range(one.range)
+    how = Defuzzifier(one.defuzzifier, one.samples, one.grid)
+    labels = _labels(path, one.terms, mistakes)
+    return SystemOutput(
+        *(one.name, labels, low, high, how, one.aggregation, one.default),
+        clips=clips,
+        unit=one.unit or "",
+    )
 
 
 def _bare(names: Sequence[str]) -> tuple[SystemTerm, ...]:

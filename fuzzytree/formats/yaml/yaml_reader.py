@@ -18,6 +18,7 @@ from fuzzytree.formats.yaml.binding import (
     record_at,
     records_at,
     value_of,
+    variables_at,
 )
 from fuzzytree.formats.yaml.clauses import (
     Vocabulary,
@@ -33,7 +34,7 @@ from fuzzytree.formats.yaml.clauses import (
     words,
 )
 from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
-from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
+from fuzzytree.formats.yaml.nodes import MappingNode, Node, Scalar, compose
 from fuzzytree.formats.yaml.system_reader import read_system
 from fuzzytree.model import (
     Band,
@@ -246,38 +247,18 @@ def _whole(items: list[R | None] | None) -> list[R] | None:
 def _variables(
     kept: Entries, mistakes: list[FileMistake]
 ) -> tuple[tuple[Variable, ...], set[Path]] | None:
-    """Return the variables and which are broken; None if names cannot be known.
-
-    In the place of a broken variable stands one of its name and its terms' names, so
-    that what speaks of it can be checked.
-    """
-    bound = records_at(kept, "variables", layout.VariableOfModel, mistakes)
-    if bound is None:
-        return None
-    variables: list[Variable] = []
+    """Return the variables and which are broken; None if names cannot be known."""
     broken: set[Path] = set()
-    for position, one in enumerate(bound):
-        if one is not None:
-            variables.append(values.variable(one))
-            continue
-        names = _names(kept["variables"], position)
-        if names is None:
-            return None
-        broken.add(("variables", position))
-        terms = tuple(Term(name, Band()) for name in names[1:])
-        variables.append(Variable(names[0], terms))
-    return tuple(variables), broken
-
-
-def _names(variables: Node, position: int) -> list[str] | None:
-    """Return the name of a variable and of its terms, as far as they can be read."""
-    node = variables.items[position] if isinstance(variables, ListNode) else variables
-    name = value_of(node, "name")
-    terms = value_of(node, "terms")
-    items = terms.items if isinstance(terms, ListNode) else ()
-    named = [name, *(value_of(term, "name") for term in items)]
-    texts = [one.text for one in named if isinstance(one, Scalar)]
-    return texts if len(texts) == len(named) else None
+    variables = variables_at(
+        kept,
+        "variables",
+        layout.VariableOfModel,
+        mistakes,
+        lambda _, one: values.variable(one),
+        lambda name, terms: Variable(name, tuple(Term(t, Band()) for t in terms)),
+        broken,
+    )
+    return None if variables is None else (variables, broken)
 
 
 def _number_mistakes(
