@@ -44,12 +44,12 @@ from .formulas import FormulaError as FormulaError
 from .formulas import fuzzylite_text_of as fuzzylite_text_of
 from .formulas import parse as parse
 from .formulas import text_of as text_of
-from .positions import in_system as in_system
 from .simpful import from_simpful as from_simpful
 from .skfuzzy import from_skfuzzy as from_skfuzzy
 from .sklearn import from_sklearn as from_sklearn
 from .text_files import LONGEST_NAME as LONGEST_NAME
 from .text_files import FileMistake as FileMistake
+from .text_files import in_system as in_system
 from .text_files import report as report
 from .text_files import split_lines as split_lines
 from .yaml.binding import bind as bind

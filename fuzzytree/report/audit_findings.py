@@ -19,8 +19,7 @@ from fuzzytree.auditing import (
 )
 from fuzzytree.model import RuleBase
 from fuzzytree.report.audit_states import SEVERITIES
-from fuzzytree.report.drawing import Axis
-from fuzzytree.report.markup import Markup
+from fuzzytree.report.drawing import Axis, Markup
 from fuzzytree.report.parts import part
 from fuzzytree.report.svg_terms import bar_picture, map_picture, span_text, windows
 from fuzzytree.report.text import counted

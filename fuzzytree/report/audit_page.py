@@ -32,8 +32,7 @@ from fuzzytree.report.audit_states import (
     state_note,
     state_word,
 )
-from fuzzytree.report.drawing import axes_of
-from fuzzytree.report.markup import Markup, joined
+from fuzzytree.report.drawing import Markup, axes_of, joined
 from fuzzytree.report.parts import part, whole_page
 from fuzzytree.report.stability import advice, criterion_row
 from fuzzytree.report.stability import stability_verdict as stability_text

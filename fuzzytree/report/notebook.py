@@ -8,7 +8,7 @@ from fuzzytree.auditing import Audit
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.report.audit_page import agreement_section
-from fuzzytree.report.markup import Markup, joined, tag, text_lines
+from fuzzytree.report.drawing import Markup, joined, tag, text_lines
 from fuzzytree.report.parts import part
 from fuzzytree.report.systems import system_lines
 from fuzzytree.report.text import head_lines, model_lines, term_lines

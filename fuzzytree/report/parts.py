@@ -19,7 +19,7 @@ from fuzzytree.report.audit_states import (
     state_text,
     state_word,
 )
-from fuzzytree.report.markup import Markup, text, text_lines
+from fuzzytree.report.drawing import Markup, text, text_lines
 from fuzzytree.report.stability import CRITERION
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import CERTIFIED, COMPARISON, counted, number

@@ -16,6 +16,7 @@ from fuzzytree.report.drawing import (
     LETTER,
     Axis,
     Curve,
+    Markup,
     Scale,
     axis_marks,
     between,
@@ -23,11 +24,12 @@ from fuzzytree.report.drawing import (
     polyline,
     spread,
     svg,
+    tag,
     tick_words,
     ticks,
+    trimmed,
     words,
 )
-from fuzzytree.report.markup import Markup, tag, trimmed
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import number
 from fuzzytree.runtimes import fire

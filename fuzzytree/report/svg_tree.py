@@ -8,8 +8,7 @@ import msgspec
 
 from fuzzytree.model import FuzzyTree, Node, intervals
 from fuzzytree.report.audit_rows import Counts, Passing
-from fuzzytree.report.drawing import LETTER, cut, svg, words
-from fuzzytree.report.markup import Markup, tag
+from fuzzytree.report.drawing import LETTER, Markup, cut, svg, tag, words
 from fuzzytree.report.text import counted, number
 
 MOST_LEAVES = 120

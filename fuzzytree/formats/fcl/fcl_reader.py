@@ -43,8 +43,15 @@ from fuzzytree.formats.fcl.fcl_syntax import (
 )
 from fuzzytree.formats.fll.fll_differences import constant_degrees, fuzzylite_losses
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree
-from fuzzytree.formats.positions import PositionGroup, Positions, locating
-from fuzzytree.formats.text_files import PartError, ReaderNotes, number_of, report
+from fuzzytree.formats.text_files import (
+    PartError,
+    PositionGroup,
+    Positions,
+    ReaderNotes,
+    locating,
+    number_of,
+    report,
+)
 from fuzzytree.model import (
     Defuzzifier,
     Document,

@@ -16,14 +16,18 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.formats.fis import fis_text as text
+from fuzzytree.formats.fis import fis_parts as text
 from fuzzytree.formats.fis import fis_words as words
-from fuzzytree.formats.fis.fis_parts import labels_of, rules_of
-from fuzzytree.formats.fis.fis_text import FisEntry, FisSection
+from fuzzytree.formats.fis.fis_parts import FisEntry, FisSection, labels_of, rules_of
 from fuzzytree.formats.fis.fis_words import Dialect
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
-from fuzzytree.formats.positions import Positions, locating
-from fuzzytree.formats.text_files import ReaderNotes, number_of, report
+from fuzzytree.formats.text_files import (
+    Positions,
+    ReaderNotes,
+    locating,
+    number_of,
+    report,
+)
 from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,

@@ -21,16 +21,18 @@ from fuzzytree.formats.fll.fll_differences import differences
 from fuzzytree.formats.fll.fll_rules import FllVariable, Vocabulary, read_rule
 from fuzzytree.formats.fll.fll_terms import FllTerm, TermScope, as_degree, read_term
 from fuzzytree.formats.fll.fll_words import MOST_BYTES, FllEntry, FllSection, read_page
-from fuzzytree.formats.positions import PositionGroup, Positions, locating
 from fuzzytree.formats.text_files import (
     CONTROL,
     LONGEST_NAME,
     MOST_SHOWN,
     PartError,
+    PositionGroup,
+    Positions,
     ReaderNotes,
     Word,
     check_characters,
     decoded,
+    locating,
     number_of,
     report,
 )

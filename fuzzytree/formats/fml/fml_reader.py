@@ -17,8 +17,13 @@ from fuzzytree.formats.fml import xml
 from fuzzytree.formats.fml.fml_rules import FmlVariables, blocks_of
 from fuzzytree.formats.fml.fml_words import CIRCULAR, curve_of, number
 from fuzzytree.formats.fml.xml import FmlElement
-from fuzzytree.formats.positions import PositionGroup, Positions, locating
-from fuzzytree.formats.text_files import ReaderNotes, report
+from fuzzytree.formats.text_files import (
+    PositionGroup,
+    Positions,
+    ReaderNotes,
+    locating,
+    report,
+)
 from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
