@@ -400,6 +400,16 @@ def svg(
     )
 
 
+def rect(x: float, y: float, width: float, height: float, class_: str) -> Markup:
+    """Return a rectangle."""
+    return tag("rect", x=x, y=y, width=width, height=height, class_=class_)
+
+
+def line(x1: float, x2: float, y1: float, y2: float, class_: str) -> Markup:
+    """Return a line."""
+    return tag("line", x1=x1, x2=x2, y1=y1, y2=y2, class_=class_)
+
+
 def words(
     x: float,
     y: float,
@@ -419,7 +429,7 @@ def axis_marks(x: Scale, base: float, *, most: int = 4) -> Iterator[Markup]:
     for value, word in zip(values, tick_words(values), strict=True):
         at = x.at(value)
         half = 0.5 * LETTER * 10 * len(word)
-        yield tag("line", x1=at, x2=at, y1=base, y2=base + 4, class_="tick")
+        yield line(at, at, base, base + 4, "tick")
         left = min(max(at, x.start - 6 + half), x.end + 6 - half)
         if left - half > previous + 4:
             previous = left + half

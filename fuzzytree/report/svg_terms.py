@@ -21,7 +21,9 @@ from fuzzytree.report.drawing import (
     axis_marks,
     between,
     cut,
+    line,
     polyline,
+    rect,
     spread,
     svg,
     tag,
@@ -56,8 +58,6 @@ def scale_of(axis: Axis, data: Data | None, start: float, end: float) -> Scale:
     """Return the scale of a variable: its domain and its rows, with some room."""
     ends = [value for value in (axis.low, axis.high) if value is not None]
     if data is not None and axis.name in data.axes:
-        import numpy as np
-
         values = data.axes[axis.name]
         finite = values[np.isfinite(values)]
         if finite.size:
@@ -76,19 +76,8 @@ def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
     y = Scale(0.0, 1.0, top + _PLOT, top)
     parts = [*_bins(axis, data, x, y)]
     parts += outside(axis, x, top - 4, y.start)
-    parts.append(
-        tag("line", x1=_LEFT, x2=_RIGHT, y1=y.start, y2=y.start, class_="axis")
-    )
-    for place, curve in enumerate(drawn):
-        parts.append(
-            tag(
-                "path",
-                tag("title", curve.name),
-                d=polyline(curve, x, y),
-                class_="curve",
-                stroke_dasharray=DASHES[place % len(DASHES)],
-            )
-        )
+    parts.append(line(_LEFT, _RIGHT, y.start, y.start, "axis"))
+    parts += _curves(drawn, x, y)
     parts += _names(names, top)
     if len(names) < len(axis.curves):
         said = f"+ {len(drawn) - len(names)} unnamed"
@@ -98,10 +87,25 @@ def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
     parts += axis_marks(x, y.start)
     high = y.start + 22.0
     title = f"The terms of {axis.title}"
-    return svg(WIDE, high, title, _told(axis), *parts, name=name)
+    return svg(WIDE, high, title, _description(axis), *parts, name=name)
 
 
-def _told(axis: Axis) -> str:
+def _curves(
+    curves: Sequence[Curve], x: Scale, y: Scale, named: Collection[str] | None = None
+) -> Iterator[Markup]:
+    """Yield the curves of terms; all but those that are named are faint."""
+    for place, curve in enumerate(curves[:MOST_CURVES]):
+        is_faint = named is not None and curve.name not in named
+        yield tag(
+            "path",
+            tag("title", curve.name),
+            d=polyline(curve, x, y),
+            class_="curve faint" if is_faint else "curve",
+            stroke_dasharray=DASHES[place % len(DASHES)],
+        )
+
+
+def _description(axis: Axis) -> str:
     terms = ", ".join(curve.name for curve in axis.curves[:MOST_CURVES]) or "none"
     domain = ""
     if axis.low is not None and axis.high is not None:
@@ -116,16 +120,9 @@ def outside(axis: Axis, x: Scale, top: float, base: float) -> Iterator[Markup]:
     left, right = x.at(axis.low), x.at(axis.high)
     for start, end in ((x.start, left), (right, x.end)):
         if end - start > 0.3:
-            yield tag(
-                "rect",
-                x=start,
-                y=top,
-                width=end - start,
-                height=base - top,
-                class_="outside",
-            )
+            yield rect(start, top, end - start, base - top, "outside")
     for at in (left, right):
-        yield tag("line", x1=at, x2=at, y1=top, y2=base, class_="domain")
+        yield line(at, at, top, base, "domain")
 
 
 def _bins(axis: Axis, data: Data | None, x: Scale, y: Scale) -> Iterator[Markup]:
@@ -143,14 +140,8 @@ def _bins(axis: Axis, data: Data | None, x: Scale, y: Scale) -> Iterator[Markup]
             high = _PLOT * 0.86 * count / tallest
             mark = class_mark(code) if code < len(data.classes) else "none"
             base -= high
-            yield tag(
-                "rect",
-                x=x.start + place * wide + 0.4,
-                y=base,
-                width=wide - 0.8,
-                height=high,
-                class_=f"bin {mark}",
-            )
+            left = x.start + place * wide + 0.4
+            yield rect(left, base, wide - 0.8, high, f"bin {mark}")
 
 
 class _Name(NamedTuple):
@@ -181,8 +172,7 @@ def _names(names: Sequence[_Name], top: float) -> Iterator[Markup]:
     for said, middle, row in names:
         base = top - 9.0 - _ROW * row
         if row:
-            ends = {"x1": middle, "x2": middle, "y1": base + 3, "y2": top - 4}
-            yield tag("line", class_="lead", **ends)
+            yield line(middle, middle, base + 3, top - 4, "lead")
         yield words(middle, base, said, "term", "middle")
 
 
@@ -260,12 +250,8 @@ def bar_picture(
     if span is not None:
         start, end = _ends(span, x)
         parts.append(_box(start, end, _TOP - 4, _BASE))
-    for place, curve in enumerate(axis.curves[:MOST_CURVES]):
-        way, dashes = polyline(curve, x, y), DASHES[place % len(DASHES)]
-        look = "curve" if curve.name in named else "curve faint"
-        title = tag("title", curve.name)
-        parts.append(tag("path", title, d=way, class_=look, stroke_dasharray=dashes))
-    parts.append(tag("line", x1=_LEFT, x2=_RIGHT, y1=_BASE, y2=_BASE, class_="axis"))
+    parts += _curves(axis.curves, x, y, named)
+    parts.append(line(_LEFT, _RIGHT, _BASE, _BASE, "axis"))
     said = span_text(span, axis.unit, 3) if span else ""
     if value is not None:
         parts += _pin(x.at(value), _TOP - 4, _BASE)
@@ -288,18 +274,11 @@ def _ends(span: Span, x: Scale) -> tuple[float, float]:
 
 
 def _box(start: float, end: float, top: float, base: float) -> Markup:
-    return tag(
-        "rect",
-        x=start,
-        y=top,
-        width=end - start,
-        height=base - top,
-        class_="region",
-    )
+    return rect(start, top, end - start, base - top, "region")
 
 
 def _pin(at: float, top: float, base: float) -> Iterator[Markup]:
-    yield tag("line", x1=at, x2=at, y1=top, y2=base, class_="pin")
+    yield line(at, at, top, base, "pin")
     yield tag("path", d=_diamond(at, base), class_="witness")
 
 
@@ -435,15 +414,15 @@ def _cells(codes: IntArray) -> Iterator[Markup]:
     left, right, top, base = _MAP
     wide, high = (right - left) / _CELLS, (base - top) / _CELLS
     ways: dict[int, list[str]] = {}
-    for row, line in enumerate(codes.tolist()):
+    for row, cells in enumerate(codes.tolist()):
         start = 0
         for place in range(1, _CELLS + 1):
-            if place < _CELLS and line[place] == line[start]:
+            if place < _CELLS and cells[place] == cells[start]:
                 continue
             x, y = left + start * wide, base - (row + 1) * high
             run = f"M{trimmed(x)} {trimmed(y)}h{trimmed((place - start) * wide)}"
             run += f"v{trimmed(high)}H{trimmed(x)}z"
-            ways.setdefault(line[start], []).append(run)
+            ways.setdefault(cells[start], []).append(run)
             start = place
     for code, runs in sorted(ways.items()):
         mark = "none" if code < 0 else class_mark(code)
@@ -481,5 +460,5 @@ def _marks_upwards(y: Scale, left: float) -> Iterator[Markup]:
     values = ticks(y.low, y.high)
     for value, said in zip(values, tick_words(values), strict=True):
         at = y.at(value)
-        yield tag("line", x1=left - 4, x2=left, y1=at, y2=at, class_="tick")
+        yield line(left - 4, left, at, at, "tick")
         yield words(left - 6, at + 3.5, cut(said, 5), "small", "end")

@@ -8,7 +8,7 @@ import msgspec
 
 from fuzzytree.model import FuzzyTree, Node, intervals
 from fuzzytree.report.audit_rows import Counts, Passing
-from fuzzytree.report.drawing import LETTER, Markup, cut, svg, tag, words
+from fuzzytree.report.drawing import LETTER, Markup, cut, rect, svg, tag, words
 from fuzzytree.report.text import counted, number
 
 MOST_LEAVES = 120
@@ -205,16 +205,10 @@ def _counts_text(counts: Counts) -> str:
 def _bar(counts: Counts, left: float, top: float, wide: float) -> Iterator[Markup]:
     """Yield the parts of a bar, the rows of each class."""
     whole = sum(counts)
-    yield tag("rect", x=left, y=top, width=wide, height=6.0, class_="track")
+    yield rect(left, top, wide, 6.0, "track")
     for code, count in enumerate(counts):
         if count:
             part = wide * count / whole
-            yield tag(
-                "rect",
-                x=left,
-                y=top,
-                width=max(part - 0.6, 0.6),
-                height=6.0,
-                class_=f"bar {class_mark(code)}",
-            )
+            mark = class_mark(code)
+            yield rect(left, top, max(part - 0.6, 0.6), 6.0, f"bar {mark}")
             left += part
