@@ -9,7 +9,7 @@ import functools
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import msgspec
 
@@ -227,65 +227,43 @@ def no_such(what: str, name: str, known: Sequence[str]) -> str:
     return f"no {what} {shown!r}; {name_choice(name[:99], known)}"
 
 
-class PositionGroup(NamedTuple):
-    """Where a variable or a block stands, and its terms or rules."""
+Positions = dict[Path, Position]
+"""Where the parts of a system stand, by their paths."""
 
-    head: Position
-    parts: tuple[Position, ...]
+PositionGroup = tuple[Position, Iterable[Position]]
+"""Where a variable or a block stands, and its terms or rules."""
 
 
-class Positions(msgspec.Struct, frozen=True, gc=False):
-    """Where the parts of a system stand.
+def positions_of(
+    inputs: Iterable[PositionGroup],
+    outputs: Iterable[PositionGroup],
+    blocks: Iterable[PositionGroup],
+) -> Positions:
+    """Return where the parts of a system stand.
 
-    Attributes:
-        inputs: Each input with its terms.
-        outputs: Each output with its terms.
-        blocks: Each block with its rules.
-        rules: If the file represents a rule base: for each rule the index of the
-            system's rule that contains it, over all blocks.
-        variables: Likewise for each variable the index of the input, None if the file
-            does not have it.
+    Example:
+        >>> list(positions_of([], [], [((3, 1), [(4, 7)])]))
+        [('blocks', 0), ('blocks', 0, 'rules', 0)]
     """
+    groups = (("inputs", "labels", inputs), ("outputs", "labels", outputs))
+    positions: Positions = {}
+    for field, inner, some in (*groups, ("blocks", "rules", blocks)):
+        for k, (head, parts) in enumerate(some):
+            positions[field, k] = head
+            positions |= {(field, k, inner, j): one for j, one in enumerate(parts)}
+    return positions
 
-    inputs: tuple[PositionGroup, ...]
-    outputs: tuple[PositionGroup, ...]
-    blocks: tuple[PositionGroup, ...]
-    rules: tuple[int, ...] = ()
-    variables: tuple[int | None, ...] = ()
 
-    def find(self, path: Path) -> Position | None:
-        """Return where a part of the system, or of its rule base, stands.
+def _find(positions: Positions, path: Path) -> Position | None:
+    """Return where the smallest part stands that contains what is at a path."""
+    outer = (path[:size] for size in range(len(path), 0, -1))
+    return next((positions[one] for one in outer if one in positions), None)
 
-        Example:
-            >>> block = PositionGroup((3, 1), ((4, 7), (5, 7)))
-            >>> positions = Positions((), (), (block,))
-            >>> positions.find(("blocks", 0, "rules", 1, "when"))
-            (5, 7)
-        """
-        match path:
-            case ("rules", int(place), *_):
-                every = [position for block in self.blocks for position in block.parts]
-                return every[self.rules[place] if self.rules else place]
-            case ("variables", int(place), *rest):
-                result = self.variables[place] if self.variables else place
-                if result is None:
-                    return None
-                return self.find(in_system(("variables", result, *rest)))
-            case (("inputs" | "outputs" | "blocks") as field, int(place), *rest):
-                group: PositionGroup = getattr(self, field)[place]
-            case _:
-                return None
-        match rest:
-            case ["labels" | "rules", int(place), *_]:
-                return group.parts[place]
-            case _:
-                return group.head
 
-    def placed(self, mistakes: Iterable[Mistake]) -> Iterator[FileMistake]:
-        """Yield what is wrong with the system where it stands."""
-        for path, sentence in mistakes:
-            line, column = self.find(path) or (1, 1)
-            yield line, column, sentence
+def placed(positions: Positions, mistakes: Iterable[Mistake]) -> list[FileMistake]:
+    """Return what is wrong with a system where it stands."""
+    places = ((_find(positions, path) or (1, 1), text) for path, text in mistakes)
+    return [(line, column, text) for (line, column), text in places]
 
 
 def locating(positions: Callable[[], Positions], facts: str | None) -> Locate:
@@ -295,15 +273,24 @@ def locating(positions: Callable[[], Positions], facts: str | None) -> Locate:
         positions: Returns the positions.
         facts: Those of the rule base that the file stands for, if it does.
     """
+    known = functools.cache(positions)
+    if facts is None:
+        return lambda path: _find(known(), path)
+    numbers, places = numbers_of(facts), places_of(facts)
 
-    @functools.cache
-    def known() -> Positions:
-        if facts is None:
-            return positions()
-        rules, variables = numbers_of(facts), places_of(facts)
-        return msgspec.structs.replace(positions(), rules=rules, variables=variables)
+    def locate(path: Path) -> Position | None:
+        match path:
+            case ("rules", int(number), *_):
+                rules = [one for one in known() if one[0] == "blocks" and len(one) > 2]
+                path = rules[numbers[number]]
+            case ("variables", int(number), *rest):
+                place = places[number]
+                path = () if place is None else in_system(("variables", place, *rest))
+            case _:
+                pass
+        return _find(known(), path)
 
-    return lambda path: known().find(path)
+    return locate
 
 
 def in_system(path: Path) -> Path:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 from lark import Token
@@ -50,6 +50,8 @@ from fuzzytree.formats.text_files import (
     ReaderNotes,
     locating,
     number_of,
+    placed,
+    positions_of,
     report,
 )
 from fuzzytree.model import (
@@ -117,30 +119,20 @@ def read_fcl(content: bytes, name: str) -> Reading:
     try:
         system = FuzzySystem(title or "system", inputs, outputs, rules)
     except InvalidModelError as error:
-        raise report(name, [*positions().placed(error.mistakes)]) from error
+        raise report(name, placed(positions(), error.mistakes)) from error
     model, facts = _model(joined_by_number(system), text.text, notes)
     return notes.reading(model, locating(positions, facts))
 
 
-def _groups(variables: Mapping[str, FclVariable]) -> tuple[PositionGroup, ...]:
-    return tuple(
-        PositionGroup(
-            place(one.token),
-            tuple(place(term.name) for term in (one.block.terms if one.block else ())),
-        )
-        for one in variables.values()
-    )
+def _groups(variables: Mapping[str, FclVariable]) -> Iterator[PositionGroup]:
+    for one in variables.values():
+        terms = one.block.terms if one.block else ()
+        yield place(one.token), [place(term.name) for term in terms]
 
 
 def _positions(known: FclVariables, blocks: Sequence[FclRuleBlock]) -> Positions:
-    return Positions(
-        _groups(known.inputs),
-        _groups(known.outputs),
-        tuple(
-            PositionGroup(place(one.head), tuple(map(place, one.tokens)))
-            for one in blocks
-        ),
-    )
+    rules = ((place(one.head), map(place, one.tokens)) for one in blocks)
+    return positions_of(_groups(known.inputs), _groups(known.outputs), rules)
 
 
 def _model(

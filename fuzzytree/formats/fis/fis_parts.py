@@ -22,6 +22,7 @@ from fuzzytree.formats.text_files import (
     check_characters,
     decoded,
     number_of,
+    positions_of,
     split_lines,
 )
 from fuzzytree.model import (
@@ -223,7 +224,7 @@ def term_of(entry: FisEntry, mistakes: list[FileMistake]) -> FisTerm | None:
     return FisTerm(name[1:-1], kind, value[open_ + 1 : close], column)
 
 
-def positions_of(
+def fis_positions(
     inputs: Sequence[FisSection],
     outputs: Sequence[FisSection],
     rules: Sequence[FisEntry],
@@ -231,8 +232,8 @@ def positions_of(
     """Return where the parts of a system stand."""
     lines = [(one.line, one.value) for one in rules]
     begins = tuple((n, len(line) - len(line.lstrip()) + 1) for n, line in lines)
-    block = PositionGroup(begins[0] if begins else (1, 1), begins)
-    return Positions(tuple(map(_group, inputs)), tuple(map(_group, outputs)), (block,))
+    block = (begins[0] if begins else (1, 1), begins)
+    return positions_of(map(_group, inputs), map(_group, outputs), [block])
 
 
 def _group(section: FisSection) -> PositionGroup:
@@ -241,7 +242,7 @@ def _group(section: FisSection) -> PositionGroup:
         for entry in section.entries
         if TERM.fullmatch(entry.key)
     )
-    return PositionGroup((section.line, 1), tuple(position for _, position in terms))
+    return (section.line, 1), [position for _, position in terms]
 
 
 About = tuple[str, Dialect, tuple[bool, int] | None]

@@ -26,6 +26,7 @@ from fuzzytree.formats.text_files import (
     ReaderNotes,
     locating,
     number_of,
+    placed,
     report,
 )
 from fuzzytree.model import (
@@ -187,12 +188,12 @@ def _system(
             notes.losses.extend(fuzzylite_losses(output))
     entries = [entry for entry, _ in result]
     positions = functools.partial(
-        text.positions_of, parts["input"], parts["output"], entries
+        text.fis_positions, parts["input"], parts["output"], entries
     )
     try:
         system = FuzzySystem(methods.name, inputs, outputs, (block,))
     except InvalidModelError as error:
-        notes.mistakes.extend(positions().placed(error.mistakes))
+        notes.mistakes.extend(placed(positions(), error.mistakes))
         return None
     return joined_by_number(system), positions
 

@@ -34,6 +34,8 @@ from fuzzytree.formats.text_files import (
     decoded,
     locating,
     number_of,
+    placed,
+    positions_of,
     report,
 )
 from fuzzytree.model import (
@@ -120,7 +122,7 @@ def _system(
         )
     except InvalidModelError as error:
         mistakes = error.mistakes[: MOST_SHOWN + 1]
-        notes.mistakes.extend(positions().placed(mistakes))
+        notes.mistakes.extend(placed(positions(), mistakes))
         return None
     notes.remarks.extend(differences(system))
     return system, positions
@@ -145,16 +147,15 @@ def _positions(
     blocks: Sequence[FllRuleBlock],
 ) -> Positions:
     """Return where the parts of the system stand."""
-    return Positions(
-        tuple(_group(one.section, one.lines) for one in inputs),
-        tuple(_group(one.section, one.lines) for one in outputs),
-        tuple(_group(one.section, one.lines) for one in blocks),
+    return positions_of(
+        (_group(one.section, one.lines) for one in inputs),
+        (_group(one.section, one.lines) for one in outputs),
+        (_group(one.section, one.lines) for one in blocks),
     )
 
 
 def _group(section: FllSection, lines: Sequence[FllEntry]) -> PositionGroup:
-    positions = tuple((one.line, one.start) for one in lines)
-    return PositionGroup((section.head.line, section.head.start), positions)
+    return section.head.position, [one.position for one in lines]
 
 
 MOST_VARIABLES: Final = 2000

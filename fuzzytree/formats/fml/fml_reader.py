@@ -22,6 +22,8 @@ from fuzzytree.formats.text_files import (
     Positions,
     ReaderNotes,
     locating,
+    placed,
+    positions_of,
     report,
 )
 from fuzzytree.model import (
@@ -77,7 +79,7 @@ def read_fml(content: bytes, name: str) -> Reading:
     try:
         system = parts.system(title)
     except InvalidModelError as error:
-        raise report(name, list(parts.positions().placed(error.mistakes))) from error
+        raise report(name, placed(parts.positions(), error.mistakes)) from error
     model, facts = as_written(system, document.comments)
     return notes.reading(model, locating(parts.positions, facts))
 
@@ -108,12 +110,10 @@ class _Parts(NamedTuple):
         for block in self.blocks:
             rules = [next(waiting) for _ in block.rules]
             head = rules[0][0].position if rules else (1, 1)
-            blocks.append(PositionGroup(head, tuple(one.position for _, one in rules)))
-        return Positions(
-            tuple(self._group(*one) for one in self.inputs),
-            tuple(self._group(*one) for one in self.outputs),
-            tuple(blocks),
-        )
+            blocks.append((head, [one.position for _, one in rules]))
+        inputs = (self._group(*one) for one in self.inputs)
+        outputs = (self._group(*one) for one in self.outputs)
+        return positions_of(inputs, outputs, blocks)
 
     def _group(
         self, element: FmlElement, variable: SystemInput | SystemOutput
@@ -124,9 +124,7 @@ class _Parts(NamedTuple):
             for child in element.children
             if (name := child.attributes.get("name")) in names
         }
-        return PositionGroup(
-            element.position, tuple(terms[one.name] for one in variable.labels)
-        )
+        return element.position, [terms[one.name] for one in variable.labels]
 
 
 def _parts(root: FmlElement, notes: ReaderNotes) -> _Parts | None:
