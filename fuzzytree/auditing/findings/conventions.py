@@ -13,12 +13,12 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.states import (
     Claim,
     Proved,
     Representation,
-    State,
     Witness,
     coordinates,
 )
@@ -39,9 +39,6 @@ if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, IntArray, Run, Runtime, SystemRun
 
     BoolArray = npt.NDArray[np.bool_]
-
-RUNTIMES: Final = ("native", "reference", "onnxruntime float64")
-"""The runtimes to run, if installed; the others are compared with the first."""
 
 MOST: Final = 240
 """The most probes of one question."""
@@ -79,9 +76,8 @@ def answers(subject: Subject) -> Iterator[Answer]:
     runs = [*_runs(subject.rules if subject.tree is None else subject.tree)]
     for question in questions(subject):
         subject.clock.check()
-        found = [
-            ModelRun(title, form, run(question.values)) for title, form, run in runs
-        ]
+        values = question.values
+        found = [ModelRun(title, form, run(values)) for title, form, run in runs]
         yield from convention_answers(subject, question, found)
 
 
@@ -91,9 +87,7 @@ def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
         kind = "tree" if isinstance(form, FuzzyTree) else "rules"
         for runtime in _runtimes():
             if kind in runtime.runs and is_installed(runtime):
-                with contextlib.suppress(
-                    LossError
-                ):  # reported by the other comparisons
+                with contextlib.suppress(LossError):  # other comparisons report it
                     yield f"{runtime.name}: {name}", form, runtime.load(form)
 
 
@@ -108,32 +102,16 @@ def _runtimes() -> list[Runtime]:
 
 
 def questions(subject: Subject) -> Iterator[Convention]:
-    """Yield the conventions with their probes, at most `MOST` of each.
-
-    Example:
-        >>> from fuzzytree.auditing.findings.records import AuditSettings
-        >>> from fuzzytree.auditing.findings.views import view
-        >>> from fuzzytree.auditing.engine.clock import Clock
-        >>> from fuzzytree.auditing.engine.domain import Domain, DomainSide
-        >>> from fuzzytree.testing import random_tree
-        >>> tree = random_tree(1)
-        >>> box = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in tree.inputs))
-        >>> facts = msgspec.structs.asdict(view(tree, box))
-        >>> subject = Subject(**facts, settings=AuditSettings(), clock=Clock())
-        >>> [question.name for question in questions(subject)][:3]
-        ['ties', 'missing values', 'infinite values']
-    """
+    """Yield the conventions with their probes, at most `MOST` of each."""
     rules = subject.rules
     yield _ties(subject)
     aimed = few_probes(rules, 2 * MOST)[:MOST]  # the first half: ends of all clauses
     bases = aimed[:: max(len(aimed) // _BASES, 1)][:_BASES]
-    inputs = {name: ([math.nan], [math.inf, -math.inf]) for name in rules.inputs}
-    missing = ((n, x) for n, (nan, _) in inputs.items() for x in nan)
-    infinite = ((n, x) for n, (_, inf) in inputs.items() for x in inf)
+    missing = ((name, math.nan) for name in rules.inputs)
+    infinite = ((name, x) for name in rules.inputs for x in (math.inf, -math.inf))
     yield _question("missing values", rules, bases, missing)
     yield _question("infinite values", rules, bases, infinite)
-    ends = np.array([[row[name] for row in aimed] for name in rules.inputs])
-    yield Convention("ends of curves and cuts", ends.reshape(len(rules.inputs), -1))
+    yield Convention("ends of curves and cuts", _values(rules, aimed))
     yield _question("far outside", rules, bases, _outside(subject))
 
 
@@ -144,12 +122,14 @@ def _question(
     changes: Iterable[tuple[str, float]],
 ) -> Convention:
     """Return rows in which one value is replaced, in each of the bases."""
-    made = [{**row, one: x} for one, x in changes for row in bases]
-    step = -(-len(made) // MOST) or 1
-    kept = made[::step]
-    table = [[row[one] for row in kept] for one in rules.inputs]
-    values = np.array(table, np.float64).reshape(len(rules.inputs), len(kept))
-    return Convention(name, values, len(made) - len(kept))
+    every = [{**row, one: x} for one, x in changes for row in bases]
+    rows = every[:: -(-len(every) // MOST) or 1]
+    return Convention(name, _values(rules, rows), len(every) - len(rows))
+
+
+def _values(rules: RuleBase, rows: Sequence[Mapping[str, float]]) -> FloatArray:
+    table = [[row[name] for row in rows] for name in rules.inputs]
+    return np.array(table, np.float64).reshape(len(rules.inputs), len(rows))
 
 
 def _ties(subject: Subject) -> Convention:
@@ -194,7 +174,6 @@ def convention_answers(
             first of all, the others against the first of their form. Raw rules are a
             model of their own.
     """
-    count = question.values.shape[1]
     first: dict[str, ModelRun] = {}
     is_alike = True
     for one in found:
@@ -207,15 +186,18 @@ def convention_answers(
             is_alike = False
             yield _broken(subject, question, one, base, rows)
     if is_alike:
-        text = (
-            f"{question.name}: {len(found)} representations answer {count} probes alike"
-        )
-        if not count:
-            text = f"{question.name}: no probe of it was met"
-        how = f"each probe was answered by {', '.join(one.title for one in found)}"
-        if question.left_out:
-            how += f"; {question.left_out} more probes were left out"
-        yield note("FT602", question.name, text, Proved(how))
+        yield _alike(question, [one.title for one in found])
+
+
+def _alike(question: Convention, titles: Sequence[str]) -> Answer:
+    name, count = question.name, question.values.shape[1]
+    text = f"{name}: {len(titles)} representations answer {count} probes alike"
+    if not count:
+        text = f"{name}: no probe of it was met"
+    how = f"each probe was answered by {', '.join(titles)}"
+    if question.left_out:
+        how += f"; {question.left_out} more probes were left out"
+    return note("FT602", name, text, Proved(how))
 
 
 def _differ(one: ModelRun, base: ModelRun) -> BoolArray:
@@ -240,17 +222,25 @@ def _broken(
     base: ModelRun,
     rows: IntArray,
 ) -> Answer:
-    values = question.values[:, rows]
-    probe = _probe(subject, values[:, 0])
     row = int(rows[0])
-    sentence = (
-        f"{question.name}: {one.title} answers {_said(one, row)} where {base.title} "
-        f"answers {_said(base, row)}, at {probe}; "
-        f"{rows.size} of {question.values.shape[1]} probes differ"
+    text = f"answers {_said(one, row)} where {base.title} answers {_said(base, row)}"
+    answer = _differing(subject, question, one.title, text, rows)
+    state = witness(subject, base.model, question.values[:, rows])
+    return answer if state is None else replace(answer, state=state)
+
+
+def _differing(
+    subject: Subject, question: Convention, title: str, text: str, rows: IntArray
+) -> Answer:
+    """Return that a representation differs in some probes, and the first of them."""
+    values = zip(
+        subject.rules.inputs, question.values[:, rows[0]].tolist(), strict=True
     )
-    found: State | None = witness(subject, base.model, values)
+    probe = ", ".join(f"{name} {x!r}" for name, x in values)
+    sentence = f"{question.name}: {title} {text}, at {probe}; "
+    sentence += f"{rows.size} of {question.values.shape[1]} probes differ"
     proof = Proved(f"both were run on the probe {probe}")
-    return finding("FT602", f"{question.name}, {one.title}", sentence, found or proof)
+    return finding("FT602", f"{question.name}, {title}", sentence, proof)
 
 
 def _said(answers: ModelRun, row: int) -> str:
@@ -287,38 +277,18 @@ def system_answers(
     subject: Subject, question: Convention, found: Sequence[tuple[str, SystemOutcome]]
 ) -> Iterator[Answer]:
     """Yield what runtimes of a system answer: each that differs, or that none does."""
-    count = question.values.shape[1]
     first, base = found[0]
     is_alike = True
     for name, one in found[1:]:
         differ = one.status != base.status
         differ |= (np.isnan(one.outputs) != np.isnan(base.outputs)).any(axis=0)
         rows = np.flatnonzero(differ)
-        if not rows.size:
-            continue
-        is_alike = False
-        probe = _probe(subject, question.values[:, rows[0]])
-        text = (
-            f"{question.name}: {name} and {first} differ in which outputs have a "
-            f"number, at {probe}; {rows.size} of {count} probes differ"
-        )
-        yield finding(
-            "FT602",
-            f"{question.name}, {name}",
-            text,
-            Proved(f"both were run on the probe {probe}"),
-        )
+        if rows.size:
+            is_alike = False
+            text = f"and {first} differ in which outputs have a number"
+            yield _differing(subject, question, name, text, rows)
     if is_alike:
-        text = (
-            f"{question.name}: {len(found)} representations answer {count} probes alike"
-        )
-        how = f"each probe was answered by {', '.join(name for name, _ in found)}"
-        yield note("FT602", question.name, text, Proved(how))
-
-
-def _probe(subject: Subject, values: FloatArray) -> str:
-    pairs = zip(subject.rules.inputs, values.tolist(), strict=True)
-    return ", ".join(f"{name} {x!r}" for name, x in pairs)
+        yield _alike(question._replace(left_out=0), [name for name, _ in found])
 
 
 # --- witnesses

@@ -32,19 +32,6 @@ if TYPE_CHECKING:
     from fuzzytree.runtimes import OnnxModel
 
 
-RUNTIMES: Final = (
-    "native",
-    "native mixed",
-    "native float32",
-    "onnxruntime float64",
-    "onnxruntime mixed",
-    "onnxruntime float32",
-)
-"""What is run: our own arrays and ONNX, in each number type; the native ones are
-compared with exact arithmetic."""
-
-OF_SYSTEMS: Final = ("reference", "native", "onnxruntime float64")
-
 PROBES: Final = 2_000
 """The most probes of a comparison."""
 
