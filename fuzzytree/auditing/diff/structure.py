@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from fuzzytree.auditing.diff.difference_records import Draft, Shown, renamed_model
@@ -23,6 +22,7 @@ from fuzzytree.auditing.engine.measures import curve_distance
 from fuzzytree.auditing.engine.states import answer_text, listed
 from fuzzytree.auditing.findings.records import Measure
 from fuzzytree.model import (
+    Clause,
     FuzzyTree,
     Path,
     Rule,
@@ -46,48 +46,37 @@ def draft_changes(
     names = _renamed_classes(old, new, curves)
     yield from _class_drafts(old, new, names)
     yield from _answer_drafts(old, new, names)
-    found = matching(RuleKeys(old, curves, names), RuleKeys(new, curves))
-    yield from _rule_drafts(old, new, found, curves, names)
+    keys = RuleKeys(old, curves, names), RuleKeys(new, curves)
+    result = matching(*keys)
+    yield from _rule_drafts(result, *keys)
     yield from variable_drafts(old, new, curves, domain)
     if trees is not None:
         yield from set_drafts(*trees, curves)
-    yield from _head_drafts(old, new, found)
+    yield from _head_drafts(old, new, result)
 
 
 def _head_drafts(old: RuleBase, new: RuleBase, found: Matching) -> Iterator[Draft]:
     yield from renamed_model(old, new)
+    here: Path = ("columns",)
     if old.columns != new.columns:
-        yield Draft(
-            "columns",
-            "the columns of the training table are "
-            f"{listed(new.columns)}, and were {listed(old.columns)}",
-            "never",
-            ("columns",),
-            ("columns",),
-        )
+        text = f"the columns of the training table are {listed(new.columns)}"
+        text += f", and were {listed(old.columns)}"
+        yield Draft("columns", text, "never", here, here)
+    here = ("variables",)
     if old.inputs != new.inputs and sorted(old.inputs) == sorted(new.inputs):
-        yield Draft(
-            "input",
-            f"the inputs stand in another order: {listed(new.inputs)}",
-            "never",
-            ("variables",),
-            ("variables",),
-        )
+        text = f"the inputs stand in another order: {listed(new.inputs)}"
+        yield Draft("input", text, "never", here, here)
     moved = [
         (match.old, match.new)
         for match in found.matches
         if old.rules[match.old - 1].support != new.rules[match.new - 1].support
     ]
     if moved:
-        rules = "1 rule is" if len(moved) == 1 else f"{len(moved)} rules are"
-        yield Draft(
-            "support",
-            f"{rules} supported by another number of rows",
-            "never",
-            old_rules=tuple(one for one, _ in moved),
-            new_rules=tuple(other for _, other in moved),
-            is_harmless=True,
-        )
+        count = "1 rule is" if len(moved) == 1 else f"{len(moved)} rules are"
+        text = f"{count} supported by another number of rows"
+        was, now = zip(*moved, strict=True)
+        draft = Draft("support", text, "never", old_rules=was, new_rules=now)
+        yield draft._replace(is_harmless=True)
 
 
 # --- classes and answers
@@ -95,22 +84,21 @@ def _head_drafts(old: RuleBase, new: RuleBase, found: Matching) -> Iterator[Draf
 
 def _renamed_classes(old: RuleBase, new: RuleBase, curves: Curves) -> dict[str, str]:
     """Return which classes have a new name: those whose antecedents are the same."""
-    gone = [label for label in old.classes if label not in new.classes]
     come = [label for label in new.classes if label not in old.classes]
-    if not gone or not come:
-        return {}
-    one, other = RuleKeys(old, curves), RuleKeys(new, curves)
-    antecedents = {
-        label: {other.antecedent(rule) for rule in new.rules if rule.then == label}
-        for label in come
-    }
-    found: dict[str, str] = {}
-    for label in gone:
-        mine = {one.antecedent(rule) for rule in old.rules if rule.then == label}
-        match = next((k for k in come if mine and antecedents[k] == mine), None)
-        if match is not None and match not in found.values():
-            found[label] = match
-    return found
+    antecedents: list[defaultdict[str, set[Hashable]]] = []
+    for rules in (old, new):
+        keys = RuleKeys(rules, curves)
+        antecedents.append(defaultdict(set))
+        for rule in rules.rules:
+            antecedents[-1][rule.then].add(keys.antecedent(rule))
+    mine, theirs = antecedents
+    names: dict[str, str] = {}
+    for label in old.classes:
+        if label not in new.classes and mine[label]:
+            match = next((k for k in come if theirs[k] == mine[label]), None)
+            if match is not None and match not in names.values():
+                names[label] = match
+    return names
 
 
 def _class_drafts(
@@ -142,10 +130,10 @@ def _answer_drafts(
     for field, where, shown in fields:
         was: str | None = getattr(one, field)
         now: str | None = getattr(other, field)
-        if (names.get(was, was) if was is not None else None) != now:
+        if (None if was is None else names.get(was, was)) != now:
             text = f"the answer {where} is {answer_text(now)}"
-            text += f", and was {answer_text(was)}"
             path = ("semantics", field)
+            text += f", and was {answer_text(was)}"
             yield Draft("answer", text, shown, path, path)
     if one.label_type != other.label_type:
         text = f"the label type is {other.label_type or 'text'}"
@@ -160,61 +148,39 @@ def _answer_drafts(
 # --- rules
 
 
-def _rule_drafts(
-    old: RuleBase,
-    new: RuleBase,
-    found: Matching,
-    curves: Curves,
-    names: Mapping[str, str],
-) -> Iterator[Draft]:
-    one, other = RuleKeys(old, curves, names), RuleKeys(new, curves)
+def _rule_drafts(found: Matching, one: RuleKeys, other: RuleKeys) -> Iterator[Draft]:
     for match in found.matches:
-        yield from _changed_rule(match, one, other)
+        if match.how not in ("same", "curves"):  # their terms are reported
+            yield _changed_rule(match, one, other)
     for number in found.removed:
-        text = f"rule {number} was removed: {sentence(old.rules[number - 1])}"
-        path = ("rules", number - 1)
-        yield Draft("rule", text, "rules", path, None, (number,))
+        text = f"rule {number} was removed: {sentence(one.rules[number - 1])}"
+        yield Draft("rule", text, "rules", ("rules", number - 1), None, (number,))
     for number in found.added:
-        text = f"rule {number} is new: {sentence(new.rules[number - 1])}"
-        path = ("rules", number - 1)
-        yield Draft("rule", text, "rules", None, path, (), (number,))
+        text = f"rule {number} is new: {sentence(other.rules[number - 1])}"
+        yield Draft("rule", text, "rules", None, ("rules", number - 1), (), (number,))
     if found.left:
         text = f"{found.left} rules are too many to be matched with each other"
         yield Draft("rule", text, "never", is_harmless=True)
     yield from _order_drafts(found.matches)
 
 
-def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Iterator[Draft]:
-    if match.how in ("same", "curves"):
-        return  # changed curves are reported with their terms
+def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Draft:
     was, now = one.rules[match.old - 1], other.rules[match.new - 1]
     texts = [*_clause_texts(was, now, one, other)]
     if one.then(was) != now.then:
         texts.append(f"its class is {now.then!r}, and was {was.then!r}")
-    numbered = f"rule {match.old}"
-    if match.old != match.new:
-        numbered += f" (now {match.new})"
-    yield Draft(
-        "rule",
-        f"{numbered} has changed: {'; '.join(texts)}",
-        "rules",
-        ("rules", match.old - 1),
-        ("rules", match.new - 1),
-        (match.old,),
-        (match.new,),
-    )
+    place = "" if match.old == match.new else f" (now {match.new})"
+    text = f"rule {match.old}{place} has changed: {'; '.join(texts)}"
+    paths = ("rules", match.old - 1), ("rules", match.new - 1)
+    return Draft("rule", text, "rules", *paths, (match.old,), (match.new,))
 
 
 def _clause_texts(
     was: Rule, now: Rule, one: RuleKeys, other: RuleKeys
 ) -> Iterator[str]:
     """Yield which clauses a rule has lost and gained."""
-    keys, read = {other.clause(c) for c in now.when}, {words_of(c) for c in now.when}
-    gone = [c for c in was.when if one.clause(c) not in keys]
-    gone = [c for c in gone if words_of(c) not in read]
-    known, words = {one.clause(c) for c in was.when}, {words_of(c) for c in was.when}
-    come = [c for c in now.when if other.clause(c) not in known]
-    come = [c for c in come if words_of(c) not in words]
+    gone = _unlike(was, one, now, other)
+    come = _unlike(now, other, was, one)
     for clause in gone:
         match = next((c for c in come if c.variable == clause.variable), None)
         if match is None:
@@ -226,21 +192,25 @@ def _clause_texts(
         yield f"it also has {clause_text(clause)!r}"
 
 
+def _unlike(
+    rule: Rule, keys: RuleKeys, other: Rule, other_keys: RuleKeys
+) -> list[Clause]:
+    """Return the clauses of a rule that another one has neither by curve nor word."""
+    known = {other_keys.clause(c) for c in other.when}
+    words = {words_of(c) for c in other.when}
+    return [
+        c for c in rule.when if keys.clause(c) not in known and words_of(c) not in words
+    ]
+
+
 def _order_drafts(matches: Sequence[Match]) -> Iterator[Draft]:
     """Yield that rules stand in another order, as many as were overtaken."""
-    moved = [(a, b) for (a, b) in itertools.pairwise(matches) if b.new < a.new]
-    if moved:
-        kept = _longest_run([match.new for match in matches])
-        count = len(matches) - kept
-        rules = "1 rule stands" if count == 1 else f"{count} rules stand"
-        yield Draft(
-            "order",
-            f"{rules} at another place among the others, which matters where two "
-            "are equally strong",
-            "ties",
-            ("rules",),
-            ("rules",),
-        )
+    count = len(matches) - _longest_run([match.new for match in matches])
+    if count:
+        text = "1 rule stands" if count == 1 else f"{count} rules stand"
+        text += " at another place among the others, which matters where two are "
+        text += "equally strong"
+        yield Draft("order", text, "ties", ("rules",), ("rules",))
 
 
 def _longest_run(numbers: Sequence[int]) -> int:
@@ -279,9 +249,9 @@ def variable_drafts(
             pairs.append((key, twin))
             yield _summed(mine[key], theirs[twin], users)
     for key in lost:
-        yield _gone(*mine[key], users[0])
+        yield _alone(*mine[key], users[0], is_new=False)
     for key in come:
-        yield _come(*theirs[key], users[1])
+        yield _alone(*theirs[key], users[1], is_new=True)
     for one, other in pairs:
         (place, variable), (at, match) = mine[one], theirs[other]
         paths: tuple[Path, Path] = (("variables", place), ("variables", at))
@@ -294,24 +264,22 @@ def _key(variable: Variable) -> AxisKey:
     return variable.parts or variable.name
 
 
-def _gone(place: int, variable: Variable, users: Users) -> Draft:
+def _alone(place: int, variable: Variable, users: Users, *, is_new: bool) -> Draft:
+    """Return that an input or a combination is new, or was removed."""
+    parts = [part.input for part in variable.parts]
+    noun = "combination" if parts else "input"
+    text = f"the {noun} {variable.name!r}"
+    if is_new and parts:
+        text += f" of {listed(parts)}"
+    text += " is new" if is_new else " was removed"
+    if is_new and not parts:
+        text += ", so that rows need it"
     path: Path = ("variables", place)
-    if not variable.parts:
-        text = f"the input {variable.name!r} was removed"
-        return Draft("input", text, "always", path)
-    text = f"the combination {variable.name!r} was removed"
-    return Draft("combination", text, "rules", path, None, _asking(variable, users))
-
-
-def _come(place: int, variable: Variable, users: Users) -> Draft:
-    path: Path = ("variables", place)
-    if not variable.parts:
-        text = f"the input {variable.name!r} is new, so that rows need it"
-        return Draft("input", text, "always", None, path)
-    parts = listed([part.input for part in variable.parts])
-    text = f"the combination {variable.name!r} of {parts} is new"
-    rules = _asking(variable, users)
-    return Draft("combination", text, "rules", None, path, (), rules)
+    rules = _users_of(variable, users) if parts else ()
+    draft = Draft(noun, text, "rules" if parts else "always")
+    if is_new:
+        return draft._replace(new=path, new_rules=rules)
+    return draft._replace(old=path, old_rules=rules)
 
 
 def _summed(
@@ -335,17 +303,15 @@ def _summed(
         "rules" if old.parts and new.parts else "always",
         ("variables", place),
         ("variables", at),
-        _asking(old, users[0]),
-        _asking(new, users[1]),
+        _users_of(old, users[0]),
+        _users_of(new, users[1]),
     )
 
 
-def _asking(variable: Variable, users: Users) -> tuple[int, ...]:
+def _users_of(variable: Variable, users: Users) -> tuple[int, ...]:
     """Return the numbers of the rules that use a variable."""
-    return tuple(
-        sorted({n for (name, _), rules in users.items() if name == variable.name
-                for n in rules})
-    )  # fmt: skip
+    known = (rules for (name, _), rules in users.items() if name == variable.name)
+    return tuple(sorted({number for rules in known for number in rules}))
 
 
 def _users(rules: RuleBase) -> Users:
@@ -449,50 +415,41 @@ def _changed_term(
     ends: tuple[Fraction, Fraction],
 ) -> Draft:
     """Return that a curve has changed, with how far the two are apart on the domain."""
-    low, high = ends
-    name = repr(terms[0].name)
-    text = f"the curve of {name} of {variable!r} has changed"
+    text = f"the curve of {terms[0].name!r} of {variable!r} has changed"
     measures: tuple[Measure, ...] = ()
-    if low <= high:
-        found = curve_distance(terms[0].shape, terms[1].shape, low, high)
+    if ends[0] <= ends[1]:
+        found = curve_distance(terms[0].shape, terms[1].shape, *ends)
         most, at = outwards(found.high)[1], float(found.at)
-        text += f", by {most:.3g} at most, near {at:.6g}"
-        if not found.high:
-            text = f"the curve of {name} of {variable!r} has changed outside the domain"
         exact = str(found.low) if found.low == found.high else None
+        near = f", by {most:.3g} at most, near {at:.6g}"
+        text += near if found.high else " outside the domain"
         measures = (
             Measure("largest difference", most, exact),
             Measure("at least", outwards(found.low)[0], str(found.low)),
             Measure("place of the largest difference", at, str(found.at)),
         )
-    return Draft(
-        "term",
-        text,
-        "rules",
-        *paths,
-        *rules,
-        measures,
-        is_harmless=not any(rules),
-    )
+    draft = Draft("term", text, "rules", *paths, *rules, measures)
+    return draft._replace(is_harmless=not any(rules))
 
 
 def set_drafts(old: FuzzyTree, new: FuzzyTree, curves: Curves) -> Iterator[Draft]:
     """Yield which fitted sets of trees differ: only raw rules use them."""
     mine, theirs = (
         {
-            (group.variable, term.name): (("sets", g, "terms", t), term.shape)
-            for g, group in enumerate(tree.sets)
-            for t, term in enumerate(group.terms)
+            (group.variable, term.name): term.shape
+            for group in tree.sets
+            for term in group.terms
         }
         for tree in (old, new)
     )
-    counts = {"changed": 0, "removed": 0, "new": 0}
-    for key, (_, shape) in mine.items():
-        if key not in theirs:
-            counts["removed"] += 1
-        elif curves.number(shape) != curves.number(theirs[key][1]):
-            counts["changed"] += 1
-    counts["new"] = sum(key not in mine for key in theirs)
+    both = [key for key in mine if key in theirs]
+    counts = {
+        "changed": sum(
+            curves.number(mine[key]) != curves.number(theirs[key]) for key in both
+        ),
+        "removed": len(mine) - len(both),
+        "new": len(theirs) - len(both),
+    }
     changes = [f"{count} {what}" for what, count in counts.items() if count]
     if changes:
         text = f"of the fitted sets {', '.join(changes)}; only raw rules use them"
