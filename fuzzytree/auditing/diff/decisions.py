@@ -10,7 +10,7 @@ difference, boxes prove that there is none on the domain, or find it, or leave a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -76,22 +76,10 @@ class RulePair(msgspec.Struct, frozen=True, eq=False):
     domain: Domain
     trees: tuple[FuzzyTree, FuzzyTree] | None = None
 
-    def decided(self, values: FloatArray) -> tuple[Decisions, Decisions]:
-        """Return the exact answers of both to rows of shape (inputs, rows)."""
-        one, other = (
-            decide(
-                model,
-                values[[self.inputs.index(name) for name in model.inputs]],
-                with_strengths=False,
-            )
-            for model in (self.old, self.new)
-        )
-        return one, other
-
-    def old_labels(self, values: FloatArray) -> IntArray:
-        """Return the number of the old model's class for each row; -1 is no class."""
-        inputs = values[[self.inputs.index(name) for name in self.old.inputs]]
-        return decide(self.old, inputs, with_strengths=False).label
+    def decide(self, model: RuleBase, values: FloatArray) -> Decisions:
+        """Return one model's exact answers to rows of shape (inputs, rows)."""
+        rows = values[[self.inputs.index(name) for name in model.inputs]]
+        return decide(model, rows, with_strengths=False)
 
     def labels(self, found: tuple[Decisions, Decisions]) -> tuple[IntArray, IntArray]:
         """Return the classes of both answers, numbered alike; -1 is no class."""
@@ -149,7 +137,12 @@ def decisions(
     if seen and is_open:
         answers.append(_drawn_answer(many, seen, settings.seed))
     if is_open and (found.left or found.is_cut):
-        answers.append(_left_answer(found.left))
+        points = (
+            f"{found.left} points"
+            if found.left
+            else "points beside decision boundaries"
+        )
+        answers.append(left_out(points, "the budget for single points was spent"))
     return answers, found.evidence(is_equal=not is_open)
 
 
@@ -207,18 +200,14 @@ def _on_rows(rows: AuditRows, found: _Found) -> Answer:
 def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
     how = f"{rows} points drawn evenly from the domain, seed {seed}"
     state = sampled_share("the domain that is classified differently", hits, rows, how)
-    sentence = (
-        f"{hits} of {rows} points drawn from the domain are classified differently"
-    )
-    return Answer("FT801", "domain", sentence, state, hits > 0)
+    text = f"{hits} of {rows} points drawn from the domain are classified differently"
+    return Answer("FT801", "domain", text, state, hits > 0)
 
 
-def _left_answer(count: int) -> Answer:
-    reason = "the budget for single points was spent"
-    points = f"{count} points" if count else "points beside decision boundaries"
-    sentence = f"{points} were not looked at: {reason}"
-    state = Declined("FTD03", reason)
-    return note("FT801", "points", sentence, state)
+def left_out(points: str, reason: str = "the budget was spent") -> Answer:
+    """Return that some points were not compared."""
+    text = f"{points} were not looked at: {reason}"
+    return note("FT801", "points", text, Declined("FTD03", reason))
 
 
 def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
@@ -233,17 +222,11 @@ def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
         if number < _MOST_REGIONS:
             spans = difference_region(pair.old, pair.new, pair.domain, point)
         state = msgspec.structs.replace(state, region=spans)
-        sentence = f"the old model answers {_answered(one)}, the new one "
+        sentence = f"{name}: " if name else ""
+        sentence += f"the old model answers {_answered(one)}, the new one "
         sentence += _answered(other)
-        if name:
-            sentence = f"{name}: {sentence}"
-        yield finding(
-            "FT801",
-            " -> ".join(map(answer_text, labels)),
-            sentence,
-            state,
-            region=spans,
-        )
+        title = " -> ".join(map(answer_text, labels))
+        yield finding("FT801", title, sentence, state, region=spans)
     if len(known) > _MOST_LISTED:
         left = len(known) - _MOST_LISTED
         sentence = f"{left} more pairs of classes are answered one for the other"
@@ -287,10 +270,6 @@ class _Found:
     def add(self, values: FloatArray, name: str = "") -> tuple[int, int]:
         """Compare the answers to some rows, as long as there is time.
 
-        Args:
-            values: Shape (inputs, rows).
-            name: What to call a row, with its number, if it is the user's.
-
         Returns:
             How many differ, of how many that were looked at.
         """
@@ -302,7 +281,8 @@ class _Found:
         return hits, seen
 
     def _add(self, values: FloatArray, name: str, start: int) -> int:
-        found = self.pair.decided(values)
+        pair = self.pair
+        found = pair.decide(pair.old, values), pair.decide(pair.new, values)
         one, other = self.pair.labels(found)
         rows = np.flatnonzero(one != other)
         margins = np.minimum(found[0].margin, found[1].margin)
@@ -325,10 +305,8 @@ class _Found:
         self, point: dict[str, Fraction], margin: float = 0.0, name: str = ""
     ) -> None:
         """Keep a point, if its pair of classes has no clearer one."""
-        one, other = (
-            prediction_at(self.pair.old, point),
-            prediction_at(self.pair.new, point),
-        )
+        one = prediction_at(self.pair.old, point)
+        other = prediction_at(self.pair.new, point)
         self.old_rules |= {one.rule} - {0}
         self.new_rules |= {other.rule} - {0}
         self.has_tie |= one.is_tie or other.is_tie
@@ -340,13 +318,8 @@ class _Found:
 
     def evidence(self, *, is_equal: bool) -> DecisionEvidence:
         """Return how differing decisions come about."""
-        return DecisionEvidence(
-            frozenset(self.old_rules),
-            frozenset(self.new_rules),
-            self.has_tie,
-            self.has_none,
-            is_equal,
-        )
+        rules = frozenset(self.old_rules), frozenset(self.new_rules)
+        return DecisionEvidence(*rules, self.has_tie, self.has_none, is_equal)
 
 
 def portions(count: int, clock: Clock) -> Iterator[slice]:
@@ -373,22 +346,31 @@ def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
     return list(best.values())
 
 
+def ends_of(domain: Domain, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper ends of some inputs, each of shape (inputs, 1)."""
+    sides = [domain.side(name) for name in names]
+    low = [side.low if side else 0.0 for side in sides]
+    high = [side.high if side else 0.0 for side in sides]
+    return np.array(low)[:, None], np.array(high)[:, None]
+
+
+def inside(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the points that are within some ends; shape (inputs, points)."""
+    kept: FloatArray = values[:, ((values >= low) & (values <= high)).all(axis=0)]
+    return kept
+
+
 def _probes(pair: RulePair) -> FloatArray:
     """Return the probes of both models that are on the domain."""
-    sides = [pair.domain.side(name) for name in pair.inputs]
-    low = np.array([side.low if side else 0.0 for side in sides])
-    high = np.array([side.high if side else 0.0 for side in sides])
-    made: list[FloatArray] = []
+    low, high = ends_of(pair.domain, pair.inputs)
+    probes: list[FloatArray] = []
     for model in (pair.old, pair.new):
         known = probe_values(model, _PROBES)
         # An input that this model does not use stays in the middle of its side.
-        values = np.repeat((low / 2 + high / 2)[:, None], known.shape[1], axis=1)
+        values = np.repeat(low / 2 + high / 2, known.shape[1], axis=1)
         values[[pair.inputs.index(name) for name in model.inputs]] = known
-        made.append(values)
-    values = np.hstack(made)
-    inside = (values >= low[:, None]) & (values <= high[:, None])
-    kept: FloatArray = values[:, inside.all(axis=0)]
-    return kept
+        probes.append(values)
+    return inside(np.hstack(probes), low, high)
 
 
 def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
@@ -403,7 +385,7 @@ def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
     made: list[IntArray] = []
     labels = pairs = np.zeros(0, np.int64)
     for part in portions(values.shape[1], clock):
-        made.append(pair.old_labels(values[:, part]))
+        made.append(pair.decide(pair.old, values[:, part]).label)
         labels = np.concatenate(made)
         pairs = np.flatnonzero(labels[:-1] != labels[1:])[:_SEGMENTS]
         if pairs.size == _SEGMENTS:
@@ -416,7 +398,7 @@ def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
             found.is_cut = True
             break
         middle = low / 2 + high / 2
-        is_low = pair.old_labels(middle) == known
+        is_low = pair.decide(pair.old, middle).label == known
         low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
         seen.append(middle)
     return np.hstack(seen)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.diff.decisions import portions
+from fuzzytree.auditing.diff.decisions import ends_of, inside, left_out, portions, union
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
 from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
@@ -27,7 +27,6 @@ from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
     Proved,
-    State,
     Witness,
     coordinates,
 )
@@ -35,7 +34,7 @@ from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, AuditSettings, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.auditing.findings.support import sampled_share
+from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.model import FuzzySystem
 from fuzzytree.numerics import outwards
 from fuzzytree.runtimes import run_system
@@ -76,14 +75,7 @@ class SystemPair(NamedTuple):
 def number_answers(
     pair: SystemPair, rows: AuditRows | None, settings: AuditSettings, clock: Clock
 ) -> list[Answer]:
-    """Return what is known of the numbers of two systems; nothing if none is of both.
-
-    Args:
-        pair: The systems.
-        rows: Rows of the columns of either.
-        settings: How many points are drawn, and their seed.
-        clock: How much time there is.
-    """
+    """Return what is known of the numbers that two systems have in common."""
     try:
         with enforced(clock):
             hows = _hows(pair)
@@ -93,29 +85,24 @@ def number_answers(
             runs = [run_system(system) for system in (pair.old, pair.new)]
     except OutOfTimeError:
         reason = "the budget was spent"
-        sentence = f"the numbers of the two were not compared: {reason}"
-        state = Declined("FTD03", reason)
-        return [note("FT801", "numbers", sentence, state)]
+        text = f"the numbers of the two were not compared: {reason}"
+        return [note("FT801", "numbers", text, Declined("FTD03", reason))]
     rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
     found = _Found(pair, open_, rounded, runs)
     answers = [*_sampled(found, rows, settings, clock)]
     if found.differing:
         answers = [*map(found.witness, found.differing), *answers]
     elif None not in hows.values():
-        is_rounded = bool(rounded)
-        how = _ROUNDED.how if is_rounded else _HELD.how
-        sentence = f"{_ALIKE} everywhere on the domain"
-        sentence += ", but for rounding" if is_rounded else ""
-        measures = (Measure("largest difference by rounding", found.rounding),)
-        whole = _proved(pair, sentence, how)
-        if is_rounded:
-            whole = msgspec.structs.replace(whole, measures=measures)
-        return [whole, *answers]
+        text = f"{_ALIKE} everywhere on the domain"
+        if not rounded:
+            return [_proved(pair, text, _SAME.how), *answers]
+        whole = _proved(pair, f"{text}, but for rounding", _ROUNDED.how)
+        most = Measure("largest difference by rounding", found.rounding)
+        return [msgspec.structs.replace(whole, measures=(most,)), *answers]
     for name, known in hows.items():
         if known is not None and name not in found.largest:
-            sentence = f"both systems compute {name!r} alike{known.where}"
-            proof = Proved(known.how)
-            answers.append(note("FT801", name, sentence, proof))
+            text = f"both systems compute {name!r} alike{known.where}"
+            answers.append(note("FT801", name, text, Proved(known.how)))
     answers += [found.bound(name) for name, how in hows.items() if how is None]
     return answers
 
@@ -162,13 +149,9 @@ def _sampled(
 ) -> Iterator[Answer]:
     """Yield how often outputs differ, and what the budget left out."""
     pair = found.pair
-    sides = [pair.domain.side(name) for name in pair.columns]
-    low, high = (
-        np.array([getattr(side, end) for side in sides if side])[:, None]
-        for end in ("low", "high")
-    )
-    chance = np.random.default_rng(settings.seed)
-    u = chance.random((len(pair.columns), min(settings.rows, _DRAWN)))
+    low, high = ends_of(pair.domain, pair.columns)
+    drawn, seed = min(settings.rows, _DRAWN), settings.seed
+    points = sample_points(union(pair.old, pair.new), pair.domain, drawn, seed)
     samples: list[tuple[str, FloatArray, str]] = []
     if rows is not None:
         samples.append(("rows", rows.values, f"rows of {rows.name}"))
@@ -176,8 +159,8 @@ def _sampled(
         [_probes(one, pair.columns, low, high) for one in (pair.old, pair.new)]
     )
     samples.append(("probes", probes, "probes of both systems within the domain"))
-    drawn = f"points drawn evenly from the domain, seed {settings.seed}"
-    samples.append(("domain", low * (1.0 - u) + high * u, drawn))
+    how = f"points drawn evenly from the domain, seed {seed}"
+    samples.append(("domain", points, how))
     left = 0
     for place, (subject, values, how) in enumerate(samples):
         clock.report("comparing numbers", place / len(samples))
@@ -188,10 +171,7 @@ def _sampled(
             if seen:
                 yield _counted(found, subject, hits, seen, how)
     if left:
-        reason = "the budget was spent"
-        sentence = f"{left} points were not looked at: {reason}"
-        state = Declined("FTD03", reason)
-        yield note("FT801", "points", sentence, state)
+        yield left_out(f"{left} points")
 
 
 def _counted(found: _Found, subject: str, hits: int, seen: int, how: str) -> Answer:
@@ -203,14 +183,7 @@ def _counted(found: _Found, subject: str, hits: int, seen: int, how: str) -> Ans
         sentence = f"an output differs on {hits} of {seen} {how}"
     elif found.rounding:
         sentence += ", but for rounding"
-    return Answer(
-        "FT801",
-        subject,
-        sentence,
-        state,
-        hits > 0,
-        severity="error" if hits else "info",
-    )
+    return (finding if hits else note)("FT801", subject, sentence, state)
 
 
 def _probes(
@@ -223,9 +196,7 @@ def _probes(
         for name, at in zip(columns, middle, strict=True)
     ]
     values = np.array(table, np.float64).reshape(len(columns), len(known))
-    inside = ((values >= low) & (values <= high)).all(axis=0)
-    kept: FloatArray = values[:, inside]
-    return kept
+    return inside(values, low, high)
 
 
 class _Largest(NamedTuple):
@@ -351,26 +322,22 @@ class _Found:
         """Return between which numbers the largest difference of an output lies."""
         of = f"the largest difference of {name!r} where both answer a number"
         known = most(self.pair.old, self.pair.new, name, self.pair.domain)
-        seen = self.largest.get(name)
+        title = f"bound of {name}"
         if known is None:
             reason = "nothing bounds what its rules conclude"
-            sentence = f"how far {name!r} can differ at most is not known: {reason}"
-            state: State = Declined("FTD02", reason)
-            return note("FT801", f"bound of {name}", sentence, state)
-        high, why = outwards(known[0])[1], known[1]
-        is_within = (
-            seen is not None
-            and math.isfinite(seen.gap)
-            and all(
+            text = f"how far {name!r} can differ at most is not known: {reason}"
+            return note("FT801", title, text, Declined("FTD02", reason))
+        (bound, why), low = known, 0.0
+        high, seen = outwards(bound)[1], self.largest.get(name)
+        if seen is not None and math.isfinite(seen.gap):
+            is_within = all(
                 side.low <= seen.row[side.variable] <= side.high
                 for side in self.pair.domain.sides
                 if side.variable in seen.row
             )
-        )
-        low = min(seen.gap, high) if seen is not None and is_within else 0.0
-        state = Bracket(of, low, high, why)
-        sentence = f"{name!r} differs by at most {high:.6g} where both answer a number"
-        return note("FT801", f"bound of {name}", sentence, state)
+            low = min(seen.gap, high) if is_within else 0.0
+        text = f"{name!r} differs by at most {high:.6g} where both answer a number"
+        return note("FT801", title, text, Bracket(of, low, high, why))
 
 
 def _shown(number: Fraction | float | None) -> str:
