@@ -7,11 +7,11 @@ its numbers do while the degrees stay, and always lies between them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
 from types import MappingProxyType
-from typing import NoReturn
+from typing import TypeVar
 
 from fuzzytree.auditing.diff.system_keys import Contribution, contributions, facts_of
 from fuzzytree.auditing.engine.domain import Domain
@@ -70,7 +70,7 @@ def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None
         NotExactError: If the output looks at a curve, or some curve, norm, hedge or
             activation is none of fractions, or a rule uses an output.
     """
-    one = next(each for each in system.outputs if each.name == output)
+    one = _named(system.outputs, output)
     how = one.defuzzifier
     if not how.is_weighted or output in joined_outputs(system):
         raise NotExactError(output)
@@ -89,8 +89,8 @@ def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None
             for conclusion in rule.then if degree > 0 else ():
                 degree = _hedged(conclusion.hedges, degree)
                 if conclusion.output == output and degree > 0:
-                    label = _label(one, conclusion.label)
-                    total += degree * _number(label, system.columns, values)
+                    label = _named(one.labels, conclusion.label)
+                    total += degree * _number(label, system, values)
                     weight += degree
                     is_number = True
     if not is_number:
@@ -102,17 +102,10 @@ def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None
 def _values(inputs: Sequence[SystemInput], point: Point) -> dict[str, Fraction]:
     values: dict[str, Fraction] = {}
     for one in inputs:
-        value = (
-            point[one.name]
-            if not one.parts
-            else sum(
-                (
-                    Fraction(p.weight) * (values[p.input] - Fraction(p.centre))
-                    for p in one.parts
-                ),
-                Fraction(0),
-            )
-        )
+        value = point.get(one.name, Fraction(0))
+        if one.parts:
+            centred = ((p, values[p.input] - Fraction(p.centre)) for p in one.parts)
+            value = sum((Fraction(p.weight) * x for p, x in centred), Fraction(0))
         values[one.name] = _clamped(one, value) if one.clips else value
     return values
 
@@ -128,19 +121,40 @@ def _answered(one: SystemOutput, number: Fraction | None) -> Fraction | None:
     return _clamped(one, number) if one.clips and number is not None else number
 
 
-def _label(one: SystemInput | SystemOutput, name: str) -> SystemTerm:
-    return next(label for label in one.labels if label.name == name)
+_Named = TypeVar("_Named", SystemInput, SystemOutput, SystemTerm)
+_Sum = tuple[Mapping[str, Fraction], Fraction]
 
 
-def _number(label: SystemTerm, columns: Sequence[str], values: Point) -> Fraction:
+def _named(parts: Iterable[_Named], name: str) -> _Named:
+    """Return the part of a name.
+
+    Raises:
+        NotExactError: If there is none.
+    """
+    for one in parts:
+        if one.name == name:
+            return one
+    raise NotExactError(name)
+
+
+def _linear(label: SystemTerm, system: FuzzySystem) -> _Sum | None:
+    """Return the number of a label as a sum of columns; None if it is none."""
     match label.curve:
         case Singleton(value=value):
-            return Fraction(value)
+            return {}, Fraction(value)
         case Linear(weights=weights, offset=offset):
-            pairs = zip(columns, weights, strict=True)
-            return sum((Fraction(w) * values[n] for n, w in pairs), Fraction(offset))
-        case curve:
-            raise NotExactError(str(curve))
+            pairs = zip(system.columns, weights, strict=True)
+            return {name: Fraction(w) for name, w in pairs if w}, Fraction(offset)
+        case _:
+            return None
+
+
+def _number(label: SystemTerm, system: FuzzySystem, values: Point) -> Fraction:
+    known = _linear(label, system)
+    if known is None:
+        raise NotExactError(str(label.curve))
+    weights, offset = known
+    return sum((w * values[name] for name, w in weights.items()), offset)
 
 
 def _hedged(hedges: Sequence[str], degree: Fraction) -> Fraction:
@@ -158,11 +172,10 @@ def _at(
         case Is(variable=name, label=label, hedges=hedges):
             if label is None:
                 return _hedged(hedges, Fraction(0))  # the last, `any`, makes 1 of it
-            one = next((each for each in system.inputs if each.name == name), None)
-            found = None if one is None else _label(one, label)
-            shape = None if found is None else shape_of(found.curve)
-            if found is None or shape is None:
-                return _nothing(name)
+            found = _named(_named(system.inputs, name).labels, label)
+            shape = shape_of(found.curve)
+            if shape is None:
+                raise NotExactError(name)
             degree = Fraction(found.height) * exact_degree(shape, values[name])
             return _hedged(hedges, degree)
         case Not(part=part):
@@ -174,10 +187,6 @@ def _at(
     if norm not in _NORMS:
         raise NotExactError(norm)
     return reduce(_NORMS[norm], (_at(part, block, system, values) for part in parts))
-
-
-def _nothing(name: str) -> NoReturn:
-    raise NotExactError(name)
 
 
 # --- bounds
@@ -195,21 +204,14 @@ def most(
     Returns:
         None where nothing bounds the output, such as a formula.
     """
-    one, other = (
-        next(each for each in system.outputs if each.name == output)
-        for system in (old, new)
-    )
+    one, other = _named(old.outputs, output), _named(new.outputs, output)
     known = contributions(old, output, domain), contributions(new, output, domain)
     found = _moved(old, new, (one, other), known, domain)
-    spans = [
-        _span(system, each, known_one, domain)
-        for system, each, known_one in zip((old, new), (one, other), known, strict=True)
-    ]
-    if found is None and (spans[0] is None or spans[1] is None):
-        return None
-    if spans[0] is None or spans[1] is None:
+    ends = _span(old, one, known[0], domain)
+    other_ends = _span(new, other, known[1], domain)
+    if ends is None or other_ends is None:
         return found
-    (a, b), (c, d) = spans[0], spans[1]
+    (a, b), (c, d) = ends, other_ends
     apart = max(abs(d - a), abs(b - c), Fraction(0))
     if found is not None and found[0] <= apart:
         return found
@@ -270,29 +272,17 @@ def _move(
     a, b = _weights(old, one), _weights(new, other)
     if a is None or b is None:
         return None
-    names = {**a[0], **b[0]}
-    apart = {
-        name: a[0].get(name, Fraction(0)) - b[0].get(name, Fraction(0))
-        for name in names
-    }
+    zero = Fraction(0)
+    apart = {n: a[0].get(n, zero) - b[0].get(n, zero) for n in {**a[0], **b[0]}}
     ends = _linear_span(apart, a[1] - b[1], domain)
     return None if ends is None else max(abs(ends[0]), abs(ends[1]))
 
 
-def _weights(
-    system: FuzzySystem, label: SystemTerm
-) -> tuple[dict[str, Fraction], Fraction] | None:
-    """Return the number of a label as a sum of columns; None if it is none."""
-    match label.curve:
-        case Singleton(value=value):
-            return {}, Fraction(value)
-        case Linear(weights=weights, offset=offset):
-            clipped = {one.name for one in system.inputs if one.clips}
-            pairs = zip(system.columns, weights, strict=True)
-            found = {name: Fraction(weight) for name, weight in pairs if weight}
-            return None if clipped & {*found} else (found, Fraction(offset))
-        case _:
-            return None
+def _weights(system: FuzzySystem, label: SystemTerm) -> _Sum | None:
+    """Return the number of a label as a sum of columns that no range clamps."""
+    known = _linear(label, system)
+    clipped = {one.name for one in system.inputs if one.clips}
+    return None if known is None or clipped & {*known[0]} else known
 
 
 def _linear_span(
