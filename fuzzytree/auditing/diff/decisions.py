@@ -60,14 +60,12 @@ _MOST_REGIONS = 4  # of which the box is looked for
 
 
 class RulePair(msgspec.Struct, frozen=True, eq=False):
-    """Two models as rules, with the points on which they are compared.
+    """Two models as rules, and where they are compared.
 
     Attributes:
-        old: The old rules.
-        new: The new rules.
         inputs: The inputs of either, the old ones first.
         domain: A side for each.
-        trees: The trees that they come from, if both are trees.
+        trees: The trees that the rules come from, if both are trees.
     """
 
     old: RuleBase

@@ -41,12 +41,9 @@ class Match(NamedTuple):
 
 
 class Matching(NamedTuple):
-    """The rules of two rule bases.
+    """The rules that two rule bases have in common, and the numbers of the others.
 
     Attributes:
-        matches: The rules that both have, in the order of the old ones.
-        removed: The numbers of the old rules that the new one does not have.
-        added: The numbers of the new rules that the old one does not have.
         left: How many rules were too many to be compared with each other.
     """
 
@@ -119,20 +116,9 @@ class RuleKeys:
 
 
 def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
-    """Return whether each class is as strong in both rule bases, at any input.
+    """Return whether each class has the same rules in both, in any order and number.
 
-    So it is where it has the same rules, in any order and any number of times; the two
-    can then differ only where two classes are equally strong.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(1))
-        >>> turned = RuleBase(
-        ...     "b", rules.classes, rules.variables, rules.rules[::-1], rules.semantics
-        ... )
-        >>> have_same_classes(rules, turned)
-        True
+    The two can then differ only where two classes are equally strong.
     """
     one, other = old.semantics, new.semantics
     if (one.conjunction, one.uncovered) != (other.conjunction, other.uncovered):
@@ -157,16 +143,7 @@ def words_of(clause: Clause) -> NamedKey:
 
 
 def matching(one: RuleKeys, other: RuleKeys) -> Matching:
-    """Match the rules of two rule bases.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(1))
-        >>> said = RuleKeys(rules, Curves())
-        >>> {match.how for match in matching(said, said).matches}
-        {'same'}
-    """
+    """Match the rules of two rule bases."""
     old, new = (dict(enumerate(said.rules, 1)) for said in (one, other))
     found: list[Match] = []
     steps: tuple[tuple[How, Callable[[RuleKeys, Rule], Hashable]], ...] = (

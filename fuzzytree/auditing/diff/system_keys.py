@@ -61,16 +61,7 @@ def operation_keys(
 ) -> dict[str, Hashable]:
     """Return for each output the operations and numbers that it is computed by.
 
-    Args:
-        system: The system.
-        domain: Where it is computed; anywhere unless given. A range that holds the
-            domain changes no value.
-
-    Example:
-        >>> from fuzzytree.testing import random_system
-        >>> one, other = (operation_keys(random_system(n)) for n in (2, 3))
-        >>> any(one[name] == other.get(name) for name in one)
-        False
+    A range that contains the domain changes no value; without a domain, none does.
     """
     read = _Read(system, None, domain)
     return {one.name: read.output(one.name) for one in system.outputs}
@@ -107,10 +98,7 @@ def contributions(
 class _Read:
     """A system, and how its parts become keys.
 
-    Args:
-        system: The system.
-        curves: Numbers curves; then operands whose order does not matter are sorted.
-        domain: Where values lie; anywhere if None.
+    With `curves`, operands whose order does not matter are sorted.
     """
 
     def __init__(

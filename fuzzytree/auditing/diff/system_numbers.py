@@ -51,14 +51,7 @@ _ALIKE = "both systems compute alike"
 
 
 class SystemPair(NamedTuple):
-    """Two systems, and where they are compared.
-
-    Attributes:
-        old: The old system.
-        new: The new one.
-        columns: The columns of either, the old one's first.
-        domain: A side for each.
-    """
+    """Two systems, and where they are compared: a side for each column of either."""
 
     old: FuzzySystem
     new: FuzzySystem

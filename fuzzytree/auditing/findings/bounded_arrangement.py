@@ -59,13 +59,7 @@ _ROUNDING: Final = 1e-9
 
 
 class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """Rules from below and from above, on a box.
-
-    Attributes:
-        lower: The rules, none of which is stronger than in truth.
-        upper: The rules, none of which is weaker.
-        bounds: The rule bases, None if nothing is.
-    """
+    """Rules from below and from above, on a box; no bounds if both are the same."""
 
     lower: Arrangement
     upper: Arrangement

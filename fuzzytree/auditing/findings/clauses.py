@@ -48,13 +48,7 @@ _MOST_TRIED = 4  # rows that are evaluated in fractions for one clause
 
 
 class _Dropped(NamedTuple):
-    """A clause that is left out.
-
-    Attributes:
-        rule: The number of its rule, from 1.
-        clause: The clause.
-        shorter: The rule without it.
-    """
+    """A clause, the number of its rule, and the rule without it."""
 
     rule: int
     clause: Clause

@@ -69,13 +69,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
 
 def depth(tree: FuzzyTree) -> int:
-    """Return how many nodes the longest path of a tree has.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> depth(random_tree(3, leaves=2))
-        1
-    """
+    """Return how many nodes the longest path of a tree has."""
     # Nodes stand before those below them.
     depths = [1] * len(tree.nodes)
     for number, node in enumerate(tree.nodes):

@@ -217,10 +217,6 @@ def configuration(content: bytes, name: str) -> Configuration:
 
     Raises:
         ReadError: As `read_configuration`.
-
-    Example:
-        >>> configuration(b"select: [FT1]", "x.yaml").select
-        ('FT1',)
     """
     root, found = compose(content, name)
     bound = bind(root, ConfigurationFile, found)

@@ -50,13 +50,9 @@ _FAR = (-1e300, -1e30, 1e30, 1e300)
 
 
 class Convention(NamedTuple):
-    """A convention, and the probes that test it.
+    """A convention, and the probes that test it, of shape (inputs, probes).
 
-    Attributes:
-        name: The convention, such as `missing values`.
-        values: Shape (inputs, probes).
-        left_out: How many probes were too many. Ends and cuts are tested
-            by a selection; `fuzzytree check` tests all.
+    How many probes were too many is counted; `fuzzytree check` tests all.
     """
 
     name: str
@@ -167,12 +163,8 @@ def convention_answers(
 ) -> Iterator[Answer]:
     """Yield each representation that differs in a question, or that none does.
 
-    Args:
-        subject: The model.
-        question: The question.
-        found: Answers of each representation; the first of a form is compared with the
-            first of all, the others against the first of their form. Raw rules are a
-            model of their own.
+    The first of a form is compared with the first of all, the others with the first of
+    their form. Raw rules are a model of their own.
     """
     first: dict[str, ModelRun] = {}
     is_alike = True
@@ -295,13 +287,7 @@ def system_answers(
 
 
 def witness(subject: Subject, form: Model, values: FloatArray) -> Witness | None:
-    """Return the first of some rows that lies in the domain, with the model's answer.
-
-    Args:
-        subject: The model.
-        form: The form of it that the rows were answered by.
-        values: Shape (inputs, rows).
-    """
+    """Return the first of some rows that lies in the domain, with a form's answer."""
     inside = ~rows_outside(subject.rules, subject.domain, values)
     inside &= np.isfinite(values).all(axis=0)
     for row in np.flatnonzero(inside).tolist()[:1]:

@@ -94,11 +94,7 @@ class CurveBounds(NamedTuple):
 
 @functools.lru_cache(maxsize=256)
 def curve_bounds(curve: Curve, of: Interval | None) -> CurveBounds | None:
-    """Return two lines between which a curve is.
-
-    Args:
-        curve: The curve.
-        of: The range on which they hold it; None for everywhere.
+    """Return two lines between which a curve is on a range; everywhere if it is None.
 
     Returns:
         None if there are no such lines: of a formula nothing is known between points.
@@ -149,13 +145,7 @@ def complement(found: CurveBounds) -> CurveBounds | None:
 
 
 def scale(found: CurveBounds, factor: float) -> CurveBounds | None:
-    """Return a curve times a factor in [0, 1]; None if it is no points.
-
-    Example:
-        >>> half = scale(CurveBounds(line := Points((0.0,), (0.5,)), line, ()), 0.5)
-        >>> half.lower.degrees, half.is_exact
-        ((0.25,), True)
-    """
+    """Return a curve times a factor in [0, 1]; None if it is no points."""
     sides: list[Shape] = []
     for shape, pick in ((found.lower, 0), (found.upper, 1)):
         if not isinstance(shape, Points):
@@ -309,13 +299,7 @@ Bend = Literal["upwards", "downwards", "both"]
 
 
 class _Rising(NamedTuple):
-    """A hedge that rises.
-
-    Attributes:
-        value: What it makes of a degree.
-        slope: How fast it rises there.
-        bend: How it bends below 1/2, and above.
-    """
+    """A hedge that rises: its value, its slope, how it bends below 1/2 and above."""
 
     value: Callable[[Fraction], Between]
     slope: Callable[[float], float]

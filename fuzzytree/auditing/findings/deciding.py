@@ -249,13 +249,7 @@ class _Ties:
         self.may: BoolArray | None = None
 
     def of(self, one: int, other: int, left: int) -> State | None:
-        """Return whether two rules tie, None if the time does not suffice.
-
-        Args:
-            one: The number of a rule, from 1.
-            other: The number of another.
-            left: How many questions are left, this one too.
-        """
+        """Return whether two rules tie, None if the time does not suffice."""
         pair = min(one, other), max(one, other)
         if pair in self.known:
             return self.known[pair]

@@ -64,13 +64,7 @@ def model_file(name: str, content: bytes) -> ModelFile:
 
 
 def rule_path(model: Document, number: int) -> Path:
-    """Return where a model holds a rule; a tree's rules are its leaves.
-
-    Example:
-        >>> from fuzzytree.testing import random_tree
-        >>> rule_path(random_tree(1), 2)
-        ('leaves', 1)
-    """
+    """Return where a model has a rule; a tree's rules are its leaves."""
     match model:
         case RuleBase():
             return ("rules", number - 1)

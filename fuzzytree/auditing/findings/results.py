@@ -25,12 +25,7 @@ _KINDS: dict[str, type[Agreement] | type[Stability]] = {
 
 
 class LoadedResult(NamedTuple):
-    """A result that a user gave.
-
-    Attributes:
-        result: Its summary in an audit.
-        found: All of it.
-    """
+    """A result of another verb: its summary in an audit, and all of it."""
 
     result: VerbResult
     found: Agreement | Stability
@@ -63,11 +58,7 @@ def read_results(
 
 
 def _read(path: PathLike, model: Document) -> LoadedResult:
-    """Return one result.
-
-    Raises:
-        ReadError: As `read_results`.
-    """
+    """Return one result; raise ReadError as `read_results` does."""
     name = os.fspath(path)
     content = read_bounded(path, _MOST_BYTES)
     found = _decoded(content, name)
@@ -94,11 +85,7 @@ def _result(found: Agreement | Stability, file: SourceFile) -> VerbResult:
 
 
 def _decoded(content: bytes, name: str) -> Agreement | Stability:
-    """Return the record that a file holds.
-
-    Raises:
-        ReadError: If it holds none, or it was not written by this version.
-    """
+    """Return the record in a file; raise ReadError if this version did not write it."""
     lead = f"{name}: is no result that `fuzzytree check` or `stability` --json wrote"
     try:
         facts = msgspec.json.decode(content, type=dict[str, object])

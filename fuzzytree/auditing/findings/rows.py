@@ -84,13 +84,9 @@ def points_of(subject: Subject, rows: AuditRows) -> DomainRows:
 
 
 def distance_measure(name: str, value: Fraction) -> Measure:
-    """Return a distance as a number of an answer, with the exact one if it is short.
+    """Return a distance in widths of the inputs' ranges, with the exact one if short.
 
     Where it is not, the double is at most the distance.
-
-    Args:
-        name: What it is, without the unit, which is added.
-        value: In widths of the inputs' ranges.
     """
     exact = str(value)
     if len(exact) <= _MOST_DIGITS:
@@ -117,16 +113,6 @@ def rank_by_distance(
         inputs: The names of the rows' values.
         variables: The combinations that regions may name; where one of another name
             is met, the point of the witness counts.
-
-    Example:
-        >>> from fuzzytree.auditing.engine.domain import DomainSide
-        >>> from fuzzytree.auditing.engine.states import Proved
-        >>> box = Domain((DomainSide("x", 0.0, 4.0),))
-        >>> where = (Span("x", 3.0, 4.0),)
-        >>> gap = Answer("FT301", "gap", "", Proved(""), True, region=where)
-        >>> rows = AuditRows("rows", np.array([[0.0, 1.0]]))
-        >>> rank_by_distance([gap], rows, box, ["x"])[0].measures[0].exact
-        '1/2'
     """
     known: list[tuple[Fraction, int, Answer]] = []
     unknown: list[Answer] = []

@@ -47,8 +47,6 @@ class BoundedRules(msgspec.Struct, frozen=True, eq=False, dict=True):
     """Rules from below and from above.
 
     Attributes:
-        lower: No rule is weaker in truth.
-        upper: No rule is stronger in truth.
         terms: The terms of both that have no exact shape in the model.
         rules: The numbers of the rules that differ in both.
         gap: How far the lines of a curve are apart at most.

@@ -134,12 +134,7 @@ class TimeSlices:
         self.left_out = 0
 
     def run(self, left: int, question: Callable[[Clock], _Found]) -> _Found | None:
-        """Return the answer to a question, None if the time does not suffice.
-
-        Args:
-            left: How many questions are left, this one too; at least 1.
-            question: Called with a clock of its own, which its steps check.
-        """
+        """Return the answer to the first of `left` questions, None without time."""
         if self.clock.is_over:
             return None
         own = self.clock.share(min(_MOST, _FAIR / left))

@@ -87,13 +87,6 @@ def sampled_share(
 ) -> Sampled:
     """Return a share that was counted in a sample, with its interval.
 
-    Args:
-        of: What was counted.
-        hits: In how many rows it holds.
-        rows: How many rows were looked at, at least 1.
-        how: Where they come from, with the seed if they were drawn.
-        confidence: Of the interval.
-
     Raises:
         ValueError: As `wilson`.
     """
@@ -103,16 +96,9 @@ def sampled_share(
 def sample_points(rules: RuleBase, domain: Domain, rows: int, seed: int) -> FloatArray:
     """Return points drawn evenly from a domain.
 
-    Args:
-        rules: Whose inputs they are for.
-        domain: A side for each input. Points outside the side of a combination are
-            dropped.
-        rows: How many are drawn.
-        seed: The same seed gives the same points.
-
     Returns:
-        Shape (inputs, points); fewer points than `rows`, perhaps none, where
-        combinations are limited.
+        Shape (inputs, points); fewer points than `rows`, perhaps none, where the
+        domain limits combinations.
 
     Raises:
         ValueError: If an input has no side.
@@ -184,16 +170,7 @@ class RuleCounts(msgspec.Struct, frozen=True, eq=False):
 def count_rows(
     subject: Subject, values: FloatArray, codes: IntArray | None = None
 ) -> RuleCounts:
-    """Count what the rules say about some rows.
-
-    Args:
-        subject: The rules, and what is taken for small.
-        values: Shape (inputs, rows).
-        codes: The number of each row's class, -1 if it has none of the model's.
-
-    Raises:
-        OutOfTimeError: If the budget is spent.
-    """
+    """Count what the rules say about some rows of shape (inputs, rows)."""
     rules, settings = subject.rules, subject.settings
     totals = dict.fromkeys(("missing", "uncovered", "weak", "tied", "close"), 0)
     count = len(rules.rules)
@@ -285,11 +262,7 @@ def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
-    """Count what the rows show about each rule, and estimate shares of the domain.
-
-    Raises:
-        OutOfTimeError: If the budget is spent.
-    """
+    """Count what the rows show about each rule, and estimate shares of the domain."""
     if subject.rows is None:
         reason = "rows are needed (--data TABLE)"
         text = f"what rows say about the rules is not known: {reason}"

@@ -52,13 +52,7 @@ from fuzzytree.semantics import shape_of
 
 
 class SystemTerms:
-    """The terms of each input.
-
-    Attributes:
-        plain: As given.
-        bounds: As given.
-        made: Hedged terms of conditions, by variable and a name of their own.
-    """
+    """The terms of each input: exact ones, bounded ones, and `made` for hedges."""
 
     def __init__(
         self,
@@ -223,12 +217,7 @@ _NEVER: tuple[Way, ...] = ()
 
 
 class DecliningError(Exception):
-    """A condition has no exact counterpart.
-
-    Attributes:
-        code: Why, as a code of an audit.
-        reason: Why, in a sentence.
-    """
+    """A condition has no exact counterpart; the code and the reason say why."""
 
     def __init__(self, code: str, reason: str) -> None:
         super().__init__(reason)
@@ -242,16 +231,7 @@ def decline(code: str, reason: str) -> NoReturn:
 
 
 class Conditions:
-    """Makes ways of a block's conditions: each holds as far as the best of them.
-
-    Example:
-        >>> from fuzzytree.model.rulebase import Points
-        >>> line = Points((0.0, 1.0), (0.0, 1.0))
-        >>> terms = SystemTerms({"a": {"high": line}, "b": {"high": line}})
-        >>> made = Conditions("min", terms, RuleBlock(()))
-        >>> len(made.ways(Or((Is("a", "high"), Is("b", "high")))))
-        2
-    """
+    """Makes ways of a block's conditions: each holds as far as the best of them."""
 
     def __init__(
         self, conjunction: Conjunction, terms: SystemTerms, block: RuleBlock
@@ -261,11 +241,7 @@ class Conditions:
         self.block = block
 
     def ways(self, condition: Condition | None, *, negated: bool = False) -> list[Way]:
-        """Return the ways in which a condition holds; none if it never does.
-
-        Args:
-            condition: The condition; None holds always.
-            negated: Whether the ways in which it does not hold are returned.
+        """Return the ways in which a condition is true, or is not if negated.
 
         Raises:
             DecliningError: If it has none that are exact.

@@ -20,14 +20,7 @@ from fuzzytree.numerics import outwards
 
 
 class VariableRange(NamedTuple):
-    """The values of a variable on the domain.
-
-    Attributes:
-        variable: The variable.
-        low: The least.
-        high: The largest.
-        is_open: Whether the least is left out.
-    """
+    """The values of a variable on the domain; of an open range without the least."""
 
     variable: Variable
     low: Fraction
