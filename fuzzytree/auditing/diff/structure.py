@@ -297,15 +297,10 @@ def _summed(
         text += f", with {listed(come)}"
     if not (gone or come):
         text += ": its weights, centres or order have changed"
-    return Draft(
-        "combination",
-        text,
-        "rules" if old.parts and new.parts else "always",
-        ("variables", place),
-        ("variables", at),
-        _users_of(old, users[0]),
-        _users_of(new, users[1]),
-    )
+    shown: Shown = "rules" if old.parts and new.parts else "always"
+    paths = ("variables", place), ("variables", at)
+    rules = _users_of(old, users[0]), _users_of(new, users[1])
+    return Draft("combination", text, shown, *paths, *rules)
 
 
 def _users_of(variable: Variable, users: Users) -> tuple[int, ...]:

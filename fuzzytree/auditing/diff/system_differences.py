@@ -86,17 +86,10 @@ def _fact_drafts(
             continue
         text = f"the {key}{of} is {_text(now)}, and was {_text(was)}"
         if key == "clips":
-            text = (
-                f"values{of} are {'now' if now else 'no longer'} clamped to its range"
-            )
-        yield Draft(
-            "unit" if key == "unit" else part,
-            text,
-            "any",
-            old[0],
-            new[0],
-            is_harmless=key in ("unit", "name"),
-        )
+            still = "now" if now else "no longer"
+            text = f"values{of} are {still} clamped to its range"
+        draft = Draft("unit" if key == "unit" else part, text, "any", old[0], new[0])
+        yield draft._replace(is_harmless=key in ("unit", "name"))
 
 
 def _text(value: object) -> str:

@@ -283,13 +283,8 @@ class _Found:
                 point = {key: Fraction(value) for key, value in found.row.items()}
         except NotExactError:
             pass
-        return finding(
-            "FT801",
-            name,
-            f"{said}, {how}",
-            Witness(coordinates(point), ()),
-            measures=(measure,),
-        )
+        state = Witness(coordinates(point), ())
+        return finding("FT801", name, f"{said}, {how}", state, measures=(measure,))
 
     def _exact(
         self, name: str, point: Mapping[str, Fraction]

@@ -27,7 +27,7 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.auditing.findings.codes import note
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.auditing.findings.support import sample_points
@@ -95,24 +95,16 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
     yield from slices.rest("FT107", "clause", "whether they are needed")
     for number in silent:
         name = subject.rule_name(number)
-        yield note(
-            "FT107",
-            name,
-            f"{name} never fires, so its clauses are not tested one by one",
-            Proved("one of its clauses is 0 on all of the domain"),
-            rules=(number,),
-        )
+        text = f"{name} never fires, so its clauses are not tested one by one"
+        proof = Proved("one of its clauses is 0 on all of the domain")
+        yield note("FT107", name, text, proof, rules=(number,))
     if needed > MOST_SHOWN:
         rest = needed - MOST_SHOWN
-        text = "clause matters: it decides"
-        text = text if rest == 1 else "clauses matter: each decides"
-        yield note(
-            "FT107",
-            "clauses",
-            f"{rest} more {text} some input",
-            Proved("an input was found for each, and evaluated in fractions"),
-            measures=(Measure("clauses", rest),),
-        )
+        text = "clause matters: it" if rest == 1 else "clauses matter: each"
+        text = f"{rest} more {text} decides some input"
+        proof = Proved("an input was found for each, and evaluated in fractions")
+        measures = (Measure("clauses", rest),)
+        yield note("FT107", "clauses", text, proof, measures=measures)
 
 
 def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
@@ -247,13 +239,6 @@ def _answer(subject: Subject, one: _Dropped, state: State) -> Answer:
         )
     elif not isinstance(state, Proved):
         sentence = f"whether {name} needs {text} is open"
-    return Answer(
-        "FT107",
-        f"{name}, {text}",
-        sentence,
-        state,
-        isinstance(state, Proved),
-        severity="info",
-        rules=(one.rule,),
-        terms=tuple(TermName(one.clause.variable, term) for term in one.clause.terms),
-    )
+    terms = tuple(TermName(one.clause.variable, term) for term in one.clause.terms)
+    build, title = finding if isinstance(state, Proved) else note, f"{name}, {text}"
+    return build("FT107", title, sentence, state, rules=(one.rule,), terms=terms)

@@ -59,13 +59,8 @@ def answers(subject: Subject) -> Iterator[Answer]:
         )
         measures.append(measure("index of Nauck", product))
         text += f", index of Nauck {short(product.nearest)}"
-    yield note(
-        "FT501",
-        "the rule base",
-        text,
-        Proved("counted, and integrated in fractions"),
-        measures=tuple(measures),
-    )
+    proof = Proved("counted, and integrated in fractions")
+    yield note("FT501", "the rule base", text, proof, measures=tuple(measures))
 
 
 def depth(tree: FuzzyTree) -> int:

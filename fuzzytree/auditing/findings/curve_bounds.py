@@ -136,30 +136,27 @@ def as_points(shape: Shape, of: Interval | None) -> CurveBounds | None:
 
 def complement(found: CurveBounds) -> CurveBounds | None:
     """Return 1 minus a curve; None if it is no points."""
-    sides: list[Shape] = []
-    for shape, pick in ((found.upper, 0), (found.lower, 1)):
-        if not isinstance(shape, Points):
-            return None
-        sides.append(_mapped(shape, lambda degree: 1 - degree, pick))
-    return CurveBounds(sides[0], sides[1], ("not", *found.key))
+    turned = CurveBounds(found.upper, found.lower, ("not", *found.key))
+    return _mapped(turned, lambda degree: 1 - degree)
 
 
 def scale(found: CurveBounds, factor: float) -> CurveBounds | None:
     """Return a curve times a factor in [0, 1]; None if it is no points."""
-    sides: list[Shape] = []
-    for shape, pick in ((found.lower, 0), (found.upper, 1)):
-        if not isinstance(shape, Points):
-            return None
-        sides.append(_mapped(shape, lambda degree: degree * Fraction(factor), pick))
-    return CurveBounds(sides[0], sides[1], (factor, *found.key))
+    scaled = found._replace(key=(factor, *found.key))
+    return _mapped(scaled, lambda degree: degree * Fraction(factor))
 
 
 def _mapped(
-    points: Points, change: Callable[[Fraction], Fraction], pick: int
-) -> Points:
-    """Return points whose degrees are changed, and rounded down (0) or up (1)."""
-    degrees = (outwards(change(Fraction(one)))[pick] for one in points.degrees)
-    return Points(points.values, tuple(degrees))
+    found: CurveBounds, change: Callable[[Fraction], Fraction]
+) -> CurveBounds | None:
+    """Return lines whose degrees are changed, and rounded down or up; if of points."""
+    lower, upper = found.lower, found.upper
+    if not (isinstance(lower, Points) and isinstance(upper, Points)):
+        return None
+    low = (outwards(change(Fraction(one)))[0] for one in lower.degrees)
+    high = (outwards(change(Fraction(one)))[1] for one in upper.degrees)
+    lines = Points(lower.values, tuple(low)), Points(upper.values, tuple(high))
+    return CurveBounds(*lines, found.key)
 
 
 @functools.lru_cache(maxsize=256)
@@ -183,17 +180,13 @@ def gap(found: CurveBounds, of: Interval) -> Fraction:
 
 def _is_near(curve: Curve, points: Points, off: Fraction) -> bool:
     """Return whether the points are as near to the curve as they are said to be."""
-    for place, (x, degree) in enumerate(zip(*_parts(points), strict=True)):
+    for place, x in enumerate(points.values):
         if _is_step(points, place):
             continue
-        found = degree_between(curve, x)
-        if found is None or found.low < degree - off or found.high > degree + off:
+        found, degree = degree_between(curve, Fraction(x)), points.degrees[place]
+        if found is None or not found.low + off >= degree >= found.high - off:
             return False
     return True
-
-
-def _parts(points: Points) -> tuple[list[Fraction], list[Fraction]]:
-    return [*map(Fraction, points.values)], [*map(Fraction, points.degrees)]
 
 
 def _is_step(points: Points, place: int) -> bool:

@@ -75,22 +75,14 @@ def _firing(subject: Subject, sides: BoundedArrangement) -> Iterator[Answer]:
                 break
         state = next((s for s in states if not isinstance(s, Proved)), states[0])
         is_dead = isinstance(state, Proved)
-        sentence = (
-            f"{name} never fires: no value of the domain makes its condition hold"
-            if is_dead
-            else f"{name} fires"
-            if isinstance(state, Witness)
-            else f"it is open whether {name} ever fires"
-        )
-        yield Answer(
-            "FT101",
-            name,
-            sentence,
-            state,
-            is_dead,
-            severity="error",
-            rules=(numbers[0],),
-        )
+        sentence = f"it is open whether {name} ever fires"
+        if is_dead:
+            sentence = f"{name} never fires: no value of the domain makes its condition"
+            sentence += " hold"
+        elif isinstance(state, Witness):
+            sentence = f"{name} fires"
+        rules = (numbers[0],)
+        yield Answer("FT101", name, sentence, state, is_dead, "error", rules)
 
 
 def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
@@ -226,17 +218,9 @@ def _led(
         else f"no lead of {name} above {found.low:.3g} was found, and one above "
         f"{found.high:.3g} is excluded"
     )
-    return Answer(
-        "FT102",
-        name,
-        sentence,
-        found,
-        is_marginal,
-        severity="warning",
-        rules=(number,),
-        region=won.region,
-        measures=measures,
-    )
+    facts = "FT102", name, sentence, found
+    rules, region = (number,), won.region
+    return Answer(*facts, is_marginal, "warning", rules, (), region, measures)
 
 
 class _Ties:

@@ -343,14 +343,9 @@ def _nearest_answer(
     state = narrowed_state(
         "the distance of the nearest disagreement", low, best, search.claims, search.why
     )
-    return note(
-        "FT203",
-        "rows",
-        f"{before}; around {some} others the nearest disagreement is "
-        f"{percent(best.high)} {OF_RANGES} from row {search.row}",
-        state,
-        measures=tuple(measures),
-    )
+    text = f"{before}; around {some} others the nearest disagreement is "
+    text += f"{percent(best.high)} {OF_RANGES} from row {search.row}"
+    return note("FT203", "rows", text, state, measures=tuple(measures))
 
 
 def _no_nearest(search: _Search, low: Fraction) -> State:
@@ -415,19 +410,16 @@ def leaf_differences(
 
 
 def _difference(given: Arrangement, region: Region, state: State) -> Answer:
-    name, rules = f"leaf {region.leaf}", (region.leaf,)
+    name = f"leaf {region.leaf}"
+    rules: tuple[int, ...] = (region.leaf,)
     if not isinstance(state, Witness):
         text = f"whether the raw rules decide differently in {name} is left open"
         return note("FT203", name, text, state, rules=rules)
     strengths = strengths_at(given, point_of(state.point))
     best = max(strengths)
     winner = strengths.index(best) + 1
-    return finding(
-        "FT203",
-        name,
-        f"in {name} the tree answers {region.label!r}, and somewhere there "
-        f"the raw rules answer {answer_text(state.claims[-1].label)}",
-        state,
-        rules=rules if not best or (winner,) == rules else (*rules, winner),
-        region=state.region,
-    )
+    if best and winner != region.leaf:
+        rules = (*rules, winner)
+    text = f"in {name} the tree answers {region.label!r}, and somewhere there "
+    text += f"the raw rules answer {answer_text(state.claims[-1].label)}"
+    return finding("FT203", name, text, state, rules=rules, region=state.region)

@@ -115,14 +115,11 @@ def _region(
     where = f"where {' and '.join(texts)}" if texts else "everywhere"
     claim = Claim("decides", of="tree", label=region.label)
     share = share_of(box, tree, subject.domain)
+    measures = () if share is None else (Measure("share of the domain", share),)
+    state = Witness(coordinates(point), (claim,), spans)
+    text, rules = f"{name} decides {region.label!r} {where}", (region.leaf,)
     return note(
-        "FT205",
-        name,
-        f"{name} decides {region.label!r} {where}",
-        Witness(coordinates(point), (claim,), spans),
-        rules=(region.leaf,),
-        region=spans,
-        measures=() if share is None else (Measure("share of the domain", share),),
+        "FT205", name, text, state, rules=rules, region=spans, measures=measures
     )
 
 
@@ -161,14 +158,9 @@ def _unreached(subject: Subject, tree: FuzzyTree, region: Region, count: int) ->
     how = "the intervals on its path have nothing in common with the domain"
     if count:
         how = f"{count} boxes of combinations tested: no point of the inputs is in them"
-    return finding(
-        "FT101",
-        name,
-        f"{name} (rule {region.leaf}) is never reached: "
-        f"{_reason(tree, region, subject.domain)}",
-        Proved(how),
-        rules=(region.leaf,),
-    )
+    text = f"{name} (rule {region.leaf}) is never reached: "
+    text += _reason(tree, region, subject.domain)
+    return finding("FT101", name, text, Proved(how), rules=(region.leaf,))
 
 
 def _reason(tree: FuzzyTree, region: Region, domain: Domain) -> str:

@@ -341,5 +341,5 @@ def _rest_of_conflicts(
         Measure("pairs that never do", clean),
         Measure("pairs not listed", hidden),
     )
-    of = finding if hidden else note
-    return of("FT201", "pairs of rules", "; ".join(parts), proof, measures=measures)
+    build = finding if hidden else note
+    return build("FT201", "pairs of rules", "; ".join(parts), proof, measures=measures)

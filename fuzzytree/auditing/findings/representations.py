@@ -128,17 +128,13 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answ
         rows = probed(model, values, PROBES).values
         witness = conventions.witness(subject, form, rows[:, [*one.row_numbers]])
         state = witness or state
-    return finding(
-        "FT601",
-        one.representation,
-        f"{sentence}: {facts}" if facts else sentence,
-        state,
-        measures=(
-            Measure("rows that differ", one.differing),
-            Measure("rows of another class", one.flips),
-            Measure("largest difference", one.largest_difference),
-        ),
+    measures = (
+        Measure("rows that differ", one.differing),
+        Measure("rows of another class", one.flips),
+        Measure("largest difference", one.largest_difference),
     )
+    sentence += f": {facts}" if facts else ""
+    return finding("FT601", one.representation, sentence, state, measures=measures)
 
 
 def _form(one: Comparison) -> str:

@@ -283,10 +283,11 @@ def _answer(
     own, _ = decider.decided(point)
     aside = ASIDE if decider.leaves_out(own) else ""
     what = f"the distance from {name} to another decision"
+    state: State
     if found.point is None or found.high is None:
         if found.is_none:
             text = f"all of the domain is decided as {name}, {answer_text(own)}{aside}"
-            state: State = Proved("other decisions were sought on the whole domain")
+            state = Proved("other decisions were sought on the whole domain")
         else:
             text = f"no decision other than {answer_text(own)} is known around {name}"
             state = Bracket(what, outwards(found.low)[0], 1.0, found.why)
@@ -298,20 +299,12 @@ def _answer(
     changed = " and ".join(f"{axis!r} is {values[axis]}" for axis in moved)
     if len(moved) > _MOST_NAMED:
         changed = f"{len(moved)} inputs move by no more than {percent(found.high)}"
-    text = (
-        f"{name} stays {answer_text(own)} within {percent(found.low)} {OF_RANGES}"
-        f"{aside}; where {changed} it is {answer_text(other)}"
-    )
-    return note(
-        "FT204",
-        name.removeprefix("the "),
-        text,
-        narrowed_state(what, found.low, found, [claim], found.why),
-        measures=(
-            distance_measure("certified radius", found.low),
-            distance_measure("distance of the witness", found.high),
-        ),
-    )
+    text = f"{name} stays {answer_text(own)} within {percent(found.low)} {OF_RANGES}"
+    text += f"{aside}; where {changed} it is {answer_text(other)}"
+    state = narrowed_state(what, found.low, found, [claim], found.why)
+    low = distance_measure("certified radius", found.low)
+    measures = low, distance_measure("distance of the witness", found.high)
+    return note("FT204", name.removeprefix("the "), text, state, measures=measures)
 
 
 def _short_values(
@@ -351,11 +344,9 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if subject.policy.decision != "strongest":
         return
     declined = _declined(subject)
-    if declined is None and subject.rows is None:
-        declined = Declined("FTD06", "rows are needed (--data TABLE)")
     if declined is not None or subject.rows is None:
-        assert declined is not None  # set above where there are no rows
-        yield note("FT204", "rows", NOT_SOUGHT, declined)
+        needed = Declined("FTD06", "rows are needed (--data TABLE)")
+        yield note("FT204", "rows", NOT_SOUGHT, declined or needed)
         return
     points = points_of(subject, subject.rows)
     decider = decider_of(subject)
@@ -404,17 +395,13 @@ def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> Answer:
     aside = ASIDE if any(one.is_aside for one in radii) else ""
     of_all = "" if len(radii) == len(points.at) else "with the smallest margins "
     median = statistics.median_low([one.low for one in radii])
-    return note(
-        "FT204",
-        "rows",
-        f"of {points.text} {len(radii)} different ones {of_all}were "
-        f"evaluated: each keeps its decision within at least {percent(least)} "
-        f"{OF_RANGES}, half of them within {percent(median)}{aside}",
-        first.answer.state,
-        measures=(
-            count,
-            distance_measure("smallest certified radius", least),
-            distance_measure("median certified radius", median),
-            Measure("row", first.number),
-        ),
+    text = f"of {points.text} {len(radii)} different ones {of_all}were evaluated: "
+    text += f"each keeps its decision within at least {percent(least)} {OF_RANGES}, "
+    text += f"half of them within {percent(median)}{aside}"
+    measures = (
+        count,
+        distance_measure("smallest certified radius", least),
+        distance_measure("median certified radius", median),
+        Measure("row", first.number),
     )
+    return note("FT204", "rows", text, first.answer.state, measures=measures)

@@ -17,7 +17,7 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, Sampled
-from fuzzytree.auditing.findings.codes import note
+from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import Clause, RuleBase, shapes_of
@@ -397,12 +397,6 @@ def _of_rule(subject: Subject, found: RuleCounts, number: int, how: str) -> Answ
             of = f"rows that {name} wins and that have its class"
             state = sampled_share(of, right, won, f"of {how}, those that it wins")
             sentence += f"; {right} of these have its class {label!r}"
-    return Answer(
-        "FT701",
-        name,
-        sentence,
-        state,
-        is_finding,
-        rules=(number,),
-        measures=tuple(measures),
-    )
+    build = finding if is_finding else note
+    facts = "FT701", name, sentence, state
+    return build(*facts, rules=(number,), measures=tuple(measures))

@@ -191,13 +191,9 @@ def _answer(
     one: SystemInput, label: SystemLabel, outcome: tuple[str, str], users: str
 ) -> Answer:
     name, (what, reason) = f"term {label.name!r} of {one.name!r}", outcome
-    return note(
-        "FTD02",
-        name,
-        f"{name} {what}: {reason}; {users}",
-        Declined("FTD02", f"{reason}; {users}"),
-        terms=(TermName(one.name, label.name),),
-    )
+    text, state = f"{name} {what}: {reason}; {users}", f"{reason}; {users}"
+    terms = (TermName(one.name, label.name),)
+    return note("FTD02", name, text, Declined("FTD02", state), terms=terms)
 
 
 MOST_WAYS: Final = 64

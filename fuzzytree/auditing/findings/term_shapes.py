@@ -60,13 +60,10 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
     if not sound and not shallow:
         return
     shapes = "1 term has" if sound == 1 else f"{sound} terms have"
-    yield note(
-        "FT402",
-        "terms",
-        f"{shapes} no defect of shape of {short(SHALLOW)} or more",
-        Proved("turning points and crossings of 0 and 1 were found for each piece"),
-        measures=(Measure("smaller excesses and dips", shallow),),
-    )
+    text = f"{shapes} no defect of shape of {short(SHALLOW)} or more"
+    how = "turning points and crossings of 0 and 1 were found for each piece"
+    measures = (Measure("smaller excesses and dips", shallow),)
+    yield note("FT402", "terms", text, Proved(how), measures=measures)
 
 
 def _defects(of: VariableRange, term: Term) -> Iterator[Answer | None]:
@@ -89,16 +86,9 @@ def _defect(
     measures: tuple[Measure, ...],
     region: tuple[Span, ...] = (),
 ) -> Answer:
-    name = term_name(of.variable, term)
-    return finding(
-        "FT402",
-        name,
-        f"{name} {text}",
-        Proved(how),
-        terms=labels_of(of, term),
-        region=region,
-        measures=measures,
-    )
+    name, terms = term_name(of.variable, term), labels_of(of, term)
+    facts = "FT402", name, f"{name} {text}", Proved(how)
+    return finding(*facts, terms=terms, region=region, measures=measures)
 
 
 def _excess(of: VariableRange, term: Term, found: Excess) -> Answer:
@@ -274,15 +264,10 @@ def _overlapping(
         at, height = max(shared.crossings, key=lambda pair: pair[1].low)
         measures.append(measure("crossing height", height))
         measures.append(Measure("crossing", float(at), unit=of.variable.unit))
-    return finding(
-        "FT403",
-        name,
-        f"{name} are hard to distinguish: they share "
-        f"{_share(jaccard)} of their area{relation}",
-        state,
-        terms=labels_of(of, one, other),
-        measures=tuple(measures),
-    )
+    text = f"{name} are hard to distinguish: they share {_share(jaccard)} of their "
+    text += f"area{relation}"
+    terms = labels_of(of, one, other)
+    return finding("FT403", name, text, state, terms=terms, measures=tuple(measures))
 
 
 def _share(jaccard: Bounds) -> str:
@@ -293,13 +278,8 @@ def _share(jaccard: Bounds) -> str:
 def _too_large(of: VariableRange, one: Term, other: Term) -> Answer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
     reason = f"their curves have more than {_MOST_PIECES} pieces"
-    return note(
-        "FT403",
-        name,
-        f"{name} were not compared: {reason}",
-        Declined("FTD05", reason),
-        terms=labels_of(of, one, other),
-    )
+    text, terms = f"{name} were not compared: {reason}", labels_of(of, one, other)
+    return note("FT403", name, text, Declined("FTD05", reason), terms=terms)
 
 
 def _other_pairs(found: int, apart: int, points: int, limit: float) -> Answer:
@@ -309,15 +289,13 @@ def _other_pairs(found: int, apart: int, points: int, limit: float) -> Answer:
         parts.append(f"{more} besides those listed share more")
     if points:
         parts.append(f"{counted(points, 'pair')} have no area on the domain")
-    return Answer(
-        "FT403",
-        "pairs of terms",
-        "; ".join(parts),
-        Proved("areas were enclosed on cells, and integrated in fractions where near"),
-        found > MOST_SHOWN,
-        measures=(
-            Measure("pairs apart", apart),
-            Measure("pairs not listed", max(found - MOST_SHOWN, 0)),
-            Measure("pairs without area", points),
-        ),
+    how = "areas were enclosed on cells, and integrated in fractions where near"
+    measures = (
+        Measure("pairs apart", apart),
+        Measure("pairs not listed", max(found - MOST_SHOWN, 0)),
+        Measure("pairs without area", points),
+    )
+    build = finding if found > MOST_SHOWN else note
+    return build(
+        "FT403", "pairs of terms", "; ".join(parts), Proved(how), measures=measures
     )

@@ -124,13 +124,10 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answe
                 yield _low_term(of, term, height, at, len(made.cells.rank))
     if clean:
         terms = "1 term reaches" if clean == 1 else f"{clean} terms reach"
-        yield note(
-            "FT401",
-            "terms",
-            f"{terms} a degree of {short(level)} or more",
-            Proved(f"the height of {clean} terms was found"),
-            measures=(Measure("lowest height", float(lowest), str(lowest)),),
-        )
+        text = f"{terms} a degree of {short(level)} or more"
+        proof = Proved(f"the height of {clean} terms was found")
+        measures = (Measure("lowest height", float(lowest), str(lowest)),)
+        yield note("FT401", "terms", text, proof, measures=measures)
 
 
 def _is_full(of: VariableRange, term: Term) -> bool:
@@ -155,19 +152,11 @@ def _low_term(
     sentence = f"{name} is hardly reached: {text}"
     if not height.high:
         sentence = f"{name} is empty: its degree is 0 {where}"
-    return Answer(
-        "FT401",
-        name,
-        sentence,
-        Proved(
-            f"its curve was visited in {counted(cells, 'stretch', 'stretches')}, in "
-            "each of which it is monotone"
-        ),
-        True,
-        severity="warning" if height.high else "error",
-        terms=labels_of(of, term),
-        measures=(measure("height", height),),
-    )
+    how = f"its curve was visited in {counted(cells, 'stretch', 'stretches')}, in each "
+    how += "of which it is monotone"
+    terms, measures = labels_of(of, term), (measure("height", height),)
+    low = finding("FT401", name, sentence, Proved(how), terms=terms, measures=measures)
+    return replace(low, severity="warning") if height.high else low
 
 
 def _low_curve(
@@ -180,16 +169,12 @@ def _low_curve(
     begins = "is hardly reached" if is_low else "may hardly be reached"
     largest = f"its largest degree {where}"
     why = "its curve is known between two lines of points"
-    return Answer(
-        "FT401",
-        name,
-        f"{name} {begins}: {largest} lies between {short(low)} and {short(high)}",
-        Bracket(f"the largest degree of {name}", low, high, why),
-        is_low,
-        severity="warning",
-        terms=labels_of(of, term),
-        measures=(Measure("height at least", low), Measure("height at most", high)),
-    )
+    text = f"{name} {begins}: {largest} lies between {short(low)} and {short(high)}"
+    state = Bracket(f"the largest degree of {name}", low, high, why)
+    measures = Measure("height at least", low), Measure("height at most", high)
+    facts = "FT401", name, text, state
+    terms = labels_of(of, term)
+    return Answer(*facts, is_low, "warning", terms=terms, measures=measures)
 
 
 # --- FT404: is it used?
@@ -205,36 +190,18 @@ def _unused(subject: Subject) -> Iterator[Answer]:
     proof = Proved(f"{counted(len(clauses), 'proposition')} of all rules read")
     for name in variables:
         if name not in needed:
-            yield finding(
-                "FT404",
-                f"variable {name!r}",
-                f"no rule uses variable {name!r}",
-                proof,
-                terms=tuple(TermName(name, term) for of, term in terms if of == name),
-            )
+            title = f"variable {name!r}"
+            own = tuple(TermName(name, term) for of, term in terms if of == name)
+            yield finding("FT404", title, f"no rule uses {title}", proof, terms=own)
     idle = [one for one in terms if one[0] in needed and one not in used]
     for name, term in idle:
-        yield finding(
-            "FT404",
-            f"term {term!r} of {name!r}",
-            f"no rule uses term {term!r} of {name!r}",
-            proof,
-            terms=(TermName(name, term),),
-        )
-    counts = (
-        sum(name in needed for name in variables),
-        sum(one in used for one in terms),
-    )
-    yield note(
-        "FT404",
-        "terms and variables",
-        f"rules use {counted(counts[0], 'variable')} and {counted(counts[1], 'term')}",
-        proof,
-        measures=(
-            Measure("variables in use", counts[0]),
-            Measure("terms in use", counts[1]),
-        ),
-    )
+        title, own = f"term {term!r} of {name!r}", (TermName(name, term),)
+        yield finding("FT404", title, f"no rule uses {title}", proof, terms=own)
+    count = sum(name in needed for name in variables)
+    of_terms = sum(one in used for one in terms)
+    text = f"rules use {counted(count, 'variable')} and {counted(of_terms, 'term')}"
+    measures = Measure("variables in use", count), Measure("terms in use", of_terms)
+    yield note("FT404", "terms and variables", text, proof, measures=measures)
 
 
 def _inventory(
