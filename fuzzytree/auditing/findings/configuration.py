@@ -38,13 +38,10 @@ from fuzzytree.formats import (
 )
 from fuzzytree.model import as_names, name_choice
 
-_RANGES: Mapping[str, tuple[float, float, str]] = {
-    "epsilon": (0.0, 1.0, "above 0 and at most 1"),
-    "margin": (0.0, 1.0, "above 0 and at most 1"),
-    "lead": (0.0, 1.0, "above 0 and at most 1"),
-    "level": (0.0, 1.0, "above 0 and at most 1"),
-    "overlap": (0.0, 1.0, "above 0 and at most 1"),
-    "budget_s": (0.0, 1e9, "above 0 and at most 1e9 seconds"),
+_SHARES = ("epsilon", "margin", "lead", "level", "overlap")
+_RANGES: Mapping[str, tuple[float, str]] = {
+    **dict.fromkeys(_SHARES, (1.0, "above 0 and at most 1")),
+    "budget_s": (1e9, "above 0 and at most 1e9 seconds"),
 }
 _COUNTS: Mapping[str, tuple[int, int]] = {
     "rows": (1, 10_000_000),
@@ -95,9 +92,9 @@ def check_settings(settings: AuditSettings) -> None:
     Raises:
         ValueError: If one is; in a sentence.
     """
-    for name, (low, high, allowed) in _RANGES.items():
+    for name, (high, allowed) in _RANGES.items():
         value = getattr(settings, name)
-        if not low < value <= high:
+        if not 0.0 < value <= high:
             shown = "the budget" if name == "budget_s" else name
             raise ValueError(f"{shown} must be {allowed}, not {value!r}")
     for name, (least, most) in _COUNTS.items():

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Literal, assert_never
 
 import msgspec
@@ -38,7 +39,6 @@ from fuzzytree.model import (
     SystemInput,
     Trapezoid,
     TwoGaussians,
-    Variable,
 )
 
 if TYPE_CHECKING:
@@ -212,40 +212,27 @@ class _Axis(msgspec.Struct, frozen=True):
 
 def _axes(model: Document) -> Iterator[_Axis]:
     """Yield the inputs of a model, in its order."""
-    if isinstance(model, FuzzySystem):
-        curves = [label.curve for one in model.inputs for label in one.labels]
-        summed = _summed(model.inputs)
-        if any(isinstance(curve, Formula | Linear) for curve in curves):
-            summed = {one.name for one in model.inputs}  # which they may name
-        for one in model.inputs:
-            if not one.parts:
-                yield _axis(one, [label.curve for label in one.labels], summed)
-        return
-    summed = _summed(model.variables)
-    fitted = model.sets if isinstance(model, FuzzyTree) else ()
-    for variable in model.variables:
-        if not variable.parts:
-            terms = [
-                *variable.terms,
-                *(t for s in fitted if s.variable == variable.name for t in s.terms),
-            ]
-            yield _axis(variable, [term.shape for term in terms], summed)
-
-
-def _summed(variables: Iterable[Variable | SystemInput]) -> set[str]:
-    """Return the inputs that combinations are made of."""
-    return {part.input for one in variables for part in one.parts}
-
-
-def _axis(
-    one: Variable | SystemInput, curves: Iterable[Curve], summed: Collection[str]
-) -> _Axis:
-    curves = tuple(curves)
-    ends = tuple(end for curve in curves for end in _ends(curve))
-    sets = tuple(curve for curve in curves if isinstance(curve, LR))
-    is_open = any(map(_is_open, curves))
-    is_used = one.name in summed or any(curve != Band() for curve in curves)
-    return _Axis(one.name, one.low, one.high, ends, is_open, sets, is_used)
+    curves: dict[str, list[Curve]] = {}
+    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
+    for one in variables:
+        if isinstance(one, SystemInput):
+            curves[one.name] = [label.curve for label in one.labels]
+        else:
+            curves[one.name] = [term.shape for term in one.terms]
+    for fitted in model.sets if isinstance(model, FuzzyTree) else ():
+        curves[fitted.variable] += [term.shape for term in fitted.terms]
+    summed = {part.input for one in variables for part in one.parts}
+    every = itertools.chain.from_iterable(curves.values())
+    if any(isinstance(curve, Formula | Linear) for curve in every):
+        summed = {*curves}  # which they may name
+    for one in variables:
+        if not one.parts:
+            own = curves[one.name]
+            ends = tuple(end for curve in own for end in _ends(curve))
+            sets = tuple(curve for curve in own if isinstance(curve, LR))
+            is_used = one.name in summed or any(curve != Band() for curve in own)
+            is_open = any(map(_is_open, own))
+            yield _Axis(one.name, one.low, one.high, ends, is_open, sets, is_used)
 
 
 def _is_open(curve: Curve) -> bool:
