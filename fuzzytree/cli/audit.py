@@ -334,13 +334,13 @@ def _write_page(found: Audit, material: Material, page: str) -> None:
     from fuzzytree.checking import Stability
     from fuzzytree.model import Agreement
 
-    given = [one.found for one in material.given]
+    records = [one.record for one in material.results]
     text = report.page(
         found,
         material.model,
         rows=material.rows,
-        agreement=next((one for one in given if isinstance(one, Agreement)), None),
-        stability=next((one for one in given if isinstance(one, Stability)), None),
+        agreement=next((one for one in records if isinstance(one, Agreement)), None),
+        stability=next((one for one in records if isinstance(one, Stability)), None),
     )
     write_atomically(page, text.encode())
 

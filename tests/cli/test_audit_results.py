@@ -86,7 +86,7 @@ def test_what_the_verbs_print_fits_its_schema_and_is_read(call: Call) -> None:
         (given,) = read_results(["own.json"], grip())
         assert given.result.verb == name
         assert given.result.wrong == 0
-        assert given.found.to_json() == out.removesuffix("\n")
+        assert given.record.to_json() == out.removesuffix("\n")
 
 
 def changed(edit: Callable[[Any], object]) -> None:

@@ -79,12 +79,12 @@ class RulePair(msgspec.Struct, frozen=True, eq=False):
         rows = values[[self.inputs.index(name) for name in model.inputs]]
         return decide(model, rows, with_strengths=False)
 
-    def labels(self, found: tuple[Decisions, Decisions]) -> tuple[IntArray, IntArray]:
+    def labels(self, both: tuple[Decisions, Decisions]) -> tuple[IntArray, IntArray]:
         """Return the classes of both answers, numbered alike; -1 is no class."""
         known = list(dict.fromkeys((*self.old.classes, *self.new.classes)))
         one, other = (
             np.array([*map(known.index, model.classes), -1], np.int64)[decided.label]
-            for model, decided in zip((self.old, self.new), found, strict=True)
+            for model, decided in zip((self.old, self.new), both, strict=True)
         )
         return one, other
 
@@ -110,38 +110,38 @@ def decisions(
     whole = _same_everywhere(pair)
     if whole is not None:
         return [whole], DecisionEvidence(is_equal=True)
-    found = _Found(pair, clock.share(_POINTS))
+    differences = _Differences(pair, clock.share(_POINTS))
     answers: list[Answer] = []
     if rows is not None:
-        answers.append(_on_rows(rows, found))
+        answers.append(_on_rows(rows, differences))
     values = sample_points(
         union(pair.old, pair.new), pair.domain, settings.rows, settings.seed
     )
-    many, seen = found.add(values)
-    found.add(_probes(pair))
-    if not found.witnesses:
-        found.add(_boundaries(found, values))
-    if found.witnesses:
-        answers = [*_witness_answers(pair, found), *answers]
+    many, count = differences.add(values)
+    differences.add(_probes(pair))
+    if not differences.witnesses:
+        differences.add(_boundaries(differences, values))
+    if differences.witnesses:
+        answers = [*_witness_answers(pair, differences), *answers]
     else:
         clock.report("proving that decisions are equal", 0.3)
         state = _alike(pair, clock)
         if isinstance(state, Witness):
-            found.add_point(point_of(state.point))
-            answers = [*_witness_answers(pair, found), *answers]
+            differences.add_point(point_of(state.point))
+            answers = [*_witness_answers(pair, differences), *answers]
         else:
             answers.insert(0, _equal_answer(pair, state))
     is_open = not isinstance(answers[0].state, Proved)
-    if seen and is_open:
-        answers.append(_drawn_answer(many, seen, settings.seed))
-    if is_open and (found.left or found.is_cut):
+    if count and is_open:
+        answers.append(_drawn_answer(many, count, settings.seed))
+    if is_open and (differences.left or differences.is_cut):
         points = (
-            f"{found.left} points"
-            if found.left
+            f"{differences.left} points"
+            if differences.left
             else "points beside decision boundaries"
         )
         answers.append(left_out(points, "the budget for single points was spent"))
-    return answers, found.evidence(is_equal=not is_open)
+    return answers, differences.evidence(is_equal=not is_open)
 
 
 def _alike(pair: RulePair, clock: Clock) -> State:
@@ -183,8 +183,8 @@ def _equal_answer(pair: RulePair, state: State) -> Answer:
     return note("FT801", "decisions", sentence, state)
 
 
-def _on_rows(rows: AuditRows, found: _Found) -> Answer:
-    hits, count = found.add(rows.values, name="row")
+def _on_rows(rows: AuditRows, differences: _Differences) -> Answer:
+    hits, count = differences.add(rows.values, name="row")
     of = f"{count} rows"
     if count < rows.values.shape[1]:
         of = f"the first {count} of {rows.values.shape[1]} rows"
@@ -208,9 +208,9 @@ def left_out(points: str, reason: str = "the budget was spent") -> Answer:
     return note("FT801", "points", text, Declined("FTD03", reason))
 
 
-def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
+def _witness_answers(pair: RulePair, differences: _Differences) -> Iterator[Answer]:
     """Yield a witness for each pair of classes, the clearest one that is known."""
-    known = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
+    known = sorted(differences.witnesses.items(), key=lambda item: str(item[0]))
     for number, (labels, (_, name, found_at)) in enumerate(known[:_MOST_LISTED]):
         point = found_at if name else _simple(pair, labels, found_at)
         one, other = prediction_at(pair.old, point), prediction_at(pair.new, point)
@@ -253,7 +253,7 @@ def _answered(one: ExactPrediction) -> str:
     return f"{answer_text(one.label)} by {how}"
 
 
-class _Found:
+class _Differences:
     """Points at which two models answer differently, and how that comes about."""
 
     def __init__(self, pair: RulePair, clock: Clock) -> None:
@@ -271,24 +271,24 @@ class _Found:
         Returns:
             How many differ, of how many that were looked at.
         """
-        hits = seen = 0
+        hits = count = 0
         for part in portions(values.shape[1], self.clock):
             hits += self._add(values[:, part], name, part.start)
-            seen = min(part.stop, values.shape[1])
-        self.left += values.shape[1] - seen
-        return hits, seen
+            count = min(part.stop, values.shape[1])
+        self.left += values.shape[1] - count
+        return hits, count
 
     def _add(self, values: FloatArray, name: str, start: int) -> int:
         pair = self.pair
-        found = pair.decide(pair.old, values), pair.decide(pair.new, values)
-        one, other = self.pair.labels(found)
+        both = pair.decide(pair.old, values), pair.decide(pair.new, values)
+        one, other = self.pair.labels(both)
         rows = np.flatnonzero(one != other)
-        margins = np.minimum(found[0].margin, found[1].margin)
-        missing = (found[0].status == MISSING) | (found[1].status == MISSING)
+        margins = np.minimum(both[0].margin, both[1].margin)
+        missing = (both[0].status == MISSING) | (both[1].status == MISSING)
         known = rows[~missing[rows]]
-        self.old_rules |= {*found[0].rule[known].tolist()} - {0}
-        self.new_rules |= {*found[1].rule[known].tolist()} - {0}
-        status = np.concatenate([each.status[known] for each in found])
+        self.old_rules |= {*both[0].rule[known].tolist()} - {0}
+        self.new_rules |= {*both[1].rule[known].tolist()} - {0}
+        status = np.concatenate([each.status[known] for each in both])
         self.has_tie |= bool((status == TIE).any())
         self.has_none |= bool((status == UNCOVERED).any())
         for row in _clearest(one[known], other[known], margins[known]):
@@ -371,7 +371,7 @@ def _probes(pair: RulePair) -> FloatArray:
     return inside(np.hstack(probes), low, high)
 
 
-def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
+def _boundaries(differences: _Differences, values: FloatArray) -> FloatArray:
     """Return points beside the old model's decision boundaries, to the last double.
 
     Points of different decisions are joined, and the line is halved as long as its
@@ -379,24 +379,24 @@ def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
     """
     if not values.shape[1]:
         return values
-    pair, clock = found.pair, found.clock
-    made: list[IntArray] = []
+    pair, clock = differences.pair, differences.clock
+    parts: list[IntArray] = []
     labels = pairs = np.zeros(0, np.int64)
     for part in portions(values.shape[1], clock):
-        made.append(pair.decide(pair.old, values[:, part]).label)
-        labels = np.concatenate(made)
+        parts.append(pair.decide(pair.old, values[:, part]).label)
+        labels = np.concatenate(parts)
         pairs = np.flatnonzero(labels[:-1] != labels[1:])[:_SEGMENTS]
         if pairs.size == _SEGMENTS:
             break
-    found.is_cut = pairs.size < _SEGMENTS and labels.size < values.shape[1]
+    differences.is_cut = pairs.size < _SEGMENTS and labels.size < values.shape[1]
     low, high, known = values[:, pairs], values[:, pairs + 1], labels[pairs]
-    seen = [low, high]
+    points = [low, high]
     for _ in range(_HALVINGS if pairs.size else 0):
         if clock.is_over:
-            found.is_cut = True
+            differences.is_cut = True
             break
         middle = low / 2 + high / 2
         is_low = pair.decide(pair.old, middle).label == known
         low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
-        seen.append(middle)
-    return np.hstack(seen)
+        points.append(middle)
+    return np.hstack(points)

@@ -64,13 +64,13 @@ def deciding_model(model: Document, name: str) -> FuzzyTree | RuleBase:
     """
     if not isinstance(model, FuzzySystem):
         return model
-    found = as_rules(model, None)
-    if found is None:
+    rules = as_rules(model, None)
+    if rules is None:
         raise ReadError(
             f"{name}: is a fuzzy system whose outputs are numbers, and is not "
             "compared with rules or a tree"
         )
-    return found
+    return rules
 
 
 def joined_domain(
@@ -110,10 +110,10 @@ def joined_domain(
             elif known is not None and known.origin == side.origin:
                 low, high = min(known.low, side.low), max(known.high, side.high)
                 sides[side.variable] = DomainSide(side.variable, low, high, side.origin)
-    given = Domain(tuple(sides.values()))
+    domain = Domain(tuple(sides.values()))
     if limits:
-        given = limited(given, limits, union(old, new))
-    ends = {side.variable: side for side in given.sides}
+        domain = limited(domain, limits, union(old, new))
+    ends = {side.variable: side for side in domain.sides}
     return Domain(tuple(ends[name] for name in inputs))
 
 

@@ -145,7 +145,7 @@ def words_of(clause: Clause) -> NamedKey:
 def matching(one: RuleKeys, other: RuleKeys) -> Matching:
     """Match the rules of two rule bases."""
     old, new = (dict(enumerate(said.rules, 1)) for said in (one, other))
-    found: list[Match] = []
+    matches: list[Match] = []
     steps: tuple[tuple[How, Callable[[RuleKeys, Rule], Hashable]], ...] = (
         ("same", RuleKeys.same),
         ("class", RuleKeys.antecedent),
@@ -156,15 +156,15 @@ def matching(one: RuleKeys, other: RuleKeys) -> Matching:
             {number: key(one, rule) for number, rule in old.items()},
             {number: key(other, rule) for number, rule in new.items()},
         )
-        found += [Match(a, b, how) for a, b in pairs]
+        matches += [Match(a, b, how) for a, b in pairs]
         for a, b in pairs:
             del old[a], new[b]
     left = len(old) + len(new) if max(len(old), len(new)) > _MOST_LEFT else 0
     if not left:
         for a, b in _nearest(one, old, other, new):
-            found.append(Match(a, b, "clauses"))
+            matches.append(Match(a, b, "clauses"))
             del old[a], new[b]
-    return Matching(tuple(sorted(found)), tuple(old), tuple(new), left)
+    return Matching(tuple(sorted(matches)), tuple(old), tuple(new), left)
 
 
 def paired(

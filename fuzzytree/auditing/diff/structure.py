@@ -55,7 +55,7 @@ def draft_changes(
     yield from _head_drafts(old, new, result)
 
 
-def _head_drafts(old: RuleBase, new: RuleBase, found: Matching) -> Iterator[Draft]:
+def _head_drafts(old: RuleBase, new: RuleBase, result: Matching) -> Iterator[Draft]:
     yield from renamed_model(old, new)
     here: Path = ("columns",)
     if old.columns != new.columns:
@@ -68,7 +68,7 @@ def _head_drafts(old: RuleBase, new: RuleBase, found: Matching) -> Iterator[Draf
         yield Draft("input", text, "never", here, here)
     moved = [
         (match.old, match.new)
-        for match in found.matches
+        for match in result.matches
         if old.rules[match.old - 1].support != new.rules[match.new - 1].support
     ]
     if moved:
@@ -148,20 +148,20 @@ def _answer_drafts(
 # --- rules
 
 
-def _rule_drafts(found: Matching, one: RuleKeys, other: RuleKeys) -> Iterator[Draft]:
-    for match in found.matches:
+def _rule_drafts(result: Matching, one: RuleKeys, other: RuleKeys) -> Iterator[Draft]:
+    for match in result.matches:
         if match.how not in ("same", "curves"):  # their terms are reported
             yield _changed_rule(match, one, other)
-    for number in found.removed:
+    for number in result.removed:
         text = f"rule {number} was removed: {sentence(one.rules[number - 1])}"
         yield Draft("rule", text, "rules", ("rules", number - 1), None, (number,))
-    for number in found.added:
+    for number in result.added:
         text = f"rule {number} is new: {sentence(other.rules[number - 1])}"
         yield Draft("rule", text, "rules", None, ("rules", number - 1), (), (number,))
-    if found.left:
-        text = f"{found.left} rules are too many to be matched with each other"
+    if result.left:
+        text = f"{result.left} rules are too many to be matched with each other"
         yield Draft("rule", text, "never", is_harmless=True)
-    yield from _order_drafts(found.matches)
+    yield from _order_drafts(result.matches)
 
 
 def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Draft:
@@ -310,12 +310,12 @@ def _users_of(variable: Variable, users: Users) -> tuple[int, ...]:
 
 
 def _users(rules: RuleBase) -> Users:
-    found: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
+    uses: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
     for number, rule in enumerate(rules.rules, 1):
         named = {(clause.variable, t) for clause in rule.when for t in clause.terms}
         for term in named:
-            found[term].append(number)
-    return {term: tuple(numbers) for term, numbers in found.items()}
+            uses[term].append(number)
+    return {term: tuple(numbers) for term, numbers in uses.items()}
 
 
 def _fact_drafts(
@@ -413,15 +413,15 @@ def _changed_term(
     text = f"the curve of {terms[0].name!r} of {variable!r} has changed"
     measures: tuple[Measure, ...] = ()
     if ends[0] <= ends[1]:
-        found = curve_distance(terms[0].shape, terms[1].shape, *ends)
-        most, at = outwards(found.high)[1], float(found.at)
-        exact = str(found.low) if found.low == found.high else None
+        distance = curve_distance(terms[0].shape, terms[1].shape, *ends)
+        most, at = outwards(distance.high)[1], float(distance.at)
+        exact = str(distance.low) if distance.low == distance.high else None
         near = f", by {most:.3g} at most, near {at:.6g}"
-        text += near if found.high else " outside the domain"
+        text += near if distance.high else " outside the domain"
         measures = (
             Measure("largest difference", most, exact),
-            Measure("at least", outwards(found.low)[0], str(found.low)),
-            Measure("place of the largest difference", at, str(found.at)),
+            Measure("at least", outwards(distance.low)[0], str(distance.low)),
+            Measure("place of the largest difference", at, str(distance.at)),
         )
     draft = Draft("term", text, "rules", *paths, *rules, measures)
     return draft._replace(is_harmless=not any(rules))

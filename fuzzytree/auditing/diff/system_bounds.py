@@ -172,11 +172,11 @@ def _at(
         case Is(variable=name, label=label, hedges=hedges):
             if label is None:
                 return _hedged(hedges, Fraction(0))  # the last, `any`, makes 1 of it
-            found = _named(_named(system.inputs, name).labels, label)
-            shape = shape_of(found.curve)
+            term = _named(_named(system.inputs, name).labels, label)
+            shape = shape_of(term.curve)
             if shape is None:
                 raise NotExactError(name)
-            degree = Fraction(found.height) * exact_degree(shape, values[name])
+            degree = Fraction(term.height) * exact_degree(shape, values[name])
             return _hedged(hedges, degree)
         case Not(part=part):
             return 1 - _at(part, block, system, values)
@@ -206,15 +206,15 @@ def most(
     """
     one, other = _named(old.outputs, output), _named(new.outputs, output)
     known = contributions(old, output, domain), contributions(new, output, domain)
-    found = _moved(old, new, (one, other), known, domain)
+    bound = _moved(old, new, (one, other), known, domain)
     ends = _span(old, one, known[0], domain)
     other_ends = _span(new, other, known[1], domain)
     if ends is None or other_ends is None:
-        return found
+        return bound
     (a, b), (c, d) = ends, other_ends
     apart = max(abs(d - a), abs(b - c), Fraction(0))
-    if found is not None and found[0] <= apart:
-        return found
+    if bound is not None and bound[0] <= apart:
+        return bound
     return apart, "both answers lie between the numbers that rules conclude"
 
 
@@ -305,11 +305,11 @@ def _span(
     domain: Domain,
 ) -> _Ends | None:
     """Return between which ends an output's numbers lie."""
-    found: list[_Ends] = []
+    spans: list[_Ends] = []
     if not one.defuzzifier.is_weighted:
         assert one.low is not None  # a system without range is refused
         assert one.high is not None
-        found.append((Fraction(one.low), Fraction(one.high)))
+        spans.append((Fraction(one.low), Fraction(one.high)))
     elif one.defuzzifier.method == "weighted sum":
         return None
     else:
@@ -318,11 +318,11 @@ def _span(
             ends = None if weights is None else _linear_span(*weights, domain)
             if ends is None:
                 return None
-            found.append(ends)
+            spans.append(ends)
     if one.default is not None:
         default = Fraction(one.default)
-        found.append((default, default))
-    if not found:
+        spans.append((default, default))
+    if not spans:
         return None
-    low, high = min(low for low, _ in found), max(high for _, high in found)
+    low, high = min(low for low, _ in spans), max(high for _, high in spans)
     return (_clamped(one, low), _clamped(one, high)) if one.clips else (low, high)

@@ -151,7 +151,7 @@ class _Read:
         return self._output(self.outputs[name])
 
     def _output(self, one: SystemOutput) -> Hashable:
-        made = [
+        entries = [
             (entry.strength, entry.label and self._concluded(one, entry.label))
             for entry in self.contributions(one.name)
         ]
@@ -160,11 +160,11 @@ class _Read:
             joins = joins if one.name in joined_outputs(self.system) else None
         is_free = self.curves is not None and joins != "normalized sum"
         if is_free and not self.is_chained:
-            made.sort(key=repr)
+            entries.sort(key=repr)
         order: tuple[Hashable, ...] = ()
         if is_weighted and joins is not None and not is_free:
             order = tuple(self._concluded(one, label) for label in one.labels)
-        return facts_of(one), joins, order, tuple(made)
+        return facts_of(one), joins, order, tuple(entries)
 
     def _concluded(self, one: SystemOutput, label: SystemTerm) -> Hashable:
         """Return what a term of an output is, and which of those that are the same."""
@@ -268,10 +268,10 @@ class _Read:
                 norm: str = block.conjunction or "minimum"
             case Or(parts=parts):
                 norm = block.disjunction or "maximum"
-        made = [self._condition(part, block) for part in parts]
+        operands = [self._condition(part, block) for part in parts]
         if self.curves is not None and norm != "normalized sum":
-            made.sort(key=repr)
-        return norm, tuple(made)
+            operands.sort(key=repr)
+        return norm, tuple(operands)
 
 
 def facts_of(one: SystemOutput) -> tuple[Hashable, ...]:

@@ -81,22 +81,22 @@ def number_answers(
         text = f"the numbers of the two were not compared: {reason}"
         return [note("FT801", "numbers", text, Declined("FTD03", reason))]
     rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
-    found = _Found(pair, open_, rounded, runs)
-    answers = [*_sampled(found, rows, settings, clock)]
-    if found.differing:
-        answers = [*map(found.witness, found.differing), *answers]
+    differences = _Differences(pair, open_, rounded, runs)
+    answers = [*_sampled(differences, rows, settings, clock)]
+    if differences.differing:
+        answers = [*map(differences.witness, differences.differing), *answers]
     elif None not in hows.values():
         text = f"{_ALIKE} everywhere on the domain"
         if not rounded:
             return [_proved(pair, text, _SAME.how), *answers]
         whole = _proved(pair, f"{text}, but for rounding", _ROUNDED.how)
-        most = Measure("largest difference by rounding", found.rounding)
+        most = Measure("largest difference by rounding", differences.rounding)
         return [msgspec.structs.replace(whole, measures=(most,)), *answers]
     for name, known in hows.items():
-        if known is not None and name not in found.largest:
+        if known is not None and name not in differences.largest:
             text = f"both systems compute {name!r} alike{known.where}"
             answers.append(note("FT801", name, text, Proved(known.how)))
-    answers += [found.bound(name) for name, how in hows.items() if how is None]
+    answers += [differences.bound(name) for name, how in hows.items() if how is None]
     return answers
 
 
@@ -138,10 +138,13 @@ def _proved(pair: SystemPair, sentence: str, how: str) -> Answer:
 
 
 def _sampled(
-    found: _Found, rows: AuditRows | None, settings: AuditSettings, clock: Clock
+    differences: _Differences,
+    rows: AuditRows | None,
+    settings: AuditSettings,
+    clock: Clock,
 ) -> Iterator[Answer]:
     """Yield how often outputs differ, and what the budget left out."""
-    pair = found.pair
+    pair = differences.pair
     low, high = ends_of(pair.domain, pair.columns)
     drawn, seed = min(settings.rows, _DRAWN), settings.seed
     points = sample_points(union(pair.old, pair.new), pair.domain, drawn, seed)
@@ -159,22 +162,26 @@ def _sampled(
         clock.report("comparing numbers", place / len(samples))
         count = values.shape[1]
         if count:
-            hits, seen = found.add(values, clock.share(1.0 / (len(samples) - place)))
-            left += count - seen
-            if seen:
-                yield _counted(found, subject, hits, seen, how)
+            hits, number = differences.add(
+                values, clock.share(1.0 / (len(samples) - place))
+            )
+            left += count - number
+            if number:
+                yield _counted(differences, subject, hits, number, how)
     if left:
         yield left_out(f"{left} points")
 
 
-def _counted(found: _Found, subject: str, hits: int, seen: int, how: str) -> Answer:
+def _counted(
+    differences: _Differences, subject: str, hits: int, rows: int, how: str
+) -> Answer:
     state = sampled_share(
-        "rows in which an output differs", hits, seen, f"{seen} {how}"
+        "rows in which an output differs", hits, rows, f"{rows} {how}"
     )
-    sentence = f"no output differs on {seen} {how}"
+    sentence = f"no output differs on {rows} {how}"
     if hits:
-        sentence = f"an output differs on {hits} of {seen} {how}"
-    elif found.rounding:
+        sentence = f"an output differs on {hits} of {rows} {how}"
+    elif differences.rounding:
         sentence += ", but for rounding"
     return (finding if hits else note)("FT801", subject, sentence, state)
 
@@ -201,7 +208,7 @@ class _Largest(NamedTuple):
     row: Mapping[str, float]
 
 
-class _Found:
+class _Differences:
     """Where outputs were seen to differ."""
 
     def __init__(
@@ -223,15 +230,15 @@ class _Found:
 
     def add(self, values: FloatArray, clock: Clock) -> tuple[int, int]:
         """Compare some rows as long as there is time; return how many differ, of."""
-        hits = seen = 0
+        hits = count = 0
         for part in portions(values.shape[1], clock):
             try:
                 with enforced(clock):
                     hits += self._add(values[:, part])
             except OutOfTimeError:
                 break
-            seen = min(part.stop, values.shape[1])
-        return hits, seen
+            count = min(part.stop, values.shape[1])
+        return hits, count
 
     def _add(self, values: FloatArray) -> int:
         one, other = self._numbers(values)
@@ -254,21 +261,21 @@ class _Found:
 
     def _numbers(self, values: FloatArray) -> list[FloatArray]:
         """Return what both compute, each of shape (outputs, rows)."""
-        found: list[FloatArray] = []
+        numbers: list[FloatArray] = []
         pair = self.pair
         for system, run in zip((pair.old, pair.new), self.runs, strict=True):
             rows = values[[pair.columns.index(name) for name in system.columns]]
             known = [one.name for one in system.outputs]
-            found.append(run(rows).outputs[[known.index(n) for n in self.outputs]])
-        return found
+            numbers.append(run(rows).outputs[[known.index(n) for n in self.outputs]])
+        return numbers
 
     def witness(self, name: str) -> Answer:
         """Return where an output differs most, of what was seen."""
-        found = self.largest[name]
-        point = {key: Fraction(value) for key, value in found.row.items()}
+        largest = self.largest[name]
+        point = {key: Fraction(value) for key, value in largest.row.items()}
         how = "as the reference computes it"
-        said = f"{name!r} is {_shown(found.now)}, and was {_shown(found.was)}"
-        measure = Measure("largest difference", found.gap)
+        said = f"{name!r} is {_shown(largest.now)}, and was {_shown(largest.was)}"
+        measure = Measure("largest difference", largest.gap)
         try:
             point = self._simple(name, point)
             was, now = self._exact(name, point)
@@ -280,7 +287,7 @@ class _Found:
                 gap = math.inf if apart is None else float(apart)
                 measure = Measure("largest difference", gap, exact)
             else:  # rounding alone
-                point = {key: Fraction(value) for key, value in found.row.items()}
+                point = {key: Fraction(value) for key, value in largest.row.items()}
         except NotExactError:
             pass
         state = Witness(coordinates(point), ())
@@ -316,14 +323,14 @@ class _Found:
             text = f"how far {name!r} can differ at most is not known: {reason}"
             return note("FT801", title, text, Declined("FTD02", reason))
         (bound, why), low = known, 0.0
-        high, seen = outwards(bound)[1], self.largest.get(name)
-        if seen is not None and math.isfinite(seen.gap):
+        high, largest = outwards(bound)[1], self.largest.get(name)
+        if largest is not None and math.isfinite(largest.gap):
             is_within = all(
-                side.low <= seen.row[side.variable] <= side.high
+                side.low <= largest.row[side.variable] <= side.high
                 for side in self.pair.domain.sides
-                if side.variable in seen.row
+                if side.variable in largest.row
             )
-            low = min(seen.gap, high) if is_within else 0.0
+            low = min(largest.gap, high) if is_within else 0.0
         text = f"{name!r} differs by at most {high:.6g} where both answer a number"
         return note("FT801", title, text, Bracket(of, low, high, why))
 

@@ -117,7 +117,7 @@ def audit(
         limits=LIMITS,
         is_complete=not progress.cut,
         accepted=tuple(sorted(ids.intersection(selection.accepted))),
-        results=tuple(one.result for one in material.given),
+        results=tuple(one.result for one in material.results),
         numbers=() if _is_plain(viewed.numbers) else viewed.numbers,
     )
     # A count among doubles is a double from here on, as it is for who reads the file.

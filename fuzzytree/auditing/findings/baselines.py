@@ -65,8 +65,8 @@ def resolved_ids(baseline: Mapping[str, str], audit: Audit) -> Iterator[str]:
 
     Codes that were not run, or were cut short, are left out.
     """
-    found = {answer.id for answer in audit.findings}
+    ids = {answer.id for answer in audit.findings}
     unasked = {text.partition(" ")[0] for text in audit.unasked}
     for one in sorted(baseline):
-        if one not in found and one.partition("-")[0] not in unasked:
+        if one not in ids and one.partition("-")[0] not in unasked:
             yield one

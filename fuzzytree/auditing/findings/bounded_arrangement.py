@@ -91,16 +91,16 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def firing(self, number: int, clock: Clock) -> State:
         """Return whether a rule fires anywhere; see `wins`."""
-        found = wins(self.lower, number, (), clock)
+        state = wins(self.lower, number, (), clock)
         if self.bounds is None or not self.is_inexact(number):
-            return found
-        if isinstance(found, Witness):
-            return self.bounds.certified(found)
+            return state
+        if isinstance(state, Witness):
+            return self.bounds.certified(state)
         most = wins(self.upper, number, (), clock)
         if isinstance(most, Proved):
             return most
         # Where the lower strength is 0, a clause is, and its gap bounds the upper one.
-        high = self.bounds.gap if isinstance(found, Proved) else 1.0
+        high = self.bounds.gap if isinstance(state, Proved) else 1.0
         return Bracket(f"the strength of rule {number}", 0.0, high, self.bounds.why)
 
     def never_weaker(self, strong: int, weak: int) -> Dominance:
@@ -109,8 +109,8 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
             return self.from_below.never_weaker(strong, weak)
         if self._pair(strong, weak).never_weaker(1, 2) == "always":
             return "always"
-        found = self._pair(weak, strong, shares=False).never_weaker(2, 1)
-        return "not" if found == "not" else "open"
+        back = self._pair(weak, strong, shares=False).never_weaker(2, 1)
+        return "not" if back == "not" else "open"
 
     def _pair(self, one: int, other: int, *, shares: bool = True) -> RulePairs:
         """Return two rules, the first from below and the second from above."""
@@ -141,8 +141,8 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
         if self.is_product:
             return rule.when.count(clause) <= others.count(clause)
         mine, weight, _ = self.bounds.weighted_key(clause)
-        found = map(self.bounds.weighted_key, others)
-        return any(theirs == mine and most <= weight for theirs, _, most in found)
+        keys = map(self.bounds.weighted_key, others)
+        return any(theirs == mine and most <= weight for theirs, _, most in keys)
 
     def distance(self, one: int, other: int, most: Fraction) -> RuleDistance | None:
         """Return how far two rules are apart, None if more; see `factors.distance`.
@@ -176,7 +176,7 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 
         Each of shape (rules, places), off by far less than `_ROUNDING`.
         """
-        found: list[tuple[FloatArray, FloatArray]] = []
+        bounds: list[tuple[FloatArray, FloatArray]] = []
         for variable in self.lower.rules.variables:
             at = _places(variable, self.lower.domain)
             if not at.size:
@@ -185,14 +185,14 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
                 _degrees(one.rules, variable.name, at)
                 for one in (self.lower, self.upper)
             )
-            found.append((low[0], high[1]))
-        return tuple(found)
+            bounds.append((low[0], high[1]))
+        return tuple(bounds)
 
     def uncovered(self, clock: Clock) -> State:
         """Return whether every rule is somewhere exactly 0; see `cover`."""
-        found = uncovered(self.upper, clock)
-        if self.bounds is None or isinstance(found, Witness):
-            return found
+        state = uncovered(self.upper, clock)
+        if self.bounds is None or isinstance(state, Witness):
+            return state
         least = uncovered(self.lower, clock)
         if isinstance(least, Proved):
             return least
@@ -200,9 +200,9 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def below(self, epsilon: Fraction, clock: Clock) -> State:
         """Return whether all rules are somewhere weaker than a level; see `cover`."""
-        found = below(self.lower, epsilon, clock)
-        if self.bounds is None or isinstance(found, Proved):
-            return found
+        state = below(self.lower, epsilon, clock)
+        if self.bounds is None or isinstance(state, Proved):
+            return state
         most = below(self.upper, epsilon, clock)
         if isinstance(most, Witness):
             return most
@@ -211,11 +211,11 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def least_cover(self, clock: Clock) -> Bracket:
         """Return bounds of the least strength that the strongest rule has anywhere."""
-        found = least_cover(self.lower, clock)
+        bracket = least_cover(self.lower, clock)
         if self.bounds is None:
-            return found
+            return bracket
         high = least_cover(self.upper, clock).high
-        return Bracket(found.of, found.low, max(high, found.low), self.bounds.why)
+        return Bracket(bracket.of, bracket.low, max(high, bracket.low), self.bounds.why)
 
     def highest(self, one: int) -> FloatArray:
         """Return bounds of the levels that a rule reaches with each other one."""
@@ -223,15 +223,15 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def meet(self, one: int, other: int, level: Fraction, clock: Clock) -> JointMaximum:
         """Return the highest level that two rules reach at one point; see `meeting`."""
-        found = joint_maximum(self.from_below, one, other, level, clock)
+        joint = joint_maximum(self.from_below, one, other, level, clock)
         if self.bounds is None or not self.is_inexact(one, other):
-            return found
+            return joint
         above = joint_maximum(self.from_above, one, other, level, clock)
         most = above.level.high
-        if isinstance(found.state, Witness):
-            state = self.bounds.certified(found.state)
+        if isinstance(joint.state, Witness):
+            state = self.bounds.certified(joint.state)
             return JointMaximum(
-                Bounds(found.level.low, max(most, found.level.low)), state
+                Bounds(joint.level.low, max(most, joint.level.low)), state
             )
         if most < level or isinstance(above.state, Proved):
             state = above.state
@@ -254,8 +254,8 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 def bounded_arrangement(subject: Subject) -> BoundedArrangement:
     """Return a subject's rules from below and from above, on its domain."""
     if subject.bounds is None:
-        given = arrange(subject.rules, subject.domain)
-        return BoundedArrangement(given, given)
+        arrangement = arrange(subject.rules, subject.domain)
+        return BoundedArrangement(arrangement, arrangement)
     lower, upper = subject.bounds.lower, subject.bounds.upper
     return BoundedArrangement(
         arrange(lower, subject.domain), arrange(upper, subject.domain), subject.bounds
@@ -275,14 +275,14 @@ def _terms(variable: Variable) -> Iterator[Term]:
 def _places(variable: Variable, domain: Domain) -> FloatArray:
     """Return the values of a variable at which its terms have points."""
     low, high = span(variable, domain)
-    found = {
+    values = {
         x
         for term in variable.terms
         if isinstance(term.shape, Points)
         for x in term.shape.values
         if low < x <= high
     }
-    return np.array(sorted(found), np.float64)
+    return np.array(sorted(values), np.float64)
 
 
 def _degrees(rules: RuleBase, name: str, at: FloatArray) -> tuple[FloatArray, ...]:

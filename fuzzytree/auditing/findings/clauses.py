@@ -70,9 +70,9 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
         subject.rules,
         rules=(*subject.rules.rules, *(one.shorter for one in every)),
     )
-    given = arrange(both, subject.domain)
-    compared = RulePairs(given)
-    seen = _Seen(subject, given, both)
+    arrangement = arrange(both, subject.domain)
+    compared = RulePairs(arrangement)
+    sample = _Sample(subject, arrangement, both)
     count = len(subject.rules.rules)
     silent = [
         number for number in range(1, count + 1) if not compared.fires[number - 1]
@@ -83,7 +83,7 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
             continue
         subject.clock.check()
         subject.clock.report("irrelevant clause", (number - count) / len(every))
-        state = _state(subject, compared, seen, one, number, slices)
+        state = _state(subject, compared, sample, one, number, slices)
         if state is None:
             slices.left_out += 1
             continue
@@ -117,7 +117,7 @@ def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
 def _state(
     subject: Subject,
     compared: RulePairs,
-    seen: _Seen,
+    sample: _Sample,
     one: _Dropped,
     number: int,
     slices: TimeSlices,
@@ -128,9 +128,9 @@ def _state(
     by = _backed(subject, compared, one, number)
     if by is not None:
         return Proved(by)
-    found = seen.witness(one, number - 1)
-    if found is not None:
-        return found
+    witness = sample.witness(one, number - 1)
+    if witness is not None:
+        return witness
     shorter = one.of(subject.rules)
     turn = partial(equivalence, subject.rules, shorter, subject.domain)
     state = slices.run(left, turn)
@@ -167,11 +167,13 @@ def _witness(rules: RuleBase, point: dict[str, Fraction]) -> Witness:
     return Witness(coordinates(point), (Claim("decides", label=label),))
 
 
-class _Seen:
+class _Sample:
     """Rows of the domain, with the strengths of all rules with and without clauses."""
 
-    def __init__(self, subject: Subject, given: Arrangement, both: RuleBase) -> None:
-        self.rules, self.given = subject.rules, given
+    def __init__(
+        self, subject: Subject, arrangement: Arrangement, both: RuleBase
+    ) -> None:
+        self.rules, self.arrangement = subject.rules, arrangement
         self.count = len(subject.rules.rules)
         most = min(MOST_ROWS, _MOST_STRENGTHS // len(both.rules))
         rows, seed = subject.settings.rows, subject.settings.seed
@@ -189,8 +191,8 @@ class _Seen:
         self.uncovered = -1 if uncovered is None else numbers[uncovered]
         whole = self.strengths[: self.count]
         self.best, self.first = whole.max(axis=0), whole.argmax(axis=0)
-        found = self.classes[self.first]
-        self.labels = np.where(self.best > 0.0, found, self.uncovered)
+        winners = self.classes[self.first]
+        self.labels = np.where(self.best > 0.0, winners, self.uncovered)
         self.known: dict[int, list[Fraction]] = {}
 
     def _point(self, row: int) -> dict[str, Fraction]:
@@ -214,7 +216,7 @@ class _Seen:
         gain = strengths[rows] - self.strengths[own, rows]
         for row in rows[np.argsort(-gain, kind="stable")][:_MOST_TRIED].tolist():
             point = self._point(row)
-            if not is_within(self.given, point):
+            if not is_within(self.arrangement, point):
                 continue
             if row not in self.known:
                 self.known[row] = rule_strengths(self.rules, point)

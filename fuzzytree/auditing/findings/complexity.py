@@ -130,10 +130,10 @@ def coverage(of: VariableRange) -> Bounds:
         '1'
     """
     terms = of.variable.terms
-    made = separate_axis([term.shape for term in terms], of.low, of.high)
-    total, slack = ZERO, sum((b - a for a, b in made.cells.zones), ZERO)
-    for low, high in made.cells.between:
-        summed = _sum(made, (low + high) / 2)
+    axis = separate_axis([term.shape for term in terms], of.low, of.high)
+    total, slack = ZERO, sum((b - a for a, b in axis.cells.zones), ZERO)
+    for low, high in axis.cells.between:
+        summed = _sum(axis, (low + high) / 2)
         over = difference(summed, (ONE,))
         places = [*roots(over, low, high)]
         slack += sum((root.high - root.low for root in places), ZERO)
@@ -152,12 +152,12 @@ def coverage(of: VariableRange) -> Bounds:
     return Bounds(total / width, min((total + slack) / width, ONE))
 
 
-def _sum(made: CurveAxis, at: Fraction) -> Polynomial:
-    found: Polynomial = (ZERO,)
-    for element in made.elements:
+def _sum(axis: CurveAxis, at: Fraction) -> Polynomial:
+    total: Polynomial = (ZERO,)
+    for element in axis.elements:
         negative = tuple(-c for c in local_polynomial(element, at))
-        found = difference(found, negative)
-    return found
+        total = difference(total, negative)
+    return total
 
 
 def _terms(rules: RuleBase) -> set[tuple[str, str]]:

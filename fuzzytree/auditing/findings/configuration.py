@@ -75,15 +75,15 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
                 f"the code {text!r} cannot be left out: it reports what was declined"
             )
     taken = select or ("FT",)
-    found = {
+    codes = {
         code
         for code in CODES
         if code.startswith("FTD")
         or (code.startswith(taken) and not code.startswith(ignore))
     }
-    if all(code.startswith("FTD") for code in found):
+    if all(code.startswith("FTD") for code in codes):
         raise ValueError("select and ignore leave no code to answer")
-    return found
+    return codes
 
 
 def check_settings(settings: AuditSettings) -> None:
@@ -116,20 +116,20 @@ def settings_with(settings: AuditSettings, texts: Mapping[str, str]) -> AuditSet
         0.2
     """
     known = [name for name in (*_RANGES, *_COUNTS) if name != "budget_s"]
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for name, text in texts.items():
         if name not in known:
             raise ValueError(f"no setting {name!r}; {name_choice(name, known)}")
         try:
-            found[name] = int(text) if name in _COUNTS else float(text)
+            values[name] = int(text) if name in _COUNTS else float(text)
         except ValueError:
             noun = "a whole number" if name in _COUNTS else "a number"
             raise ValueError(f"{name} must be {noun}, not {text!r}") from None
-        if not math.isfinite(found[name]):
+        if not math.isfinite(values[name]):
             raise ValueError(f"{name} must be finite, not {text!r}")
-    made = msgspec.structs.replace(settings, **found)
-    check_settings(made)
-    return made
+    result = msgspec.structs.replace(settings, **values)
+    check_settings(result)
+    return result
 
 
 FILE: Final = "fuzzytree-audit.yaml"
@@ -202,11 +202,11 @@ def read_configuration(path: PathLike) -> Configuration:
     Raises:
         ReadError: If it is none; it lists all mistakes with their places.
     """
-    found = configuration(read_bounded(path, _MOST_BYTES), str(path))
-    if found.baseline is None:
-        return found
-    beside = str(PurePath(path).parent / found.baseline)
-    return msgspec.structs.replace(found, baseline=beside)
+    result = configuration(read_bounded(path, _MOST_BYTES), str(path))
+    if result.baseline is None:
+        return result
+    beside = str(PurePath(path).parent / result.baseline)
+    return msgspec.structs.replace(result, baseline=beside)
 
 
 def configuration(content: bytes, name: str) -> Configuration:
@@ -215,24 +215,24 @@ def configuration(content: bytes, name: str) -> Configuration:
     Raises:
         ReadError: As `read_configuration`.
     """
-    root, found = compose(content, name)
-    bound = bind(root, ConfigurationFile, found)
-    if bound is None or found:
-        raise report(name, found)
+    root, mistakes = compose(content, name)
+    bound = bind(root, ConfigurationFile, mistakes)
+    if bound is None or mistakes:
+        raise report(name, mistakes)
     assert isinstance(root, MappingNode)  # or it would not have been bound
-    settings = _settings(bound.settings or SettingsOfFile(), root, found)
+    settings = _settings(bound.settings or SettingsOfFile(), root, mistakes)
     for position, fault in _wrong_limits(bound.limits):
         node = find(root, ("limits", position))
-        found.append((node.line, node.column, fault))
+        mistakes.append((node.line, node.column, fault))
     for key in ("select", "ignore"):
         for position, text in enumerate(getattr(bound, key)):
             try:
                 chosen_codes([text])
             except ValueError as error:
                 node = find(root, (key, position))
-                found.append((node.line, node.column, str(error)))
-    if found:
-        raise report(name, found)
+                mistakes.append((node.line, node.column, str(error)))
+    if mistakes:
+        raise report(name, mistakes)
     return Configuration(
         bound.select,
         bound.ignore,
@@ -245,11 +245,11 @@ def configuration(content: bytes, name: str) -> Configuration:
 
 def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
     """Yield the positions of limits that are none, and why."""
-    seen: set[str] = set()
+    names: set[str] = set()
     for position, one in enumerate(limits):
-        if one.variable in seen:
+        if one.variable in names:
             yield position, f"{one.variable!r} has limits already"
-        seen.add(one.variable)
+        names.add(one.variable)
         if not (math.isfinite(one.from_) and math.isfinite(one.to)):
             yield position, f"limits must be finite, not {one.from_!r} to {one.to!r}"
         elif one.from_ > one.to:
@@ -258,20 +258,20 @@ def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
 
 
 def _settings(
-    values: SettingsOfFile, root: MappingNode, found: list[FileMistake]
+    values: SettingsOfFile, root: MappingNode, mistakes: list[FileMistake]
 ) -> AuditSettings:
     """Return settings, the defaults where a value is left out or wrong."""
-    made = AuditSettings()
+    settings = AuditSettings()
     for key, value in msgspec.structs.asdict(values).items():
         if value is None:
             continue
         name = "budget_s" if key == "budget" else key
         try:
-            changed = msgspec.structs.replace(made, **{name: value})
+            changed = msgspec.structs.replace(settings, **{name: value})
             check_settings(changed)
         except ValueError as error:
             node = find(root, ("settings", key))
-            found.append((node.line, node.column, str(error)))
+            mistakes.append((node.line, node.column, str(error)))
         else:
-            made = changed
-    return made
+            settings = changed
+    return settings

@@ -73,8 +73,8 @@ def answers(subject: Subject) -> Iterator[Answer]:
     for question in questions(subject):
         subject.clock.check()
         values = question.values
-        found = [ModelRun(title, form, run(values)) for title, form, run in runs]
-        yield from convention_answers(subject, question, found)
+        results = [ModelRun(title, form, run(values)) for title, form, run in runs]
+        yield from convention_answers(subject, question, results)
 
 
 def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
@@ -159,7 +159,7 @@ def _outside(subject: Subject) -> Iterator[tuple[str, float]]:
 
 
 def convention_answers(
-    subject: Subject, question: Convention, found: Sequence[ModelRun]
+    subject: Subject, question: Convention, results: Sequence[ModelRun]
 ) -> Iterator[Answer]:
     """Yield each representation that differs in a question, or that none does.
 
@@ -168,17 +168,17 @@ def convention_answers(
     """
     first: dict[str, ModelRun] = {}
     is_alike = True
-    for one in found:
+    for one in results:
         form = one.title.rpartition(": ")[2]
         base = first.setdefault(form, one)
         if base is one and form != "raw rules":
-            base = found[0]
+            base = results[0]
         rows = np.flatnonzero(_differ(one, base))
         if rows.size:
             is_alike = False
             yield _broken(subject, question, one, base, rows)
     if is_alike:
-        yield _alike(question, [one.title for one in found])
+        yield _alike(question, [one.title for one in results])
 
 
 def _alike(question: Convention, titles: Sequence[str]) -> Answer:
@@ -261,17 +261,17 @@ def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
         if question.name not in _OF_SYSTEMS:
             continue
         subject.clock.check()
-        found = [(name, run(question.values)) for name, run in runs]
-        yield from system_answers(subject, question, found)
+        results = [(name, run(question.values)) for name, run in runs]
+        yield from system_answers(subject, question, results)
 
 
 def system_answers(
-    subject: Subject, question: Convention, found: Sequence[tuple[str, SystemOutcome]]
+    subject: Subject, question: Convention, results: Sequence[tuple[str, SystemOutcome]]
 ) -> Iterator[Answer]:
     """Yield what runtimes of a system answer: each that differs, or that none does."""
-    first, base = found[0]
+    first, base = results[0]
     is_alike = True
-    for name, one in found[1:]:
+    for name, one in results[1:]:
         differ = one.status != base.status
         differ |= (np.isnan(one.outputs) != np.isnan(base.outputs)).any(axis=0)
         rows = np.flatnonzero(differ)
@@ -280,7 +280,7 @@ def system_answers(
             text = f"and {first} differ in which outputs have a number"
             yield _differing(subject, question, name, text, rows)
     if is_alike:
-        yield _alike(question._replace(left_out=0), [name for name, _ in found])
+        yield _alike(question._replace(left_out=0), [name for name, _ in results])
 
 
 # --- witnesses

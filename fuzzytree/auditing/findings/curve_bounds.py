@@ -101,24 +101,24 @@ def curve_bounds(curve: Curve, of: Interval | None) -> CurveBounds | None:
 
     Example:
         >>> of = Fraction(-3), Fraction(3)
-        >>> found = curve_bounds(Gaussian(0.0, 1.0), of)
-        >>> found.lower.degrees[0] > 0.01, float(gap(found, of)) < 0.001
+        >>> bounds = curve_bounds(Gaussian(0.0, 1.0), of)
+        >>> bounds.lower.degrees[0] > 0.01, float(gap(bounds, of)) < 0.001
         (True, True)
     """
     try:
-        found = points_for(curve, HALF_GAP)
+        fit = points_for(curve, HALF_GAP)
     except LossError:
         return None
-    off = Fraction(found.bound) * _MORE
-    values, degrees = found.points.values, found.points.degrees
-    if not _is_near(curve, found.points, off):
+    off = Fraction(fit.bound) * _MORE
+    values, degrees = fit.points.values, fit.points.degrees
+    if not _is_near(curve, fit.points, off):
         return None
     middle = [*zip(values, map(Fraction, degrees), strict=True)]
     below, above = [(x, d - off) for x, d in middle], [(x, d + off) for x, d in middle]
     if _is_smooth(curve):
         for place in range(len(middle)):
             x, degree = middle[place]
-            if degree in (0, 1) and _is_exact(curve, found.points, place):
+            if degree in (0, 1) and _is_exact(curve, fit.points, place):
                 line = above if degree == 0 else below
                 line[place] = x, degree
     least = Fraction(0) if of is None else _least(curve, of)
@@ -134,38 +134,38 @@ def as_points(shape: Shape, of: Interval | None) -> CurveBounds | None:
     return curve_bounds(shape, of)
 
 
-def complement(found: CurveBounds) -> CurveBounds | None:
+def complement(bounds: CurveBounds) -> CurveBounds | None:
     """Return 1 minus a curve; None if it is no points."""
-    turned = CurveBounds(found.upper, found.lower, ("not", *found.key))
+    turned = CurveBounds(bounds.upper, bounds.lower, ("not", *bounds.key))
     return _mapped(turned, lambda degree: 1 - degree)
 
 
-def scale(found: CurveBounds, factor: float) -> CurveBounds | None:
+def scale(bounds: CurveBounds, factor: float) -> CurveBounds | None:
     """Return a curve times a factor in [0, 1]; None if it is no points."""
-    scaled = found._replace(key=(factor, *found.key))
+    scaled = bounds._replace(key=(factor, *bounds.key))
     return _mapped(scaled, lambda degree: degree * Fraction(factor))
 
 
 def _mapped(
-    found: CurveBounds, change: Callable[[Fraction], Fraction]
+    bounds: CurveBounds, change: Callable[[Fraction], Fraction]
 ) -> CurveBounds | None:
     """Return lines whose degrees are changed, and rounded down or up; if of points."""
-    lower, upper = found.lower, found.upper
+    lower, upper = bounds.lower, bounds.upper
     if not (isinstance(lower, Points) and isinstance(upper, Points)):
         return None
     low = (outwards(change(Fraction(one)))[0] for one in lower.degrees)
     high = (outwards(change(Fraction(one)))[1] for one in upper.degrees)
     lines = Points(lower.values, tuple(low)), Points(upper.values, tuple(high))
-    return CurveBounds(*lines, found.key)
+    return CurveBounds(*lines, bounds.key)
 
 
 @functools.lru_cache(maxsize=256)
-def gap(found: CurveBounds, of: Interval) -> Fraction:
+def gap(bounds: CurveBounds, of: Interval) -> Fraction:
     """Return how far two lines are apart at most on a range."""
     low, high = of
     apart = Fraction(0)
-    lines = RuleCurve(found.lower), RuleCurve(found.upper)
-    for shape in (found.lower, found.upper):
+    lines = RuleCurve(bounds.lower), RuleCurve(bounds.upper)
+    for shape in (bounds.lower, bounds.upper):
         if isinstance(shape, Points):
             inner = (Fraction(x) for x in shape.values)
             for x in (low, *(x for x in inner if low <= x <= high), high):
@@ -183,8 +183,8 @@ def _is_near(curve: Curve, points: Points, off: Fraction) -> bool:
     for place, x in enumerate(points.values):
         if _is_step(points, place):
             continue
-        found, degree = degree_between(curve, Fraction(x)), points.degrees[place]
-        if found is None or not found.low + off >= degree >= found.high - off:
+        between, degree = degree_between(curve, Fraction(x)), points.degrees[place]
+        if between is None or not between.low + off >= degree >= between.high - off:
             return False
     return True
 
@@ -198,9 +198,9 @@ def _is_exact(curve: Curve, points: Points, place: int) -> bool:
     """Return whether a curve has the degree of a point, or jumps to it."""
     if _is_step(points, place):
         return True
-    found = degree_between(curve, Fraction(points.values[place]))
+    between = degree_between(curve, Fraction(points.values[place]))
     degree = Fraction(points.degrees[place])
-    return found is not None and found.low == found.high == degree
+    return between is not None and between.low == between.high == degree
 
 
 def _is_smooth(curve: Curve) -> bool:
@@ -222,8 +222,8 @@ def _least(curve: Curve, of: Interval) -> Fraction:
     is_risen = isinstance(curve, kinds) or (isinstance(curve, Bell) and curve.slope > 0)
     if not is_risen:
         return Fraction(0)
-    found = [degree_between(curve, x) for x in of]
-    low = min(one.low for one in found if one is not None)
+    ends = [degree_between(curve, x) for x in of]
+    low = min(one.low for one in ends if one is not None)
     return Fraction(outwards(low)[0])
 
 
@@ -255,9 +255,9 @@ def _meeting(one: Knot, other: Knot, limit: Fraction, sign: int) -> Iterator[Kno
 def rounded_line(knots: Sequence[Knot], side: Side, of: Interval | None) -> Points:
     """Return a line as points, with degrees rounded to its side; only on a range."""
     pick = 0 if side == "lower" else 1
-    made = [(x, outwards(degree)[pick]) for x, degree in knots]
+    line = [(x, outwards(degree)[pick]) for x, degree in knots]
     kept: list[tuple[float, float]] = []
-    for x, degree in made:
+    for x, degree in line:
         if len(kept) > 1 and kept[-1][0] == kept[-2][0] == x:
             kept.pop()  # within a step only its two ends count
         kept.append((x, degree))
@@ -299,7 +299,7 @@ class _Rising(NamedTuple):
     bend: tuple[Bend, Bend]
 
 
-def hedged_bounds(found: CurveBounds, hedge: Hedge) -> CurveBounds | None:
+def hedged_bounds(bounds: CurveBounds, hedge: Hedge) -> CurveBounds | None:
     """Return what a hedge makes of a curve between lines.
 
     Returns:
@@ -314,17 +314,17 @@ def hedged_bounds(found: CurveBounds, hedge: Hedge) -> CurveBounds | None:
         (True, True)
     """
     if hedge == "not":
-        return complement(found)
+        return complement(bounds)
     if hedge == "any":
         one = Points((0.0,), (1.0,))
         return CurveBounds(one, one, (one,))
-    if not isinstance(found.lower, Points) or not isinstance(found.upper, Points):
+    if not isinstance(bounds.lower, Points) or not isinstance(bounds.upper, Points):
         return None
-    lower = _line(found.lower, _RISING[hedge], "lower")
-    upper = _line(found.upper, _RISING[hedge], "upper")
+    lower = _line(bounds.lower, _RISING[hedge], "lower")
+    upper = _line(bounds.upper, _RISING[hedge], "upper")
     if lower is None or upper is None:
         return None
-    return CurveBounds(lower, upper, (hedge, *found.key))
+    return CurveBounds(lower, upper, (hedge, *bounds.key))
 
 
 def _line(points: Points, hedge: _Rising, side: Side) -> Points | None:
@@ -334,14 +334,14 @@ def _line(points: Points, hedge: _Rising, side: Side) -> Points | None:
     if sum(map(len, parts)) > MOST_POINTS:
         return None
     off = Fraction(max((_off(hedge, of, side) for of in parts), default=0.0))
-    made: list[Knot] = []
+    knots: list[Knot] = []
     for of in parts:
         is_level = all(degree == of[0][1] for _, degree in of)
         shift = Fraction(0) if is_level else off if pick else -off
         ends = [(x, hedge.value(degree)[pick] + shift) for x, degree in of]
-        made += ends if not made or made[-1] != ends[0] else ends[1:]
+        knots += ends if not knots or knots[-1] != ends[0] else ends[1:]
     extreme = (max if pick else min)(map(Fraction, points.degrees))
-    return rounded_line([*clip(made, hedge.value(extreme)[pick], side)], side, None)
+    return rounded_line([*clip(knots, hedge.value(extreme)[pick], side)], side, None)
 
 
 def _stretches(points: Points, hedge: _Rising) -> Iterator[list[Knot]]:
@@ -378,11 +378,11 @@ def _along(one: Knot, other: Knot, x: float) -> Fraction:
 def _off(hedge: _Rising, of: Sequence[Knot], side: Side) -> float:
     """Return how far chords are beyond the curve on the side that counts."""
     counts = ("both", "upwards" if side == "lower" else "downwards")
-    found = 0.0
+    most = 0.0
     for (_, p), (_, q) in itertools.pairwise(of):
         if _bend(hedge, p, q) in counts:
-            found = max(found, _error(hedge, p, q))
-    return found
+            most = max(most, _error(hedge, p, q))
+    return most
 
 
 def _bend(hedge: _Rising, p: Fraction, q: Fraction) -> Bend:
@@ -415,16 +415,16 @@ def _power(power: Fraction) -> _Rising:
         return powered(degree, power)
 
     def whole(degree: Fraction) -> Between:
-        found = degree**power.numerator
-        return Between(found, found)
+        exact = degree**power.numerator
+        return Between(exact, exact)
 
     bend: Bend = "upwards" if power > 1 else "downwards"
     return _Rising(whole if power.denominator == 1 else value, slope, (bend, bend))
 
 
 def _extremely(degree: Fraction) -> Between:
-    found = 2 * degree**2 if degree <= _HALF else 1 - 2 * (1 - degree) ** 2
-    return Between(found, found)
+    exact = 2 * degree**2 if degree <= _HALF else 1 - 2 * (1 - degree) ** 2
+    return Between(exact, exact)
 
 
 def _slope_of_extremely(degree: float) -> float:

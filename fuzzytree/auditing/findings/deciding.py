@@ -46,18 +46,18 @@ def answers(subject: Subject) -> Iterator[Answer]:
     Where every rule that fires takes part in the answer: whether it fires.
     """
     sides = bounded_arrangement(subject)
-    given = sides.lower
-    if given.is_empty:
+    arrangement = sides.lower
+    if arrangement.is_empty:
         return
     if subject.policy.decision == "all":
         yield from _firing(subject, sides)
         return
-    seen = RandomProbes(given, subject.settings.seed)
+    probes = RandomProbes(arrangement, subject.settings.seed)
     won: dict[int, Witness] = {}
-    yield from _winning(subject, seen, won)
-    yield from _leading(subject, seen, won)
-    ties = _Ties(subject, given)
-    yield from _needed(subject, seen, ties)
+    yield from _winning(subject, probes, won)
+    yield from _leading(subject, probes, won)
+    ties = _Ties(subject, arrangement)
+    yield from _needed(subject, probes, ties)
     yield from ties.answers()
 
 
@@ -94,20 +94,20 @@ def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
 
 
 def _winning(
-    subject: Subject, seen: RandomProbes, won: dict[int, Witness]
+    subject: Subject, probes: RandomProbes, won: dict[int, Witness]
 ) -> Iterator[Answer]:
     """Answer whether each rule wins strictly; those that were not seen to win first."""
-    given = seen.base
+    arrangement = probes.base
     count = len(subject.rules.rules)
     slices = TimeSlices(subject.clock, 0.5)
-    order = sorted(range(1, count + 1), key=seen.is_ahead)
+    order = sorted(range(1, count + 1), key=probes.is_ahead)
     for place, number in enumerate(order):
         name = subject.rule_name(number)
         subject.clock.report(f"does {name} win", place / count)
         rivals = _rivals(subject, number)
-        state = slices.run(count - place, partial(wins, given, number, rivals))
+        state = slices.run(count - place, partial(wins, arrangement, number, rivals))
         if not isinstance(state, Proved | Witness):
-            state = seen.wins(number, rivals) or state
+            state = probes.wins(number, rivals) or state
         if isinstance(state, Witness):
             won[number] = state
         if state is None:
@@ -115,7 +115,7 @@ def _winning(
             continue
         # For the leaves of a tree see `fuzzytree.auditing.findings.leaves`.
         if subject.tree is None:
-            yield _won(subject, given, number, state)
+            yield _won(subject, arrangement, number, state)
         if not isinstance(state, Proved | Witness):
             sentence = f"how far {name} leads is open, for it is open whether it wins"
             yield note("FT102", name, sentence, state, rules=(number,))
@@ -125,7 +125,7 @@ def _winning(
 
 
 def _leading(
-    subject: Subject, seen: RandomProbes, won: dict[int, Witness]
+    subject: Subject, probes: RandomProbes, won: dict[int, Witness]
 ) -> Iterator[Answer]:
     """Answer whether each rule that wins leads by enough."""
     slices = TimeSlices(subject.clock, 0.5)
@@ -133,19 +133,21 @@ def _leading(
         name = subject.rule_name(number)
         subject.clock.report(f"how far does {name} lead", place / len(won))
         rivals = _rivals(subject, number)
-        start = seen.wins(number, rivals) or state
-        found = slices.run(
+        start = probes.wins(number, rivals) or state
+        answer = slices.run(
             len(won) - place,
-            partial(_led, subject, seen.base, number, rivals, (state, start)),
+            partial(_led, subject, probes.base, number, rivals, (state, start)),
         )
-        if found is None:
+        if answer is None:
             slices.left_out += 1
             continue
-        yield found
+        yield answer
     yield from slices.rest("FT102", "rule", "how far they lead")
 
 
-def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Answer:
+def _won(
+    subject: Subject, arrangement: Arrangement, number: int, state: State
+) -> Answer:
     name = subject.rule_name(number)
     if isinstance(state, Witness):
         sentence = f"{name} wins somewhere"
@@ -157,7 +159,7 @@ def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Ans
         return note("FT101", name, sentence, state, rules=(number,))
     rivals = _rivals(subject, number)
     order = decides_by_order(
-        given,
+        arrangement,
         number,
         [n for n in rivals if n < number],
         [n for n in rivals if n > number],
@@ -171,7 +173,7 @@ def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Ans
         return Answer(
             "FT101", name, sentence, order, True, severity="warning", rules=(number,)
         )
-    fires = wins(given, number, (), subject.clock.share(_PART))
+    fires = wins(arrangement, number, (), subject.clock.share(_PART))
     if isinstance(fires, Proved):
         sentence = f"{name} never fires on the domain"
         return finding("FT101", name, sentence, fires, rules=(number,))
@@ -190,7 +192,7 @@ def _won(subject: Subject, given: Arrangement, number: int, state: State) -> Ans
 
 def _led(
     subject: Subject,
-    given: Arrangement,
+    arrangement: Arrangement,
     number: int,
     rivals: tuple[int, ...],
     known: tuple[Witness, Witness],
@@ -200,25 +202,25 @@ def _led(
     name = subject.rule_name(number)
     won, start = known
     enough = Fraction(subject.settings.lead)
-    found = largest_lead(given, number, rivals, start, enough, clock)
+    bracket = largest_lead(arrangement, number, rivals, start, enough, clock)
     measures = (
-        Measure("largest lead, at least", found.low),
-        Measure("largest lead, at most", found.high),
+        Measure("largest lead, at least", bracket.low),
+        Measure("largest lead, at most", bracket.high),
     )
-    if found.low >= subject.settings.lead:
-        state = Witness(found.point, found.claims)
-        sentence = f"{name} leads by {found.low:.4g} at least somewhere"
+    if bracket.low >= subject.settings.lead:
+        state = Witness(bracket.point, bracket.claims)
+        sentence = f"{name} leads by {bracket.low:.4g} at least somewhere"
         return note(
             "FT102", name, sentence, state, rules=(number,), measures=measures[:1]
         )
-    is_marginal = found.high < subject.settings.lead
-    sentence = (
-        f"{name} never leads by {subject.settings.lead:g}: at most by {found.high:.3g}"
-        if is_marginal
-        else f"no lead of {name} above {found.low:.3g} was found, and one above "
-        f"{found.high:.3g} is excluded"
-    )
-    facts = "FT102", name, sentence, found
+    lead, is_marginal = subject.settings.lead, bracket.high < subject.settings.lead
+    sentence = f"{name} never leads by {lead:g}: at most by {bracket.high:.3g}"
+    if not is_marginal:
+        sentence = (
+            f"no lead of {name} above {bracket.low:.3g} was found, and one above "
+        )
+        sentence += f"{bracket.high:.3g} is excluded"
+    facts = "FT102", name, sentence, bracket
     rules, region = (number,), won.region
     return Answer(*facts, is_marginal, "warning", rules, (), region, measures)
 
@@ -226,8 +228,8 @@ def _led(
 class _Ties:
     """Which rules of different classes tie as the strongest; tests each pair once."""
 
-    def __init__(self, subject: Subject, given: Arrangement) -> None:
-        self.subject, self.given = subject, given
+    def __init__(self, subject: Subject, arrangement: Arrangement) -> None:
+        self.subject, self.arrangement = subject, arrangement
         self.slices = TimeSlices(subject.clock, 0.9)
         self.known: dict[tuple[int, int], State] = {}
         self.may: BoolArray | None = None
@@ -238,10 +240,10 @@ class _Ties:
         if pair in self.known:
             return self.known[pair]
         if self.may is None:
-            self.may = self.slices.run(1, lambda _: may_tie(self.given))
+            self.may = self.slices.run(1, lambda _: may_tie(self.arrangement))
         if self.may is not None and not self.may[one - 1, other - 1]:
             return _APART
-        state = self.slices.run(left, partial(tie, self.given, *pair))
+        state = self.slices.run(left, partial(tie, self.arrangement, *pair))
         if state is not None:
             self.known[pair] = state
         return state
@@ -297,7 +299,7 @@ class _Ties:
         )
 
 
-def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answer]:
+def _needed(subject: Subject, probes: RandomProbes, ties: _Ties) -> Iterator[Answer]:
     """Answer whether leaving out a rule changes a decision."""
     count = len(subject.rules.rules)
     if count == 1:
@@ -307,8 +309,8 @@ def _needed(subject: Subject, seen: RandomProbes, ties: _Ties) -> Iterator[Answe
         name = subject.rule_name(number)
         subject.clock.report(f"is {name} needed", number / count)
         others = tuple(n for n in range(1, count + 1) if n != number)
-        state = seen.wins_alone(number, others) or slices.run(
-            count - number + 1, partial(wins, seen.base, number, others)
+        state = probes.wins_alone(number, others) or slices.run(
+            count - number + 1, partial(wins, probes.base, number, others)
         )
         if state is None:
             slices.left_out += 1

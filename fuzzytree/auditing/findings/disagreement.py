@@ -69,17 +69,17 @@ class TreeAndRules:
         tree: FuzzyTree,
         raw: RuleBase,
         domain: Domain,
-        found: Sequence[Region],
+        leaf_regions: Sequence[Region],
     ) -> None:
-        self.tree, self.domain, self.found = tree, domain, found
-        self.given = arrange(raw, domain)
+        self.tree, self.domain, self.leaf_regions = tree, domain, leaf_regions
+        self.arrangement = arrange(raw, domain)
         self.crisp = CrispDecider(tree, domain)
         self.around = BoxBounds(raw, domain)
 
     def claims(self, point: Mapping[str, Fraction]) -> tuple[Claim, Claim]:
         """Return what both decide at a point."""
         label = self.tree.leaves[leaf_at(self.tree, point) - 1].label
-        other = decision_at(self.given, point)
+        other = decision_at(self.arrangement, point)
         return (
             Claim("decides", of="tree", label=label),
             Claim("decides", of="raw rules", label=other),
@@ -88,14 +88,14 @@ class TreeAndRules:
     def differ(self, point: Mapping[str, Fraction]) -> bool:
         """Return whether both decide differently at a point of the domain."""
         one, other = self.claims(point)
-        return one.label != other.label and is_within(self.given, point)
+        return one.label != other.label and is_within(self.arrangement, point)
 
     def disagree(self, box: Domain, clock: Clock) -> State:
         """Return whether both decide differently somewhere in a box."""
         left_open: State | None = None
-        for region in self.found:
+        for region in self.leaf_regions:
             inside = [*boxes(region, self.tree, box)]
-            state = other_in_boxes(self.given, inside, region.label, clock)
+            state = other_in_boxes(self.arrangement, inside, region.label, clock)
             if isinstance(state, Witness):
                 return state
             if not isinstance(state, Proved):
@@ -108,12 +108,14 @@ class TreeAndRules:
 
 
 def other_in_boxes(
-    given: Arrangement, inside: Sequence[Domain], label: str, clock: Clock
+    arrangement: Arrangement, inside: Sequence[Domain], label: str, clock: Clock
 ) -> State:
     """Return whether raw rules decide for another class somewhere in some boxes."""
     left_open: State | None = None
     for box in inside:
-        state = other_decision(restricted(given, box), label, clock, of="raw rules")
+        state = other_decision(
+            restricted(arrangement, box), label, clock, of="raw rules"
+        )
         if isinstance(state, Witness):
             tree_too = Claim("decides", of="tree", label=label)
             return Witness(state.point, (tree_too, *state.claims), state.region)
@@ -146,13 +148,13 @@ def nearest_difference(
     inputs = both.tree.inputs
     values = columns([point for _, point in points.at], inputs)
     tree = decide(both.tree, values)
-    raw = decide(both.given.rules, values, with_strengths=False)
+    raw = decide(both.arrangement.rules, values, with_strengths=False)
     alike: list[_Row] = []
     differ: list[Mapping[str, Fraction]] = []
     for place in np.argsort(raw.margin, kind="stable").tolist():
         number, point = points.at[place]
         label = both.tree.leaves[int(tree.rule[place]) - 1].label
-        if label == answer_of(both.given.rules, int(raw.rule[place])):
+        if label == answer_of(both.arrangement.rules, int(raw.rule[place])):
             cut = both.clear_of_cuts(point, label)
             alike.append(_Row(number, point, label, cut))
         else:
@@ -224,7 +226,7 @@ class _Search:
             place, row = left[0], self.rows[left[0]]
             share = len(self.settled) / len(self.rows)
             self.clock.report(f"nearest disagreement to row {row.number}", share)
-            found = nearest(
+            result = nearest(
                 self.both.domain,
                 row.point,
                 lambda box: self.both.disagree(box, self.end),
@@ -233,29 +235,29 @@ class _Search:
                 within=None if self.best is None else self.best.high,
                 near=[hints[place][1]] if place in hints else (),
             )
-            if found.is_none:  # and so for all of them: the search covered the domain
+            if result.is_none:  # and so for all of them: the search covered the domain
                 self.settled, self.low = set(range(len(self.rows))), None
                 return
             before = self.best
-            self._add(place, found)
-            if found.why and not found.is_narrow:
-                self.why = self.why or f"around row {row.number}: {found.why}"
+            self._add(place, result)
+            if result.why and not result.is_narrow:
+                self.why = self.why or f"around row {row.number}: {result.why}"
             left = left[1:] if self.best is before else self._left(left[1:])
         if left:
             self.why = self.why or "the budget was spent"
 
-    def _add(self, place: int, found: Nearest) -> None:
-        self._lower(found.low)
+    def _add(self, place: int, result: Nearest) -> None:
+        self._lower(result.low)
         self.settled.add(place)
-        if found.high is not None and found.point is not None:
+        if result.high is not None and result.point is not None:
             best = None if self.best is None else self.best.high
-            if best is None or found.high < best:
-                self._keep(place, found)
+            if best is None or result.high < best:
+                self._keep(place, result)
 
-    def _keep(self, place: int, found: Nearest) -> None:
-        assert found.point is not None  # checked by the caller
-        self.claims = self.both.claims(found.point)
-        self.best, self.place = found, place
+    def _keep(self, place: int, result: Nearest) -> None:
+        assert result.point is not None  # checked by the caller
+        self.claims = self.both.claims(result.point)
+        self.best, self.place = result, place
 
     def _lower(self, low: Fraction) -> None:
         self.low = low if self.low is None else min(self.low, low)
@@ -268,13 +270,13 @@ class _Search:
             best = None if self.best is None else self.best.high
             if self.end.is_over or (best is not None and row.cut > best):
                 return
-            found = self.both.crisp.nearest_other(row.point, self.end)
-            if not found.why:
-                self.exact[place] = found.low
-            if found.point is None or found.high is None:
+            result = self.both.crisp.nearest_other(row.point, self.end)
+            if not result.why:
+                self.exact[place] = result.low
+            if result.point is None or result.high is None:
                 continue
-            if self.both.differ(found.point) and (best is None or found.high < best):
-                self._keep(place, found)
+            if self.both.differ(result.point) and (best is None or result.high < best):
+                self._keep(place, result)
 
     def _hints(
         self, seeds: Sequence[Mapping[str, Fraction]]
@@ -284,10 +286,10 @@ class _Search:
         hints: dict[int, tuple[float, dict[str, Fraction]]] = {}
         rows = self.rows[:_HINTS]
         values = columns([row.point for row in rows], inputs)
-        found, away = around.approached(values, [row.label for row in rows])
+        near, away = around.approached(values, [row.label for row in rows])
         for place, distance_of in enumerate(away.tolist()):
             if distance_of < np.inf:
-                moved = map(Fraction, found[:, place].tolist())
+                moved = map(Fraction, near[:, place].tolist())
                 hints[place] = distance_of, dict(zip(inputs, moved, strict=True))
         every = columns([row.point for row in self.rows], inputs)
         nearest_seed = around.pairs(every, columns(seeds, inputs))
@@ -363,17 +365,17 @@ def answers(subject: Subject) -> Iterator[Answer]:
     tree, raw = subject.tree, subject.raw
     if tree is None or raw is None:
         return
-    found = regions(tree)
-    declined = too_many_boxes(found)
+    leaf_regions = regions(tree)
+    declined = too_many_boxes(leaf_regions)
     if declined is not None:
         yield note("FT203", "leaves", NOT_LOOKED_AT, declined)
         return
     known: list[Answer] = []
-    for answer in leaf_differences(subject, raw, tree, found):
+    for answer in leaf_differences(subject, raw, tree, leaf_regions):
         known.append(answer)
         yield answer
     if subject.rows is not None:
-        both = TreeAndRules(tree, raw, subject.domain, found)
+        both = TreeAndRules(tree, raw, subject.domain, leaf_regions)
         points = points_of(subject, subject.rows)
         points_known = [
             point_of(one.state.point) for one in known if isinstance(one.state, Witness)
@@ -386,36 +388,37 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
 
 def leaf_differences(
-    subject: Subject, raw: RuleBase, tree: FuzzyTree, found: Sequence[Region]
+    subject: Subject, raw: RuleBase, tree: FuzzyTree, leaf_regions: Sequence[Region]
 ) -> Iterator[Answer]:
     """Yield the leaves in whose regions the raw rules decide differently."""
-    given = arrange(raw, subject.domain)
+    arrangement = arrange(raw, subject.domain)
     alike = count = 0
-    for region in found:
+    for region in leaf_regions:
         subject.clock.report(
-            f"leaf {region.leaf} against the raw rules", region.leaf / len(found)
+            f"leaf {region.leaf} against the raw rules", region.leaf / len(leaf_regions)
         )
         inside = [*boxes(region, tree, subject.domain)]
         subject.clock.check()
         part = subject.clock.share(_LEAF_PART)
-        state = other_in_boxes(given, inside, region.label, part)
+        state = other_in_boxes(arrangement, inside, region.label, part)
         count += len(inside)
         if isinstance(state, Proved):
             alike += 1
         else:
-            yield _difference(given, region, state)
-    text = f"in {alike} of {len(found)} leaves the raw rules decide as the tree does"
+            yield _difference(arrangement, region, state)
+    text = f"in {alike} of {len(leaf_regions)} leaves "
+    text += "the raw rules decide as the tree does"
     how = f"all other decisions were sought in {count} boxes of the leaves"
     yield note("FT203", "leaves", text, Proved(how))
 
 
-def _difference(given: Arrangement, region: Region, state: State) -> Answer:
+def _difference(arrangement: Arrangement, region: Region, state: State) -> Answer:
     name = f"leaf {region.leaf}"
     rules: tuple[int, ...] = (region.leaf,)
     if not isinstance(state, Witness):
         text = f"whether the raw rules decide differently in {name} is left open"
         return note("FT203", name, text, state, rules=rules)
-    strengths = strengths_at(given, point_of(state.point))
+    strengths = strengths_at(arrangement, point_of(state.point))
     best = max(strengths)
     winner = strengths.index(best) + 1
     if best and winner != region.leaf:

@@ -79,10 +79,12 @@ def _weak(subject: Subject, sides: BoundedArrangement) -> Answer:
     return note("FT301", subject_of, sentence, state, measures=measures)
 
 
-def _gaps(subject: Subject, given: Arrangement, first: Witness) -> Iterator[Answer]:
+def _gaps(
+    subject: Subject, arrangement: Arrangement, first: Witness
+) -> Iterator[Answer]:
     """Answer with the gaps that were found, the nearest to a row first."""
-    found, is_all = _separate(subject, given, first)
-    gaps = [_gap(subject, state) for state in found]
+    witnesses, is_all = _separate(subject, arrangement, first)
+    gaps = [_gap(subject, state) for state in witnesses]
     if subject.rows is not None:
         rules = subject.rules
         found_near = rank_by_distance(
@@ -93,7 +95,7 @@ def _gaps(subject: Subject, given: Arrangement, first: Witness) -> Iterator[Answ
         replace(one, subject=f"gap {place}") for place, one in enumerate(gaps, 1)
     )
     if not is_all:
-        sentence = f"there may be more gaps than the {len(found)} that are listed"
+        sentence = f"there may be more gaps than the {len(witnesses)} that are listed"
         reason = f"{MOST_GAPS} gaps at most are looked for, within the budget"
         state = Declined("FTD05", reason)
         yield note("FT301", "more gaps", sentence, state)
@@ -129,29 +131,31 @@ def _stretch(side: Span) -> str:
 
 
 def _separate(
-    subject: Subject, given: Arrangement, first: Witness
+    subject: Subject, arrangement: Arrangement, first: Witness
 ) -> tuple[list[Witness], bool]:
     """Return gaps in separate parts of the domain, and whether these are all."""
-    found = [first]
-    todo = deque(_around(given, subject.domain, first.region))
+    witnesses = [first]
+    todo = deque(_around(arrangement, subject.domain, first.region))
     tried = 0
     clock = subject.clock.share(_PART)
     while todo:
-        if len(found) == MOST_GAPS or tried == _MOST_BOXES:
-            return found, False
+        if len(witnesses) == MOST_GAPS or tried == _MOST_BOXES:
+            return witnesses, False
         box = todo.popleft()
         tried += 1
         try:
-            state: State = uncovered(restricted(given, box), clock)
+            state: State = uncovered(restricted(arrangement, box), clock)
             clock.check()
         except OutOfTimeError:
-            return found, False
+            return witnesses, False
         if isinstance(state, Witness):
-            found.append(replace(state, region=_region_in(state, box, subject.domain)))
-            todo += _around(given, box, state.region)
+            witnesses.append(
+                replace(state, region=_region_in(state, box, subject.domain))
+            )
+            todo += _around(arrangement, box, state.region)
         elif not isinstance(state, Proved):
-            return found, False
-    return found, True
+            return witnesses, False
+    return witnesses, True
 
 
 def _region_in(state: Witness, box: Domain, domain: Domain) -> tuple[Span, ...]:
@@ -166,11 +170,11 @@ def _region_in(state: Witness, box: Domain, domain: Domain) -> tuple[Span, ...]:
 
 
 def _around(
-    given: Arrangement, box: Domain, region: tuple[Span, ...]
+    arrangement: Arrangement, box: Domain, region: tuple[Span, ...]
 ) -> Iterator[Domain]:
     """Yield the parts of a box outside an inner one; together they are all of it."""
     sides = {side.variable: side for side in box.sides}
-    variables = {axis.variable.name: axis.variable for axis in given.axes}
+    variables = {axis.variable.name: axis.variable for axis in arrangement.axes}
     for inner in region:
         if inner.low is None or inner.high is None:
             return  # no finite region

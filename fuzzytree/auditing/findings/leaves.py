@@ -48,18 +48,18 @@ def answers(subject: Subject) -> Iterator[Answer]:
     tree = subject.tree
     if tree is None:
         return
-    found = regions(tree)
-    declined = too_many_boxes(found)
+    tree_regions = regions(tree)
+    declined = too_many_boxes(tree_regions)
     if declined is not None:
         for code in ("FT101", "FT205"):
             yield note(code, "leaves", NOT_LOOKED_AT, declined)
         return
-    yield from leaf_regions(subject, tree, found)
+    yield from leaf_regions(subject, tree, tree_regions)
 
 
-def too_many_boxes(found: Sequence[Region]) -> Declined | None:
+def too_many_boxes(tree_regions: Sequence[Region]) -> Declined | None:
     """Return why the regions of a tree are not looked at, None if they are."""
-    count = sum(map(box_count, found))
+    count = sum(map(box_count, tree_regions))
     if count <= MOST_BOXES:
         return None
     why = f"the leaves are made of {count} boxes, more than {MOST_BOXES}"
@@ -67,15 +67,15 @@ def too_many_boxes(found: Sequence[Region]) -> Declined | None:
 
 
 def leaf_regions(
-    subject: Subject, tree: FuzzyTree, found: Sequence[Region]
+    subject: Subject, tree: FuzzyTree, tree_regions: Sequence[Region]
 ) -> Iterator[Answer]:
     """Yield where each leaf decides, or that it never does."""
-    live, count = 0, sum(map(box_count, found))
+    live, count = 0, sum(map(box_count, tree_regions))
     if count > MOST_LISTED:
         why = f"the leaves are made of {count} boxes, more than {MOST_LISTED}"
         text = "the regions of the leaves are not listed"
         yield note("FT205", "leaves", text, Declined("FTD05", why))
-    for region in found:
+    for region in tree_regions:
         subject.clock.check()
         inside = [*boxes(region, tree, subject.domain)]
         met = [(box, point_in(box, tree)) for box in inside]
@@ -89,7 +89,7 @@ def leaf_regions(
             if len(parts) > 1:
                 name += f", part {number} of {len(parts)}"
             yield _region(subject, tree, region, name, box, point)
-    text = f"{live} of {len(found)} leaves are reached"
+    text = f"{live} of {len(tree_regions)} leaves are reached"
     how = "a point in each of their regions was found and evaluated in fractions"
     yield note("FT101", "leaves", text, Proved(how))
 

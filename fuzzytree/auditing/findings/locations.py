@@ -99,7 +99,7 @@ def term_path(model: Document, label: TermName) -> Path:
 
 def _label_path(system: FuzzySystem, label: TermName) -> Path:
     for position, one in enumerate(system.variables):
-        names = [found.name for found in one.labels]
+        names = [term.name for term in one.labels]
         if one.name == label.variable and label.term in names:
             k = position - len(system.inputs)
             field = ("inputs", position) if k < 0 else ("outputs", k)
@@ -115,8 +115,8 @@ def locations_of(
         return ()
     paths = [rule_path(model, number) for number in numbers]
     paths += [term_path(model, label) for label in answer.terms]
-    found = (file.place(path) for path in paths)
-    return tuple(dict.fromkeys(place for place in found if place is not None))
+    places = (file.place(path) for path in paths)
+    return tuple(dict.fromkeys(place for place in places if place is not None))
 
 
 # --- ids

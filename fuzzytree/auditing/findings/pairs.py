@@ -186,10 +186,10 @@ def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
         else:
             near += 1
     decides = subject.policy.decision == "strongest"
-    for pair, found in copies:
+    for pair, distance in copies:
         first, second = (subject.rule_name(number) for number in pair)
         one, other = (_then(subject, number) for number in pair)
-        is_exact = not found.each.high
+        is_exact = not distance.each.high
         nearly = "the same antecedent" if is_exact else "nearly the same antecedent"
         if one == other:
             text = f"and the same {_noun(subject)} {one!r}"
@@ -197,14 +197,16 @@ def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
             text = f"and contradict each other: {one!r} and {other!r}"
         else:
             text = f"and different conclusions: {one!r} and {other!r}"
-        measures: tuple[Measure, ...] = (measure("largest distance", found.each),)
+        measures: tuple[Measure, ...] = (measure("largest distance", distance.each),)
         if not is_exact:
-            variable = compared.lower.axes[found.axis].variable
+            variable = compared.lower.axes[distance.axis].variable
             text += (
-                f"; degrees differ by at most {short(found.each.high)}, "
-                f"at {variable.name!r} = {short(found.at)}"
+                f"; degrees differ by at most {short(distance.each.high)}, "
+                f"at {variable.name!r} = {short(distance.at)}"
             )
-            measures += (Measure("place of it", float(found.at), unit=variable.unit),)
+            measures += (
+                Measure("place of it", float(distance.at), unit=variable.unit),
+            )
         severity: Severity = "warning"
         if one != other:  # a contradiction; in a system two rules for two outputs
             severity = "error" if decides else "info"
@@ -256,16 +258,16 @@ def _conflicts(subject: Subject, compared: BoundedArrangement) -> Iterator[Answe
             hidden += len(near) - place
             break
         subject.clock.check()
-        found = compared.meet(*pair, Fraction(level), subject.clock.share(0.05))
-        is_shown = isinstance(found.state, Witness)
-        if found.level.high < level or isinstance(found.state, Proved):
+        joint = compared.meet(*pair, Fraction(level), subject.clock.share(0.05))
+        is_shown = isinstance(joint.state, Witness)
+        if joint.level.high < level or isinstance(joint.state, Proved):
             clean += 1
-            touching += found.is_touch
+            touching += joint.is_touch
         elif is_shown and listed == MOST_SHOWN:
             hidden += 1
         else:
             listed += is_shown
-            yield _conflict(subject, pair, found)
+            yield _conflict(subject, pair, joint)
     if clean or hidden:
         yield _rest_of_conflicts(subject, compared, (clean, touching), hidden)
 
@@ -287,17 +289,17 @@ def _may_conflict(subject: Subject, one: int, other: int) -> bool:
     return any(name in shared for name, _ in parts[0] ^ parts[1])
 
 
-def _conflict(subject: Subject, pair: Pair, found: JointMaximum) -> Answer:
+def _conflict(subject: Subject, pair: Pair, joint: JointMaximum) -> Answer:
     first, second = (subject.rule_name(number) for number in pair)
     one, other = (_then(subject, number) for number in pair)
-    low, high = found.level
-    both, state = f"{first} and {second}", found.state
+    low, high = joint.level
+    both, state = f"{first} and {second}", joint.state
     most = Measure("highest common level at most", float(high))
     if not isinstance(state, Witness):
         text = f"{both} may conflict, on {one!r} and {other!r}: no more than "
         text += f"{short(high)} is reached by both"
         return note("FT201", both, text, state, rules=pair, measures=(most,))
-    text = f"{both} conflict: both reach {level_reached(found)} at one input, "
+    text = f"{both} conflict: both reach {level_reached(joint)} at one input, "
     text += f"and say {one!r} and {other!r}"
     exact = str(low) if low == high else None
     measures: tuple[Measure, ...]
@@ -308,15 +310,15 @@ def _conflict(subject: Subject, pair: Pair, found: JointMaximum) -> Answer:
     return replace(conflict, region=state.region)
 
 
-def level_reached(found: JointMaximum) -> str:
+def level_reached(joint: JointMaximum) -> str:
     """Return the level that two rules both reach, as their sentence says it.
 
     A point in fractions may fall a little short of a level that is irrational.
     """
-    low = found.level.low
-    if not isinstance(found.state, Witness):
+    low = joint.level.low
+    if not isinstance(joint.state, Witness):
         return short(low)
-    shown = [Fraction(one.level or 0) for one in found.state.claims]
+    shown = [Fraction(one.level or 0) for one in joint.state.claims]
     is_short = max(shown, default=low) < low or (low < 1 and short(low) == "1")
     return f"{'nearly ' if is_short else ''}{short(low)}"
 

@@ -49,14 +49,14 @@ def answers(subject: Subject) -> Iterator[Answer]:
     """
     subject.clock.check()
     values, how = _points(subject)
-    found = agreement(subject, values)
-    yield from agreement_answers(subject, found, values)
+    result = agreement(subject, values)
+    yield from agreement_answers(subject, result, values)
     if subject.system is None:
-        made = {str(name): form for name, form in forms(_model(subject)).items()}
-        for one in found.certificates:
+        models = {str(name): form for name, form in forms(_model(subject)).items()}
+        for one in result.certificates:
             subject.clock.check()
             yield from _certified(
-                subject, one, made[one.representation.rpartition(" in ")[0]], how
+                subject, one, models[one.representation.rpartition(" in ")[0]], how
             )
     yield from conventions.answers(subject)
 
@@ -93,11 +93,11 @@ def agreement(
 
 
 def agreement_answers(
-    subject: Subject, found: Agreement, values: FloatArray
+    subject: Subject, result: Agreement, values: FloatArray
 ) -> Iterator[Answer]:
     """Yield an answer for each disagreement of a check, and a summary of the rest."""
     clean: dict[Basis, list[Comparison]] = {}
-    for one in found.comparisons:
+    for one in result.comparisons:
         if one.verdict in ("DISAGREES", "rows only"):
             yield _disagreement(subject, one, values)
         elif one.verdict == "agrees":  # raw rules differ from a tree by design: FT203
@@ -105,7 +105,7 @@ def agreement_answers(
             clean.setdefault(basis, []).append(one)
     for basis, ones in clean.items():
         yield _agreeing(basis, ones)
-    for text in found.skipped:
+    for text in result.skipped:
         if text.startswith("all cells"):  # a proof covers them
             continue
         name = text.partition(" is not installed")[0].partition(": ")[0]
@@ -123,8 +123,8 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answ
     state: State = Proved(f"both were run or read; {facts}")
     if subject.system is None and one.row_numbers:
         model = _model(subject)
-        made = {str(name): form for name, form in forms(model).items()}
-        form = made.get(_form(one), model)
+        models = {str(name): form for name, form in forms(model).items()}
+        form = models.get(_form(one), model)
         rows = probed(model, values, PROBES).values
         witness = conventions.witness(subject, form, rows[:, [*one.row_numbers]])
         state = witness or state
@@ -188,19 +188,19 @@ def _certified(
     if one.on == "data" and one.rows:
         noun = "rows" if subject.rows is not None else "points"
         text = f"{name}: the class is open on {one.in_band} of {one.rows} {noun}"
-        seen = sampled_share(
+        share = sampled_share(
             f"{noun} within the band of {name}", one.in_band, one.rows, how
         )
-        yield note("FT601", f"{name}, its band", text, seen)
+        yield note("FT601", f"{name}, its band", text, share)
 
 
 def _bounded(bound: Certificate, one: Certified) -> State:
     origin = bound.origin.replace("the declared ranges", "the domain")
     if bound.delta is not None or not bound.reasons:
         return Proved(origin)
-    seen = one.largest or 0.0
+    largest = one.largest or 0.0
     of = f"the largest error of a strength of {one.representation}"
-    return Bracket(of, seen, 1.0, "; ".join(bound.reasons))
+    return Bracket(of, largest, 1.0, "; ".join(bound.reasons))
 
 
 def _within(form: Model, domain: Domain) -> Model:

@@ -28,7 +28,7 @@ class LoadedResult(NamedTuple):
     """A result of another verb: its summary in an audit, and all of it."""
 
     result: VerbResult
-    found: Agreement | Stability
+    record: Agreement | Stability
 
 
 def read_results(
@@ -44,44 +44,44 @@ def read_results(
         ReadError: If a file is none of these, was changed by hand, is about another
             model or of another version, or another one is of the same verb.
     """
-    found: dict[str, LoadedResult] = {}
+    results: dict[str, LoadedResult] = {}
     for path in paths:
         one = _read(path, model)
         verb = one.result.verb
-        if verb in found:
+        if verb in results:
             raise ReadError(
                 f"{os.fspath(path)}: is a result of {verb}, and so is "
-                f"{found[verb].result.file.name}; give one of them"
+                f"{results[verb].result.file.name}; give one of them"
             )
-        found[verb] = one
-    return tuple(found.values())
+        results[verb] = one
+    return tuple(results.values())
 
 
 def _read(path: PathLike, model: Document) -> LoadedResult:
     """Return one result; raise ReadError as `read_results` does."""
     name = os.fspath(path)
     content = read_bounded(path, _MOST_BYTES)
-    found = _decoded(content, name)
+    record = _decoded(content, name)
     result = _result(
-        found, SourceFile(writable(name), hashlib.sha256(content).hexdigest())
+        record, SourceFile(writable(name), hashlib.sha256(content).hexdigest())
     )
     wanted = fingerprint(model)
-    if found.fingerprint != wanted:
+    if record.fingerprint != wanted:
         raise ReadError(
             f"{name}: is a result of another model: its fingerprint is "
-            f"{found.fingerprint[:12]}..., and that of {model.name[:60]!r} is "
+            f"{record.fingerprint[:12]}..., and that of {model.name[:60]!r} is "
             f"{wanted[:12]}...; run `fuzzytree {result.verb}` again"
         )
-    return LoadedResult(result, found)
+    return LoadedResult(result, record)
 
 
-def _result(found: Agreement | Stability, file: SourceFile) -> VerbResult:
+def _result(record: Agreement | Stability, file: SourceFile) -> VerbResult:
     """Return the summary of a result."""
-    if isinstance(found, Stability):
-        verdicts = [one.verdict for one in found.criteria]
+    if isinstance(record, Stability):
+        verdicts = [one.verdict for one in record.criteria]
         return VerbResult("stability", file, len(verdicts), verdicts.count("FAILS"))
-    count = len(found.comparisons) + len(found.certificates)
-    return VerbResult("check", file, count, len(found.wrong))
+    count = len(record.comparisons) + len(record.certificates)
+    return VerbResult("check", file, count, len(record.wrong))
 
 
 def _decoded(content: bytes, name: str) -> Agreement | Stability:
@@ -101,12 +101,12 @@ def _decoded(content: bytes, name: str) -> Agreement | Stability:
             f"{version()}; run it again"
         )
     try:
-        found = msgspec.convert(_whole(facts, inspect.type_info(kind)), kind)
+        record = msgspec.convert(_whole(facts, inspect.type_info(kind)), kind)
     except msgspec.ValidationError as error:
         raise ReadError(f"{lead}: {_quoted(error)}") from error
-    if msgspec.json.decode(found.to_json()) != facts:
+    if msgspec.json.decode(record.to_json()) != facts:
         raise ReadError(f"{lead}: what it says does not fit together")
-    return found
+    return record
 
 
 def _quoted(error: Exception) -> str:

@@ -126,13 +126,13 @@ class RuleDecider:
 
     def __init__(self, subject: Subject) -> None:
         self.subject = subject
-        self.given = arrange(subject.rules, subject.domain)
+        self.arrangement = arrange(subject.rules, subject.domain)
         self.around = BoxBounds(subject.rules, subject.domain)
         self.ahead: dict[tuple[Fraction, ...], tuple[Point, float]] = {}
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
         """Return the class of the first of the strongest rules, and the rule."""
-        strengths = strengths_at(self.given, point)
+        strengths = strengths_at(self.arrangement, point)
         best = max(strengths)
         if not best:
             return self.subject.rules.semantics.uncovered, "no rule"
@@ -152,30 +152,30 @@ class RuleDecider:
     def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
         """Seek points near some others that are decided otherwise, by doubles."""
         inputs = self.subject.rules.inputs
-        labels = [decision_at(self.given, point) for point in points]
-        found, away = self.around.approached(columns(points, inputs), labels)
+        labels = [decision_at(self.arrangement, point) for point in points]
+        near, away = self.around.approached(columns(points, inputs), labels)
         for place, point in enumerate(points):
-            values = map(Fraction, found[:, place].tolist())
+            values = map(Fraction, near[:, place].tolist())
             other = dict(zip(inputs, values, strict=True))
             self.ahead[tuple(point[n] for n in inputs)] = other, float(away[place])
 
     def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
         """Return how far the nearest point is where a rule of another class wins."""
-        label = decision_at(self.given, point)
+        label = decision_at(self.arrangement, point)
         key = tuple(point[name] for name in self.subject.rules.inputs)
         if key not in self.ahead:
             self.look([point])
         other, away = self.ahead[key]
 
         def is_one(other: Mapping[str, Fraction]) -> bool:
-            return is_within(self.given, other) and (
-                decision_at(self.given, other) != label
+            return is_within(self.arrangement, other) and (
+                decision_at(self.arrangement, other) != label
             )
 
         return nearest(
             self.subject.domain,
             point,
-            lambda box: other_decision(restricted(self.given, box), label, clock),
+            lambda box: other_decision(restricted(self.arrangement, box), label, clock),
             is_one,
             clock,
             clear=self._clear(point, label, away),
@@ -224,8 +224,8 @@ def radius(subject: Subject, row: Mapping[str, float]) -> Answer:
     """
     point = _point(subject, row)
     decider = decider_of(subject)
-    found = decider.nearest_other(point, subject.clock)
-    return _answer(decider, "the row", point, found)
+    result = decider.nearest_other(point, subject.clock)
+    return _answer(decider, "the row", point, result)
 
 
 def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[Answer]:
@@ -278,32 +278,32 @@ def _point(subject: Subject, row: Mapping[str, float]) -> dict[str, Fraction]:
 
 
 def _answer(
-    decider: Decider, name: str, point: Mapping[str, Fraction], found: Nearest
+    decider: Decider, name: str, point: Mapping[str, Fraction], result: Nearest
 ) -> Answer:
     own, _ = decider.decided(point)
     aside = ASIDE if decider.leaves_out(own) else ""
     what = f"the distance from {name} to another decision"
     state: State
-    if found.point is None or found.high is None:
-        if found.is_none:
+    if result.point is None or result.high is None:
+        if result.is_none:
             text = f"all of the domain is decided as {name}, {answer_text(own)}{aside}"
             state = Proved("other decisions were sought on the whole domain")
         else:
             text = f"no decision other than {answer_text(own)} is known around {name}"
-            state = Bracket(what, outwards(found.low)[0], 1.0, found.why)
+            state = Bracket(what, outwards(result.low)[0], 1.0, result.why)
         return note("FT204", name.removeprefix("the "), text, state)
-    other, _ = decider.decided(found.point)
+    other, _ = decider.decided(result.point)
     claim = Claim("decides", of=decider.of, label=other)
-    moved = [axis for axis, value in found.point.items() if value != point[axis]]
-    values = _short_values(decider, point, found.point, moved)
+    moved = [axis for axis, value in result.point.items() if value != point[axis]]
+    values = _short_values(decider, point, result.point, moved)
     changed = " and ".join(f"{axis!r} is {values[axis]}" for axis in moved)
     if len(moved) > _MOST_NAMED:
-        changed = f"{len(moved)} inputs move by no more than {percent(found.high)}"
-    text = f"{name} stays {answer_text(own)} within {percent(found.low)} {OF_RANGES}"
+        changed = f"{len(moved)} inputs move by no more than {percent(result.high)}"
+    text = f"{name} stays {answer_text(own)} within {percent(result.low)} {OF_RANGES}"
     text += f"{aside}; where {changed} it is {answer_text(other)}"
-    state = narrowed_state(what, found.low, found, [claim], found.why)
-    low = distance_measure("certified radius", found.low)
-    measures = low, distance_measure("distance of the witness", found.high)
+    state = narrowed_state(what, result.low, result, [claim], result.why)
+    low = distance_measure("certified radius", result.low)
+    measures = low, distance_measure("distance of the witness", result.high)
     return note("FT204", name.removeprefix("the "), text, state, measures=measures)
 
 
@@ -359,13 +359,13 @@ def answers(subject: Subject) -> Iterator[Answer]:
         if clock.is_over:
             break
         subject.clock.report(f"radius of row {number}", len(radii) / len(chosen))
-        found = decider.nearest_other(point, clock)
-        is_worth_keeping = found.is_narrow or (not radii and found.high is not None)
+        result = decider.nearest_other(point, clock)
+        is_worth_keeping = result.is_narrow or (not radii and result.high is not None)
         if clock.is_over and not is_worth_keeping:
             break
-        answer = _answer(decider, f"row {number}", point, found)
+        answer = _answer(decider, f"row {number}", point, result)
         is_aside = decider.leaves_out(decider.decided(point)[0])
-        radii.append(_RowRadius(number, found.low, answer, is_aside))
+        radii.append(_RowRadius(number, result.low, answer, is_aside))
     radii.sort(key=lambda one: (one.low, one.number))
     yield _in_all(points, radii)
     yield from (one.answer for one in radii[:SHOWN_ROWS])

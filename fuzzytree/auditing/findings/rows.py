@@ -67,12 +67,12 @@ def points_of(subject: Subject, rows: AuditRows) -> DomainRows:
     names = subject.rules.inputs
     total = rows.values.shape[1]
     margins = decide(subject.rules, rows.values, with_strengths=False).margin
-    seen: dict[tuple[float, ...], int] = {}
+    numbers: dict[tuple[float, ...], int] = {}
     for row in np.argsort(margins, kind="stable").tolist():
-        seen.setdefault(tuple(rows.values[:, row].tolist()), row + 1)
+        numbers.setdefault(tuple(rows.values[:, row].tolist()), row + 1)
     complete = [
         (number, dict(zip(names, map(Fraction, values), strict=True)))
-        for values, number in seen.items()
+        for values, number in numbers.items()
         if all(map(math.isfinite, values))
     ]
     at = tuple(
@@ -80,7 +80,7 @@ def points_of(subject: Subject, rows: AuditRows) -> DomainRows:
         for number, point in complete
         if contains(subject.domain, subject.rules.variables, point)
     )
-    return DomainRows(at, len(seen) - len(at), total)
+    return DomainRows(at, len(numbers) - len(at), total)
 
 
 def distance_measure(name: str, value: Fraction) -> Measure:
@@ -119,13 +119,13 @@ def rank_by_distance(
     for place, gap in enumerate(gaps):
         part = _part(gap, domain, inputs, variables)
         if part is None:
-            found = _nearest_row(_spans(gap, inputs), rows, domain, inputs)
+            near = _nearest_row(_spans(gap, inputs), rows, domain, inputs)
         else:
-            found = _nearest_to_part(part, rows, domain, inputs)
-        if found is None:
+            near = _nearest_to_part(part, rows, domain, inputs)
+        if near is None:
             unknown.append(gap)
             continue
-        away, number = found
+        away, number = near
         added = (
             distance_measure("distance to the nearest row", away),
             Measure("nearest row", number),
@@ -174,9 +174,9 @@ def _nearest_to_part(
     for bound, row, point in sorted(near, key=lambda one: one[:2]):
         if best is not None and bound > best[0]:
             break
-        found = regions.nearest(point, [0])
-        if not found.is_none and (best is None or found.low < best[0]):
-            best = found.low, row + 1
+        result = regions.nearest(point, [0])
+        if not result.is_none and (best is None or result.low < best[0]):
+            best = result.low, row + 1
     return best
 
 
@@ -240,13 +240,13 @@ def rows_left_out(code: str, count: int) -> Answer:
 
 
 def narrowed_state(
-    name: str, low: Fraction, found: Nearest, claims: Sequence[Claim], why: str
+    name: str, low: Fraction, result: Nearest, claims: Sequence[Claim], why: str
 ) -> State:
     """Return how a distance is known: by a witness, or between two bounds."""
-    assert found.point is not None  # checked by the caller
-    assert found.high is not None
-    point = coordinates(found.point)
-    if msgspec.structs.replace(found, low=low).is_narrow:
+    assert result.point is not None  # checked by the caller
+    assert result.high is not None
+    point = coordinates(result.point)
+    if msgspec.structs.replace(result, low=low).is_narrow:
         return Witness(point, tuple(claims))
-    high = outwards(found.high)[1]
+    high = outwards(result.high)[1]
     return Bracket(name, outwards(low)[0], high, why, point, tuple(claims))

@@ -120,28 +120,28 @@ def bounded_rules(
     """
     if not terms and all(weight == 1.0 for weight in weights):
         return None
-    made = _Made(rules, terms, ranges)
+    builder = _Builder(rules, terms, ranges)
     own = tuple(
-        Rule(tuple(made.clauses(rule, weight)), rule.then)
+        Rule(tuple(builder.clauses(rule, weight)), rule.then)
         for rule, weight in zip(rules.rules, weights, strict=True)
     )
-    inexact = {name for name, one in made.terms.items() if not one.is_exact}
+    inexact = {name for name, one in builder.terms.items() if not one.is_exact}
     used = [
         {(clause.variable, term) for clause in rule.when for term in clause.terms}
         for rule in own
     ]
     known = {name for of in used for name in of} & inexact
-    apart = (gap(made.terms[one], of) for one in known if (of := ranges[one[0]]))
+    apart = (gap(builder.terms[one], of) for one in known if (of := ranges[one[0]]))
     return BoundedRules(
-        msgspec.structs.replace(rules, rules=own, variables=made.variables("lower")),
-        msgspec.structs.replace(rules, rules=own, variables=made.variables("upper")),
-        made.terms,
+        msgspec.structs.replace(rules, rules=own, variables=builder.variables("lower")),
+        msgspec.structs.replace(rules, rules=own, variables=builder.variables("upper")),
+        builder.terms,
         frozenset(n for n, of in enumerate(used, 1) if of & inexact),
         outwards(max(apart, default=Fraction(0)))[1],
     )
 
 
-class _Made:
+class _Builder:
     """The terms of both rule bases, as they are made for clauses."""
 
     def __init__(
@@ -170,39 +170,39 @@ class _Made:
         names = [(clause.variable, term) for term in clause.terms]
         if not clause.negated or not any(name in self.terms for name in names):
             return clause
-        made = [
+        terms = [
             self._named(f"{name[1]}, other side", name[0], self.terms[name].swapped)
             if name in self.terms
             else name[1]
             for name in names
         ]
-        return Clause(clause.variable, tuple(made), negated=True)
+        return Clause(clause.variable, tuple(terms), negated=True)
 
     def _weighted(self, clause: Clause, weight: float) -> Iterator[Clause]:
         """Yield a clause's degree times a weight; `w (1 - max(a, b))` as two."""
-        made: list[str] = []
+        names: list[str] = []
         for term in clause.terms:
             one = self._points(clause.variable, term)
             text = f"{term} x {weight!r}"
             if clause.negated:
                 one, text = complement(one) or one, f"not {text}"
-            found = scale(one, weight)
-            assert found is not None  # of points
-            made.append(self._named(text, clause.variable, found))
+            product = scale(one, weight)
+            assert product is not None  # of points
+            names.append(self._named(text, clause.variable, product))
         if clause.negated:
-            yield from (Clause(clause.variable, (name,)) for name in made)
+            yield from (Clause(clause.variable, (name,)) for name in names)
         else:
-            yield Clause(clause.variable, tuple(made))
+            yield Clause(clause.variable, tuple(names))
 
     def _points(self, variable: str, term: str) -> CurveBounds:
         """Return a term as points, between two lines if need be."""
         known = self.terms.get((variable, term))
         if known is not None:
             return known
-        found = as_points(self.plain[variable, term], self.ranges[variable])
-        if found is None:
+        points = as_points(self.plain[variable, term], self.ranges[variable])
+        if points is None:
             raise ValueError(f"the curve of {term!r} of {variable!r} has no points")
-        return found
+        return points
 
     def _constant(self, rule: Rule, weight: float) -> Clause:
         """Return a clause that has the same degree everywhere."""
@@ -211,8 +211,8 @@ class _Made:
         if not names:
             raise ValueError("there is no input that a weight could be laid upon")
         line = Points((0.0,), (weight,))
-        found = CurveBounds(line, line, (line,))
-        return Clause(names[0], (self._named(f"x {weight!r}", names[0], found),))
+        bounds = CurveBounds(line, line, (line,))
+        return Clause(names[0], (self._named(f"x {weight!r}", names[0], bounds),))
 
     def _named(self, text: str, variable: str, one: CurveBounds) -> str:
         """Return the name of a term that is made, kept once."""
@@ -225,12 +225,12 @@ class _Made:
 
     def variables(self, side: Side) -> tuple[Variable, ...]:
         """Return the variables with all terms, from below or from above."""
-        found: list[Variable] = []
+        result: list[Variable] = []
         for variable in self.rules.variables:
             shapes = {term.name: term.shape for term in variable.terms}
             for (name, term), one in self.terms.items():
                 if name == variable.name:
                     shapes[term] = one.lower if side == "lower" else one.upper
             terms = tuple(Term(term, shape) for term, shape in shapes.items())
-            found.append(msgspec.structs.replace(variable, terms=terms))
-        return tuple(found)
+            result.append(msgspec.structs.replace(variable, terms=terms))
+        return tuple(result)

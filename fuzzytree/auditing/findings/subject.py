@@ -49,14 +49,14 @@ class Material(msgspec.Struct, frozen=True, eq=False):
         file: Where it was read from; None if from memory.
         rows: The user's rows.
         data: The table that they come from, if it is a file.
-        given: What other verbs found of the model.
+        results: What other verbs found of the model.
     """
 
     model: Document
     file: ModelFile | None = None
     rows: AuditRows | None = None
     data: SourceFile | None = None
-    given: tuple[LoadedResult, ...] = ()
+    results: tuple[LoadedResult, ...] = ()
 
 
 class AuditView(msgspec.Struct, frozen=True, eq=False):
@@ -119,7 +119,7 @@ class Subject(AuditView, frozen=True, eq=False, kw_only=True):
 _MOST: Final = 0.25  # of the time that is left, for one question
 _FAIR: Final = 4.0  # times as much as its own share may one of many take
 
-_Found = TypeVar("_Found")
+_Result = TypeVar("_Result")
 
 
 class TimeSlices:
@@ -133,7 +133,7 @@ class TimeSlices:
         self.clock = clock.share(part)
         self.left_out = 0
 
-    def run(self, left: int, question: Callable[[Clock], _Found]) -> _Found | None:
+    def run(self, left: int, question: Callable[[Clock], _Result]) -> _Result | None:
         """Return the answer to the first of `left` questions, None without time."""
         if self.clock.is_over:
             return None

@@ -179,19 +179,19 @@ def count_rows(
     for start in range(0, values.shape[1], _STEP):
         subject.clock.check()
         part = values[:, start : start + _STEP]
-        found = decide(rules, part)
-        fires, is_weak, margin = _settled(subject, part, found)
-        is_known = found.status != MISSING
-        is_covered = is_known & (found.status != UNCOVERED)
+        decisions = decide(rules, part)
+        fires, is_weak, margin = _settled(subject, part, decisions)
+        is_known = decisions.status != MISSING
+        is_covered = is_known & (decisions.status != UNCOVERED)
         fired += (fires & is_known).sum(axis=1)
-        won += np.bincount(found.rule, minlength=count + 1)[1:]
+        won += np.bincount(decisions.rule, minlength=count + 1)[1:]
         if codes is not None:
-            is_won = found.rule > 0
-            own = found.rule[is_won] - 1
+            is_won = decisions.rule > 0
+            own = decisions.rule[is_won] - 1
             is_right = codes[start : start + _STEP][is_won] == owner[own]
             right += np.bincount(own[is_right], minlength=count)
         totals["missing"] += int((~is_known).sum())
-        totals["uncovered"] += int((found.status == UNCOVERED).sum())
+        totals["uncovered"] += int((decisions.status == UNCOVERED).sum())
         totals["weak"] += int((is_known & is_weak).sum())
         totals["tied"] += int((is_covered & (margin == 0.0)).sum())
         totals["close"] += int((is_covered & (margin <= settings.margin)).sum())
@@ -206,7 +206,7 @@ def count_rows(
 
 
 def _settled(
-    subject: Subject, values: FloatArray, found: Decisions
+    subject: Subject, values: FloatArray, decisions: Decisions
 ) -> tuple[BoolArray, BoolArray, FloatArray]:
     """Settle by fractions what the doubts of some answers leave open.
 
@@ -216,16 +216,16 @@ def _settled(
         one is, and on the same side of the settings' margin.
     """
     rules, settings = subject.rules, subject.settings
-    assert found.strengths is not None  # the default
-    best = found.strengths.max(axis=0)
+    assert decisions.strengths is not None  # the default
+    best = decisions.strengths.max(axis=0)
     fires, may_fire = _firing(rules, values)
     is_weak = best < settings.epsilon
-    margin = found.margin.copy()
+    margin = decisions.margin.copy()
     is_open = (fires != may_fire).any(axis=0)
-    is_open |= np.abs(best - settings.epsilon) <= found.doubt
+    is_open |= np.abs(best - settings.epsilon) <= decisions.doubt
     for limit in (0.0, settings.margin):
-        is_open |= (found.margin <= limit) & (found.margin_high > limit)
-    is_open &= found.status != MISSING
+        is_open |= (decisions.margin <= limit) & (decisions.margin_high > limit)
+    is_open &= decisions.status != MISSING
     for row in np.flatnonzero(is_open).tolist():
         subject.clock.check()
         named = dict(zip(rules.inputs, values[:, row].tolist(), strict=True))
@@ -251,11 +251,11 @@ def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
             for clause in rule.when:
                 if clause not in known:
                     x = axes[clause.variable]
-                    found = [
+                    degrees = [
                         degree_enclosure(shapes[clause.variable, term], x)
                         for term in clause.terms
                     ]
-                    known[clause] = clause_enclosure(clause, found)
+                    known[clause] = clause_enclosure(clause, degrees)
                 fires[position] &= known[clause].low > 0.0
                 may_fire[position] &= known[clause].high > 0.0
     return fires, may_fire
@@ -275,29 +275,29 @@ def answers(subject: Subject) -> Iterator[Answer]:
 def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[Answer]:
     """Yield what the user's rows say, of all rules together and of each."""
     codes = None if subject.system else rows.codes  # a view has classes of its own
-    found, most = _both(subject, rows.values, codes)
+    lower, most = _both(subject, rows.values, codes)
     how = f"every row of {rows.name}"
-    total = found.rows
+    total = lower.rows
     for name, hits, text in (
-        ("rows with a missing value", found.missing, "a value is missing"),
-        ("rows outside the domain", found.outside, "a value is outside the domain"),
+        ("rows with a missing value", lower.missing, "a value is missing"),
+        ("rows outside the domain", lower.outside, "a value is outside the domain"),
     ):
         state = sampled_share(name, hits, total, how)
         sentence = f"on {hits} of {total} rows {text}"
         yield Answer("FT701", name, sentence, state, hits > 0)
-    if not found.known:
+    if not lower.known:
         return
-    if found.missing:
+    if lower.missing:
         how += " without a missing value"
-    for answer in _shares(subject, (found, most), "rows", how):
+    for answer in _shares(subject, (lower, most), "rows", how):
         is_finding = isinstance(answer.state, Sampled) and answer.state.hits > 0
         yield msgspec.structs.replace(answer, is_finding=is_finding)
     for number in range(1, len(subject.rules.rules) + 1):
         fired = int(most.fired[number - 1])
-        if fired > found.fired[number - 1]:
-            yield _nearly_fired(subject, found, number, fired)
+        if fired > lower.fired[number - 1]:
+            yield _nearly_fired(subject, lower, number, fired)
             continue
-        yield _of_rule(subject, found, number, how)
+        yield _of_rule(subject, lower, number, how)
 
 
 def _of_domain(subject: Subject) -> Iterator[Answer]:
@@ -311,10 +311,10 @@ def _of_domain(subject: Subject) -> Iterator[Answer]:
         text = f"shares of the domain are not known: {reason}"
         yield note("FT701", "domain", text, Declined("FTD04", reason))
         return
-    found, most = _both(subject, points)
+    lower, most = _both(subject, points)
     how = f"points drawn evenly from the domain, seed {settings.seed}"
-    if found.known:  # a combination may overflow everywhere
-        yield from _shares(subject, (found, most), "points", how)
+    if lower.known:  # a combination may overflow everywhere
+        yield from _shares(subject, (lower, most), "points", how)
 
 
 def _both(
@@ -322,8 +322,8 @@ def _both(
 ) -> tuple[RuleCounts, RuleCounts]:
     """Count what the rules say from below, and from above; see `counted`."""
     if subject.bounds is None:
-        found = count_rows(subject, values, codes)
-        return found, found
+        counts = count_rows(subject, values, codes)
+        return counts, counts
     lower, upper = (
         msgspec.structs.replace(subject, rules=rules)
         for rules in (subject.bounds.lower, subject.bounds.upper)
@@ -332,11 +332,11 @@ def _both(
 
 
 def _nearly_fired(
-    subject: Subject, found: RuleCounts, number: int, most: int
+    subject: Subject, lower: RuleCounts, number: int, most: int
 ) -> Answer:
     """Return on how many rows a rule fires, as far as its curves are known."""
-    name, least = subject.rule_name(number), int(found.fired[number - 1])
-    reason = f"it fires on {least} of {found.known} at least, and on {most} at most"
+    name, least = subject.rule_name(number), int(lower.fired[number - 1])
+    reason = f"it fires on {least} of {lower.known} at least, and on {most} at most"
     sentence = f"on how many rows {name} fires is not decided: {reason}"
     return note("FT701", name, sentence, Declined("FTD02", reason))
 
@@ -345,11 +345,11 @@ def _shares(
     subject: Subject, counts: tuple[RuleCounts, RuleCounts], noun: str, how: str
 ) -> Iterator[Answer]:
     """Yield in which share of some rows or points the rules are weak or undecided."""
-    found, most = counts
-    settings, total = subject.settings, found.known
+    lower, most = counts
+    settings, total = subject.settings, lower.known
     questions = [
-        ("uncovered", found.uncovered, "no rule fires"),
-        ("weak", found.weak, f"no rule reaches {settings.epsilon!r}"),
+        ("uncovered", lower.uncovered, "no rule fires"),
+        ("weak", lower.weak, f"no rule reaches {settings.epsilon!r}"),
     ]
     for name, fewest in (("uncovered", most.uncovered), ("weak", most.weak)):
         hits = next(h for n, h, _ in questions if n == name)
@@ -368,8 +368,8 @@ def _shares(
     if subject.policy.decision == "strongest":
         margin = f"the two strongest classes are at most {settings.margin!r} apart"
         questions += [
-            ("tied", found.tied, "rules of two classes tie"),
-            ("close", found.close, margin),
+            ("tied", lower.tied, "rules of two classes tie"),
+            ("close", lower.close, margin),
         ]
     for name, hits, text in questions:
         state = sampled_share(f"{name} {noun}", hits, total, how)
@@ -377,10 +377,10 @@ def _shares(
         yield note("FT701", f"{name} {noun}", sentence, state)
 
 
-def _of_rule(subject: Subject, found: RuleCounts, number: int, how: str) -> Answer:
+def _of_rule(subject: Subject, counts: RuleCounts, number: int, how: str) -> Answer:
     """Return on how many rows a rule fires, how many it wins, and how many rightly."""
-    name, total = subject.rule_name(number), found.known
-    fired, won = int(found.fired[number - 1]), int(found.won[number - 1])
+    name, total = subject.rule_name(number), counts.known
+    fired, won = int(counts.fired[number - 1]), int(counts.won[number - 1])
     label = subject.rules.rules[number - 1].then
     sentence = f"{name} fires on {fired or 'none'} of {total} rows"
     measures = [Measure("rows fired", fired)]
@@ -391,8 +391,8 @@ def _of_rule(subject: Subject, found: RuleCounts, number: int, how: str) -> Answ
         measures.append(Measure("rows won", won))
         state = sampled_share(f"rows that {name} wins", won, total, how)
         sentence += f" and wins {won or 'none'}" if fired else ""
-        if found.right is not None and won:
-            right = int(found.right[number - 1])
+        if counts.right is not None and won:
+            right = int(counts.right[number - 1])
             measures.append(Measure("rows won rightly", right))
             of = f"rows that {name} wins and that have its class"
             state = sampled_share(of, right, won, f"of {how}, those that it wins")

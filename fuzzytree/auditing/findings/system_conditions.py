@@ -63,7 +63,7 @@ class SystemTerms:
         self.plain = plain
         self.bounds = bounds or {}
         self.ranges = ranges or {}
-        self.made: dict[Name, CurveBounds] = {}
+        self.hedged_terms: dict[Name, CurveBounds] = {}
 
     def knows(self, variable: str, term: str) -> bool:
         """Return whether rules can use a term."""
@@ -71,7 +71,7 @@ class SystemTerms:
 
     def pointed(self, variable: str, term: str) -> CurveBounds | None:
         """Return a term between lines of points, or as points; None if it has none."""
-        known = {**self.bounds, **self.made}.get((variable, term))
+        known = {**self.bounds, **self.hedged_terms}.get((variable, term))
         if known is not None:
             return known
         return as_points(self.plain[variable][term], self.ranges.get(variable))
@@ -82,40 +82,40 @@ class SystemTerms:
         Returns:
             None if there are no lines between which it is.
         """
-        found = self.pointed(variable, term)
+        lines = self.pointed(variable, term)
         for hedge in reversed(hedges):
-            found = found and hedged_bounds(found, hedge)
-        if found is None:
+            lines = lines and hedged_bounds(lines, hedge)
+        if lines is None:
             return None
         name = " ".join((*hedges, term))
         while (
             self.knows(variable, name)
-            or self.made.get((variable, name), found) != found
+            or self.hedged_terms.get((variable, name), lines) != lines
         ):
             name += "'"
-        self.made[variable, name] = found
+        self.hedged_terms[variable, name] = lines
         return name
 
     def variable(self, one: SystemInput) -> Variable:
         """Return an input as a variable; an inexact term has its lower line."""
         shapes = {**self.plain[one.name]}
-        for (variable, term), found in {**self.bounds, **self.made}.items():
+        for (variable, term), lines in {**self.bounds, **self.hedged_terms}.items():
             if variable == one.name:
-                shapes[term] = found.lower
+                shapes[term] = lines.lower
         terms = tuple(Term(name, shape) for name, shape in shapes.items())
         return Variable(one.name, terms, one.unit, one.low, one.high, one.parts)
 
 
 def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Interval | None]:
     """Return the values of each input on a domain, None where they are not known."""
-    found: dict[str, Interval | None] = {}
+    ranges: dict[str, Interval | None] = {}
     for one in system.inputs:
         needed = [part.input for part in one.parts] or [one.name]
-        found[one.name] = None
+        ranges[one.name] = None
         if all(domain.side(name) is not None for name in needed):
             low, high = span(Variable(one.name, parts=one.parts), domain)
-            found[one.name] = (low, high) if low <= high else None
-    return found
+            ranges[one.name] = (low, high) if low <= high else None
+    return ranges
 
 
 def terms_of(
@@ -138,13 +138,13 @@ def terms_of(
             if shape is not None:
                 plain[one.name][label.name] = shape
                 continue
-            found = None if is_moved else _between(label, ranges[one.name])
-            if found is not None:
-                bounds[one.name, label.name] = found
+            lines = None if is_moved else _between(label, ranges[one.name])
+            if lines is not None:
+                bounds[one.name, label.name] = lines
             count = uses[one.name, label.name]
             few = {0: "no rule uses it", 1: "1 rule uses it"}
             users = few.get(count, f"{count} rules use it")
-            outcome = _outcome(one, label, found, ranges[one.name])
+            outcome = _outcome(one, label, lines, ranges[one.name])
             answers.append(_answer(one, label, outcome, users))
     return SystemTerms(plain, bounds, ranges), tuple(answers)
 
@@ -156,31 +156,31 @@ def _shape(label: SystemLabel) -> Shape | None:
         return None if shape is None or any(shape_mistakes(shape)) else shape
     if not isinstance(shape, Points):
         return None
-    found = scale(CurveBounds(shape, shape, (shape,)), label.height)
-    return found.lower if found is not None and found.is_exact else None
+    lines = scale(CurveBounds(shape, shape, (shape,)), label.height)
+    return lines.lower if lines is not None and lines.is_exact else None
 
 
 def _between(label: SystemLabel, of: Interval | None) -> CurveBounds | None:
     shape = shape_of(label.curve)
     if shape is not None and any(shape_mistakes(shape)):
         return None
-    found = curve_bounds(label.curve, of)
-    return found and (found if label.height == 1.0 else scale(found, label.height))
+    lines = curve_bounds(label.curve, of)
+    return lines and (lines if label.height == 1.0 else scale(lines, label.height))
 
 
 def _outcome(
-    one: SystemInput, label: SystemLabel, found: CurveBounds | None, of: Interval | None
+    one: SystemInput, label: SystemLabel, lines: CurveBounds | None, of: Interval | None
 ) -> tuple[str, str]:
     """Return what becomes of a term, and why."""
     kind = str(label.curve.__struct_config__.tag)
     reason = f"its curve ({kind}) has no exact method"
     if one.parts and one.clips:
         reason = "a combination that is moved into a range has no exact method"
-    if found is None:
+    if lines is None:
         return "is left out", reason
-    if of is None and isinstance(found.lower, Points):
-        of = Fraction(found.lower.values[0]), Fraction(found.lower.values[-1])
-    apart = f" {float(gap(found, of)):.2g} apart" if of else ""
+    if of is None and isinstance(lines.lower, Points):
+        of = Fraction(lines.lower.values[0]), Fraction(lines.lower.values[-1])
+    apart = f" {float(gap(lines, of)):.2g} apart" if of else ""
     return (
         f"is bounded by two lines{apart} at most",
         f"{reason}; its shape and its overlaps are not checked",
@@ -276,10 +276,10 @@ class Conditions:
             name = f"{one.label!r} of {one.variable!r}"
             decline("FTD02", f"the curve of {name} has no exact method")
         if hedges:
-            made = self.terms.hedged(one.variable, one.label, hedges)
-            if made is None:
+            term = self.terms.hedged(one.variable, one.label, hedges)
+            if term is None:
                 decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
-            return [(Clause(one.variable, (made,), negated),)]
+            return [(Clause(one.variable, (term,), negated),)]
         return [(Clause(one.variable, (one.label,), negated),)]
 
     def _one_clause(
@@ -316,19 +316,19 @@ class Conditions:
     def _joined(
         self, parts: Sequence[Condition], *, is_union: bool, negated: bool
     ) -> list[Way]:
-        found = [*(_NEVER if is_union else _ALWAYS)]
+        whole = [*(_NEVER if is_union else _ALWAYS)]
         for part in parts:
             ways = self.ways(part, negated=negated)
-            count = len(found) + len(ways) if is_union else len(found) * len(ways)
+            count = len(whole) + len(ways) if is_union else len(whole) * len(ways)
             if count > MOST_WAYS:
                 decline("FTD05", f"it can hold in more than {MOST_WAYS} ways")
             if is_union:
-                found += ways
+                whole += ways
             else:
-                pairs = itertools.product(found, ways)
-                found = [self._both(one, other) for one, other in pairs]
-            found = [*dict.fromkeys(found)]
-        return found
+                pairs = itertools.product(whole, ways)
+                whole = [self._both(one, other) for one, other in pairs]
+            whole = [*dict.fromkeys(whole)]
+        return whole
 
     def _both(self, one: Way, other: Way) -> Way:
         """Return clauses of both; a minimum does not change by repetition."""

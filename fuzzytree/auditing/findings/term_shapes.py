@@ -52,9 +52,9 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
     for of in ranges(subject):
         for term in of.variable.terms:
             subject.clock.check()
-            found = [*_defects(of, term)]
-            defects = [one for one in found if one is not None]
-            shallow += len(found) - len(defects)
+            every = [*_defects(of, term)]
+            defects = [one for one in every if one is not None]
+            shallow += len(every) - len(defects)
             sound += not defects
             yield from defects
     if not sound and not shallow:
@@ -91,25 +91,25 @@ def _defect(
     return finding(*facts, terms=terms, region=region, measures=measures)
 
 
-def _excess(of: VariableRange, term: Term, found: Excess) -> Answer:
-    end = "above 1" if found.is_above else "below 0"
+def _excess(of: VariableRange, term: Term, excess: Excess) -> Answer:
+    end = "above 1" if excess.is_above else "below 0"
     return _defect(
         of,
         term,
-        f"is clipped: its polynomial goes {short(found.depth)} {end} "
-        f"between {short(found.low)} and {short(found.high)}",
+        f"is clipped: its polynomial goes {short(excess.depth)} {end} "
+        f"between {short(excess.low)} and {short(excess.high)}",
         "the polynomial's turning points and crossings were isolated",
         (
-            Measure("excess", float(found.depth)),
-            Measure("place of the excess", float(found.at), unit=of.variable.unit),
+            Measure("excess", float(excess.depth)),
+            Measure("place of the excess", float(excess.at), unit=of.variable.unit),
         ),
-        (Span(of.variable.name, float(found.low), float(found.high)),),
+        (Span(of.variable.name, float(excess.low), float(excess.high)),),
     )
 
 
 def _dips(of: VariableRange, term: Term) -> Iterator[Answer | None]:
-    made = of.line(term)
-    walked = [*walk(made, 0)]
+    axis = of.line(term)
+    walked = [*walk(axis, 0)]
     deep = [*dips(walked, SHALLOW)]
     smaller = [*dips(walked, Fraction(1, 10**12))]
     yield from [None] * (len(smaller) - len(deep))
@@ -123,7 +123,7 @@ def _dips(of: VariableRange, term: Term) -> Iterator[Answer | None]:
         term,
         f"has {len(deep) + 1} peaks: between {short(left)} and {short(right)} "
         f"its degree falls to {short(bottom.nearest)}, at {short(valley)}",
-        f"its curve was visited in {len(made.cells.rank)} stretches, in each of which "
+        f"its curve was visited in {len(axis.cells.rank)} stretches, in each of which "
         "it is monotone",
         (
             Measure("peaks", len(deep) + 1),
@@ -198,7 +198,7 @@ _MOST_PIECES = 4_000  # of two curves whose overlap is computed
 def overlap_answers(subject: Subject) -> Iterator[Answer]:
     """Answer which terms share so much area that they are hard to distinguish."""
     limit = Fraction(subject.settings.overlap)
-    found: list[tuple[Fraction, Answer]] = []
+    overlaps: list[tuple[Fraction, Answer]] = []
     apart = points = 0
     for of in ranges(subject):
         terms = of.variable.terms
@@ -221,13 +221,13 @@ def overlap_answers(subject: Subject) -> Iterator[Answer]:
             if jaccard.high < limit:
                 apart += 1
                 continue
-            found.append(
+            overlaps.append(
                 (-jaccard.low, _overlapping(of, one, other, shared, jaccard, limit))
             )
-    found.sort(key=lambda pair: pair[0])
-    yield from (answer for _, answer in found[:MOST_SHOWN])
-    if found or apart or points:
-        yield _other_pairs(len(found), apart, points, float(limit))
+    overlaps.sort(key=lambda pair: pair[0])
+    yield from (answer for _, answer in overlaps[:MOST_SHOWN])
+    if overlaps or apart or points:
+        yield _other_pairs(len(overlaps), apart, points, float(limit))
 
 
 def _overlapping(
@@ -282,20 +282,20 @@ def _too_large(of: VariableRange, one: Term, other: Term) -> Answer:
     return note("FT403", name, text, Declined("FTD05", reason), terms=terms)
 
 
-def _other_pairs(found: int, apart: int, points: int, limit: float) -> Answer:
-    fewer, more = (counted(n, "pair") for n in (apart, found - MOST_SHOWN))
+def _other_pairs(count: int, apart: int, points: int, limit: float) -> Answer:
+    fewer, more = (counted(n, "pair") for n in (apart, count - MOST_SHOWN))
     parts = [f"{fewer} of terms share less than {short(limit)} of their area"]
-    if found > MOST_SHOWN:
+    if count > MOST_SHOWN:
         parts.append(f"{more} besides those listed share more")
     if points:
         parts.append(f"{counted(points, 'pair')} have no area on the domain")
     how = "areas were enclosed on cells, and integrated in fractions where near"
     measures = (
         Measure("pairs apart", apart),
-        Measure("pairs not listed", max(found - MOST_SHOWN, 0)),
+        Measure("pairs not listed", max(count - MOST_SHOWN, 0)),
         Measure("pairs without area", points),
     )
-    build = finding if found > MOST_SHOWN else note
+    build = finding if count > MOST_SHOWN else note
     return build(
         "FT403", "pairs of terms", "; ".join(parts), Proved(how), measures=measures
     )

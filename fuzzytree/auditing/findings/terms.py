@@ -39,13 +39,13 @@ def ranges(subject: Subject) -> tuple[VariableRange, ...]:
     Terms whose curves are known between bounds are left out.
     """
     bounds = subject.bounds.terms if subject.bounds else {}
-    found: list[VariableRange] = []
+    result: list[VariableRange] = []
     for of in whole_ranges(subject):
         name, terms = of.variable.name, of.variable.terms
         plain = tuple(term for term in terms if (name, term.name) not in bounds)
         if plain:
-            found.append(of._replace(variable=replace(of.variable, terms=plain)))
-    return tuple(found)
+            result.append(of._replace(variable=replace(of.variable, terms=plain)))
+    return tuple(result)
 
 
 def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
@@ -53,7 +53,7 @@ def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
 
     Terms that only the view has, such as `very high`, are left out.
     """
-    found: list[VariableRange] = []
+    result: list[VariableRange] = []
     for variable in subject.rules.variables:
         if subject.bounds is not None:
             variable = replace(variable, terms=tuple(_own_terms(subject, variable)))
@@ -63,8 +63,8 @@ def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
         side = subject.domain.side(variable.name)
         if variable.terms:
             is_open = side is not None and side.is_open and low == side.low < high
-            found.append(VariableRange(variable, low, high, is_open))
-    return tuple(found)
+            result.append(VariableRange(variable, low, high, is_open))
+    return tuple(result)
 
 
 def _own_terms(subject: Subject, variable: Variable) -> Iterator[Term]:
@@ -111,8 +111,8 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answe
             if lines is None and _is_full(of, term):
                 clean += 1
                 continue
-            made = of.line(term)
-            ((height, at),) = heights(made)
+            axis = of.line(term)
+            ((height, at),) = heights(axis)
             if lines is not None:
                 upper = of.line(Term(term.name, lines.upper))
                 height = Bounds(height.low, heights(upper)[0][0].high)
@@ -121,7 +121,7 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answe
             elif lines is not None and height.high:
                 yield _low_curve(of, term, height, is_low=height.high < level)
             else:
-                yield _low_term(of, term, height, at, len(made.cells.rank))
+                yield _low_term(of, term, height, at, len(axis.cells.rank))
     if clean:
         terms = "1 term reaches" if clean == 1 else f"{clean} terms reach"
         text = f"{terms} a degree of {short(level)} or more"

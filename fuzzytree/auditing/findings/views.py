@@ -65,8 +65,8 @@ def view(model: Document, domain: Domain) -> AuditView:
 
     Example:
         >>> from fuzzytree.testing import random_system
-        >>> found = view(random_system(3), Domain(()))
-        >>> found.policy.decision, found.rules is None or len(found.numbers) > 0
+        >>> rules = view(random_system(3), Domain(()))
+        >>> rules.policy.decision, rules.rules is None or len(rules.numbers) > 0
         ('all', True)
     """
     match model:
@@ -117,7 +117,7 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
             Semantics(conjunction),
         )
         both = bounded_rules(
-            rules, taken.weights, {**terms.bounds, **terms.made}, ranges
+            rules, taken.weights, {**terms.bounds, **terms.hedged_terms}, ranges
         )
     return AuditView(
         rules,
