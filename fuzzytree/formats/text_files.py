@@ -216,7 +216,7 @@ def number_of(text: str) -> float | None:
     return None if math.isinf(value) else value
 
 
-def no_such(what: str, name: str, known: Sequence[str]) -> str:
+def no_such(what: str, name: str, known: Iterable[str]) -> str:
     """Return the sentence on an unknown name.
 
     Example:
@@ -267,12 +267,7 @@ def placed(positions: Positions, mistakes: Iterable[Mistake]) -> list[FileMistak
 
 
 def locating(positions: Callable[[], Positions], facts: str | None) -> Locate:
-    """Return where parts stand in a file; its positions are gathered when needed.
-
-    Args:
-        positions: Returns the positions.
-        facts: Those of the rule base that the file stands for, if it does.
-    """
+    """Return where parts stand in a file, or in the rule base of its facts."""
     known = functools.cache(positions)
     if facts is None:
         return lambda path: _find(known(), path)

@@ -94,17 +94,7 @@ def findings_section(
 
 
 class ShownFinding(NamedTuple):
-    """A finding as the page shows it.
-
-    Attributes:
-        answer: The finding.
-        name: By which links find it.
-        is_accepted: Whether the baseline has it.
-        is_whole: Whether all of it is shown, and nothing folded.
-        concerned: The rules and terms that it is about, in words.
-        where: Its region in words.
-        pictures: Of its region.
-    """
+    """A finding as the page shows it; links find it by its name."""
 
     answer: Answer
     name: str
@@ -182,12 +172,7 @@ Drawn = Literal["nothing", "bars", "maps"]
 
 
 class Scene(NamedTuple):
-    """What the text and pictures of findings are made from.
-
-    Attributes:
-        axes: Every variable, by name.
-        viewed: The rules as they are audited.
-    """
+    """All variables by name, and the rules as they are audited."""
 
     axes: Mapping[str, Axis]
     viewed: AuditView

@@ -143,13 +143,7 @@ class Scale(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """A term's curve as it is drawn.
-
-    Attributes:
-        name: Of the term.
-        degree: The degree of a value.
-        corners: The values at which it may turn or step, ascending.
-    """
+    """A term's curve as it is drawn; at its corners it may turn or step."""
 
     name: str
     degree: Callable[[float], float]
@@ -162,17 +156,7 @@ class Curve(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """A variable as it is drawn.
-
-    Attributes:
-        name: Of the variable.
-        unit: Of its values; may be empty.
-        curves: Of its terms that can be drawn.
-        undrawn: The names of the others.
-        low: The lower end of the domain; None if it has none.
-        high: The upper end.
-        parts: The summands, if it is a combination.
-    """
+    """A variable as it is drawn: its terms, and the ends of its domain, if any."""
 
     name: str
     unit: str

@@ -204,12 +204,7 @@ class Window(NamedTuple):
 
 
 def span_text(span: Span, unit: str = "", digits: int = 6) -> str:
-    """Return a side of a region in words.
-
-    Args:
-        span: The side.
-        unit: Of its variable; may be empty.
-        digits: Of its ends; more where they would look alike.
+    """Return a side of a region in words; its ends have digits enough to differ.
 
     Example:
         >>> span_text(Span("force", 0.5, None), "N")
@@ -365,15 +360,7 @@ def decisions(
     """Return the number of the class decided for at each point of a grid, -1 for none.
 
     The native runtime decides, in double; a combination is a variable like any other.
-
-    Args:
-        rules: The rule base.
-        across: A variable and its values.
-        down: Another variable and its values.
-        others: The value of every other variable that the rules test.
-
-    Returns:
-        Shape (values down, values across).
+    The result has the shape (values down, values across).
 
     Example:
         >>> from fuzzytree.model.rulebase import Band, Clause, Rule, Term, Variable

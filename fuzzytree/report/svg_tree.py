@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from fuzzytree.model import FuzzyTree, Node, intervals
+from fuzzytree.model import FuzzyTree, Node
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import LETTER, Markup, cut, rect, svg, tag, words
-from fuzzytree.report.text import counted, number
+from fuzzytree.report.text import counted, number, taken
 
 MOST_LEAVES = 120
 """Of a tree that is drawn; a larger one is printed as an outline."""
@@ -26,18 +26,11 @@ _PALETTE = 10
 
 
 class Box(msgspec.Struct):
-    """A node or a leaf, its branch, and where it stands.
+    """A node or a leaf, the branch that leads to it, and where it stands.
 
-    Attributes:
-        level: How many branches lead to it.
-        title: The variable of a node, the class or pattern of a leaf.
-        note: Where a node cuts, or the rule and the rows of a leaf.
-        branch: The terms and values of the branch that leads to it.
-        code: The number of a leaf's class; None for a node.
-        counts: The rows that reach it, by class; empty if they are not known.
-        middle: How far below the top its middle is, in points.
-        above: The node whose branch leads to it.
-        below: Where its own branches lead.
+    The code is the number of a leaf's class, None for a node; the counts are the rows
+    that reach it by class, empty if they are not known; its middle is in points below
+    the top.
     """
 
     level: int
@@ -134,18 +127,7 @@ def _add_up(boxes: Sequence[Box]) -> None:
 
 
 def _branch_words(node: Node, place: int) -> str:
-    taken: list[str] = []
-    for (low, high), owner in zip(intervals(node), node.owners, strict=True):
-        if owner != place:
-            continue
-        if low is None:
-            taken.append(f"≤ {number(high)}" if high is not None else "any")
-        elif high is None:
-            taken.append(f"> {number(low)}")
-        else:
-            taken.append(f"> {number(low)} to {number(high)}")
-    names = " or ".join(node.branches[place].terms)
-    return f"{names}: {' or '.join(taken)}"
+    return f"{' or '.join(node.branches[place].terms)}: {taken(node, place, '≤')}"
 
 
 def placed(boxes: Sequence[Box]) -> float:

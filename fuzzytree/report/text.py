@@ -28,6 +28,7 @@ from fuzzytree.model import (
     Shape,
     Side,
     Variable,
+    intervals,
     printable,
     sentence,
 )
@@ -35,7 +36,8 @@ from fuzzytree.runtimes import Facts, OnnxModel
 from fuzzytree.semantics import rules_from_tree
 
 _MOST_PAIRS = 6  # points that a line of text shows one by one
-_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
+UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
+"""Of nanoseconds; what is shorter has that unit itself."""
 
 
 number = number_text
@@ -60,11 +62,7 @@ def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
 def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
     """Return a text in lines; what a terminal might obey is written as an escape.
 
-    Args:
-        text: The text.
-        width: Of a line, its indent included.
-        first: Stands before the first line.
-        rest: Stands before the others.
+    `first` stands before the first line and `rest` before the others, in the width.
     """
     return textwrap.wrap(
         printable(text),
@@ -96,7 +94,7 @@ def duration(ns: float) -> str:
         >>> duration(45.31), duration(999.7), duration(2069.0), duration(0.0712)
         ('45.3 ns', '1000 ns', '2.07 µs', '0.0712 ns')
     """
-    for size, unit in _UNITS:
+    for size, unit in UNITS:
         if ns >= size:
             return f"{digits(ns / size)} {unit}"
     return f"{digits(ns)} ns"
@@ -200,7 +198,7 @@ def tree_lines(tree: FuzzyTree) -> Iterator[str]:
         branch = node.branches[position]
         is_last = position == len(node.branches) - 1
         corner, rail = ("└─ ", "   ") if is_last else ("├─ ", "│  ")
-        text = f"{' or '.join(branch.terms)} ({_taken(node, position)})"
+        text = f"{' or '.join(branch.terms)} ({taken(node, position)})"
         yield f"{indent}{corner}{text}: {_end_text(tree, branch, parts)}"
         if branch.node is not None:
             todo += _branches(tree.nodes[branch.node - 1], indent + rail)
@@ -228,21 +226,19 @@ def _leaf_text(position: int, leaf: Leaf) -> str:
     return f"{leaf.label}{shape}  [{position}]{rows}"
 
 
-def _taken(node: Node, position: int) -> str:
+def taken(node: Node, position: int, most: str = "<=") -> str:
     """Return the values that a branch takes, such as `<= 2.5` or `1 to 2`."""
-    edges = [None, *node.cuts, None]
-    taken: list[str] = []
-    for interval, owner in enumerate(node.owners):
-        low, high = edges[interval], edges[interval + 1]
+    values: list[str] = []
+    for (low, high), owner in zip(intervals(node), node.owners, strict=True):
         if owner != position:
             continue
         if low is None:
-            taken.append(f"<= {number(high)}" if high is not None else "any")
+            values.append(f"{most} {number(high)}" if high is not None else "any")
         elif high is None:
-            taken.append(f"> {number(low)}")
+            values.append(f"> {number(low)}")
         else:
-            taken.append(f"> {number(low)} to {number(high)}")
-    return " or ".join(taken)
+            values.append(f"> {number(low)} to {number(high)}")
+    return " or ".join(values)
 
 
 def rule_lines(rules: RuleBase) -> Iterator[str]:

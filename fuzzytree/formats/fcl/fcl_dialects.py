@@ -277,19 +277,10 @@ def clauses(condition: FclCondition) -> Iterator[FclProposition]:
                 yield from clauses(part)
 
 
-def norm_of(block: FclBlock, keyword: str, notes: ReaderNotes) -> SNorm | None:
-    """Return the OR or ACCU of a block; None if it says none."""
-    return _named(block, keyword, S_WORDS, notes)
-
-
-def t_norm_of(block: FclBlock, keyword: str, notes: ReaderNotes) -> TNorm | None:
-    """Return the AND or ACT of a block; None if it says none."""
-    return _named(block, keyword, T_WORDS, notes)
-
-
-def _named(
+def norm_of(
     block: FclBlock, keyword: str, words: Mapping[str, _Norm], notes: ReaderNotes
 ) -> _Norm | None:
+    """Return the norm that a block names behind a keyword; None if it names none."""
     for word in block.words(keyword):
         if word.upper() != "NONE" and word.upper() not in words:
             choice = name_choice(word.upper()[:99], words)

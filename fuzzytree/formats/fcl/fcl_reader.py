@@ -21,6 +21,7 @@ from fuzzytree.formats.fcl import fcl_terms
 from fuzzytree.formats.fcl.fcl_dialects import (
     DEFUZZIFIERS,
     METHOD_WORDS,
+    S_WORDS,
     Dialect,
     detected,
     is_marked,
@@ -177,7 +178,7 @@ def _aggregated(
     it says nothing.
     """
     own = known.outputs[output.name].block
-    stated = [None if own is None else norm_of(own, "ACCU", known.notes)]
+    stated = [None if own is None else norm_of(own, "ACCU", S_WORDS, known.notes)]
     stated += [one.accu for one in blocks if output.name in one.concluded]
     norms = [one for one in stated if one is not None]
     where = f"output {output.name!r}"

@@ -12,9 +12,10 @@ from msgspec.structs import replace
 from fuzzytree.formats.fcl.fcl_dialects import (
     JFUZZYLOGIC_PAIRS,
     PAIRS,
+    S_WORDS,
+    T_WORDS,
     Dialect,
     norm_of,
-    t_norm_of,
 )
 from fuzzytree.formats.fcl.fcl_syntax import (
     FclBlock,
@@ -27,7 +28,7 @@ from fuzzytree.formats.fcl.fcl_syntax import (
     raw,
 )
 from fuzzytree.formats.fll.fll_words import FLL_HEDGES
-from fuzzytree.formats.text_files import ReaderNotes, number_of
+from fuzzytree.formats.text_files import ReaderNotes, no_such, number_of
 from fuzzytree.model import (
     And,
     Conclusion,
@@ -125,7 +126,7 @@ def _hedges(words: Sequence[Token], scope: Scope) -> tuple[Hedge, ...]:
     for word in words:
         hedge = FLL_HEDGES.get(word.lower())
         if hedge is None:
-            sentence = f"no hedge {str(word)!r}; {name_choice(word[:99], FLL_HEDGES)}"
+            sentence = no_such("hedge", str(word), FLL_HEDGES)
             scope.notes.mistake(place(word), sentence)
         else:
             results.append(hedge)
@@ -137,8 +138,7 @@ def _known_variable(
 ) -> bool:
     if str(token) in terms or notes.is_full:
         return True
-    sentence = f"no variable {str(token)!r}; {name_choice(token[:99], terms)}"
-    notes.mistake(place(token), sentence)
+    notes.mistake(place(token), no_such("variable", str(token), terms))
     return False
 
 
@@ -215,7 +215,7 @@ def read_block(block: FclBlock, scope: Scope) -> FclRuleBlock:
         implication=_implication(block, rules, scope),
         name=raw(block.head.words),
     )
-    accu = norm_of(block, "ACCU", scope.notes)
+    accu = norm_of(block, "ACCU", S_WORDS, scope.notes)
     return FclRuleBlock(result, block.head.keyword, tuple(tokens), accu)
 
 
@@ -226,7 +226,7 @@ def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:
 def _implication(
     block: FclBlock, rules: Sequence[SystemRule], scope: Scope
 ) -> TNorm | None:
-    stated = t_norm_of(block, "ACT", scope.notes)
+    stated = norm_of(block, "ACT", T_WORDS, scope.notes)
     is_needed = any(one.output in scope.curved for rule in rules for one in rule.then)
     if stated is not None or not is_needed:
         return stated
@@ -238,8 +238,8 @@ def _norms(
     block: FclBlock, rules: Sequence[SystemRule], scope: Scope
 ) -> tuple[TNorm | None, SNorm | None]:
     """Return AND and OR; one that is missing and needed comes with the other one."""
-    conjunction = t_norm_of(block, "AND", scope.notes)
-    disjunction = norm_of(block, "OR", scope.notes)
+    conjunction = norm_of(block, "AND", T_WORDS, scope.notes)
+    disjunction = norm_of(block, "OR", S_WORDS, scope.notes)
     is_jfuzzylogic = scope.dialect == "jfuzzylogic"
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
     if conjunction is None and any(_uses(rule.when, And) for rule in rules):

@@ -155,11 +155,7 @@ class _Statements(Transformer[Token, Any]):
     def setting(self, children: list[Token]) -> Setting:
         return Setting(children[0], _words(children[1:]))
 
-    def default(self, children: list[Token]) -> Setting:
-        return Setting(children[0], _words(children[1:]))
-
-    def lock(self, children: list[Token]) -> Setting:
-        return Setting(children[0], _words(children[1:]))
+    default = lock = setting
 
     def number(self, children: list[Token]) -> tuple[str, tuple[Token, ...]]:
         return "number", tuple(children)

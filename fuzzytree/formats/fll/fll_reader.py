@@ -283,7 +283,7 @@ def _variable(
             low,
             high,
             how[0],
-            fll.s_norm(section.one_of("aggregation"), notes),
+            fll.named(section.one_of("aggregation"), fll.S_NORMS, notes),
             _default(section.one_of("default"), notes),
             clips,
         )
@@ -456,9 +456,9 @@ def read_block(
         )
     block = RuleBlock(
         tuple(rules),
-        fll.t_norm(section.one_of("conjunction"), notes),
-        fll.s_norm(section.one_of("disjunction"), notes),
-        fll.t_norm(section.one_of("implication"), notes),
+        fll.named(section.one_of("conjunction"), fll.T_NORMS, notes),
+        fll.named(section.one_of("disjunction"), fll.S_NORMS, notes),
+        fll.named(section.one_of("implication"), fll.T_NORMS, notes),
         fll.activation(section.one_of("activation"), notes),
         section.head.value,
     )

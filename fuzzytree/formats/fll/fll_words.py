@@ -255,19 +255,10 @@ def number(word: Word, notes: ReaderNotes) -> float:
     return value
 
 
-def t_norm(entry: FllEntry | None, notes: ReaderNotes) -> TNorm | None:
-    """Return the AND that an entry names; None for none."""
-    return _named(entry, T_NORMS, notes)
-
-
-def s_norm(entry: FllEntry | None, notes: ReaderNotes) -> SNorm | None:
-    """Return the OR that an entry names; None for none."""
-    return _named(entry, S_NORMS, notes)
-
-
-def _named(
+def named(
     entry: FllEntry | None, table: Mapping[str, T], notes: ReaderNotes
 ) -> T | None:
+    """Return what the word of an entry means; None for none, or with a mistake."""
     if entry is None or entry.value in ("", "none"):
         return None
     if entry.value not in table:

@@ -8,13 +8,13 @@ their own name back.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple, TypeVar
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fml import fml_words as words
 from fuzzytree.formats.fml import xml
-from fuzzytree.formats.fml.fml_rules import FmlVariables, blocks_of
+from fuzzytree.formats.fml.fml_rules import FmlVariables, blocks_of, word_of
 from fuzzytree.formats.fml.fml_words import CIRCULAR, curve_of, number
 from fuzzytree.formats.fml.xml import FmlElement
 from fuzzytree.formats.text_files import (
@@ -42,8 +42,6 @@ from fuzzytree.model import (
     numbered,
 )
 from fuzzytree.semantics import as_written
-
-_T = TypeVar("_T")
 
 _VARIABLES: Final = ("fuzzyVariable", "tskVariable", "tsukamotoVariable")
 _OUTSIDE: Final = ("anYaDataCloud", "anYaRuleBase", "aggregatedFuzzyVariable")
@@ -276,7 +274,7 @@ def _output(
     how, aggregation = Defuzzifier("weighted average"), None
     if element.name == "fuzzyVariable":
         how = _defuzzifier(element, notes)
-        aggregation = _word(element, "accumulation", words.FML_SNORMS, "MAX", notes)
+        aggregation = word_of(element, "accumulation", words.FML_SNORMS, "MAX", notes)
         if not all(isinstance(label.curve, Singleton) for label in labels):
             notes.remark(
                 f"output {name!r}: FML says nothing of samples; read with {how.samples}"
@@ -298,22 +296,8 @@ def _output(
 
 
 def _defuzzifier(element: FmlElement, notes: ReaderNotes) -> Defuzzifier:
-    method = _word(element, "defuzzifier", words.FML_METHODS, "COG", notes)
+    method = word_of(element, "defuzzifier", words.FML_METHODS, "COG", notes)
     return Defuzzifier(method or "centroid", words.USUAL.samples, words.USUAL.grid)
-
-
-def _word(
-    element: FmlElement,
-    key: str,
-    known: Mapping[str, _T],
-    default: str,
-    notes: ReaderNotes,
-) -> _T | None:
-    value = element.attributes.get(key, default)
-    if value.upper() not in known:
-        choice = name_choice(value[:40].upper(), known)
-        notes.mistake(element.position, f"no {key} {value[:40]!r}; {choice}")
-    return known.get(value.upper())
 
 
 def _tsk_term(

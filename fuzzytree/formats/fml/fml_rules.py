@@ -27,7 +27,7 @@ from fuzzytree.model import (
     name_choice,
 )
 
-_Norm = TypeVar("_Norm")
+_Word = TypeVar("_Word")
 
 _RULES: Final = {
     "mamdaniRuleBase": ("rule", "consequent", "then", "else", "clause"),
@@ -120,22 +120,29 @@ def _block(rules: Sequence[SystemRule], norms: _Norms, name: str) -> RuleBlock:
 
 def _norms(base: FmlElement, rule: FmlElement, notes: ReaderNotes) -> _Norms:
     """Return the norms of a rule: its own, or those of its base."""
-
-    def norm(
-        key: str, known: Mapping[str, _Norm], default: str, own: FmlElement
-    ) -> _Norm | None:
-        element = own if key in own.attributes else base
-        text = element.attributes.get(key, default)
-        if text.upper() not in known:
-            notes.mistake(element.position, _unknown(key, text, known))
-        return known.get(text.upper())
-
-    conjunction = norm("andMethod", words.FML_TNORMS, "MIN", rule)
-    disjunction = norm("orMethod", words.FML_SNORMS, "MAX", rule)
+    of_and, of_or = (
+        rule if key in rule.attributes else base for key in ("andMethod", "orMethod")
+    )
+    conjunction = word_of(of_and, "andMethod", words.FML_TNORMS, "MIN", notes)
+    disjunction = word_of(of_or, "orMethod", words.FML_SNORMS, "MAX", notes)
     implication: TNorm | None = None
     if base.name == "mamdaniRuleBase":
-        implication = norm("activationMethod", words.FML_TNORMS, "MIN", base)
+        implication = word_of(base, "activationMethod", words.FML_TNORMS, "MIN", notes)
     return _Norms(conjunction or "minimum", disjunction or "maximum", implication)
+
+
+def word_of(
+    element: FmlElement,
+    key: str,
+    known: Mapping[str, _Word],
+    default: str,
+    notes: ReaderNotes,
+) -> _Word | None:
+    """Return what the word of an attribute means; None, and a mistake, if nothing."""
+    text = element.attributes.get(key, default)
+    if text.upper() not in known:
+        notes.mistake(element.position, _unknown(key, text, known))
+    return known.get(text.upper())
 
 
 def _unknown(key: str, text: str, known: Iterable[str]) -> str:
@@ -318,14 +325,10 @@ def _condition_of(
 def _inner(element: FmlElement, notes: ReaderNotes) -> _Inner:
     """Return what an <and> or an <or> joins its parts by."""
     if element.name == "and":
-        word = element.attributes.get("t-norm", "MIN")
-        if word.upper() not in words.FML_TNORMS:
-            notes.mistake(element.position, _unknown("t-norm", word, words.FML_TNORMS))
-        return _Inner(element, t_norm=words.FML_TNORMS.get(word.upper()))
-    word = element.attributes.get("t-conorm", "MAX")
-    if word.upper() not in words.FML_SNORMS:
-        notes.mistake(element.position, _unknown("t-conorm", word, words.FML_SNORMS))
-    return _Inner(element, s_norm=words.FML_SNORMS.get(word.upper()))
+        t_norm = word_of(element, "t-norm", words.FML_TNORMS, "MIN", notes)
+        return _Inner(element, t_norm=t_norm)
+    s_norm = word_of(element, "t-conorm", words.FML_SNORMS, "MAX", notes)
+    return _Inner(element, s_norm=s_norm)
 
 
 def _joined(

@@ -368,15 +368,7 @@ def variables_at(
 
     In the place of a broken variable stands one of its name and its terms' names, so
     that what speaks of it can be checked.
-
-    Args:
-        kept: The entries.
-        key: Of the list.
-        kind: The record of a variable.
-        mistakes: Where mistakes are added.
-        build: Makes a variable of its path and its record.
-        bare: Makes one of its name and those of its terms.
-        broken: Where the paths of broken variables are added.
+    `build` makes a variable of its path and record, `bare` one of names alone.
     """
     bound = records_at(kept, key, kind, mistakes)
     variables: list[V] = []

@@ -5,11 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from fuzzytree.benchmarking import Kind, Point, Question, Study, Timing, error_of
 from fuzzytree.report.plots.sheet import SIZE, style
-from fuzzytree.report.text import counted
+from fuzzytree.report.text import UNITS, counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,29 +42,12 @@ _FEW = 100  # points, up to which peers are named as well
 _MARKER = 4.5  # half the width of a marker, in pixels
 _DISTANCES = (7, 12, 18, 26, 36, 48, 62, 80, 100, 125)  # of a name, in points
 _SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
-_ACROSS: Mapping[int, Literal["left", "center", "right"]] = {
-    1: "left",
-    0: "center",
-    -1: "right",
-}
-_UP: Mapping[int, Literal["bottom", "center", "top"]] = {
-    1: "bottom",
-    0: "center",
-    -1: "top",
-}
-_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
+_ACROSS: Final = ("center", "left", "right")  # by a side's -1, 0 or 1
+_UP: Final = ("center", "bottom", "top")
 
 
 class Mark(NamedTuple):
-    """A candidate in the picture.
-
-    Attributes:
-        point: Of the study.
-        timing: Its time that is drawn.
-        measure: Which axes it is in.
-        error: The number drawn there, at most 1.
-        is_front: Whether no candidate is both faster and more exact.
-    """
+    """A candidate in the picture; of the front none is both faster and more exact."""
 
     point: Point
     timing: Timing
@@ -399,7 +382,7 @@ def time_text(nanoseconds: float, _position: object = None) -> str:
         >>> time_text(10.0), time_text(2500.0), time_text(1e9)
         ('10 ns', '2.5 µs', '1 s')
     """
-    for size, unit in _UNITS:
+    for size, unit in UNITS:
         if nanoseconds >= size:
             return f"{nanoseconds / size:g} {unit}"
     return f"{nanoseconds:g} ns"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from fuzzytree.model import FuzzyTree
@@ -99,16 +99,6 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Figure:
         for number, note in enumerate(notes):
             sheet.write(MARGIN, end + (number + 0.5) * _NOTE, note)
     return sheet.figure
-
-
-def class_colours(classes: Sequence[str]) -> dict[str, str]:
-    """Return a colour for each class, the same in every picture of a model.
-
-    Example:
-        >>> class_colours(["circle", "square"])
-        {'circle': '#0072b2', 'square': '#c04d00'}
-    """
-    return {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(classes)}
 
 
 def _notes(tree: FuzzyTree) -> Iterator[str]:
