@@ -187,8 +187,7 @@ SESSION = "floor: an empty session call"
 def floors(question: Question) -> Candidates:
     """Return the floors; they answer nothing and have no error.
 
-    Args:
-        question: The one to list them under.
+    They are listed under the `question`.
 
     Example:
         >>> found, omitted = floors("tree")
@@ -349,11 +348,8 @@ _MOST_DEGREES = 10_000_000  # whose errors are bounded in about a second
 def gather(model: Model, values: FloatArray, peers: str | None = None) -> Candidates:
     """Return every candidate for a model, and what cannot be one.
 
-    Args:
-        model: A tree or a rule base.
-        values: The rows of the study: certified bounds hold on them, or on the first
-            of them where the model is large.
-        peers: The path of a module with further candidates; see `load_peers`.
+    Certified bounds hold on the `values`, or on the first of them where the model is
+    large; for `peers` see `load_peers`.
     """
     layouts = Layouts()
     main = next(iter(questions(model)))
@@ -378,8 +374,7 @@ def load_peers(path: str | None) -> Peers:
     The function takes a model and a function that certifies the error of its strengths
     in a number type. It returns further candidates, and omissions with their reasons.
 
-    Args:
-        path: The module's file or the package's folder. None: no further candidates.
+    The `path` is a module's file or a package's folder; None gives no candidates.
 
     Raises:
         ValueError: If there is no such module, it cannot be run or has no function
@@ -419,10 +414,7 @@ def chosen(
 ) -> tuple[list[Candidate], list[Omission]]:
     """Return the candidates that are wanted, and a line about the others.
 
-    Args:
-        candidates: All there are.
-        only: Names, parts before the colon, questions or kinds; all if none.
-        skip: The same, for what is not wanted.
+    `only` and `skip` have names, parts before the colon, questions or kinds.
 
     Raises:
         ValueError: If a word names nothing that could be there, or nothing is left;

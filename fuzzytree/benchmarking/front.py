@@ -70,11 +70,7 @@ def entries(
 
 
 def front(found: Sequence[FrontEntry]) -> list[FrontEntry]:
-    """Return whom nobody beats: each is slower than the one before, and more exact.
-
-    Args:
-        found: As from `entries`, the fastest first.
-    """
+    """Return whom nobody beats: each is slower than the one before, and more exact."""
     kept: list[FrontEntry] = []
     for one in found:
         if not kept or one.error < kept[-1].error:
@@ -111,10 +107,8 @@ def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...
     keeps, and one for each coarser power of ten at which something else is faster for
     sure: the interval of the quotient lies above 1.
 
-    Args:
-        points: Of a study.
-        most: The largest error of a strength that is allowed. A tree's answer is
-            right or wrong, so there the classes must all be right whatever is allowed.
+    Errors of strengths up to `most` are allowed. A tree's answer is right or wrong, so
+    there the classes must all be right whatever is allowed.
 
     Returns:
         Sentences, those for most rows last; the last one is the one to remember.

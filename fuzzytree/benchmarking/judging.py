@@ -201,10 +201,7 @@ def made_rows(model: Model, count: int, *, seed: int = 0) -> tuple[FloatArray, s
     declares none is drawn from where its terms change their formula, and a tenth
     beyond; one that only combinations use, within a unit of each of them.
 
-    Args:
-        model: A tree or a rule base.
-        count: How many rows.
-        seed: The same model, count and seed give the same rows.
+    The same model, count and seed give the same rows.
 
     Returns:
         Values of shape (inputs, rows), and a sentence that says what they are.
@@ -260,9 +257,7 @@ def _apart(low: float, high: float) -> tuple[float, float]:
 def repeated(values: FloatArray, count: int) -> FloatArray:
     """Return so many rows: the first ones, or all of them again and again.
 
-    Args:
-        values: Shape (inputs, rows), at least one row.
-        count: How many rows.
+    The values have shape (inputs, rows), with at least one row.
 
     Example:
         >>> repeated(np.array([[1.0, 2.0]]), 5).tolist()

@@ -24,9 +24,7 @@ _CPU_INFO = Path("/proc/cpuinfo")
 def machine(packages: Iterable[str] = ()) -> Machine:
     """Return what there is to know about this machine now.
 
-    Args:
-        packages: The distributions whose versions matter, beside `PACKAGES`; those
-            that are not installed are left out.
+    Versions are those of the `packages` that are installed, beside `PACKAGES`.
 
     Example:
         >>> machine(["no such package"]).cores >= 1

@@ -251,13 +251,8 @@ def costs(
     Files are opened and run in onnxruntime, models run in the native runtime, both in
     one thread.
 
-    Args:
-        made: The stages.
-        uses: What a tree serves.
-        table: The path of a table to read; none is read if None.
-        seconds: For all of it.
-        rounds: The most samples of each call.
-        progress: Called with the current step and the share that is done.
+    All of it takes `seconds`, with at most `rounds` samples of each call. No table is
+    read if `table` is None.
 
     Returns:
         The costs, and what could not be timed and why.

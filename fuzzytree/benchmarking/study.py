@@ -191,15 +191,8 @@ def run_study(
 ) -> Study:
     """Try, judge and time candidates; see `bench`, which finds them.
 
-    Args:
-        model: What they run.
-        candidates: Their names are unique.
-        values: At least one row, shape (inputs, rows).
-        data: What the rows are.
-        omissions: What was left out before.
-        plan: How many rows, threads, seconds.
-        progress: Called with the current step and the share that is done.
-        clock: Where the time comes from; the system unless given.
+    The candidates have unique names; `values` have shape (inputs, rows), with at least
+    one row, and `data` says what they are. `omissions` were made before.
     """
     with noticed() as check:
 
@@ -457,11 +450,8 @@ def fitting(
     faster ones before the slower ones. None of these may take more than a tenth of
     the time.
 
-    Args:
-        costs: What one call of each is likely to cost.
-        ranks: Who comes first: the lowest.
-        left: The time for all of them, in the same unit.
-        samples: How many samples each needs, beside the warm-up.
+    `costs` are those of one call, in the unit of `left`, the time for all of them; the
+    lowest of the `ranks` comes first; each needs `samples` beside the warm-up.
 
     Example:
         >>> costs = {"native": 2.0, "fast": 1.0, "slow": 30.0}

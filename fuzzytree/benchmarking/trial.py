@@ -52,15 +52,8 @@ def tried(
 ) -> dict[str, str]:
     """Return why candidates cannot be run, by name; those that can are not in it.
 
-    Args:
-        model: A tree or a rule base.
-        names: The candidates to try.
-        values: A few rows, shape (inputs, rows).
-        peers: The path of a module with further candidates; see `gather.load_peers`.
-        seconds: How long one candidate may take to load and to answer.
-        left: The seconds that are left for all of them; what is not tried by then is
-            not run.
-        progress: Called with the current step and the share that is done.
+    Each has `seconds` to load and to answer the few rows of `values`; what is not tried
+    when no time is `left` is not run.
     """
     faults: dict[str, str] = {}
     todo = list(names)

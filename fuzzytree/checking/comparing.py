@@ -228,13 +228,8 @@ def compare_within(
     allowed difference apart. Rows in which 1 is allowed prove nothing and are counted
     as such.
 
-    Args:
-        found: The answers of the representation examined.
-        expected: The answers of the other one.
-        rows: The rows.
-        allowed: The largest difference of a strength, for each row. The result shows
-            that of the row that exceeds it most, or else of the largest difference.
-        origin: Where the allowed differences come from.
+    The result shows what is `allowed` in the row that exceeds it most, or else in that
+    of the largest difference, and its `origin`.
     """
     is_bound = allowed < 1.0
     apart = strength_gap(found.outcome, expected.outcome)
@@ -261,12 +256,8 @@ def compare_answers(
 ) -> Comparison:
     """Compare classes and missing rows alone.
 
-    Args:
-        found: The answers of the representation examined.
-        expected: The answers of the other one.
-        rows: The rows.
-        by_design: Whether the two are different functions, so that a difference is
-            reported and not a fault.
+    `by_design` says that the two are different functions, so that a difference is
+    reported and not a fault.
     """
     flips = labels(found) != labels(expected)
     gap = np.zeros(flips.shape)
@@ -458,11 +449,7 @@ def compare_exact(
     margin is at most twice that, or where a value lies within its rounding from a cut
     of the tree, and nowhere else.
 
-    Args:
-        found: The answers of the representation examined.
-        truth: The exact answers to the same rows.
-        rows: The rows; those of the data are counted if there are any.
-        dtype: The number type in which they were computed.
+    Rows of the data are counted if there are any.
     """
     allowed = np.zeros(len(rows.numbers))
     if isinstance(found.model, RuleBase):

@@ -70,11 +70,6 @@ Likeness = Literal["equal", "alike", "renamed", "other"]
 def equivalence(model: Document, written: Written, again: Reading) -> Likeness:
     """Return how what was read back stands to what was written.
 
-    Args:
-        model: What was written.
-        written: The file.
-        again: What it was read as.
-
     Returns:
         `equal` in every number and name; `alike` but for names, notes and units, or
         lines that became points, of which remarks were made; `renamed`, the same
@@ -251,9 +246,6 @@ def canonical_form(model: Document) -> Document:
     ranges where no value is moved into them and no curve is looked at in them. Curves
     with the same degrees at every double are alike, and so are conditions that min or
     max joins in another order; norms that no rule uses are left out.
-
-    Args:
-        model: A tree, a rule base or a system.
 
     Example:
         >>> from fuzzytree.model.rulebase import RuleBase, Rule, Variable

@@ -435,12 +435,8 @@ def _follow(
 ) -> IntArray:
     """Enter rule and status of some rows; return those to be fired.
 
-    Args:
-        net: The forks.
-        rows: All rows.
-        result: The rule and the status of each row, and a lower bound of its strength,
-            which is raised.
-        unsure: The rows to do.
+    `result` has the rule and the status of each row, and a lower bound of its strength,
+    which is raised; `unsure` are the rows to do.
     """
     rule, status, floor = result
     ends, crowded = _reachable(net, rows, floor, unsure)

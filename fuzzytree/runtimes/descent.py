@@ -286,13 +286,10 @@ def descend_rows(
 ) -> None:
     """Write the number of the leaf of some rows.
 
-    Args:
-        descent: The tree.
-        lines: Values of shape (variables, rows), contiguous.
-        start: The first row to answer.
-        out: A number for each row from there on; best not more than `CHUNK` of them.
-            Where a value is NaN, the leaf is any.
-        desk: Room for as many rows, of the type of the values.
+    `lines` are values of shape (variables, rows), contiguous. The answer to the rows
+    from `start` on goes to `out`, best not more than `CHUNK` of them; where a value is
+    NaN, the leaf is any. The `desk` has room for as many rows, of the type of the
+    values.
     """
     if not descent.top:
         out[:] = 1

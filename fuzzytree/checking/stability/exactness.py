@@ -41,11 +41,8 @@ def exactness(
     Runtimes of one number type that claim no bound of their own promise the same
     operations: they are compared with each other as well, bit for bit.
 
-    Args:
-        model: A tree or a rule base.
-        runtimes: What to run.
-        values: Shape (inputs, rows): each breakpoint with its neighbouring floats, in
-            float32 and float64, and rows of data.
+    Values are each breakpoint with its neighbouring floats, in float32 and float64, and
+    rows of data, of shape (inputs, rows).
     """
     trial = Trial("N8", _ADVICE)
     exact: dict[tuple[str, int], Decisions] = {}
@@ -95,10 +92,7 @@ def offsets(
     The moved model is a model of its own, whose numbers are rounded once. A runtime is
     compared with its exact predictions, on probes of its edges and on moved data.
 
-    Args:
-        model: A tree or a rule base.
-        runtimes: What to run; those that are slow get a share of the rows.
-        data: Rows of one's own, shape (inputs, rows); there may be none.
+    There may be no rows of data. Slow runtimes get a share of the rows.
 
     Returns:
         The criterion, and what each distance costs in each number type.

@@ -39,10 +39,7 @@ def roundtrips(
     is written again; lines may come back as points, within 2^-52. One that only runs
     must answer like the native runtime of its number type, bit for bit.
 
-    Args:
-        model: A tree or a rule base.
-        formats: The formats.
-        values: Shape (inputs, rows): what files that run compute.
+    The values, of shape (inputs, rows), are what files that run compute.
     """
     trial = Trial("N9", _ADVICE, worst=0.0)
     for representation, form in forms(model).items():

@@ -42,13 +42,7 @@ _ADVICE = (
 
 
 def order(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Criterion:
-    """Permute, repeat and cut up the rows, and reorder the inputs; demand equal bits.
-
-    Args:
-        model: A tree or a rule base.
-        runtimes: What to run.
-        values: Shape (inputs, rows).
-    """
+    """Permute, repeat and cut up rows, and reorder inputs; demand equal bits (N3)."""
     trial = Trial("N3", _ADVICE)
     for one in loaded_forms(model, runtimes, trial.skipped):
         rows = one.some(values)
@@ -118,11 +112,6 @@ def scaling(
 
     k runs over a ladder up to both ends of the range in which every number of the
     model stays normal; last, every input has a k of its own.
-
-    Args:
-        model: A tree or a rule base.
-        runtimes: What to run.
-        values: Shape (inputs, rows).
 
     Returns:
         The criterion, and the range of k for each form and number type.
@@ -279,11 +268,6 @@ def specials(
     the runtime's type of axes, is not finite; then there is no rule, and no strength is
     a number. -0.0 is answered like 0.0. Runtimes of one number type that promise equal
     bits give each other's rules.
-
-    Args:
-        model: A tree or a rule base.
-        runtimes: What to run.
-        values: Shape (inputs, rows); some of them are changed.
     """
     trial = Trial("N6", _ADVICE_SPECIALS)
     if not model.inputs:

@@ -65,10 +65,7 @@ def loaded_forms(
 ) -> Iterator[LoadedForm]:
     """Yield each form of a model in each runtime that can run it.
 
-    Args:
-        model: A tree or a rule base.
-        runtimes: The runtimes.
-        skipped: Gets a sentence for each that is not installed or cannot.
+    `skipped` gets a sentence for each that is not installed or cannot.
     """
     for representation, form in forms(model).items():
         for runtime in runtimes:
@@ -168,10 +165,7 @@ def exact_check(
     Rows that are missing in the number type and not in double (beyond float32) are
     left to criterion N6.
 
-    Args:
-        one: The runtime, with its model.
-        values: Shape (inputs, rows).
-        exact: The exact answers to these rows, if they are known already.
+    `exact` has the exact answers to these rows, if they are known already.
     """
     truth = decide(one.model, values) if exact is None else exact
     found = one.run(values)

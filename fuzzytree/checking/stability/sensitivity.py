@@ -67,11 +67,7 @@ class InputScale(NamedTuple):
 def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff, ...]:
     """Return what float32 costs each input of a model, the costliest first.
 
-    Args:
-        model: A tree or a rule base.
-        values: Rows to try it on, shape (inputs, rows).
-        is_data: Whether the rows are data, of which no class should change; probes lie
-            on edges, where some must.
+    No class of data should change; probes lie on edges, where some must.
     """
     rule_bases = [form for form in forms(model).values() if isinstance(form, RuleBase)]
     step = max(-(-values.shape[1] // _ROWS), 1)

@@ -85,9 +85,7 @@ def term_probes(
 ) -> TermProbes | None:
     """Return the terms of a rule base as rules, and their edges as rows.
 
-    Args:
-        rules: The rule base.
-        shape: What to test in place of each membership function.
+    `shape` gives what is tested in place of each membership function.
 
     Returns:
         The rows and rules; None if no variable has a term.
@@ -221,13 +219,9 @@ def _try_terms(
 ) -> None:
     """Compare the degrees of all terms in all runtimes with what is demanded of them.
 
-    Args:
-        trial: Gets the result.
-        model: Its forms that are rules have the terms.
-        runtimes: What to run.
-        title: What to call the terms of a form, with `{}` for its name.
-        shape: What to test in place of each membership function.
-        is_exact: Whether degrees are also compared with the exact ones.
+    `title` names the terms of a form, with `{}` for its name; `shape` gives what is
+    tested in place of each membership function. Degrees are compared with the exact
+    ones if `is_exact`.
     """
     for representation, form in forms(model).items():
         rules = form if isinstance(form, RuleBase) else None

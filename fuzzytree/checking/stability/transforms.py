@@ -110,9 +110,7 @@ def moved(model: AnyModel, offsets: Mapping[str, float]) -> AnyModel:
     Every place is added to its input's offset and rounded once; spreads stay. It is a
     model of its own, close to the original as far as doubles allow at that distance.
 
-    Args:
-        model: A tree or a rule base.
-        offsets: What to add, by the name of an input; nothing for those not named.
+    Inputs that `offsets` do not name stay.
 
     Raises:
         InvalidModelError: If places that differ become one.
