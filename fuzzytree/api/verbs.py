@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         Code,
         Difference,
         Material,
+        ModelFile,
         SourceFile,
     )
     from fuzzytree.auditing import Report as RecheckReport
@@ -550,21 +551,28 @@ def material(
         TableError: If a column is absent or holds text, the table has no row, or it
             changes while it is read.
     """
-    from fuzzytree.auditing import Material, model_file, read_results
+    from fuzzytree.auditing import Material, read_results
 
-    file = None
-    if isinstance(model, str | os.PathLike):
-        file = model_file(os.fspath(model), _bytes_of(model))
-        model = load_content(file.content, file.name, allow_loss=allow_loss)
-    else:
-        model = as_model(model)
-    given = read_results(results, model)
+    document, file = _model_and_file(model, allow_loss)
+    known = read_results(results, document)
     data, name = _readable_twice(data)
     source = _source_of(data, name)
-    rows = audited_rows(data, model, target=target, name=name)
+    rows = audited_rows(data, document, target=target, name=name)
     if _source_of(data, name) != source:
         raise TableError(f"{name}: was changed while it was read")
-    return Material(model, file, rows, source, given)
+    return Material(document, file, rows, source, known)
+
+
+def _model_and_file(
+    model: ModelSource, allow_loss: bool
+) -> tuple[Document, ModelFile | None]:
+    """Return a model, and what is known of its file if it is the path of one."""
+    from fuzzytree.auditing import model_file
+
+    if not isinstance(model, str | os.PathLike):
+        return as_model(model), None
+    file = model_file(os.fspath(model), _bytes_of(model))
+    return load_content(file.content, file.name, allow_loss=allow_loss), file
 
 
 def _readable_twice(data: object) -> tuple[object, str | None]:
@@ -709,25 +717,16 @@ def diff(
         AuditRows,
         AuditSettings,
         Clock,
-        ModelFile,
         all_inputs,
         check_common_inputs,
         difference,
         joined_domain,
-        model_file,
     )
 
     clock = Clock(budget_s, report=progress)
-    models: list[Document] = []
-    files: list[ModelFile | None] = []
-    for model in (old, new):
-        if isinstance(model, str | os.PathLike):
-            file = model_file(os.fspath(model), _bytes_of(model))
-            files.append(file)
-            models.append(load_content(file.content, file.name, allow_loss=allow_loss))
-        else:
-            files.append(None)
-            models.append(as_model(model))
+    models, files = zip(
+        *(_model_and_file(model, allow_loss) for model in (old, new)), strict=True
+    )
     first, second = models
     titles = [f.name if f else m.name for f, m in zip(files, models, strict=True)]
     check_common_inputs(first, second, (titles[0], titles[1]))

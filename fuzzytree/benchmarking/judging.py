@@ -168,22 +168,13 @@ def _part(sample: _Sample, most: int) -> _Sample:
     if step <= 1:
         return sample
     values = np.ascontiguousarray(sample.values[:, ::step])
-    return _Sample(sample.model, values, _thinned(sample.exact, step))
-
-
-def _thinned(exact: Decisions, step: int) -> Decisions:
-    """Return the exact answers to every so many rows."""
-    strengths = exact.strengths
-    return Decisions(
-        exact.rule[::step],
-        exact.label[::step],
-        exact.status[::step],
-        None if strengths is None else strengths[:, ::step],
-        exact.doubt[::step],
-        exact.margin[::step],
-        exact.margin_high[::step],
-        exact.by_fractions,
-    )
+    arrays = {
+        name: array[..., ::step]
+        for name, array in msgspec.structs.asdict(sample.exact).items()
+        if isinstance(array, np.ndarray)
+    }
+    exact = msgspec.structs.replace(sample.exact, **arrays)
+    return _Sample(sample.model, values, exact)
 
 
 def _most_rows(model: Model) -> int:

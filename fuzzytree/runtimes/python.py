@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fuzzytree.exporters import write_python
-from fuzzytree.model import Model, Outcome, RuleBase, Run, Runtime
+from fuzzytree.model import Model, Outcome, Run, Runtime
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
@@ -26,25 +26,13 @@ def load(model: Model) -> Run:
 def load_content(content: bytes, model: Model) -> Run:
     """Return the same for a file that `fuzzytree.exporters.python` wrote of a model."""
     answer = _answer_of(content)
-    rules = len(model.rules) if isinstance(model, RuleBase) else None
 
     def run(values: FloatArray) -> Outcome:
-        import numpy as np
+        from fuzzytree.runtimes.rows import checked, outcome_of
 
-        from fuzzytree.runtimes.rows import checked
-
-        array = checked(values, model.inputs)
-        rows = array.T.tolist()
-        answers = [answer(row) for row in rows]
-        strengths = None
-        if rules is not None:
-            result = [row[3] for row in answers if len(row) == 4]
-            strengths = np.array(result, np.float64).reshape(len(rows), rules).T
-        return Outcome(
-            np.array([row[1] for row in answers], np.int64),
-            np.array([row[2] for row in answers], np.int64),
-            strengths,
-        )
+        answers = map(answer, checked(values, model.inputs).T.tolist())
+        rows = [[*row[1:3], *(row[3] if len(row) == 4 else ())] for row in answers]
+        return outcome_of(model, rows)
 
     return run
 

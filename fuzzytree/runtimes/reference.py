@@ -24,25 +24,16 @@ def load(model: Model) -> Run:
     """Return a function that answers rows one after another."""
 
     def run(values: FloatArray) -> Outcome:
-        import numpy as np
-
-        from fuzzytree.runtimes.rows import checked
+        from fuzzytree.runtimes.rows import checked, outcome_of
 
         table = checked(values, model.inputs).T.tolist()
         rows = [dict(zip(model.inputs, row, strict=True)) for row in table]
         answers: list[Answer]
         if isinstance(model, RuleBase):
             answers = [evaluate(model, row) for row in rows]
-            strengths = np.array([answer.strengths for answer in answers], np.float64)
-            strengths = strengths.reshape(len(rows), len(model.rules)).T
         else:
             answers = [descend(model, row) for row in rows]
-            strengths = None
-        return Outcome(
-            rule=np.array([answer.rule for answer in answers], np.int64),
-            status=np.array([answer.status for answer in answers], np.int64),
-            strengths=strengths,
-        )
+        return outcome_of(model, [[a.rule, a.status, *a.strengths] for a in answers])
 
     return run
 

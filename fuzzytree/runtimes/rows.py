@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import Part, Variable
+from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.model import Model, Outcome, Part, RuleBase, Variable
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -69,6 +70,29 @@ def winners(
     result[0, uncovered], result[1, uncovered] = 0, 2
     result[0, missing], result[1, missing] = 0, 3
     return result
+
+
+def outcome_of(model: Model, rows: Sequence[Sequence[float | None]]) -> Outcome:
+    """Return rows of a rule, a status and any strengths, None for NaN, as an outcome.
+
+    Raises:
+        FuzzyTreeError: If there are more or fewer strengths than rules.
+    """
+    count = len(model.rules) if isinstance(model, RuleBase) else 0
+    width = len(rows[0]) if rows else 2 + count
+    table = np.array(rows, np.float64).reshape(len(rows), width)
+    if table.shape[1] not in (2, 2 + count):
+        raise FuzzyTreeError(f"it gives {table.shape[1] - 2} strengths, not {count}")
+    strengths = table[:, 2:].T if table.shape[1] > 2 else None
+    last = len(model.rules if isinstance(model, RuleBase) else model.leaves)
+    for what, numbers, most in (
+        ("rule", table[:, 0], last),
+        ("status", table[:, 1], 3),
+    ):
+        if not np.isin(numbers, np.arange(most + 1)).all():
+            raise FuzzyTreeError(f"it answers a {what} that is none of 0 to {most}")
+    rule, status = table[:, :2].T.astype(np.int64)
+    return Outcome(rule, status, strengths)
 
 
 def _shown(names: Sequence[str]) -> str:

@@ -25,6 +25,7 @@ from fuzzytree.errors import FuzzyTreeError, MissingExtraError
 from fuzzytree.exporters import beginning
 from fuzzytree.model import Model, Outcome, RuleBase
 from fuzzytree.runtimes import c
+from fuzzytree.runtimes.rows import outcome_of
 from fuzzytree.semantics import Status
 
 if TYPE_CHECKING:
@@ -138,31 +139,9 @@ def _script(language: str) -> Engine:
     ) -> ProgramOutcome:
         result = numbers_of(content, language, values, model.classes)
         labels = tuple(None if k < 0 else model.classes[int(k)] for k in result[:, 0])
-        return ProgramOutcome(_outcome(model, result[:, 1:].tolist()), labels)
+        return ProgramOutcome(outcome_of(model, result[:, 1:].tolist()), labels)
 
     return run
-
-
-def _outcome(model: Model, rows: Sequence[Sequence[float | None]]) -> Outcome:
-    """Return rows of a rule, a status and any strengths, None for NaN, as an outcome.
-
-    Raises:
-        FuzzyTreeError: If there are more or fewer strengths than rules.
-    """
-    table = np.array(rows, np.float64).reshape(len(rows), -1)
-    count = len(model.rules) if isinstance(model, RuleBase) else 0
-    if table.shape[1] not in (2, 2 + count):
-        raise FuzzyTreeError(f"it gives {table.shape[1] - 2} strengths, not {count}")
-    strengths = table[:, 2:].T if table.shape[1] > 2 else None
-    last = len(model.rules if isinstance(model, RuleBase) else model.leaves)
-    for what, numbers, most in (
-        ("rule", table[:, 0], last),
-        ("status", table[:, 1], 3),
-    ):
-        if not np.isin(numbers, np.arange(most + 1)).all():
-            raise FuzzyTreeError(f"it answers a {what} that is none of 0 to {most}")
-    rule, status = table[:, :2].T.astype(np.int64)
-    return Outcome(rule, status, strengths)
 
 
 def _c(
@@ -208,7 +187,7 @@ def _queried(
     kept = np.array([row[:width] for row in result], np.float64).reshape(-1, width)
     if not np.array_equal(kept, values.T, equal_nan=True):
         raise FuzzyTreeError("it does not give each row with its inputs, in order")
-    outcome = _outcome(model, [row[width + 1 :] for row in result])
+    outcome = outcome_of(model, [row[width + 1 :] for row in result])
     return ProgramOutcome(outcome, tuple(row[width] for row in result))
 
 
@@ -235,7 +214,7 @@ def _pmml(
         status = Status.DECIDED if rule else Status.UNCOVERED
         fired = [line[name] if known[place] else math.nan for name in names]
         rows.append([rule, status if known[place] else Status.MISSING, *fired])
-    return ProgramOutcome(_outcome(model, rows), labels, has_status=False)
+    return ProgramOutcome(outcome_of(model, rows), labels, has_status=False)
 
 
 def _need(package: str, purpose: str) -> None:
