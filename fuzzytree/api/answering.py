@@ -220,8 +220,8 @@ def _answering_numbers(
     names: tuple[str, ...],
 ) -> Answering:
     def answer(values: FloatArray) -> Outputs:
-        found = execute(np.ascontiguousarray(values))
-        return Outputs(names, found.outputs, found.status, found.activations)
+        outcome = execute(np.ascontiguousarray(values))
+        return Outputs(names, outcome.outputs, outcome.status, outcome.activations)
 
     return Answering(inputs, trained, answer)
 

@@ -194,18 +194,20 @@ def floors(question: Question) -> Candidates:
         >>> found[0].name
         'floor: the columns read once'
     """
-    found = [
+    candidates = [
         Candidate(
             READING, question, "floor", _load_reading, note="the sum of each column"
         )
     ]
     if not all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
-        return found, [Omission(SESSION, f"not installed ({install_hint('onnx')})")]
+        return candidates, [
+            Omission(SESSION, f"not installed ({install_hint('onnx')})")
+        ]
     note = "onnxruntime hands the same table back"
     session = Candidate(
         SESSION, question, "floor", _load_session, note=note, is_foreign=True
     )
-    return [*found, session], []
+    return [*candidates, session], []
 
 
 def _nothing(values: FloatArray) -> CandidateOutput:
@@ -231,8 +233,8 @@ def _load_session(threads: int) -> LoadedCandidate:
     node = helper.make_node("Identity", ["inputs"], ["same"])
     graph = helper.make_graph([node], "empty", shapes[:1], shapes[1:])
     imports = [helper.make_opsetid("", 17)]
-    made = helper.make_model(graph, ir_version=8, opset_imports=imports)
-    content = made.SerializeToString()
+    proto = helper.make_model(graph, ir_version=8, opset_imports=imports)
+    content = proto.SerializeToString()
     bare = open_bare(content, threads)
 
     def call(values: FloatArray) -> Callable[[], object]:
@@ -294,13 +296,13 @@ def _makers(rules: RuleBase) -> dict[str, Make]:
     Without curves there is nothing to approximate.
     """
     largest = _largest_degree(rules)
-    found: dict[str, Make] = {}
+    makers: dict[str, Make] = {}
     if largest:
         for tolerance in TOLERANCES:
-            found[f"points {tolerance:.0e}"] = partial(by_points, tolerance=tolerance)
+            makers[f"points {tolerance:.0e}"] = partial(by_points, tolerance=tolerance)
     for degree in range(1, largest):
-        found[f"degree {degree}"] = partial(by_degree, degree=degree)
-    return found
+        makers[f"degree {degree}"] = partial(by_degree, degree=degree)
+    return makers
 
 
 def _largest_degree(rules: RuleBase) -> int:
@@ -325,15 +327,17 @@ def _load(
     layouts: Layouts,
     threads: int,
 ) -> LoadedCandidate:
-    found = approximate()
-    loaded = load_runtime(runtime, found.model, layouts, threads)
+    approximation = approximate()
+    loaded = load_runtime(runtime, approximation.model, layouts, threads)
 
     def bound() -> Bound | None:
-        certified = bounds(found.model, runtime.dtype)
+        certified = bounds(approximation.model, runtime.dtype)
         if certified is None:
             return None
         error, origin = certified
-        return min(found.bound + error, 1.0), f"{found.origin}, and {origin}"
+        return min(
+            approximation.bound + error, 1.0
+        ), f"{approximation.origin}, and {origin}"
 
     return replace(loaded, bound=bound)
 
@@ -353,12 +357,12 @@ def gather(model: Model, values: FloatArray, peers: str | None = None) -> Candid
     """
     layouts = Layouts()
     main = next(iter(questions(model)))
-    found, omitted = floors(main)
+    measures, omitted = floors(main)
     bounds = _bounds(values)
     mine, absent = own(model, bounds, layouts)
     others, missing = load_peers(peers)(model, bounds)
     changed, left = variants(model, bounds, layouts)
-    return [*found, *mine, *others, *changed], [*omitted, *absent, *missing, *left]
+    return [*measures, *mine, *others, *changed], [*omitted, *absent, *missing, *left]
 
 
 def foreign(model: Model, peers: str | None) -> list[Candidate]:
@@ -473,9 +477,9 @@ def _bounds(values: FloatArray) -> Bounds:
     def bounds(rules: RuleBase, dtype: Dtype) -> Bound | None:
         terms = sum(len(variable.terms) for variable in rules.variables)
         rows = max(_MOST_DEGREES // max(terms, 1), MOST_ROWS)
-        found = certify(rules, dtype, values[:, :rows])
-        if found.unbounded or found.delta is None:
+        certificate = certify(rules, dtype, values[:, :rows])
+        if certificate.unbounded or certificate.delta is None:
             return None
-        return found.delta, found.origin
+        return certificate.delta, certificate.origin
 
     return bounds

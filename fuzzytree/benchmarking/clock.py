@@ -297,17 +297,17 @@ def orders(
 
 
 def _timing(samples: _Samples, rows: int, threads: int) -> Timing:
-    found = interval(samples.walls)
+    span = interval(samples.walls)
     busy, wall = sum(samples.cpus), sum(samples.walls)
     is_known = all(cpu >= 0.0 for cpu in samples.cpus) and wall > 0.0
     return Timing(
         rows,
         threads,
         tuple(samples.walls),
-        found.median,
-        found.low,
-        found.high,
-        found.confidence,
+        span.median,
+        span.low,
+        span.high,
+        span.confidence,
         samples.calls,
         tuple(samples.rounds),
         max(0.0, 1.0 - busy / wall) if is_known else None,

@@ -58,7 +58,7 @@ def entries(
     points: Sequence[Point], question: Question, rows: int, threads: int
 ) -> list[FrontEntry]:
     """Return the points that can be compared, the fastest first."""
-    found = [
+    comparable = [
         FrontEntry(point, timing, error)
         for point in points
         if point.question == question and point.kind != "floor"
@@ -66,13 +66,15 @@ def entries(
         for timing in point.timings
         if (timing.rows, timing.threads) == (rows, threads)
     ]
-    return sorted(found, key=lambda one: (one.timing.median_ns, one.error, one.name))
+    return sorted(
+        comparable, key=lambda one: (one.timing.median_ns, one.error, one.name)
+    )
 
 
-def front(found: Sequence[FrontEntry]) -> list[FrontEntry]:
+def front(ordered: Sequence[FrontEntry]) -> list[FrontEntry]:
     """Return whom nobody beats: each is slower than the one before, and more exact."""
     kept: list[FrontEntry] = []
-    for one in found:
+    for one in ordered:
         if not kept or one.error < kept[-1].error:
             kept.append(one)
     return kept
@@ -80,13 +82,13 @@ def front(found: Sequence[FrontEntry]) -> list[FrontEntry]:
 
 def fronts(points: Sequence[Point]) -> tuple[Front, ...]:
     """Return the front of each question, number of rows and number of threads."""
-    found: list[Front] = []
+    records: list[Front] = []
     for question, rows, threads in settings(points):
         best = front(entries(points, question, rows, threads))
         if best:
             names = tuple(one.name for one in best)
-            found.append(Front(question, rows, threads, names))
-    return tuple(found)
+            records.append(Front(question, rows, threads, names))
+    return tuple(records)
 
 
 def settings(points: Sequence[Point]) -> list[tuple[Question, int, int]]:
@@ -113,7 +115,7 @@ def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...
     Returns:
         Sentences, those for most rows last; the last one is the one to remember.
     """
-    found: list[str] = []
+    sentences: list[str] = []
     fewest = min((t.threads for point in points for t in point.timings), default=1)
     sizes: list[tuple[Question, int]] = [
         (question, rows)
@@ -123,8 +125,8 @@ def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...
     for question, rows in sorted(sizes, key=lambda size: size[1]):
         known = entries(points, question, rows, fewest)
         wanted = None if question == "tree" else most
-        found += reversed([*_sentences(known, question, rows, wanted)])
-    return tuple(found)
+        sentences += reversed([*_sentences(known, question, rows, wanted)])
+    return tuple(sentences)
 
 
 def _sentences(
@@ -223,12 +225,12 @@ def _level(best: FrontEntry, level: float) -> str:
     error = best.point.error
     if best.point.question != "tree" or error is None:
         return f"an error of at most {level:g}"
-    seen = f"in {error.rows:,} row{'' if error.rows == 1 else 's'}"
+    where = f"in {error.rows:,} row{'' if error.rows == 1 else 's'}"
     edges = best.point.probes
     if edges is not None and edges.flips:
-        seen += f" (but {edges.flips} of {edges.rows} probes at its cuts)"
+        where += f" (but {edges.flips} of {edges.rows} probes at its cuts)"
     changed = "no class" if level == 0.0 else f"at most {level:.2%} of classes"
-    return f"{changed} changed {seen}"
+    return f"{changed} changed {where}"
 
 
 def _times(ratio: float) -> str:

@@ -131,22 +131,22 @@ def _edges(model: Model) -> FloatArray:
 def _error(
     loaded: LoadedCandidate, sample: _Sample, bound: float | None, origin: str
 ) -> Error:
-    found = loaded.answer(sample.values)
+    output = loaded.answer(sample.values)
     facts = error_against_exact(
         sample.model,
         sample.values,
-        found.labels,
-        found.strengths,
+        output.labels,
+        output.strengths,
         bound=bound,
         origin=origin,
         exact=sample.exact,
     )
     error = Error(**facts._asdict())
-    return msgspec.structs.replace(error, largest=_largest(facts, found, sample))
+    return msgspec.structs.replace(error, largest=_largest(facts, output, sample))
 
 
 def _largest(
-    facts: ErrorMeasure, found: CandidateOutput, sample: _Sample
+    facts: ErrorMeasure, output: CandidateOutput, sample: _Sample
 ) -> float | None:
     """Return the largest error, not above the bound where only the oracle is in doubt.
 
@@ -156,9 +156,9 @@ def _largest(
     largest, bound = facts.largest, facts.bound
     if largest is None or bound is None or largest <= bound:
         return largest
-    if not isinstance(sample.model, RuleBase) or found.strengths is None:
+    if not isinstance(sample.model, RuleBase) or output.strengths is None:
         return largest
-    least, _ = strength_errors(sample.model, sample.values, found.strengths)
+    least, _ = strength_errors(sample.model, sample.values, output.strengths)
     return largest if least.max() > bound else bound
 
 

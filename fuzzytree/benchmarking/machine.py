@@ -54,22 +54,22 @@ def after(before: Machine, timings: Sequence[Timing]) -> Machine:
     )
 
 
-def noise(found: Machine, points: Sequence[Point]) -> Iterator[str]:
+def noise(facts: Machine, points: Sequence[Point]) -> Iterator[str]:
     """Yield what makes the times doubtful, a sentence each.
 
     The machine counts as noisy if the process was kept from running for more than a
     twentieth of the time, if others wanted its cores before it began, or if half of
     the intervals are wider than a tenth of their median.
     """
-    if found.stolen is not None and found.stolen > _STOLEN:
+    if facts.stolen is not None and facts.stolen > _STOLEN:
         yield (
-            f"the machine was noisy: for {found.stolen:.0%} of the time the process "
+            f"the machine was noisy: for {facts.stolen:.0%} of the time the process "
             "was ready and did not run; times are too high by about as much"
         )
-    if found.load_before and found.load_before[0] > found.cores - 0.5:
+    if facts.load_before and facts.load_before[0] > facts.cores - 0.5:
         yield (
-            f"the machine was busy: its load was {found.load_before[0]:.2g} on "
-            f"{found.cores} cores before the study began"
+            f"the machine was busy: its load was {facts.load_before[0]:.2g} on "
+            f"{facts.cores} cores before the study began"
         )
     widths = [
         (one.high_ns - one.low_ns) / one.median_ns

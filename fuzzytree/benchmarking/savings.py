@@ -132,7 +132,7 @@ class Footprint(msgspec.Struct, frozen=True):
 
 def report(
     model: Model,
-    found: Pruned,
+    remainder: Pruned,
     *,
     uses: Collection[Use] = ("tree", "relative"),
     data: FloatArray | None = None,
@@ -144,37 +144,37 @@ def report(
 
     Args:
         model: The model.
-        found: Its pruned form.
+        remainder: Its pruned form.
         uses: What a tree serves, as when it was pruned.
         data: Rows of one's own for the proof, in the order of the model's inputs.
         table: The path of a table; reading it is timed.
         seconds: For all timings together; 0 for none.
         progress: Called with the current step and the share that is done.
     """
-    made = stages(model, found.model)
-    taken, omissions = sizes(made, uses)
+    models = stages(model, remainder.model)
+    taken, omissions = sizes(models, uses)
     timed, untimed = (
         ((), ())
         if seconds <= 0
-        else costs(made, uses, table=table, seconds=seconds, progress=progress)
+        else costs(models, uses, table=table, seconds=seconds, progress=progress)
     )
     return Footprint(
         needs(model, uses=uses),
-        found.removed,
-        found.rules,
+        remainder.removed,
+        remainder.rules,
         taken,
         timed,
-        prove(model, found, uses=uses, data=data),
+        prove(model, remainder, uses=uses, data=data),
         (*omissions, *untimed),
     )
 
 
 def stages(model: Model, left: Model) -> dict[str, Model]:
     """Return the model in its stages; without the first if it has no more columns."""
-    made = {AS_IT_IS: model, PRUNED: left}
+    models = {AS_IT_IS: model, PRUNED: left}
     if set(model.columns) > set(model.inputs):
-        return {ALL_COLUMNS: with_all_columns(model), **made}
-    return made
+        return {ALL_COLUMNS: with_all_columns(model), **models}
+    return models
 
 
 def with_all_columns(model: Model) -> Model:
@@ -195,11 +195,11 @@ def with_all_columns(model: Model) -> Model:
 
 
 def sizes(
-    made: Mapping[str, Model], uses: Collection[Use]
+    models: Mapping[str, Model], uses: Collection[Use]
 ) -> tuple[tuple[Size, ...], tuple[str, ...]]:
     """Return how large each stage is, and what could not be written and why."""
     omissions: list[str] = []
-    found = [
+    records = [
         Size(
             stage,
             len(model.inputs),
@@ -207,9 +207,9 @@ def sizes(
             _term_count(model),
             tuple(_files(model, uses, omissions)),
         )
-        for stage, model in made.items()
+        for stage, model in models.items()
     ]
-    return tuple(found), tuple(dict.fromkeys(omissions))
+    return tuple(records), tuple(dict.fromkeys(omissions))
 
 
 def _term_count(model: Model) -> int:
@@ -238,7 +238,7 @@ _Key = tuple[str, str, str, str]  # stage, representation, runtime, what
 
 
 def costs(
-    made: Mapping[str, Model],
+    models: Mapping[str, Model],
     uses: Collection[Use],
     *,
     table: object = None,
@@ -259,7 +259,7 @@ def costs(
     """
     omissions: list[str] = []
     groups: dict[int, dict[_Key, Call]] = {1: {}, BATCH: {}}
-    for stage, model in made.items():
+    for stage, model in models.items():
         rows = _plain_rows(model, BATCH)
         for title, representation in forms(model, uses).items():
             for rows_of, key, call in _calls(
@@ -274,7 +274,7 @@ def costs(
                 omissions.append(f"reading {path_of(table)}, {stage}: {error}")
             else:
                 groups[1][stage, "", "", "read the table"] = reading
-    found: list[Cost] = []
+    records: list[Cost] = []
     for size, calls in groups.items():
         named = {" ".join(filter(None, key)): key for key in calls}
         timed = time_calls(
@@ -288,11 +288,11 @@ def costs(
             raise failure
         if timed.is_interrupted:
             raise KeyboardInterrupt
-        found += [Cost(*named[name], one) for name, one in timed.timings.items()]
+        records += [Cost(*named[name], one) for name, one in timed.timings.items()]
         omissions += [
             f"{name}: the time was over" for name in named if name not in timed.timings
         ]
-    return tuple(found), tuple(dict.fromkeys(omissions))
+    return tuple(records), tuple(dict.fromkeys(omissions))
 
 
 def _calls(
@@ -321,8 +321,8 @@ def _bound(run: Callable[[FloatArray], object], values: FloatArray) -> Call:
 
 def _reading(table: object, model: Model) -> Call:
     def read() -> int:
-        found = batches(table, model.inputs, trained=model.columns)
-        return sum(batch.values.shape[1] for batch in found)
+        pieces = batches(table, model.inputs, trained=model.columns)
+        return sum(batch.values.shape[1] for batch in pieces)
 
     return read
 

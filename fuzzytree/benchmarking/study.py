@@ -142,14 +142,14 @@ def bench(
     plan = plan or BenchSettings()
     if values is None:
         count = min(max(plan.rows), _MADE)
-        values, made = made_rows(model, count, seed=plan.seed)
-        text = _data_text(f"{_rows(count)} {made}", count, plan)
+        values, origin = made_rows(model, count, seed=plan.seed)
+        text = _data_text(f"{_rows(count)} {origin}", count, plan)
     else:
         _check(model, values)
         count = values.shape[1]
         text = _data_text(f"{data or 'a table'}, {_rows(count)}", count, plan)
-    found, omitted = gather(model, values, plan.peers)
-    kept, left = chosen(found, as_names(only), as_names(skip))
+    candidates, omitted = gather(model, values, plan.peers)
+    kept, left = chosen(candidates, as_names(only), as_names(skip))
     return run_study(
         model,
         kept,
@@ -290,12 +290,17 @@ class _Run:
             try:
                 loaded = one.load(min(self.plan.threads))
                 load_ms = (self.clock.wall() - start) / 1e6
-                found = judge.judged(one, loaded)
+                judgement = judge.judged(one, loaded)
             except Exception as error:  # whatever foreign code raises is a finding
                 self.omit(one.name, trial.error_text(error))
                 continue
             self.drafts[one.name] = _Draft(
-                one, loaded, load_ms, found.error, found.probes, found.row_ns
+                one,
+                loaded,
+                load_ms,
+                judgement.error,
+                judgement.probes,
+                judgement.row_ns,
             )
 
     def time(self) -> None:
@@ -320,7 +325,7 @@ class _Run:
         values = repeated(self.values, rows)
         end = self.spent_s() + seconds
         calls = dict(self._calls(names, values, threads, end))
-        found = time_calls(
+        result = time_calls(
             calls,
             rows=rows,
             threads=threads,
@@ -330,7 +335,7 @@ class _Run:
             progress=progress,
             clock=self.clock,
         )
-        self._keep(found, rows, threads, len(calls))
+        self._keep(result, rows, threads, len(calls))
 
     def _members(self, rows: int, threads: int) -> Iterator[str]:
         """Yield the candidates to time; more threads are for parallel ones."""
@@ -395,22 +400,22 @@ class _Run:
             draft.threaded[threads] = draft.candidate.load(threads)
         return draft.threaded[threads]
 
-    def _keep(self, found: CallTimings, rows: int, threads: int, count: int) -> None:
+    def _keep(self, result: CallTimings, rows: int, threads: int, count: int) -> None:
         """Take what was measured, whole or not."""
-        for name, error in found.failures.items():
+        for name, error in result.failures.items():
             self.omit(name, f"{rows:,} rows: {trial.error_text(error)}")
-        for name, timing in found.timings.items():
+        for name, timing in result.timings.items():
             draft = self.drafts[name]
             draft.timings.append(timing)
             draft.row_ns = min(draft.row_ns, timing.median_ns / rows)
-        if found.is_interrupted:
+        if result.is_interrupted:
             raise KeyboardInterrupt
-        if len(found.timings) + len(found.failures) < count:
+        if len(result.timings) + len(result.failures) < count:
             self.is_complete = False
             self.warnings.append(
                 f"the time was over at {_rows(rows)}, {threads} "
-                f"thread{'' if threads == 1 else 's'}: {len(found.timings)} of {count} "
-                "candidates have a time there"
+                f"thread{'' if threads == 1 else 's'}: {len(result.timings)} of "
+                f"{count} candidates have a time there"
             )
 
     def study(self, data: str, before: Machine) -> Study:
@@ -418,17 +423,17 @@ class _Run:
         drafts = [d for d in self.drafts.values() if d.timings]
         points = tuple(map(_point, drafts))
         timings = [timing for point in points for timing in point.timings]
-        found = after(before, timings)
+        facts = after(before, timings)
         return Study(
             self.model.name,
             fingerprint(self.model),
             data,
-            found,
+            facts,
             points,
             tuple(self.omissions),
             warnings=(
                 *self.warnings,
-                *noise(found, points),
+                *noise(facts, points),
                 *_unsure(points),
                 *faults(points),
             ),

@@ -66,9 +66,11 @@ def abilities_of(
         >>> abilities_of(find_format("python"))[0].outcome
         'written'
     """
-    found = all_samples() if models is None else models
+    samples = all_samples() if models is None else models
     options = {} if dialect is None else {"dialect": dialect}
-    return tuple(_ability(form, name, model, options) for name, model in found.items())
+    return tuple(
+        _ability(form, name, model, options) for name, model in samples.items()
+    )
 
 
 def dialects_of(form: Format) -> tuple[str, ...]:
@@ -90,15 +92,15 @@ def _ability(
     form: Format, name: str, model: Document, options: Mapping[str, str]
 ) -> Ability:
     try:
-        given = formed(model, form)
+        document = formed(model, form)
     except LossError:
         return Ability(name, "no")
-    if kind_of(given) not in form.carries:
+    if kind_of(document) not in form.carries:
         return Ability(name, "no")
     # Each writer checks its own options; the protocol knows the common one alone.
     write = cast("Callable[..., Written]", form.write)
     try:
-        written = write(given, allow_loss=True, **options)
+        written = write(document, allow_loss=True, **options)
     except MissingExtraError:
         raise
     except FuzzyTreeError as error:
@@ -112,7 +114,7 @@ def _ability(
     if form.read is None:
         return Ability(name, "written")
     again = form.read(written.content, form.name)
-    match equivalence(given, written, again):
+    match equivalence(document, written, again):
         case "equal" if not again.losses:
             return Ability(name, "equal")
         case "equal" | "alike" | "renamed":

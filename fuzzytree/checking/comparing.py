@@ -170,7 +170,7 @@ def judged(
 
 
 def compare_bits(
-    found: ModelRun,
+    actual: ModelRun,
     expected: ModelRun,
     rows: RowSet,
     *,
@@ -182,12 +182,12 @@ def compare_bits(
     Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value. Rows that
     are excused may differ, for the reason that `origin` states.
     """
-    gap = strength_gap(found.outcome, expected.outcome)
-    wrong = unequal(found.outcome, expected.outcome)
-    wrong |= labels(found) != labels(expected)
+    gap = strength_gap(actual.outcome, expected.outcome)
+    wrong = unequal(actual.outcome, expected.outcome)
+    wrong |= labels(actual) != labels(expected)
     if excused is None:
-        return _compared(found, expected, rows, wrong, gap)
-    return _compared(found, expected, rows, wrong & ~excused, gap, origin=origin)
+        return _compared(actual, expected, rows, wrong, gap)
+    return _compared(actual, expected, rows, wrong & ~excused, gap, origin=origin)
 
 
 def unequal(one: Outcome, two: Outcome) -> BoolArray:
@@ -215,7 +215,7 @@ def same_bits(one: FloatArray, two: FloatArray) -> BoolArray:
 
 
 def compare_within(
-    found: ModelRun,
+    actual: ModelRun,
     expected: ModelRun,
     rows: RowSet,
     *,
@@ -232,23 +232,23 @@ def compare_within(
     of the largest difference, and its `origin`.
     """
     is_bound = allowed < 1.0
-    apart = strength_gap(found.outcome, expected.outcome)
+    apart = strength_gap(actual.outcome, expected.outcome)
     gap = np.where(is_bound, apart, 0.0)
-    flips = labels(found) != labels(expected)
+    flips = labels(actual) != labels(expected)
     margin = margins(expected)
     close = np.zeros_like(flips) if margin is None else margin <= 2 * allowed
     wrong = is_bound & ((gap > allowed) | (flips & ~close))
     excess = gap / np.maximum(allowed, 1e-300) if wrong.any() else gap
     limit = float(allowed[np.argmax(excess)]) if gap.size else 0.0
     return msgspec.structs.replace(
-        _compared(found, expected, rows, wrong, gap, limit, origin),
+        _compared(actual, expected, rows, wrong, gap, limit, origin),
         unbounded=int((~is_bound).sum()),
         largest_unbounded=float(apart[~is_bound].max(initial=0.0)),
     )
 
 
 def compare_answers(
-    found: ModelRun,
+    actual: ModelRun,
     expected: ModelRun,
     rows: RowSet,
     *,
@@ -259,11 +259,11 @@ def compare_answers(
     `by_design` says that the two are different functions, so that a difference is
     reported and not a fault.
     """
-    flips = labels(found) != labels(expected)
+    flips = labels(actual) != labels(expected)
     gap = np.zeros(flips.shape)
     verdict: Verdict | None = "differs by design" if by_design and flips.any() else None
     return _compared(
-        found, expected, rows, flips, gap, origin="equal classes", verdict=verdict
+        actual, expected, rows, flips, gap, origin="equal classes", verdict=verdict
     )
 
 
@@ -307,10 +307,10 @@ def compare_file(
     if is_float32 and isinstance(base.model, FuzzyTree):
         excused = open_paths(base.model, "float32", rows.values)
     if answers.outcome is not None:
-        found, right = ModelRun(title, base.model, answers.outcome), base
+        actual, right = ModelRun(title, base.model, answers.outcome), base
         if not answers.has_status:
-            found, right = _without_status(found), _without_status(base)
-        yield compare_bits(found, right, rows, excused=excused, origin=origin)
+            actual, right = _without_status(actual), _without_status(base)
+        yield compare_bits(actual, right, rows, excused=excused, origin=origin)
     if answers.labels is not None:
         classes = [*base.model.classes, None]
         wanted = [classes[number] for number in labels(base).tolist()]
@@ -330,16 +330,16 @@ def native_base(model: Model, dtype: Dtype, rows: RowSet) -> ModelRun:
     return ModelRun("the model", model, native.load(model)(rows.values))
 
 
-def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
+def strength_gap(actual: Outcome, expected: Outcome) -> FloatArray:
     """Return the largest difference of a strength in each row; NaN equals NaN.
 
     Zeros where one of the two has no strengths; infinite where one has a rule more.
     """
-    one, two = found.strengths, expected.strengths
+    one, two = actual.strengths, expected.strengths
     if one is None or two is None:
-        return np.zeros(found.rule.shape)
+        return np.zeros(actual.rule.shape)
     if one.shape != two.shape:
-        return np.full(found.rule.shape, np.inf)
+        return np.full(actual.rule.shape, np.inf)
     gap = np.abs(one - two)
     gap[np.isnan(one) & np.isnan(two)] = 0.0
     gap[np.isnan(gap)] = np.inf
@@ -367,7 +367,7 @@ def margins(answers: ModelRun) -> FloatArray | None:
 
 
 def _compared(
-    found: ModelRun,
+    actual: ModelRun,
     expected: ModelRun,
     rows: RowSet,
     wrong: BoolArray,
@@ -376,15 +376,15 @@ def _compared(
     origin: str = "equal bits",
     verdict: Verdict | None = None,
 ) -> Comparison:
-    flips = labels(found) != labels(expected)
+    flips = labels(actual) != labels(expected)
     margin = margins(expected)
     shown = np.flatnonzero(wrong)
     shown = shown[np.argsort(-gap[shown], kind="stable")][:_SHOWN]
-    detail = [_row_text(found, expected, rows, row) for row in shown.tolist()]
+    detail = [_row_text(actual, expected, rows, row) for row in shown.tolist()]
     if detail and gap.any() and not flips.any():
         detail.insert(0, "only strengths differ: every row has the same class")
     return Comparison(
-        found.title,
+        actual.title,
         expected.title,
         "rows",
         int(wrong.size),
@@ -402,16 +402,16 @@ def _compared(
     )
 
 
-def _row_text(found: ModelRun, expected: ModelRun, rows: RowSet, row: int) -> str:
-    wanted, got = _answer_text(expected, row), _answer_text(found, row)
+def _row_text(actual: ModelRun, expected: ModelRun, rows: RowSet, row: int) -> str:
+    wanted, got = _answer_text(expected, row), _answer_text(actual, row)
     if wanted == got:
-        return f"{rows.text(row)}: both answer {got}{_apart(found, expected, row)}"
-    return f"{rows.text(row)}: {expected.title} answers {wanted}, {found.title} {got}"
+        return f"{rows.text(row)}: both answer {got}{_apart(actual, expected, row)}"
+    return f"{rows.text(row)}: {expected.title} answers {wanted}, {actual.title} {got}"
 
 
-def _apart(found: ModelRun, expected: ModelRun, row: int) -> str:
+def _apart(actual: ModelRun, expected: ModelRun, row: int) -> str:
     """Return where the strengths of a row are furthest apart, in words."""
-    one, two = found.outcome.strengths, expected.outcome.strengths
+    one, two = actual.outcome.strengths, expected.outcome.strengths
     if one is None or two is None or one.shape != two.shape:
         return ""
     gap = np.abs(one[:, row] - two[:, row])
@@ -422,7 +422,7 @@ def _apart(found: ModelRun, expected: ModelRun, row: int) -> str:
     right, other = float(two[rule, row]), float(one[rule, row])
     return (
         f"; the strength of rule {rule + 1} is {right!r} in {expected.title}, "
-        f"{other!r} in {found.title}"
+        f"{other!r} in {actual.title}"
     )
 
 
@@ -441,7 +441,7 @@ def _answer_text(answers: ModelRun, row: int) -> str:
 
 
 def compare_exact(
-    found: ModelRun, truth: Decisions, rows: RowSet, *, dtype: Dtype
+    actual: ModelRun, truth: Decisions, rows: RowSet, *, dtype: Dtype
 ) -> Certified:
     """Compare predictions with the exact ones, within what a number type may change.
 
@@ -452,22 +452,22 @@ def compare_exact(
     Rows of the data are counted if there are any.
     """
     allowed = np.zeros(len(rows.numbers))
-    if isinstance(found.model, RuleBase):
-        allowed, _ = strength_bounds(found.model, dtype, rows.values)
-    low, flips, close = exact_errors(found, truth, rows.values, dtype, allowed)
+    if isinstance(actual.model, RuleBase):
+        allowed, _ = strength_bounds(actual.model, dtype, rows.values)
+    low, flips, close = exact_errors(actual, truth, rows.values, dtype, allowed)
     wrong = flips & ~close
     if low is not None:
         wrong |= (low > allowed) & (allowed < 1.0)
     is_data = len(rows.numbers) > rows.probes
     own = rows.numbers >= (rows.probes if is_data else 0)
-    facts = certify(found.model, dtype, rows.values[:, own] if is_data else None)
+    facts = certify(actual.model, dtype, rows.values[:, own] if is_data else None)
     if facts.reasons and not is_data:
-        facts = certify(found.model, dtype, rows.values)
-    lost, gained = _cover(found, truth)
+        facts = certify(actual.model, dtype, rows.values)
+    lost, gained = _cover(actual, truth)
     flipped = truth.margin_high[own & flips]
     bounded = own & (allowed < 1.0)
     return Certified(
-        found.title,
+        actual.title,
         dtype,
         facts.sentence,
         facts.delta,
@@ -482,7 +482,7 @@ def compare_exact(
         int((gained & own).sum()),
         int((own & (allowed >= 1.0)).sum()) if low is not None else 0,
         "DISAGREES" if wrong.any() else "agrees",
-        tuple(_exact_texts(found, truth, rows, wrong, allowed, low)),
+        tuple(_exact_texts(actual, truth, rows, wrong, allowed, low)),
     )
 
 
@@ -502,32 +502,32 @@ class ExactErrors(NamedTuple):
 
 
 def exact_errors(
-    found: ModelRun,
+    actual: ModelRun,
     truth: Decisions,
     values: FloatArray,
     dtype: Dtype,
     allowed: FloatArray,
 ) -> ExactErrors:
     """Return the errors of predictions, where a strength may be off by `allowed`."""
-    flips = labels(found) != truth.label
-    model, strengths = found.model, found.outcome.strengths
+    flips = labels(actual) != truth.label
+    model, strengths = actual.model, actual.outcome.strengths
     if isinstance(model, FuzzyTree):
         return ExactErrors(None, flips, open_paths(model, dtype, values))
     low = None if strengths is None else strength_errors(model, values, strengths)[0]
     return ExactErrors(low, flips, truth.margin <= 2.0 * allowed)
 
 
-def _cover(found: ModelRun, truth: Decisions) -> tuple[BoolArray, BoolArray]:
+def _cover(actual: ModelRun, truth: Decisions) -> tuple[BoolArray, BoolArray]:
     """Return which rows lost and gained cover."""
-    weighed = (found.outcome.status != Status.MISSING) & (
+    weighed = (actual.outcome.status != Status.MISSING) & (
         truth.status != Status.MISSING
     )
-    is_covered, should = found.outcome.rule > 0, truth.rule > 0
+    is_covered, should = actual.outcome.rule > 0, truth.rule > 0
     return should & ~is_covered & weighed, is_covered & ~should & weighed
 
 
 def _exact_texts(
-    found: ModelRun,
+    actual: ModelRun,
     truth: Decisions,
     rows: RowSet,
     wrong: BoolArray,
@@ -537,12 +537,12 @@ def _exact_texts(
     worst = np.flatnonzero(wrong)
     if low is not None:
         worst = worst[np.argsort(-low[worst], kind="stable")]
-    classes = found.model.classes
+    classes = actual.model.classes
     for row in worst[:_SHOWN].tolist():
         number = int(truth.label[row])
         label = classes[number] if number >= 0 else "no class"
         text = f"{rows.text(row)}: exactly {label} (rule {truth.rule[row]})"
-        text += f", {found.title} {_answer_text(found, row)}"
+        text += f", {actual.title} {_answer_text(actual, row)}"
         if low is not None:
             text += f"; a strength is off by {low[row]:.2g}, and "
             text += f"{allowed[row]:.2g} is allowed"

@@ -49,24 +49,24 @@ def failures(
         seed: Of the hostile inputs.
         damaged: How many of the files, the smallest, are damaged and read.
     """
-    found = [*_record_failures(form)]
-    if found:
-        return tuple(found)
+    faults = [*_record_failures(form)]
+    if faults:
+        return tuple(faults)
     files: list[bytes] = []
     tried: set[ModelKind] = set()
     for title, model in models:
         if kind_of(model) not in form.carries:
             continue
         tried.add(kind_of(model))
-        found += (f"{title}: {text}" for text in _model_failures(form, model, files))
+        faults += (f"{title}: {text}" for text in _model_failures(form, model, files))
     for representation in form.carries:
         if representation not in tried:
-            found.append(f"it carries {representation}, and no such model was tried")
+            faults.append(f"it carries {representation}, and no such model was tried")
     if not files:
-        found.append("it writes none of the models")
+        faults.append("it writes none of the models")
     good = sorted(set(files), key=lambda one: (len(one), one))[:damaged]
-    found += _reader_failures(form, good, random.Random(seed))
-    return tuple(dict.fromkeys(found))
+    faults += _reader_failures(form, good, random.Random(seed))
+    return tuple(dict.fromkeys(faults))
 
 
 def _record_failures(form: Format) -> Iterator[str]:
@@ -146,13 +146,13 @@ def _written_failures(
         yield f"a remark{how} is empty"
 
 
-def _is_written(found: object) -> bool:
+def _is_written(result: object) -> bool:
     """Return whether a writer, which may be of others, returned what it must."""
-    return isinstance(found, Written) and type(found.content) is bytes
+    return isinstance(result, Written) and type(result.content) is bytes
 
 
-def _is_reading(found: object) -> bool:
-    return isinstance(found, Reading)
+def _is_reading(result: object) -> bool:
+    return isinstance(result, Reading)
 
 
 def _refusal_failures(
@@ -228,13 +228,13 @@ def _reader_failures(
         return
     for title, content in [*_nonsense(), *_damaged(files, chance)]:
         begin = time.perf_counter()
-        found, error = _read(form, content)
+        reading, error = _read(form, content)
         spent = time.perf_counter() - begin
         if spent > _PATIENCE_S:
             yield f"reading {title} takes {spent:.0f} s"
-        if found is None:
+        if reading is None:
             yield from _error_failures(title, error)
-        elif not _is_reading(found):
+        elif not _is_reading(reading):
             yield f"reading {title} returns no Reading"
     for content in files:
         yield from _line_end_failures(form, content)
@@ -317,10 +317,10 @@ def _line_end_failures(form: Format, content: bytes) -> Iterator[str]:
         ("a byte order mark", b"\xef\xbb\xbf" + content),
         ("no end of the last line", content.rstrip(b"\n")),
     ):
-        found, error = _read(form, changed)
-        if found is None:
+        reading, error = _read(form, changed)
+        if reading is None:
             yield f"a file with {title} is read as {_told(error)}"
-        elif fingerprint(found.model) != fingerprint(plain.model):
+        elif fingerprint(reading.model) != fingerprint(plain.model):
             yield f"a file with {title} is read as another model"
 
 

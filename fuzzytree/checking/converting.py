@@ -171,16 +171,16 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
     if not content:
         raise ReadError(f"{name}:1:1: the file is empty")
     assert form.read is not None  # refused above; for type checkers
-    found = form.read(content, name)
-    if not isinstance(found.model, FuzzySystem):
-        return found
+    reading = form.read(content, name)
+    if not isinstance(reading.model, FuzzySystem):
+        return reading
     narrow = [
         f"term {label.name!r} of {output.name!r} is 0 at all "
         f"{len(sampled_values(output))} values at which the range is sampled: rules "
         "that conclude it change nothing"
-        for output, label in unsampled_terms(found.model)
+        for output, label in unsampled_terms(reading.model)
     ]
-    return msgspec.structs.replace(found, remarks=(*found.remarks, *narrow))
+    return msgspec.structs.replace(reading, remarks=(*reading.remarks, *narrow))
 
 
 def load(
@@ -210,8 +210,8 @@ def load_content(content: bytes, name: str, *, allow_loss: bool = False) -> Docu
         ReadError: As `load`.
         LossError: As `load`.
     """
-    found = read_content(content, format_of(name), name=name)
-    return _whole(found, name, allow_loss=allow_loss)
+    reading = read_content(content, format_of(name), name=name)
+    return _whole(reading, name, allow_loss=allow_loss)
 
 
 def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
@@ -257,15 +257,15 @@ _OBJECT_READERS: dict[tuple[str, str], Callable[[object], Document]] = {
 """The module and name of a class of another library, and what reads its objects."""
 
 
-def _whole(found: Reading, name: str, *, allow_loss: bool) -> Document:
+def _whole(reading: Reading, name: str, *, allow_loss: bool) -> Document:
     """Return what was read.
 
     Raises:
         LossError: If the model cannot hold all of it, unless allowed.
     """
-    if found.losses and not allow_loss:
-        raise LossError(losses_text(found.losses, name))
-    return found.model
+    if reading.losses and not allow_loss:
+        raise LossError(losses_text(reading.losses, name))
+    return reading.model
 
 
 def deciding(model: Document, verb: str) -> Model:
@@ -549,15 +549,14 @@ def _run(system: FuzzySystem, written: Written) -> Proof:
     from fuzzytree.runtimes import open_onnx
 
     model = open_onnx(written.content, "the file")
-    found = check(system, model, runtimes=[], limit=_FEW)
-    found.raise_if_not_ok()
-    text = f"run by onnxruntime, it answers {found.probes} probes like the system"
-    if found.coverage is not None and found.coverage.unfired:
-        count = found.coverage.rules
-        text += (
-            f", in which {count - len(found.coverage.unfired)} of {count} rules fire"
-        )
-    return Proof("alike", text, coverage=found.coverage)
+    agreement = check(system, model, runtimes=[], limit=_FEW)
+    agreement.raise_if_not_ok()
+    text = f"run by onnxruntime, it answers {agreement.probes} probes like the system"
+    coverage = agreement.coverage
+    if coverage is not None and coverage.unfired:
+        fired = coverage.rules - len(coverage.unfired)
+        text += f", in which {fired} of {coverage.rules} rules fire"
+    return Proof("alike", text, coverage=coverage)
 
 
 def _exact(model: Document, origin: str) -> Certificate | None:
@@ -610,18 +609,18 @@ def convert(
     form = find_format(to)
     name, read_as = "", ""
     if isinstance(source, Reading):
-        found = source
+        reading = source
     elif isinstance(source, str | os.PathLike):
-        found = read(source, format=format)
+        reading = read(source, format=format)
         name = os.fspath(source)
         read_as = (find_format(format) if format else format_of(source)).name
     else:
-        found = Reading(as_model(source))
-    name = name or found.model.name
-    if found.losses and not allow_loss:
-        raise LossError(losses_text(found.losses, name))
+        reading = Reading(as_model(source))
+    name = name or reading.model.name
+    if reading.losses and not allow_loss:
+        raise LossError(losses_text(reading.losses, name))
     model = formed(
-        found.model,
+        reading.model,
         form,
         representation=representation,
         kind=terms,
@@ -629,4 +628,4 @@ def convert(
     )
     written = export(model, form.name, allow_loss=allow_loss, **options)
     proof = proved(model, form, written, dtype=options.get("dtype"))
-    return Conversion(name, read_as, found, form.name, model, written, proof)
+    return Conversion(name, read_as, reading, form.name, model, written, proof)

@@ -320,7 +320,7 @@ _FEATURES: Mapping[str, Callable[[Model], Model | None]] = MappingProxyType(
 
 def prove(
     model: Model,
-    found: Pruned,
+    remainder: Pruned,
     *,
     uses: Collection[Use] = ("tree", "relative"),
     data: FloatArray | None = None,
@@ -335,7 +335,7 @@ def prove(
 
     Args:
         model: The model before.
-        found: What `pruned` made of it, or what somebody says it did.
+        remainder: What `pruned` made of it, or what somebody says it did.
         uses: What a tree serves, as when it was pruned.
         data: Rows of one's own, of shape (inputs, rows), in the order of the inputs
             of `model`.
@@ -345,8 +345,8 @@ def prove(
     Raises:
         ValueError: If a runtime is unknown, or `data` has another shape.
     """
-    whole, left = forms(model, uses), forms(found.model, uses)
-    faults = [*proof_faults(model, found.model, uses=uses, rules=found.rules)]
+    whole, left = forms(model, uses), forms(remainder.model, uses)
+    faults = [*proof_faults(model, remainder.model, uses=uses, rules=remainder.rules)]
     comparisons = [_proof(model, faults)]
     rows = probed(model, data, limit)
     for title, representation in whole.items():
@@ -355,7 +355,7 @@ def prove(
             continue
         for name in runtimes or [baseline().name]:
             comparisons += _compared(
-                title, find_runtime(name), representation, other, model, found, rows
+                title, find_runtime(name), representation, other, model, remainder, rows
             )
     return Agreement(
         model.name, fingerprint(model), tuple(comparisons), probes=rows.probes
@@ -386,15 +386,15 @@ def _compared(
     model: Model,
     left: Model,
     whole: Model,
-    found: Pruned,
+    remainder: Pruned,
     rows: RowSet,
 ) -> Iterator[Comparison]:
     if kind_of(model) not in runtime.runs:
         return
-    is_seen = _is_seen(whole, found.model, rows, runtime.dtype)
+    is_seen = _is_seen(whole, remainder.model, rows, runtime.dtype)
     order = [model.inputs.index(one) for one in left.inputs]
     outcome = runtime.load(left)(np.ascontiguousarray(rows.values[order]))
-    numbered = _in_old_numbers(outcome, model, found.rules)
+    numbered = _in_old_numbers(outcome, model, remainder.rules)
     pair = [
         ModelRun(f"pruned {title} in {runtime.name}", model, numbered),
         ModelRun(title, model, runtime.load(model)(rows.values)),

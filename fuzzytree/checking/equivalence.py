@@ -486,19 +486,19 @@ def _ordered(condition: Condition, block: RuleBlock) -> Condition:
                 if kind is And
                 else block.disjunction == "maximum"
             )
-            found = [_ordered(part, block) for part in parts]
+            ordered = [_ordered(part, block) for part in parts]
             if is_free:
-                found = sorted(
+                ordered = sorted(
                     (
                         inner
-                        for part in found
+                        for part in ordered
                         for inner in (part.parts if isinstance(part, kind) else (part,))
                     ),
                     key=repr,
                 )
-            elif isinstance(found[0], kind):
-                found[:1] = found[0].parts
-            return found[0] if len(found) == 1 else kind(tuple(found))
+            elif isinstance(ordered[0], kind):
+                ordered[:1] = ordered[0].parts
+            return ordered[0] if len(ordered) == 1 else kind(tuple(ordered))
         case _:
             return condition
 
@@ -528,7 +528,7 @@ def _conclusion(one: Conclusion, names: Names, labels: Labels) -> Conclusion:
 def _hedges(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
     """Return hedges with `very very` as two: both are the square of the square."""
     twice: tuple[Hedge, ...] = ("very", "very")
-    found: list[Hedge] = []
+    plain: list[Hedge] = []
     for hedge in hedges:
-        found.extend(twice if hedge == "very very" else (hedge,))
-    return tuple(found)
+        plain.extend(twice if hedge == "very very" else (hedge,))
+    return tuple(plain)

@@ -122,9 +122,9 @@ class CheckedModel:
             return
         some, native = self.rows.part(share), self._runs[form]
         title = self.title(form, runtime)
-        found = ModelRun(title, native.model, run(some.values))
+        actual = ModelRun(title, native.model, run(some.values))
         base = self._base(form, runtime).part(share)
-        yield _contract(runtime, found, base, some)
+        yield _contract(runtime, actual, base, some)
 
     def _base(self, form: str, runtime: Runtime) -> ModelRun:
         native, key = self._runs[form], (form, runtime.dtype)
@@ -137,10 +137,10 @@ class CheckedModel:
             self._bases[key] = ModelRun(self.title(form, base), native.model, outcome)
         return self._bases.get(key, native)
 
-    def faults(self, found: Any, expected: Any, rows: RowSet) -> list[str]:
+    def faults(self, actual: Any, expected: Any, rows: RowSet) -> list[str]:
         """Return the names of rows that are answered differently."""
         return [
-            rows.name(row) for row in np.flatnonzero(unequal(found, expected)).tolist()
+            rows.name(row) for row in np.flatnonzero(unequal(actual, expected)).tolist()
         ]
 
     def certificates(self, runtimes: Sequence[Runtime]) -> Iterator[Certified]:
@@ -160,8 +160,8 @@ class CheckedModel:
                 except LossError:  # listed among what was not examined
                     continue
                 outcome = run(self.rows.values)
-                found = ModelRun(f"{title} in {dtype}", native.model, outcome)
-                yield compare_exact(found, truth, self.rows, dtype=dtype)
+                actual = ModelRun(f"{title} in {dtype}", native.model, outcome)
+                yield compare_exact(actual, truth, self.rows, dtype=dtype)
 
     def shipped(self, title: str, other: Any) -> Iterator[Finding]:
         """Compare a file that is read as a model: its content, then its answers."""
@@ -184,8 +184,8 @@ class CheckedModel:
         kind: Kind = "raw" if file.kind == "raw" and has_raw else "relative"
         is_tree = file.representation == "tree"
         conjunction = file.semantics.conjunction
-        found = _counterpart(self.model, conjunction, None if is_tree else kind)
-        return found or _no_counterpart(self.model)
+        form = _counterpart(self.model, conjunction, None if is_tree else kind)
+        return form or _no_counterpart(self.model)
 
     def file_rows(self, title: str, file: OnnxModel) -> Iterator[Finding]:
         """Compare the answers of an ONNX file with the native ones.
@@ -223,8 +223,8 @@ def _equivalence(
     # Probes lie where the two part; how often they do so in use, only data shows.
     own = slice(rows.probes if len(rows.numbers) > rows.probes else 0, None)
     for other in raw:
-        found, expected = other.part(own), path.part(own)
-        yield compare_answers(found, expected, rows.part(own), by_design=True)
+        actual, expected = other.part(own), path.part(own)
+        yield compare_answers(actual, expected, rows.part(own), by_design=True)
 
 
 def _all_cells(
@@ -244,23 +244,23 @@ def _all_cells(
 
 
 def _contract(
-    runtime: Runtime, found: ModelRun, base: ModelRun, rows: RowSet
+    runtime: Runtime, actual: ModelRun, base: ModelRun, rows: RowSet
 ) -> Comparison:
     """Compare a runtime with its base by the contract that fits."""
-    model = found.model
+    model = actual.model
     if runtime.bound is not None:
         bound, origin = runtime.bound(model)
         allowed = np.full(rows.numbers.shape, bound)
-        return compare_within(found, base, rows, allowed=allowed, origin=origin)
+        return compare_within(actual, base, rows, allowed=allowed, origin=origin)
     if isinstance(model, FuzzyTree):
         if runtime.dtype == "float32":
             excused = open_paths(model, runtime.dtype, rows.values)
-            return compare_bits(found, base, rows, excused=excused)
+            return compare_bits(actual, base, rows, excused=excused)
     elif runtime.is_baseline:
         allowed, origin = strength_bounds(model, runtime.dtype, rows.values)
         allowed += strength_bounds(model, "float64", rows.values)[0]  # of the base
-        return compare_within(found, base, rows, allowed=allowed, origin=origin)
-    return compare_bits(found, base, rows)
+        return compare_within(actual, base, rows, allowed=allowed, origin=origin)
+    return compare_bits(actual, base, rows)
 
 
 def _shipped(title: str, other: Model, model: Model, rows: RowSet) -> Iterator[Finding]:
@@ -278,10 +278,10 @@ def _shipped(title: str, other: Model, model: Model, rows: RowSet) -> Iterator[F
             fault = f"its {what} are {', '.join(one)}"
             yield counted("file", title, f"the model's {what}", 1, (fault,))
             return
-    found = ModelRun(title, other, baseline().load(other)(rows.values))
+    actual = ModelRun(title, other, baseline().load(other)(rows.values))
     base = native_base(expected or model, "float64", rows)
     is_like = expected is not None and other.classes == model.classes
-    answers = (compare_bits if is_like else compare_answers)(found, base, rows)
+    answers = (compare_bits if is_like else compare_answers)(actual, base, rows)
     if expected is None:
         yield judged(title, "the model", (_no_counterpart(model),), [answers])
     else:
@@ -337,7 +337,7 @@ def _content(
     return judged(title, "the model", (fault,) if fault else (), rows)
 
 
-def first_difference(expected: msgspec.Struct, found: msgspec.Struct) -> str | None:
+def first_difference(expected: msgspec.Struct, actual: msgspec.Struct) -> str | None:
     """Return where two models differ first, and how; None if they are equal.
 
     Example:
@@ -345,27 +345,27 @@ def first_difference(expected: msgspec.Struct, found: msgspec.Struct) -> str | N
         >>> first_difference(Flank(1.0, 2.0), Flank(1.0, 3.0))
         'end: 3.0 where 2.0 is right'
     """
-    if expected == found:
+    if expected == actual:
         return None
-    return _differ((), msgspec.to_builtins(expected), msgspec.to_builtins(found))
+    return _differ((), msgspec.to_builtins(expected), msgspec.to_builtins(actual))
 
 
-def _differ(path: tuple[str, ...], expected: object, found: object) -> str | None:
-    if isinstance(expected, dict) and isinstance(found, dict):
-        for key in dict.fromkeys([*expected, *found]):
-            text = _differ((*path, str(key)), expected.get(key), found.get(key))
+def _differ(path: tuple[str, ...], expected: object, actual: object) -> str | None:
+    if isinstance(expected, dict) and isinstance(actual, dict):
+        for key in dict.fromkeys([*expected, *actual]):
+            text = _differ((*path, str(key)), expected.get(key), actual.get(key))
             if text:
                 return text
         return None
     where = ", ".join(path)
-    if isinstance(expected, list | tuple) and isinstance(found, list | tuple):
-        for number, (one, two) in enumerate(zip(expected, found, strict=False), 1):
+    if isinstance(expected, list | tuple) and isinstance(actual, list | tuple):
+        for number, (one, two) in enumerate(zip(expected, actual, strict=False), 1):
             text = _differ((*path[:-1], f"{path[-1]} {number}"), one, two)
             if text:
                 return text
-        if len(expected) != len(found):
-            return f"{where}: {len(found)} where {len(expected)} are right"
+        if len(expected) != len(actual):
+            return f"{where}: {len(actual)} where {len(expected)} are right"
         return None
-    if expected == found:
+    if expected == actual:
         return None
-    return f"{where}: {found!r} where {expected!r} is right"
+    return f"{where}: {actual!r} where {expected!r} is right"

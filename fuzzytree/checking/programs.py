@@ -97,16 +97,16 @@ def check_program(
         return
     faults = tuple(_faults(nearest.lines, lines))
     why = _why_not(nearest, form)
-    found: list[Comparison] = []
+    results: list[Comparison] = []
     if not faults or program.may_run:
         if why is None:
-            found = [*_run(title, program, nearest, rows)]
+            results = [*_run(title, program, nearest, rows)]
         else:
             yield f"{title}: its answers: {why}"
     elif why is None:
         yield f"{title}: its answers: only --run-code runs a file with another text"
-    yield judged(title, "a freshly written file", faults, found)
-    yield from found
+    yield judged(title, "a freshly written file", faults, results)
+    yield from results
 
 
 def _nearest(form: Format, model: Document, lines: list[bytes]) -> _Text | None:

@@ -93,8 +93,8 @@ class CheckedSystem:
         """Compare the native runtime with the inference, on a share of the rows."""
         some = self.rows.part(self.share("system"))
         right = infer_rows(self.model, activations=True)(some.values)
-        found = self.native.part(self.share("system"))
-        yield from self._compared((self.base, "the inference"), found, right, some)
+        actual = self.native.part(self.share("system"))
+        yield from self._compared((self.base, "the inference"), actual, right, some)
 
     def compared(
         self, form: str, runtime: Runtime, run: SystemRun, share: slice
@@ -105,13 +105,13 @@ class CheckedSystem:
             names = (runtime.name, self.base)
             yield from self._compared(names, run(some.values), right, some)
 
-    def faults(self, found: Any, expected: Any, rows: RowSet) -> list[str]:
+    def faults(self, actual: Any, expected: Any, rows: RowSet) -> list[str]:
         """Return what is wrong in each row, worst first.
 
         A library may compute a function of one number otherwise than of many, so that
         the answers to a row may be apart as far as those of two runners.
         """
-        return [*_Gaps(self, found, expected, rows).faults()]
+        return [*_Gaps(self, actual, expected, rows).faults()]
 
     def certificates(self, runtimes: Sequence[Runtime]) -> Iterator[Certified]:
         """Yield nothing: bounds of functions are no proof for all inputs."""
@@ -120,7 +120,7 @@ class CheckedSystem:
     def _compared(
         self,
         names: tuple[str, str],
-        found: SystemOutcome,
+        actual: SystemOutcome,
         right: SystemOutcome,
         rows: RowSet,
     ) -> Iterator[Finding]:
@@ -128,7 +128,7 @@ class CheckedSystem:
 
         Rows whose bound says little are counted apart: the table shows the others.
         """
-        gaps = _Gaps(self, found, right, rows)
+        gaps = _Gaps(self, actual, right, rows)
         is_edge, gap, allowed = gaps.is_edge(), gaps.gap, gaps.allowed
         faults = tuple(itertools.islice(gaps.faults(), _SHOWN))
         total = len(rows.numbers)
@@ -144,7 +144,7 @@ class CheckedSystem:
             origin="equal bits"
             if same == total
             else f"{ORIGIN}; equal bits in {same} rows",
-            flips=int((found.status != right.status).sum()),
+            flips=int((actual.status != right.status).sum()),
             detail=faults,
         )
         edges = int(is_edge.any(axis=0).sum())
@@ -173,9 +173,9 @@ class CheckedSystem:
             yield counted("file", title, against, 1, (fault,))
             return
         has_all = len(other.rules) == len(system.rules)
-        found = run_system(other, activations=has_all)(self.rows.values)
+        actual = run_system(other, activations=has_all)(self.rows.values)
         names = (title, self.base)
-        results = [*self._compared(names, found, self.native, self.rows)]
+        results = [*self._compared(names, actual, self.native, self.rows)]
         if is_equivalent(system, other):
             yield counted("file", title, "the system but for names", 1, ())
         else:
@@ -207,10 +207,10 @@ class CheckedSystem:
             LossError: If onnxruntime cannot run it.
         """
         assert file.run_system is not None  # `foreign` has tested it
-        found, right = file.run_system(self.rows.values), self.native
+        actual, right = file.run_system(self.rows.values), self.native
         if "status" not in file.outputs:
-            found, right = (_without_status(one) for one in (found, right))
-        yield from self._compared((title, self.base), found, right, self.rows)
+            actual, right = (_without_status(one) for one in (actual, right))
+        yield from self._compared((title, self.base), actual, right, self.rows)
 
 
 class _Gaps:
@@ -226,12 +226,12 @@ class _Gaps:
     def __init__(
         self,
         subject: CheckedSystem,
-        found: SystemOutcome,
+        actual: SystemOutcome,
         right: SystemOutcome,
         rows: RowSet,
     ) -> None:
         self.subject, self.rows = subject, rows
-        self.one, self.two = _table(found, right), _table(right, found)
+        self.one, self.two = _table(actual, right), _table(right, actual)
         is_same = same_bits(self.one, self.two)
         self.apart = np.flatnonzero(~is_same.all(axis=0))
         allowed = error_bounds(subject.program, rows.values[:, self.apart])

@@ -167,9 +167,9 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
         MissingExtraError: If no compiler is installed.
         FuzzyTreeError: If the compiler fails.
     """
-    made = write_c(system, name="model", activations=activations)
-    speed = "-O0" if len(made.content) > _LONG else "-O2"
-    infer = compiled(made.content, _INFER_LOOP, 2, speed)
+    file = write_c(system, name="model", activations=activations)
+    speed = "-O0" if len(file.content) > _LONG else "-O2"
+    infer = compiled(file.content, _INFER_LOOP, 2, speed)
     outputs = len(system.outputs)
     count = outputs + activations * len(system.rules)
 

@@ -192,7 +192,9 @@ def plan_program(program: Program) -> ProgramPlan:
             calls.append((np.where, place, step.arguments))
         else:
             calls.append((_function(step), place, step.arguments))
-    shelves = _shelves(program, [place for _, place, given in calls if len(given) < 3])
+    shelves = _shelves(
+        program, [place for _, place, arguments in calls if len(arguments) < 3]
+    )
     size = sum(shelf.count * max(shelf.samples, 1) for shelf in shelves)
     widest = max((program.steps[place].samples for place in moving), default=0)
     rows = _WORKING_SET // max(size, 2 * widest, 1)
@@ -221,14 +223,14 @@ def run_program(plan: ProgramPlan, values: FloatArray) -> FloatArray:
         array([[2., 5.]])
     """
     count = values.shape[1]
-    found = np.empty((len(plan.results), count))
+    results = np.empty((len(plan.results), count))
     with np.errstate(all="ignore"):
         for start in range(0, count, plan.rows):
             checkpoint()
             part = values[:, start : start + plan.rows]
-            out = found[:, start : start + plan.rows]
+            out = results[:, start : start + plan.rows]
             _run_chunk(plan, np.ascontiguousarray(part), out)
-    return found
+    return results
 
 
 def _run_chunk(plan: ProgramPlan, values: FloatArray, out: FloatArray) -> None:
@@ -257,14 +259,14 @@ def _run_chunk(plan: ProgramPlan, values: FloatArray, out: FloatArray) -> None:
 def _still_values(program: Program) -> tuple[Values | None, ...]:
     """Return the results that are the same for all rows, samples as a column."""
     return tuple(
-        None if found is None else _still_value(found)
-        for found in still_results(program)
+        None if value is None else _still_value(value)
+        for value in still_results(program)
     )
 
 
-def _still_value(found: StepValue) -> Values:
-    value = np.array(found)
-    return value.reshape(-1, 1) if isinstance(found, list) else value
+def _still_value(numbers: StepValue) -> Values:
+    value = np.array(numbers)
+    return value.reshape(-1, 1) if isinstance(numbers, list) else value
 
 
 def _shelves(program: Program, places: Sequence[int]) -> tuple[_Shelf, ...]:
@@ -315,11 +317,11 @@ def run_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRu
     outputs, rules = len(system.outputs), len(system.rules)
 
     def run(values: FloatArray) -> SystemOutcome:
-        found = run_program(plan, checked(values, system.columns))
+        results = run_program(plan, checked(values, system.columns))
         return SystemOutcome(
-            found[:outputs],
-            found[-1].astype(np.int64),
-            found[outputs : outputs + rules] if activations else None,
+            results[:outputs],
+            results[-1].astype(np.int64),
+            results[outputs : outputs + rules] if activations else None,
         )
 
     return run

@@ -53,20 +53,20 @@ def exactness(
         key = (one.representation, rows.shape[1])
         if key not in exact:
             exact[key] = decide(one.model, rows)
-        found = exact_check(one, rows, exact[key])
-        trial.add(found.rows, *found.faults, worst=found.worst)
-        trial.faults += other_bits(one, rows, found.outcome, first)
+        check = exact_check(one, rows, exact[key])
+        trial.add(check.rows, *check.faults, worst=check.worst)
+        trial.faults += other_bits(one, rows, check.outcome, first)
         own = f" in {one.runtime.name}" if one.runtime.bound is not None else ""
-        checks.setdefault(f"{one.runtime.dtype}{own}", []).append(found)
-    return trial.result(*(_fact(name, found) for name, found in checks.items()))
+        checks.setdefault(f"{one.runtime.dtype}{own}", []).append(check)
+    return trial.result(*(_fact(name, check) for name, check in checks.items()))
 
 
-def _fact(name: str, found: Sequence[ExactCheck]) -> str:
-    worst = max(found, key=lambda one: one.worst)
-    flips = max(one.flips for one in found)
+def _fact(name: str, checks: Sequence[ExactCheck]) -> str:
+    worst = max(checks, key=lambda one: one.worst)
+    flips = max(one.flips for one in checks)
     text = f"{name}: strengths off by at most {worst.worst:.2g}"
     text += f" where {worst.allowed:.2g} is allowed, flips: {flips}"
-    unbounded = max(one.unbounded for one in found)
+    unbounded = max(one.unbounded for one in checks)
     if unbounded:
         text += f"; no bound in {unbounded}, beyond the type or near a step"
     return text
@@ -112,17 +112,17 @@ def offsets(
                 continue
             away = rows + np.array([[steps[name]] for name in model.inputs])
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
-            found = _observed(
+            checks = _observed(
                 representation, far, runtimes, values, trial.skipped, ratio
             )
-            for one, _ in found:
+            for one, _ in checks:
                 trial.add(
                     one.rows,
                     *(f"spread over distance {ratio:.0e}: {f}" for f in one.faults),
                     worst=one.worst,
                 )
             if ratio in _REPORTED and representation != "tree":
-                costs.append(_cost(representation, ratio, found, values.shape[1]))
+                costs.append(_cost(representation, ratio, checks, values.shape[1]))
     return trial.result(), tuple(costs)
 
 
@@ -143,7 +143,7 @@ def _observed(
 ) -> list[tuple[ExactCheck, Dtype]]:
     lost: list[str] = []
     exact = decide(form, values)
-    found: list[tuple[ExactCheck, Dtype]] = []
+    checks: list[tuple[ExactCheck, Dtype]] = []
     for runtime in runtimes:
         if runtime.bound is not None:
             continue  # its bound covers points and lines, not its arithmetic at 1e12
@@ -151,25 +151,25 @@ def _observed(
         if one is not None:
             some = one.some(values)
             same = exact if some.shape == values.shape else None
-            found.append((exact_check(one, some, same), runtime.dtype))
+            checks.append((exact_check(one, some, same), runtime.dtype))
     named = {text.partition(": spread")[0] for text in skipped}
     for text in lost:  # the first distance at which a type gives up is enough
         name = ": ".join(text.split(": ")[:2])
         if name not in named:
             skipped.append(f"{name}: spread over distance {ratio:.0e}: {text}")
-    return found
+    return checks
 
 
 def _cost(
     representation: str,
     ratio: float,
-    found: Sequence[tuple[ExactCheck, Dtype]],
+    checks: Sequence[tuple[ExactCheck, Dtype]],
     rows: int,
 ) -> OffsetCost:
     def largest(dtype: Dtype) -> float | None:
-        return max((one.largest for one, kind in found if kind == dtype), default=None)
+        return max((one.largest for one, kind in checks if kind == dtype), default=None)
 
-    flips = max((one.flips for one, kind in found if kind == "float32"), default=0)
+    flips = max((one.flips for one, kind in checks if kind == "float32"), default=0)
     return OffsetCost(
         representation,
         ratio,

@@ -128,8 +128,8 @@ def _straight(
     Each degree moved by at most 2^-52, so strengths may by as much for each clause.
     """
     native = baseline().load
-    found, expected = native(back)(values), native(form)(values)
-    gap = float(strength_gap(found, expected).max(initial=0.0))
+    actual, expected = native(back)(values), native(form)(values)
+    gap = float(strength_gap(actual, expected).max(initial=0.0))
     clauses = max((len(rule.when) for rule in form.rules), default=0)
     if gap <= EXACT * max(clauses, 1) * 2:
         return values.shape[1], gap, None
@@ -137,10 +137,10 @@ def _straight(
 
 
 def _compared(
-    title: str, found: Outcome, expected: Outcome
+    title: str, actual: Outcome, expected: Outcome
 ) -> tuple[int, float, str | None]:
-    wrong = unequal(found, expected)
-    gap = float(strength_gap(found, expected).max(initial=0.0))
+    wrong = unequal(actual, expected)
+    gap = float(strength_gap(actual, expected).max(initial=0.0))
     if not wrong.any():
         return wrong.size, gap, None
     fault = (

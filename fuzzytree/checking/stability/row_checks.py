@@ -76,8 +76,8 @@ def _tries(
         starts = np.arange(0, count, size)
         for start in starts[:: -(-len(starts) // _CALLS)] if size < count else ():
             some = np.arange(start, min(start + size, count))
-            found = one.run(np.ascontiguousarray(rows[:, some]))
-            yield f"in a batch of {len(some)}", unequal(found, whole.part(some))
+            outcome = one.run(np.ascontiguousarray(rows[:, some]))
+            yield f"in a batch of {len(some)}", unequal(outcome, whole.part(some))
 
 
 def _renumbered(
@@ -91,8 +91,8 @@ def _renumbered(
     turned = msgspec.structs.replace(one.model, variables=(*reversed(inputs), *others))
     after = loaded_form(one.representation, turned, one.runtime, [])
     if after is not None:
-        found = after.run(np.ascontiguousarray(rows[::-1]))
-        yield "when the inputs stand in another order", unequal(found, whole)
+        outcome = after.run(np.ascontiguousarray(rows[::-1]))
+        yield "when the inputs stand in another order", unequal(outcome, whole)
 
 
 _STEPS = (-300, -40, -7, 7, 40, 300)  # and the ends of the range
@@ -172,9 +172,12 @@ def decades(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Cr
 def _together(usable: Sequence[Usable]) -> Iterator[tuple[str, int, int]]:
     """Yield the range that all forms share, for double axes and for float32."""
     for name, kinds in (("double", ("float64", "mixed")), ("float32", ("float32",))):
-        found = [one for one in usable if one.dtype in kinds]
-        if found:
-            lowest, highest = (one.lowest for one in found), (u.highest for u in found)
+        ranges = [one for one in usable if one.dtype in kinds]
+        if ranges:
+            lowest, highest = (
+                (one.lowest for one in ranges),
+                (u.highest for u in ranges),
+            )
             yield name, max(lowest), min(highest)
 
 
@@ -277,16 +280,16 @@ def specials(
     first: FirstOutcomes = {}
     for one in loaded_forms(model, runtimes, trial.skipped):
         tried = one.some(rows)
-        found, warning = run_with_warning(one, tried)
+        outcome, warning = run_with_warning(one, tried)
         trial.add(tried.shape[1], warning and f"{one.title}: it warns: {warning}")
-        trial.faults += _broken_policy(one, tried, found)
+        trial.faults += _broken_policy(one, tried, outcome)
         is_zero = tried == 0.0
         if is_zero.any():
             turned = np.where(is_zero, -tried, tried)
-            wrong = unequal(one.run(turned), found)
+            wrong = unequal(one.run(turned), outcome)
             if wrong.any():
                 trial.add(0, f"{one.title}: 0.0 and -0.0 are not answered alike")
-        trial.faults += other_bits(one, tried, found, first)
+        trial.faults += other_bits(one, tried, outcome, first)
     return trial.result()
 
 
@@ -296,19 +299,21 @@ def _with_specials(values: FloatArray) -> FloatArray:
     if not plain.shape[1]:
         plain = np.zeros((values.shape[0], 1))
     bases = plain[:, :: -(-plain.shape[1] // _BASES)]
-    made = [bases]
+    tables = [bases]
     for value in SPECIALS:
         for line in range(len(bases)):
             changed = bases.copy()
             changed[line] = value
-            made.append(changed)
-        made.append(np.full_like(bases[:, :1], value))
-    return np.concatenate(made, axis=1)
+            tables.append(changed)
+        tables.append(np.full_like(bases[:, :1], value))
+    return np.concatenate(tables, axis=1)
 
 
-def _broken_policy(one: LoadedForm, rows: FloatArray, found: Outcome) -> Iterator[str]:
+def _broken_policy(
+    one: LoadedForm, rows: FloatArray, outcome: Outcome
+) -> Iterator[str]:
     expected = missing_rows(one.model, rows, one.runtime.dtype)
-    is_missing = found.status == Status.MISSING
+    is_missing = outcome.status == Status.MISSING
     wrong = is_missing != expected
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
@@ -317,11 +322,11 @@ def _broken_policy(one: LoadedForm, rows: FloatArray, found: Outcome) -> Iterato
             f"{one.title}: {int(wrong.sum())} rows break the policy on missing values; "
             f"{row_text(one.model.inputs, rows, row)} {verb} taken as missing"
         )
-    if (found.rule[is_missing] != 0).any():
+    if (outcome.rule[is_missing] != 0).any():
         yield f"{one.title}: a row with a missing value has a rule"
-    if found.strengths is not None:
-        if not np.isnan(found.strengths[:, is_missing]).all():
+    if outcome.strengths is not None:
+        if not np.isnan(outcome.strengths[:, is_missing]).all():
             yield f"{one.title}: a strength of a row with a missing value is a number"
-        known = found.strengths[:, ~is_missing]
+        known = outcome.strengths[:, ~is_missing]
         if not ((known >= 0.0) & (known <= 1.0)).all():
             yield f"{one.title}: a strength is not between 0 and 1"

@@ -69,9 +69,9 @@ def loaded_forms(
     """
     for representation, form in forms(model).items():
         for runtime in runtimes:
-            found = loaded_form(representation, form, runtime, skipped)
-            if found is not None:
-                yield found
+            loaded = loaded_form(representation, form, runtime, skipped)
+            if loaded is not None:
+                yield loaded
 
 
 def loaded_form(
@@ -97,8 +97,8 @@ def run_with_warning(one: LoadedForm, values: FloatArray) -> tuple[Outcome, str 
     """Return a runtime's answers, and the first warning that it let out, if any."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = one.loud(values)
-    return found, str(caught[0].message) if caught else None
+        outcome = one.loud(values)
+    return outcome, str(caught[0].message) if caught else None
 
 
 FirstOutcomes = dict[tuple[str, Dtype, bool], tuple[str, Outcome]]
@@ -106,13 +106,13 @@ FirstOutcomes = dict[tuple[str, Dtype, bool], tuple[str, Outcome]]
 
 
 def other_bits(
-    one: LoadedForm, rows: FloatArray, found: Outcome, first: FirstOutcomes
+    one: LoadedForm, rows: FloatArray, outcome: Outcome, first: FirstOutcomes
 ) -> Iterator[str]:
     """Yield where a runtime has other bits than the first one that promises them."""
     if one.runtime.bound is None:
         key = (one.representation, one.runtime.dtype, one.runtime.is_slow)
-        title, other = first.setdefault(key, (one.title, found))
-        wrong = np.flatnonzero(unequal(found, other))
+        title, other = first.setdefault(key, (one.title, outcome))
+        wrong = np.flatnonzero(unequal(outcome, other))
         if wrong.size:
             yield (
                 f"{one.title}: other bits than {title} in {wrong.size} rows, first "
@@ -127,8 +127,8 @@ def first_line(error: Exception) -> str:
 
 def row_text(inputs: Sequence[str], values: FloatArray, row: int) -> str:
     """Return a row as people read it, each number with all its digits."""
-    found = values[:, row].tolist()
-    shown = [f"{n} {v!r}" for n, v in zip(inputs, found, strict=True)][:8]
+    numbers = values[:, row].tolist()
+    shown = [f"{n} {v!r}" for n, v in zip(inputs, numbers, strict=True)][:8]
     return ", ".join(shown) + (", ..." if len(inputs) > 8 else "")
 
 
@@ -168,17 +168,17 @@ def exact_check(
     `exact` has the exact answers to these rows, if they are known already.
     """
     truth = decide(one.model, values) if exact is None else exact
-    found = one.run(values)
+    outcome = one.run(values)
     dtype = one.runtime.dtype
     known = ~missing_rows(one.model, values, dtype)
     allowed = allowed_errors(one, values)
-    run = ModelRun(one.title, one.model, found)
+    run = ModelRun(one.title, one.model, outcome)
     errors = exact_errors(run, truth, values, dtype, allowed)
     flips = errors.flips & known
     low = np.where(known, 0.0 if errors.low is None else errors.low, 0.0)
     wrong = flips & ~errors.close | (low > allowed)
     bounded = np.where(allowed < 1.0, low, 0.0)
-    faults = [_fault(one, values, found, wrong, low, allowed)] if wrong.any() else []
+    faults = [_fault(one, values, outcome, wrong, low, allowed)] if wrong.any() else []
     worst = int(np.argmax(bounded)) if low.size else 0
     return ExactCheck(
         values.shape[1],
@@ -188,7 +188,7 @@ def exact_check(
         int(flips.sum()),
         int((known & (allowed >= 1.0)).sum()),
         tuple(faults),
-        found,
+        outcome,
     )
 
 
@@ -207,7 +207,7 @@ def allowed_errors(one: LoadedForm, values: FloatArray) -> FloatArray:
 def _fault(
     one: LoadedForm,
     values: FloatArray,
-    found: Outcome,
+    outcome: Outcome,
     wrong: BoolArray,
     low: FloatArray,
     allowed: FloatArray,
@@ -218,7 +218,7 @@ def _fault(
     if low[row] > allowed[row]:
         sizes = f"strengths off by {low[row]:.3g}, {allowed[row]:.3g} allowed"
         return f"{text}: {sizes}: {where}"
-    return f"{text}: rule {found.rule[row]} wins and another is right: {where}"
+    return f"{text}: rule {outcome.rule[row]} wins and another is right: {where}"
 
 
 def missing_rows(model: Model, values: FloatArray, dtype: Dtype) -> BoolArray:

@@ -75,7 +75,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
     scales = input_scales(model, rows)
     near = _near(model, rows, scales)
     exact = [decide(form, near) for form in rule_bases]
-    found: list[Stiff] = []
+    records: list[Stiff] = []
     for line, name in enumerate(model.inputs):
         scale = scales[name]
         changed = near.copy()
@@ -91,7 +91,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
         is_safe = max(predicted, scale.curves) <= SAFE and not (is_data and flips)
         spread = scale.spread if math.isfinite(scale.spread) else None
         is_known = spread is not None and scale.location > 0.0
-        found.append(
+        records.append(
             Stiff(
                 name,
                 spread,
@@ -105,7 +105,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
                 _advice(scale, predicted, offset, is_safe=is_safe),
             )
         )
-    return tuple(sorted(found, key=lambda one: (-one.predicted, -one.observed)))
+    return tuple(sorted(records, key=lambda one: (-one.predicted, -one.observed)))
 
 
 def input_scales(model: Model, values: FloatArray) -> dict[str, InputScale]:
@@ -271,36 +271,38 @@ def curves(model: Model) -> tuple[Criterion, tuple[CurveFault, ...]]:
         The criterion, and what is to be known about curves, worst first.
     """
     trial = Trial("N7", _ADVICE, worst=0.0)
-    found: list[CurveFault] = []
+    curve_faults: list[CurveFault] = []
     for form, variable, term in _terms(model):
         for side in conduct(term.shape):
             trial.cases += 1
             fault = _fault(form, variable, term, side)
             if fault is not None:
-                found.append(fault)
-    found.sort(key=lambda f: (not f.fails, -max(f.overshoot, f.rise), -f.condition))
-    for one in found:
+                curve_faults.append(fault)
+    curve_faults.sort(
+        key=lambda f: (not f.fails, -max(f.overshoot, f.rise), -f.condition)
+    )
+    for one in curve_faults:
         fault_text = _sentence(one) if one.fails else None
         trial.add(0, fault_text, worst=max(one.overshoot, one.rise))
-    harmless = len(found) - len(trial.faults)
+    harmless = len(curve_faults) - len(trial.faults)
     fact = f"{harmless} of {trial.cases} sides bulge or rise within the limits"
     if not trial.cases:
         trial.skipped.append("no term of the model has a fitted curve")
-    return trial.result(*[fact] * (harmless > 0)), tuple(found)
+    return trial.result(*[fact] * (harmless > 0)), tuple(curve_faults)
 
 
 def _terms(model: Model) -> Iterator[tuple[str, str, Term]]:
     """Yield each term of a model once, with its form and its variable."""
     is_raw = isinstance(model, RuleBase) and model.kind == "raw"
     form = "raw" if is_raw else "rules" if isinstance(model, RuleBase) else "relative"
-    seen: set[tuple[str, Shape]] = set()
+    known: set[tuple[str, Shape]] = set()
     groups = [(form, v.name, v.terms) for v in model.variables]
     if isinstance(model, FuzzyTree):
         groups += [("raw", group.variable, group.terms) for group in model.sets]
     for kind, variable, terms in groups:
         for term in terms:
-            if (variable, term.shape) not in seen:
-                seen.add((variable, term.shape))
+            if (variable, term.shape) not in known:
+                known.add((variable, term.shape))
                 yield kind, variable, term
 
 

@@ -77,7 +77,7 @@ def examine(
     some = np.concatenate(
         [probe_values(model, _SOME), _thinned(rows, _SOME_DATA)], axis=1
     )
-    found: list[Criterion] = []
+    criteria: list[Criterion] = []
     usable: tuple[Usable, ...] = ()
     costs: tuple[OffsetCost, ...] = ()
     faults: tuple[CurveFault, ...] = ()
@@ -106,7 +106,7 @@ def examine(
                 one = roundtrips(model, formats, some)
             case _:
                 one = Trial(code, skipped=[_NOT_MEASURED]).result()
-        found.append(one)
+        criteria.append(one)
     has_data = rows.shape[1] > 0
     progress("stiffness of the inputs", len(wanted) / (len(wanted) + 1))
     return Stability(
@@ -116,7 +116,7 @@ def examine(
         rows.shape[1],
         values.shape[1] - probes.shape[1],
         tuple(runtime.name for runtime in runtimes if is_installed(runtime)),
-        tuple(found),
+        tuple(criteria),
         stiffness(model, rows if has_data else probes, is_data=has_data),
         faults,
         usable,
@@ -128,9 +128,9 @@ def _wanted(only: Sequence[str]) -> tuple[str, ...]:
     only = as_names(only)
     codes = [code.upper().replace("B", "b") for code in only]
     known = ", ".join(TITLES)
-    for given, code in zip(only, codes, strict=True):
+    for text, code in zip(only, codes, strict=True):
         if code not in TITLES:
-            raise ValueError(f"no criterion {given!r}; there is {known}")
+            raise ValueError(f"no criterion {text!r}; there is {known}")
     if "N2" in codes:
         codes.append("N2b")
     return tuple(code for code in TITLES if not codes or code in codes)

@@ -106,7 +106,7 @@ def term_probes(
     ]
     if not variables:
         return None
-    found = [
+    tests = [
         Rule((Clause(v.name, (t.name,)),), "true") for v in variables for t in v.terms
     ]
     lines: list[list[float]] = [[] for _ in variables]
@@ -118,13 +118,13 @@ def term_probes(
             places.append((number, term.shape, slice(start, len(lines[number]))))
     longest = max(map(len, lines))
     values = np.array([(line * longest)[:longest] for line in lines], np.float64)
-    whole = RuleBase(rules.name, ("true",), tuple(variables), tuple(found))
-    return TermProbes(whole, values, tuple(places), total - len(found))
+    whole = RuleBase(rules.name, ("true",), tuple(variables), tuple(tests))
+    return TermProbes(whole, values, tuple(places), total - len(tests))
 
 
 def _edges(shape: Shape) -> list[float]:
-    found = [value for mark in landmarks(shape) for value in neighbours(mark)]
-    return list(dict.fromkeys(found)) or [0.0]
+    values = [value for mark in landmarks(shape) for value in neighbours(mark)]
+    return list(dict.fromkeys(values)) or [0.0]
 
 
 def collapsed(shape: Shape) -> Shape:
@@ -239,11 +239,11 @@ def _try_terms(
 def _try_degrees(
     trial: Trial, one: LoadedForm, terms: TermProbes, exact: _Exact | None
 ) -> None:
-    found, warning = run_with_warning(one, terms.values)
+    outcome, warning = run_with_warning(one, terms.values)
     trial.add(0, warning and f"{one.title}: it warns: {warning}")
     if terms.left_out:
         trial.skipped.append(f"{terms.left_out} of the terms: there are too many")
-    if found.strengths is None:
+    if outcome.strengths is None:
         trial.skipped.append(f"{one.runtime.name} returns no degrees")
         return
     if one.runtime.bound is not None:  # it promises nothing at a single value
@@ -253,7 +253,7 @@ def _try_degrees(
     for number, (line, shape, rows) in enumerate(terms.places):
         clause = terms.rules.rules[number].when[0]
         name = f"{one.title}: {clause.variable} is {clause.terms[0]}"
-        columns = (terms.values[line], found.strengths[number], limits)
+        columns = (terms.values[line], outcome.strengths[number], limits)
         cells = zip(*(column[rows].tolist() for column in columns), strict=True)
         for value, degree, allowed in cells:
             trial.cases += 1
@@ -353,13 +353,13 @@ def _small_tables(one: LoadedForm, values: FloatArray) -> Iterator[tuple[str, bo
         yield f"{_COPIES} equal rows are not answered like one of them", is_other
     for size in (0, 1, 2):
         try:
-            found = one.run(np.ascontiguousarray(values[:, :size]))
+            outcome = one.run(np.ascontiguousarray(values[:, :size]))
         except FuzzyTreeError as error:
             yield f"a table of {size} rows is refused: {error}", True
             continue
         shape = (min(size, count),)
-        wrong = found.rule.shape != shape or found.status.shape != shape
-        yield f"a table of {size} rows gets {found.rule.shape[0]} answers", wrong
+        wrong = outcome.rule.shape != shape or outcome.status.shape != shape
+        yield f"a table of {size} rows gets {outcome.rule.shape[0]} answers", wrong
 
 
 def _thin_terms(model: Model) -> Iterator[str]:

@@ -190,19 +190,19 @@ def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
     The power is 1 for places and lengths, and -1 for weights, which divide by it. The
     lengths between two places are among them, for runtimes divide by those.
     """
-    found: list[tuple[str, int, float]] = []
+    numbers: list[tuple[str, int, float]] = []
 
     def keep(name: str, value: float) -> float:
-        found.append((name, 1, value))
+        numbers.append((name, 1, value))
         return value
 
     def part(_: Variable, one: Part) -> Part:
-        found.append((one.input, -1, one.weight))
+        numbers.append((one.input, -1, one.weight))
         keep(one.input, one.centre)
         return one
 
     in_units(model, UnitChange(keep, keep, part))
-    yield from found
+    yield from numbers
     groups = [(variable.name, variable.terms) for variable in model.variables]
     if isinstance(model, FuzzyTree):
         groups += [(group.variable, group.terms) for group in model.sets]
