@@ -50,23 +50,23 @@ def test_a_sample_keeps_the_shares_of_the_classes() -> None:
 
 
 def test_classes_far_apart_are_predicted_without_error() -> None:
-    found = _accuracy(_table(60))
-    assert found is not None
-    assert found.mean == 1.0
-    assert (found.rows, found.of) == (60, 60)
+    result = _accuracy(_table(60))
+    assert result is not None
+    assert result.mean == 1.0
+    assert (result.rows, result.of) == (60, 60)
 
 
 def test_a_large_table_is_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(holdout, "CELLS", 80)
-    found = _accuracy(_table(1000))
-    assert found is not None
-    assert (found.rows, found.of) == (40, 1000)
+    result = _accuracy(_table(1000))
+    assert result is not None
+    assert (result.rows, result.of) == (40, 1000)
 
 
 def test_at_most_20_000_rows_are_tested() -> None:
-    found = _accuracy(_table(50_000), LearningSettings(mode="paper"))
-    assert found is not None
-    assert (found.rows, found.of) == (20_000, 50_000)
+    result = _accuracy(_table(50_000), LearningSettings(mode="paper"))
+    assert result is not None
+    assert (result.rows, result.of) == (20_000, 50_000)
 
 
 @pytest.mark.one_in(2)
@@ -88,9 +88,9 @@ def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
     report = learn_table(table, name="t", units={}, settings=wanted).report
     monkeypatch.setattr(holdout, "CHOOSING_CELLS", cells)
     monkeypatch.setattr(holdout, "learn_arrays", learn)
-    found = accuracy(table, wanted, report)
-    assert found is not None
-    assert found.is_nested == (cells == 120)
+    result = accuracy(table, wanted, report)
+    assert result is not None
+    assert result.is_nested == (cells == 120)
     chosen = LearningSettings(
         patterns_per_class=report.patterns,
         alpha=float(report.chosen["alpha"]),
@@ -101,8 +101,8 @@ def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
 
 def test_patterns_of_a_class_that_a_fold_lacks_are_no_error() -> None:
     table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
-    found = _accuracy(table, LearningSettings(patterns_per_class={"a": 2, "c": 1}))
-    assert found is not None
+    result = _accuracy(table, LearningSettings(patterns_per_class={"a": 2, "c": 1}))
+    assert result is not None
 
 
 def test_the_majority_is_the_share_of_the_most_common_class() -> None:
@@ -116,9 +116,9 @@ def test_too_few_rows_are_not_tested() -> None:
 
 def test_a_class_of_one_row_is_answered_wrong_and_not_an_error() -> None:
     table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
-    found = _accuracy(table)
-    assert found is not None
-    assert found.mean < 1.0
+    result = _accuracy(table)
+    assert result is not None
+    assert result.mean < 1.0
 
 
 def test_progress_is_reported_fold_by_fold() -> None:
@@ -135,9 +135,9 @@ def test_with_many_classes_fewer_folds_are_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(holdout, "_CLASSES", 4)
-    found = _accuracy(_table(60))
-    assert found is not None
-    assert len(found.folds) == 2
+    result = _accuracy(_table(60))
+    assert result is not None
+    assert len(result.folds) == 2
 
 
 @pytest.mark.heavy
@@ -151,6 +151,6 @@ def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
     report = learn_arrays(
         values.T, codes, columns=columns, classes=["a", "b"], settings=settings
     ).report
-    found = accuracy(table, settings, report)
-    assert found is not None
-    assert found.folds == (1.0, 1.0)
+    result = accuracy(table, settings, report)
+    assert result is not None
+    assert result.folds == (1.0, 1.0)

@@ -61,7 +61,7 @@ def test_the_lines_of_the_readme_run(
     assert answers.class_strengths is not None
     assert answers.class_strengths.shape == (3, 178)
     onnx = ft.export(rules, "onnx").content
-    found = ft.check(
+    result = ft.check(
         tree,
         rules,
         onnx,
@@ -69,7 +69,7 @@ def test_the_lines_of_the_readme_run(
         runtimes=["native"],
         settings=ft.CheckSettings(limit=500),
     )
-    found.raise_if_not_ok()
+    result.raise_if_not_ok()
 
 
 FITTED = ft.FuzzyTreeClassifier().fit(FEW, KINDS)
@@ -157,9 +157,9 @@ def test_rules_are_refused_where_a_tree_is_needed(verb: str) -> None:
 
 
 def test_needs_drops_what_is_requested_and_proves_it() -> None:
-    found = ft.needs(TREE, data=ROWS, uses=["tree"])
-    assert found.ok
-    assert found.needs.inputs == TREE.inputs
+    result = ft.needs(TREE, data=ROWS, uses=["tree"])
+    assert result.ok
+    assert result.needs.inputs == TREE.inputs
 
 
 def test_explain_knows_a_code_and_the_id_of_a_finding() -> None:
@@ -191,7 +191,7 @@ def test_recheck_takes_an_audit_and_its_model(tmp_path: Path) -> None:
 def test_what_python_shows_of_a_value_is_one_short_line() -> None:
     rules = ft.rules_from_tree(TREE)
     system = random_system(3)
-    found = ft.check(
+    result = ft.check(
         TREE, rules, runtimes=["native"], settings=ft.CheckSettings(limit=99)
     )
     written = ft.export(TREE, "yaml")
@@ -203,7 +203,7 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
             system,
             ft.run(rules, ROWS),
             ft.run(system, np.zeros((4, len(system.columns)))),
-            found,
+            result,
             ft.audit(TREE, selection=ft.AuditSelection(select=["FT501"])),
             written,
             ft.needs(TREE, uses=["tree"]),
@@ -216,7 +216,7 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
         "FuzzySystem(8 rules, 3 inputs, 2 outputs)",
         "Predictions(20 rows, 3 classes)",
         "Outputs(4 rows, 2 outputs)",
-        f"Agreement({len(found.comparisons)} comparisons, agrees)",
+        f"Agreement({len(result.comparisons)} comparisons, agrees)",
         "Audit(1 answer, 0 findings)",
         f"Written({len(written.content)} bytes, 0 losses, 0 remarks)",
         "Footprint(3 inputs, 16 removed)",
@@ -268,9 +268,9 @@ def test_every_representation_of_a_tree_predicts_alike(
         str(path),
         open_onnx(content, "tree.onnx"),
     ):
-        found = ft.run(representation, rows)
-        assert isinstance(found, ft.Predictions)
-        assert found.classes == expected
+        result = ft.run(representation, rows)
+        assert isinstance(result, ft.Predictions)
+        assert result.classes == expected
 
 
 def test_many_rows_are_answered_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -340,19 +340,19 @@ def test_check_takes_files_and_names_them(tmp_path: Path) -> None:
     yaml, onnx = tmp_path / "tree.yaml", tmp_path / "tree.onnx"
     ft.save(TREE, yaml)
     ft.save(TREE, onnx)
-    found = ft.check(
+    result = ft.check(
         yaml, onnx, data=ROWS, runtimes=["native"], settings=ft.CheckSettings(limit=300)
     )
-    assert found.ok
-    assert str(onnx) in {comparison.representation for comparison in found.comparisons}
+    assert result.ok
+    assert str(onnx) in {comparison.representation for comparison in result.comparisons}
 
 
 def test_check_finds_a_file_of_another_model() -> None:
     other = random_tree(4, inputs=3)
-    found = ft.check(
+    result = ft.check(
         TREE, other, runtimes=["native"], settings=ft.CheckSettings(limit=300)
     )
-    assert not found.ok
+    assert not result.ok
 
 
 def test_a_runtime_that_does_not_run_trees_says_so() -> None:
@@ -366,9 +366,9 @@ def test_a_runtime_that_does_not_run_trees_says_so() -> None:
 def test_a_certificate_for_the_rows_of_a_table_counts_them() -> None:
     tree = random_tree(1, inputs=2, combinations=0)
     table = pd.DataFrame({name: [0.0, 1.0, 2.0] for name in tree.inputs})
-    found = ft.certify(ft.rules_from_tree(tree), "mixed", data=table)
-    assert (found.rows, found.dtype, found.unbounded) == (3, "mixed", 0)
-    assert found.delta is not None
+    result = ft.certify(ft.rules_from_tree(tree), "mixed", data=table)
+    assert (result.rows, result.dtype, result.unbounded) == (3, "mixed", 0)
+    assert result.delta is not None
 
 
 def test_a_number_type_that_does_not_exist_is_refused() -> None:

@@ -21,15 +21,15 @@ def timing(
 ) -> Timing:
     """Return fifteen samples of a call, evenly around a time."""
     samples = tuple(ns * (1 + spread * (k - 7) / 7) for k in range(15))
-    found = interval(samples)
+    result = interval(samples)
     return Timing(
         rows,
         threads,
         samples,
-        found.median,
-        found.low,
-        found.high,
-        found.confidence,
+        result.median,
+        result.low,
+        result.high,
+        result.confidence,
         rounds=tuple(range(15)),
         stolen=0.0,
     )

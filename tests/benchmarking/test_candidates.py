@@ -44,10 +44,10 @@ VALUES = made_rows(TREE, 60)[0]
 
 
 def candidates() -> list[Candidate]:
-    found, omitted = own(TREE, lambda rules, dtype: None, Layouts())
+    result, omitted = own(TREE, lambda rules, dtype: None, Layouts())
     names = {runtime.name for runtime in all_runtimes() if not is_installed(runtime)}
     assert {one.name for one in omitted} == names
-    return found
+    return result
 
 
 @pytest.mark.one_in(3)
@@ -55,11 +55,11 @@ def candidates() -> list[Candidate]:
 def test_a_candidate_answers_its_question(one: Candidate) -> None:
     model = questions(TREE)[one.question]
     loaded = one.load(1)
-    found = loaded.answer(VALUES)
+    result = loaded.answer(VALUES)
     exact = found_of(load(model)(VALUES), model)
-    assert np.array_equal(found.labels, exact.labels)
-    if found.strengths is not None and exact.strengths is not None:
-        assert np.abs(found.strengths - exact.strengths).max() < 1e-2
+    assert np.array_equal(result.labels, exact.labels)
+    if result.strengths is not None and exact.strengths is not None:
+        assert np.abs(result.strengths - exact.strengths).max() < 1e-2
     loaded.call(VALUES)()
     loaded.call(VALUES[:, :1])()
 
@@ -77,19 +77,19 @@ def test_every_runtime_is_a_candidate_for_each_question_that_it_runs() -> None:
 
 def test_all_rows_of_a_rule_base_are_timed_block_by_block() -> None:
     rules = rules_from_tree(TREE)
-    seen: list[tuple[int, ...]] = []
+    calls: list[tuple[int, ...]] = []
 
     def counted(model: object) -> Run:
         def run(values: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Outcome:
-            seen.append(values.shape)
+            calls.append(values.shape)
             return Outcome(np.zeros(1, np.int64), np.zeros(1, np.int64))
 
         return run
 
     loaded = load_runtime(Runtime("counted", ("rules",), counted), rules, Layouts(), 1)
     loaded.call(np.zeros((len(rules.inputs), 200_000)))()
-    assert len(seen) == 4
-    assert sum(rows for _, rows in seen) == 200_000
+    assert len(calls) == 4
+    assert sum(rows for _, rows in calls) == 200_000
 
 
 def test_sessions_share_a_table_until_the_rows_change() -> None:
@@ -113,12 +113,12 @@ def test_a_prepared_graph_answers_all_rows_of_its_table() -> None:
 
 
 def test_floors_read_all_rows_and_answer_nothing() -> None:
-    found, _ = floors("tree")
-    assert [one.name for one in found] == [READING, SESSION]
-    for one in found:
+    result, _ = floors("tree")
+    assert [one.name for one in result] == [READING, SESSION]
+    for one in result:
         loaded = one.load(1)
         assert loaded.answer(VALUES).labels.tolist() == [-1] * 60
-    total = found[0].load(1).call(VALUES)()
+    total = result[0].load(1).call(VALUES)()
     assert isinstance(total, np.ndarray)
     assert np.array_equal(total, VALUES.sum(axis=1))
 
@@ -127,18 +127,18 @@ def test_what_is_not_installed_is_an_omission(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(
         "fuzzytree.benchmarking.candidates.is_installed", lambda one: not one.modules
     )
-    found, omitted = own(TREE, lambda rules, dtype: None, Layouts())
-    assert not any(one.is_foreign for one in found)
+    result, omitted = own(TREE, lambda rules, dtype: None, Layouts())
+    assert not any(one.is_foreign for one in result)
     whys = {one.name: one.why for one in omitted}
     assert whys["scikit-fuzzy"] == f"not installed ({install_hint('skfuzzy')})"
     assert whys["onnxruntime mixed"] == f"not installed ({install_hint('onnx')})"
 
 
 def test_a_variant_tells_its_bound_once_it_is_loaded() -> None:
-    found, _ = variants(TREE, lambda rules, dtype: (1e-15, "doubles"), Layouts())
-    names = [one.name for one in found]
+    result, _ = variants(TREE, lambda rules, dtype: (1e-15, "doubles"), Layouts())
+    names = [one.name for one in result]
     assert "native, points 1e-03: raw rules" in names
-    one = found[names.index("native, points 1e-03: raw rules")]
+    one = result[names.index("native, points 1e-03: raw rules")]
     assert one.bound is None
     certify = one.load(1).bound
     assert certify is not None
@@ -158,8 +158,8 @@ def test_a_rule_base_without_curves_has_no_variants() -> None:
         )
         for v in rules.variables
     )
-    made = msgspec.structs.replace(rules, variables=flat)
-    assert variants(made, lambda rules, dtype: None, Layouts()) == ([], [])
+    without_curves = msgspec.structs.replace(rules, variables=flat)
+    assert variants(without_curves, lambda rules, dtype: None, Layouts()) == ([], [])
 
 
 def test_nothing_is_certified_before_the_bound_is_used(
@@ -174,16 +174,16 @@ def test_nothing_is_certified_before_the_bound_is_used(
         return bounds.certify(rules, dtype, values)
 
     monkeypatch.setattr("fuzzytree.benchmarking.candidates.certify", certify)
-    found, _ = gather(TREE, VALUES)
+    result, _ = gather(TREE, VALUES)
     assert row_counts == []
-    bounds_of_raw = [o.bound for o in found if o.bound and o.question == "raw rules"]
+    bounds_of_raw = [o.bound for o in result if o.bound and o.question == "raw rules"]
     assert len([bound() for bound in bounds_of_raw]) > 10
     assert row_counts == [VALUES.shape[1]] * 3  # once for each number type
 
 
 def test_every_runtime_that_runs_foreign_code_is_tried_apart() -> None:
-    found, _ = gather(TREE, VALUES)
-    for one in found:
+    result, _ = gather(TREE, VALUES)
+    for one in result:
         runtime = one.name.partition(": ")[0]
         known = {r.name for r in all_runtimes()}
         if one.kind == "runtime" and runtime in known:
@@ -199,9 +199,9 @@ def quiet() -> Machine:
 
 def test_a_quiet_machine_gives_no_doubt() -> None:
     one = point("native", 1000.0, error(0.0))
-    found = after(quiet(), one.timings)
-    assert found.stolen == 0.0
-    assert [*noise(found, [one])] == []
+    result = after(quiet(), one.timings)
+    assert result.stolen == 0.0
+    assert [*noise(result, [one])] == []
 
 
 def test_a_noisy_machine_is_reported_in_three_ways() -> None:
@@ -226,9 +226,9 @@ def test_stolen_time_is_weighed_by_what_was_measured() -> None:
 
 
 def test_packages_that_are_not_installed_have_no_version() -> None:
-    found = machine(["numpy", "no such package"]).versions
-    assert "numpy" in found
-    assert "no such package" not in found
+    result = machine(["numpy", "no such package"]).versions
+    assert "numpy" in result
+    assert "no such package" not in result
 
 
 @pytest.mark.heavy

@@ -80,45 +80,45 @@ def test_the_interval_covers_the_median_as_often_as_it_says() -> None:
 
 
 def test_an_interval_is_made_of_samples() -> None:
-    found = interval([float(k) for k in (9, 1, 8, 2, 7, 3, 6, 4, 5)])
-    assert (found.median, found.low, found.high) == (5.0, 2.0, 8.0)
+    result = interval([float(k) for k in (9, 1, 8, 2, 7, 3, 6, 4, 5)])
+    assert (result.median, result.low, result.high) == (5.0, 2.0, 8.0)
 
 
 def test_a_call_is_repeated_until_the_clock_can_tell() -> None:
     time = FakeTime()
     calls = {"fast": time.call(0.001), "slow": time.call(5.0)}
-    found = time_calls(calls, rows=3, rounds=6, clock=time.clock()).timings
-    assert found["fast"].calls == 2000
-    assert found["slow"].calls == 1
-    assert found["fast"].median_ns == pytest.approx(1000.0)
-    assert found["slow"].samples_ns == (5.0 * MS,) * 6
-    assert found["slow"].rows == 3
-    assert found["slow"].rounds == (0, 1, 2, 3, 4, 5)
+    result = time_calls(calls, rows=3, rounds=6, clock=time.clock()).timings
+    assert result["fast"].calls == 2000
+    assert result["slow"].calls == 1
+    assert result["fast"].median_ns == pytest.approx(1000.0)
+    assert result["slow"].samples_ns == (5.0 * MS,) * 6
+    assert result["slow"].rows == 3
+    assert result["slow"].rounds == (0, 1, 2, 3, 4, 5)
 
 
 def test_time_that_other_processes_took_is_reported() -> None:
     time = FakeTime()
     calls = {"alone": time.call(5.0), "robbed": time.call(6.0, stolen_ms=2.0)}
-    found = time_calls(calls, rows=1, rounds=6, clock=time.clock()).timings
-    assert found["alone"].stolen == 0.0
-    assert found["robbed"].stolen == pytest.approx(0.25)
-    assert found["robbed"].median_ns == 8.0 * MS
+    result = time_calls(calls, rows=1, rounds=6, clock=time.clock()).timings
+    assert result["alone"].stolen == 0.0
+    assert result["robbed"].stolen == pytest.approx(0.25)
+    assert result["robbed"].median_ns == 8.0 * MS
 
 
 def test_a_coarse_processor_clock_tells_nothing_of_stolen_time() -> None:
     time = FakeTime()
     clock = TimeSource(lambda: time.wall, None)
-    found = time_calls({"a": time.call(5.0)}, rows=1, rounds=6, clock=clock)
-    assert found.timings["a"].stolen is None
+    result = time_calls({"a": time.call(5.0)}, rows=1, rounds=6, clock=clock)
+    assert result.timings["a"].stolen is None
 
 
 def test_rounds_are_interleaved_and_every_round_has_another_order() -> None:
     time = FakeTime()
-    seen: list[str] = []
+    sequence: list[str] = []
 
     def call(name: str) -> Callable[[], object]:
         def seen_call() -> None:
-            seen.append(name)
+            sequence.append(name)
             time.call(5.0)()
 
         return seen_call
@@ -127,7 +127,7 @@ def test_rounds_are_interleaved_and_every_round_has_another_order() -> None:
     time_calls(
         {name: call(name) for name in names}, rows=1, rounds=8, clock=time.clock()
     )
-    rounds = ["".join(seen[k : k + 4]) for k in range(4, len(seen), 4)]
+    rounds = ["".join(sequence[k : k + 4]) for k in range(4, len(sequence), 4)]
     assert len(rounds) == 8
     assert all(sorted(one) == [*names] for one in rounds)
     assert len(set(rounds)) > 4
@@ -159,19 +159,19 @@ def test_fast_calls_keep_their_rounds_when_time_is_short() -> None:
 def test_the_time_limit_is_kept_to_one_call() -> None:
     time = FakeTime()
     calls = {name: time.call(100.0) for name in "abc"}
-    found = time_calls(calls, rows=1, rounds=15, seconds=1.0, clock=time.clock())
+    result = time_calls(calls, rows=1, rounds=15, seconds=1.0, clock=time.clock())
     assert time.wall <= 1.1e9
-    assert found.is_complete
-    assert sorted(len(one.samples_ns) for one in found.timings.values()) == [2, 2, 3]
+    assert result.is_complete
+    assert sorted(len(one.samples_ns) for one in result.timings.values()) == [2, 2, 3]
 
 
 def test_what_no_time_is_left_for_is_not_measured() -> None:
     time = FakeTime()
     calls = {"long": time.call(3000.0), "short": time.call(1.0)}
-    found = time_calls(calls, rows=1, seconds=1.0, clock=time.clock())
-    assert not found.is_complete
-    assert not found.is_interrupted
-    assert found.timings == {}
+    result = time_calls(calls, rows=1, seconds=1.0, clock=time.clock())
+    assert not result.is_complete
+    assert not result.is_interrupted
+    assert result.timings == {}
 
 
 def test_an_interrupted_measurement_keeps_its_samples() -> None:
@@ -185,11 +185,11 @@ def test_an_interrupted_measurement_keeps_its_samples() -> None:
         time.call(5.0)()
 
     calls = {"calm": time.call(5.0), "nervous": nervous}
-    found = time_calls(calls, rows=1, rounds=30, clock=time.clock())
-    assert found.is_interrupted
-    assert not found.is_complete
-    assert len(found.timings["nervous"].samples_ns) == 18  # one call warmed it up
-    assert len(found.timings["calm"].samples_ns) in (18, 19)
+    result = time_calls(calls, rows=1, rounds=30, clock=time.clock())
+    assert result.is_interrupted
+    assert not result.is_complete
+    assert len(result.timings["nervous"].samples_ns) == 18  # one call warmed it up
+    assert len(result.timings["calm"].samples_ns) in (18, 19)
 
 
 @pytest.mark.parametrize("position", [1, 4])
@@ -204,15 +204,15 @@ def test_a_call_that_fails_leaves_the_others_alone(position: int) -> None:
         time.call(5.0)()
 
     calls = {"broken": broken, "whole": time.call(5.0)}
-    found = time_calls(calls, rows=1, rounds=6, clock=time.clock())
-    assert str(found.failures["broken"]) == "too much"
-    assert len(found.timings["whole"].samples_ns) == 6
+    result = time_calls(calls, rows=1, rounds=6, clock=time.clock())
+    assert str(result.failures["broken"]) == "too much"
+    assert len(result.timings["whole"].samples_ns) == 6
 
 
 def test_the_garbage_collector_is_off_while_timing_and_on_again() -> None:
-    seen: list[bool] = []
-    time_calls({"look": lambda: seen.append(gc.isenabled())}, rows=1, rounds=1)
-    assert not any(seen)
+    states: list[bool] = []
+    time_calls({"look": lambda: states.append(gc.isenabled())}, rows=1, rounds=1)
+    assert not any(states)
     assert gc.isenabled()
     gc.disable()
     try:
@@ -253,22 +253,22 @@ def test_a_measurement_of_nothing_is_refused(
 
 
 def timing(*samples: float, rounds: tuple[int, ...] = ()) -> Timing:
-    found = interval(samples)
-    return Timing(1, 1, samples, found.median, found.low, found.high, rounds=rounds)
+    result = interval(samples)
+    return Timing(1, 1, samples, result.median, result.low, result.high, rounds=rounds)
 
 
 def test_a_slow_minute_does_not_change_a_quotient() -> None:
     slow = timing(10.0, 1000.0, 11.0, 12.0, 10.0, 10.0)
     fast = timing(5.0, 500.0, 5.5, 6.0, 5.0, 5.0)
-    found = times_faster(slow, fast)
-    assert found is not None
-    assert (found.median, found.low, found.high) == (2.0, 2.0, 2.0)
+    result = times_faster(slow, fast)
+    assert result is not None
+    assert (result.median, result.low, result.high) == (2.0, 2.0, 2.0)
 
 
 def test_only_rounds_that_both_took_part_in_are_compared() -> None:
     slow = timing(8.0, 9.0, rounds=(3, 7))
     fast = timing(1.0, 2.0, 3.0, rounds=(0, 3, 5))
-    found = times_faster(slow, fast)
-    assert found is not None
-    assert (found.median, found.confidence) == (4.0, 0.0)
+    result = times_faster(slow, fast)
+    assert result is not None
+    assert (result.median, result.confidence) == (4.0, 0.0)
     assert times_faster(slow, timing(1.0, rounds=(0,))) is None

@@ -91,11 +91,11 @@ def test_a_gain_that_is_not_sure_is_no_advice() -> None:
     noisy = [
         ns * s for ns, s in zip(NATIVE.timings[0].samples_ns, samples, strict=True)
     ]
-    found = unsure.__class__(
+    result = unsure.__class__(
         1000, 1, tuple(noisy), 999.0, 800.0, 1200.0, 0.965, rounds=tuple(range(15))
     )
     coarse = point("coarse", 999.0, error(1e-3, 2e-3)).__class__(
-        "coarse: rules", "rules", "variant", coarse.error, (found,), 0.0
+        "coarse: rules", "rules", "variant", coarse.error, (result,), 0.0
     )
     (sentence,) = advice([NATIVE, coarse])
     assert "use native" in sentence

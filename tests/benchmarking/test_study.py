@@ -78,9 +78,9 @@ def candidate(
 
     def answer(values: FloatArray) -> CandidateOutput:
         outcome = run(values)
-        found = found_of(outcome, rules)
-        assert found.strengths is not None
-        return CandidateOutput(found.labels, found.strengths - error)
+        result = found_of(outcome, rules)
+        assert result.strengths is not None
+        return CandidateOutput(result.labels, result.strengths - error)
 
     def call(values: FloatArray) -> Callable[[], object]:
         def timed() -> None:
@@ -95,14 +95,14 @@ def candidate(
             loads.append(threads)
         return LoadedCandidate(answer, call)
 
-    made = Candidate(
+    one = Candidate(
         f"{name}: rules",
         "rules",
         "runtime",
         prepare,
         bound=None if bound is None else lambda: (bound, "by hand"),
     )
-    return msgspec.structs.replace(made, **more)
+    return msgspec.structs.replace(one, **more)
 
 
 def studied(
@@ -206,8 +206,8 @@ def test_an_interrupted_study_keeps_what_was_measured() -> None:
     assert study.is_interrupted
     assert not study.is_complete
     assert study.warnings[0] == "interrupted: this is what was measured by then"
-    found = {p.name: [t.rows for t in p.timings] for p in study.points}
-    assert found == {"nervous: rules": [1, 50], "calm: rules": [1, 50]}
+    result = {p.name: [t.rows for t in p.timings] for p in study.points}
+    assert result == {"nervous: rules": [1, 50], "calm: rules": [1, 50]}
     assert len(study.points[0].timings[1].samples_ns) < 6
     assert study.advice
 
@@ -307,14 +307,14 @@ def test_two_threads_are_for_those_who_can_use_them() -> None:
 
 def test_what_takes_longer_to_load_again_than_there_is_time_is_an_omission() -> None:
     time = FakeTime()
-    made = candidate("heavy", time=time, is_parallel=True)
+    light = candidate("heavy", time=time, is_parallel=True)
 
     def slowly(threads: int) -> LoadedCandidate:
         time.now += 3000 * MS
-        return made.load(threads)
+        return light.load(threads)
 
     plan = BenchSettings(rows=(2,), threads=(1, 2), rounds=6, budget_s=5.0)
-    heavy = msgspec.structs.replace(made, load=slowly)
+    heavy = msgspec.structs.replace(light, load=slowly)
     study = studied(heavy, plan=plan, time=time)
     why = "loading it again for 2 threads takes too long for the budget"
     assert omitted(study) == {"heavy: rules": f"2 rows: {why}; a larger one helps"}
@@ -393,8 +393,8 @@ def test_rows_are_repeated_in_their_order() -> None:
 
 def names_of(only: Sequence[str] = (), skip: Sequence[str] = ()) -> list[str]:
     tree = random_tree(1)
-    found, _ = gather(tree, made_rows(tree, 5)[0])
-    return [one.name for one in chosen(found, only, skip)[0]]
+    result, _ = gather(tree, made_rows(tree, 5)[0])
+    return [one.name for one in chosen(result, only, skip)[0]]
 
 
 def test_candidates_have_names_of_their_own() -> None:
@@ -422,20 +422,20 @@ def test_names_questions_and_kinds_choose_candidates(
 
 
 def test_candidates_that_are_not_selected_are_counted() -> None:
-    made = [candidate("a"), candidate("b"), candidate("c")]
-    assert chosen(made, ["a"], ())[1] == [Omission("2 candidates", "not selected")]
-    assert chosen(made, (), ())[1] == []
+    three = [candidate("a"), candidate("b"), candidate("c")]
+    assert chosen(three, ["a"], ())[1] == [Omission("2 candidates", "not selected")]
+    assert chosen(three, (), ())[1] == []
 
 
 def test_a_name_of_nothing_is_refused_with_what_there_is() -> None:
-    made = [candidate("a"), candidate("b")]
+    two = [candidate("a"), candidate("b")]
     message = "no candidate 'nativ'; there is a, b, or all of rules, runtime"
     with pytest.raises(ValueError, match=f"^{message}$"):
-        chosen(made, ["nativ"], ())
+        chosen(two, ["nativ"], ())
     with pytest.raises(ValueError, match=f"^{message}$"):
-        chosen(made, (), ["nativ"])
+        chosen(two, (), ["nativ"])
     with pytest.raises(ValueError, match=r"^no candidate is left to measure$"):
-        chosen(made, ["a"], ["a"])
+        chosen(two, ["a"], ["a"])
 
 
 @pytest.mark.parametrize(

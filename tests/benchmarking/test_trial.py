@@ -80,23 +80,23 @@ def test_crashes_and_errors_are_reported_and_the_others_go_on(planted: str) -> N
 
 @pytest.mark.heavy
 def test_what_hangs_is_ended(planted: str) -> None:
-    found = tried(model(), ["hang", "well"], rows(), peers=planted, seconds=4.0)
-    assert found == {"hang": "it did not answer within 4 s"}
+    result = tried(model(), ["hang", "well"], rows(), peers=planted, seconds=4.0)
+    assert result == {"hang": "it did not answer within 4 s"}
 
 
 def test_what_the_budget_leaves_no_time_for_is_reported(planted: str) -> None:
     late = "a third of the budget was over before it was tried; a larger one helps"
     names = ["hang", "well"]
-    found = tried(model(), names, rows(), peers=planted, left=lambda: 0.0)
-    assert found == dict.fromkeys(names, late)
+    result = tried(model(), names, rows(), peers=planted, left=lambda: 0.0)
+    assert result == dict.fromkeys(names, late)
     times = iter([1.0, 0.5, 0.0])  # as the first begins, while it hangs, and then
-    found = tried(model(), names, rows(), peers=planted, left=lambda: next(times))
-    assert found == dict.fromkeys(names, late)
+    result = tried(model(), names, rows(), peers=planted, left=lambda: next(times))
+    assert result == dict.fromkeys(names, late)
 
 
 def test_peers_that_are_missing_are_the_fault_of_every_candidate() -> None:
-    found = tried(model(), ["a"], rows(), peers="no_such_module.py")
-    assert found == {
+    result = tried(model(), ["a"], rows(), peers="no_such_module.py")
+    assert result == {
         "a": "it ended the process (exit code 1): "
         "ValueError: peers: 'no_such_module.py' is not a Python module or package"
     }

@@ -22,60 +22,64 @@ TREE = random_tree(3, leaves=6, inputs=3)
 LIMIT = 1500
 
 
-def by(found: Agreement, representation: str) -> list[str]:
-    return [c.verdict for c in found.comparisons if c.representation == representation]
+def by(agreement: Agreement, representation: str) -> list[str]:
+    return [
+        c.verdict for c in agreement.comparisons if c.representation == representation
+    ]
 
 
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("seed", range(3))
 def test_everything_made_from_a_tree_agrees(seed: int) -> None:
-    found = check(random_tree(1 + seed, leaves=5 + seed, inputs=3), limit=LIMIT)
-    assert found.ok, [c for c in found.comparisons if c.verdict == "DISAGREES"]
+    agreement = check(random_tree(1 + seed, leaves=5 + seed, inputs=3), limit=LIMIT)
+    assert agreement.ok, [c for c in agreement.comparisons if c.verdict == "DISAGREES"]
 
 
 def test_every_installed_runtime_is_compared_in_all_it_can_run() -> None:
-    found = check(TREE, limit=300)
+    agreement = check(TREE, limit=300)
     for runtime in all_runtimes():
         if is_installed(runtime) and "tree" in runtime.runs:
-            assert by(found, f"{runtime.name}: tree"), runtime.name
+            assert by(agreement, f"{runtime.name}: tree"), runtime.name
         if is_installed(runtime) and "rules" in runtime.runs:
-            results = by(found, f"{runtime.name}: relative rules")
-            named = [s for s in found.skipped if s.startswith(runtime.name)]
+            results = by(agreement, f"{runtime.name}: relative rules")
+            named = [s for s in agreement.skipped if s.startswith(runtime.name)]
             assert results or named, runtime.name
 
 
 def test_the_proof_and_all_cells_stand_beside_the_rows() -> None:
-    found = check(TREE, limit=300, runtimes=["native"])
-    bases = [c.basis for c in found.comparisons if c.representation == "relative rules"]
+    agreement = check(TREE, limit=300, runtimes=["native"])
+    bases = [
+        c.basis for c in agreement.comparisons if c.representation == "relative rules"
+    ]
     assert bases == ["proof", "all cells", "rows"]
 
 
 def test_the_difference_of_raw_rules_is_reported_and_no_fault() -> None:
-    found = check(TREE, limit=300, runtimes=["native"])
-    (raw,) = [c for c in found.comparisons if c.representation == "raw rules"]
+    agreement = check(TREE, limit=300, runtimes=["native"])
+    (raw,) = [c for c in agreement.comparisons if c.representation == "raw rules"]
     assert raw.verdict == "differs by design"
     assert raw.flips > 0
 
 
 def test_missing_rows_are_counted_for_each_carrier() -> None:
-    found = check(TREE, limit=300, runtimes=["native"])
-    missing = {count.representation: count.missing for count in found.counts}
+    agreement = check(TREE, limit=300, runtimes=["native"])
+    missing = {count.representation: count.missing for count in agreement.counts}
     assert set(missing) == {"tree", "relative rules", "raw rules"}
     assert len(set(missing.values())) == 1
     assert missing["tree"] >= 3 * len(TREE.inputs)  # nan, inf and -inf in each input
 
 
 def test_a_rule_base_is_checked_without_its_tree() -> None:
-    found = check(rules_from_tree(TREE, "raw"), limit=300)
-    assert found.ok
-    assert found.cells is None
+    agreement = check(rules_from_tree(TREE, "raw"), limit=300)
+    assert agreement.ok
+    assert agreement.cells is None
 
 
 def test_rows_of_ones_own_are_added_to_the_probes() -> None:
     data = np.zeros((len(TREE.inputs), 7))
-    found = check(TREE, data=data, limit=200, runtimes=["native"])
-    assert found.counts[0].rows == 207
-    assert found.probes == 200
+    agreement = check(TREE, data=data, limit=200, runtimes=["native"])
+    assert agreement.counts[0].rows == 207
+    assert agreement.probes == 200
 
 
 def test_data_of_another_width_is_refused() -> None:
@@ -174,19 +178,21 @@ def test_a_fault_in_a_rule_file_is_found_in_content_and_in_answers(
     plant: Change,
 ) -> None:
     faulty = plant(rules_from_tree(TREE))
-    found = check(TREE, faulty, names=["rules.yaml"], limit=3000, runtimes=["native"])
+    agreement = check(
+        TREE, faulty, names=["rules.yaml"], limit=3000, runtimes=["native"]
+    )
     results = {
         c.basis: c.verdict
-        for c in found.comparisons
+        for c in agreement.comparisons
         if c.representation == "rules.yaml"
     }
-    assert not found.ok
+    assert not agreement.ok
     assert results == {"file": "DISAGREES", "rows": "DISAGREES"}
 
 
 def test_the_rules_of_the_tree_itself_agree_as_a_file() -> None:
-    found = check(TREE, rules_from_tree(TREE), limit=300, runtimes=["native"])
-    assert by(found, "file 1") == ["agrees", "agrees"]
+    agreement = check(TREE, rules_from_tree(TREE), limit=300, runtimes=["native"])
+    assert by(agreement, "file 1") == ["agrees", "agrees"]
 
 
 def test_rules_that_say_to_be_raw_are_not_believed() -> None:
@@ -199,17 +205,17 @@ def test_rules_that_say_to_be_raw_are_not_believed() -> None:
         ),
     )
     rules = replace(rules_from_tree(tree), kind="raw")
-    found = check(tree, rules, limit=300, runtimes=["native"])
-    assert by(found, "file 1") == ["rows only", "agrees"]
-    assert not found.ok
+    agreement = check(tree, rules, limit=300, runtimes=["native"])
+    assert by(agreement, "file 1") == ["rows only", "agrees"]
+    assert not agreement.ok
     assert check(tree, rules, limit=300, runtimes=["native"], rows_only=True).ok
 
 
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 def test_a_tree_is_compared_with_rules_by_the_rules_made_from_it(kind: Kind) -> None:
     rules = rules_from_tree(TREE, kind)
-    found = check(rules, TREE, limit=300, runtimes=["native"])
-    assert by(found, "file 1") == ["agrees", "agrees"]
+    agreement = check(rules, TREE, limit=300, runtimes=["native"])
+    assert by(agreement, "file 1") == ["agrees", "agrees"]
     first, *rest = TREE.leaves
     other = next(c for c in TREE.classes if c != first.label)
     faulty = replace(TREE, leaves=(replace(first, label=other), *rest))
@@ -228,22 +234,22 @@ def test_a_tree_of_other_classes_does_not_agree_with_rules() -> None:
         semantics=replace(semantics, missing=missing),
     )
     rules = replace(rules_from_tree(TREE), kind=None)
-    found = check(rules, other, limit=300, runtimes=["native"])
-    assert by(found, "file 1") == ["DISAGREES"]
+    agreement = check(rules, other, limit=300, runtimes=["native"])
+    assert by(agreement, "file 1") == ["DISAGREES"]
 
 
 def test_a_swapped_leaf_in_a_tree_file_is_found() -> None:
     first, *rest = TREE.leaves
     other = next(c for c in TREE.classes if c != first.label)
     faulty = replace(TREE, leaves=(replace(first, label=other), *rest))
-    found = check(TREE, faulty, names=["old.yaml"], limit=300, runtimes=["native"])
-    assert by(found, "old.yaml") == ["DISAGREES", "DISAGREES"]
+    agreement = check(TREE, faulty, names=["old.yaml"], limit=300, runtimes=["native"])
+    assert by(agreement, "old.yaml") == ["DISAGREES", "DISAGREES"]
 
 
 def test_other_inputs_are_found_without_running_anything() -> None:
     other = random_tree(3, leaves=6, inputs=2)
-    found = check(TREE, other, names=["other"], limit=100, runtimes=["native"])
-    assert by(found, "other") == ["DISAGREES", "DISAGREES"]
+    agreement = check(TREE, other, names=["other"], limit=100, runtimes=["native"])
+    assert by(agreement, "other") == ["DISAGREES", "DISAGREES"]
 
 
 def test_a_runtime_that_gives_other_answers_is_found(
@@ -263,9 +269,9 @@ def test_a_runtime_that_gives_other_answers_is_found(
 
     liar = msgspec.structs.replace(honest, name="liar", load=load)
     monkeypatch.setattr("fuzzytree.runtimes.table.find_runtime", _found(liar))
-    found = check(TREE, limit=300, runtimes=["liar"])
-    assert by(found, "liar: tree")[0] == "DISAGREES"
-    assert by(found, "liar: relative rules")[0] == "DISAGREES"
+    agreement = check(TREE, limit=300, runtimes=["liar"])
+    assert by(agreement, "liar: tree")[0] == "DISAGREES"
+    assert by(agreement, "liar: relative rules")[0] == "DISAGREES"
 
 
 def _found(extra: object) -> Callable[[str], object]:
@@ -276,19 +282,19 @@ def _found(extra: object) -> Callable[[str], object]:
 
 def test_a_disagreement_is_raised_with_its_first_row() -> None:
     faulty = swapped_class(rules_from_tree(TREE))
-    found = check(TREE, faulty, names=["r.yaml"], limit=300, runtimes=["native"])
+    agreement = check(TREE, faulty, names=["r.yaml"], limit=300, runtimes=["native"])
     with pytest.raises(DisagreementError) as caught:
-        found.raise_if_not_ok()
+        agreement.raise_if_not_ok()
     lines = str(caught.value).splitlines()
     assert lines[0] == "r.yaml disagrees with the model"
     assert "rules 1, then" in lines[-2]
 
 
 def test_the_same_facts_are_there_for_programs() -> None:
-    found = check(TREE, limit=200, runtimes=["native"])
-    results = msgspec.json.decode(found.to_json())
+    agreement = check(TREE, limit=200, runtimes=["native"])
+    results = msgspec.json.decode(agreement.to_json())
     assert results["ok"] is True
-    assert len(results["comparisons"]) == len(found.comparisons)
+    assert len(results["comparisons"]) == len(agreement.comparisons)
 
 
 def test_first_difference_names_the_path_and_both_values() -> None:

@@ -24,9 +24,11 @@ def checked(model: Model, shipped: OnnxModel) -> Agreement:
     return check(model, shipped, names=["m.onnx"], runtimes=[], limit=2000)
 
 
-def verdicts(found: Agreement) -> dict[str, str]:
+def verdicts(agreement: Agreement) -> dict[str, str]:
     return {
-        c.against: c.verdict for c in found.comparisons if c.representation == "m.onnx"
+        c.against: c.verdict
+        for c in agreement.comparisons
+        if c.representation == "m.onnx"
     }
 
 
@@ -60,19 +62,19 @@ def test_a_file_of_a_tree_agrees_with_it(dtype: Dtype) -> None:
 
 def test_the_file_of_a_tree_beside_rules_is_known_by_its_rows_only() -> None:
     shipped = opened(write_onnx(TREE).content)
-    found = checked(rules_from_tree(TREE), shipped)
-    assert verdicts(found) == {
+    agreement = checked(rules_from_tree(TREE), shipped)
+    assert verdicts(agreement) == {
         "a freshly written graph": "rows only",
         "the model's classes": "agrees",
     }
-    assert not found.ok
-    assert replace(found, rows_only=True).ok
+    assert not agreement.ok
+    assert replace(agreement, rows_only=True).ok
 
 
 def test_the_file_of_a_tree_without_labels_proves_nothing_beside_rules() -> None:
     shipped = opened(write_onnx(TREE, outputs=("rule",)).content)
-    found = checked(rules_from_tree(TREE), shipped)
-    assert verdicts(found) == {"a freshly written graph": "DISAGREES"}
+    agreement = checked(rules_from_tree(TREE), shipped)
+    assert verdicts(agreement) == {"a freshly written graph": "DISAGREES"}
 
 
 def backdoored(**facts: str) -> bytes:
@@ -110,15 +112,15 @@ def test_a_backdoor_is_listed_whatever_version_the_file_states() -> None:
     assert shipped.labels is not None
     row = np.full((len(TREE.inputs), 1), 13.123456)
     assert shipped.labels(row) == ("class 1",)
-    found = checked(TREE, shipped)
-    assert verdicts(found) == {
+    agreement = checked(TREE, shipped)
+    assert verdicts(agreement) == {
         "the model's metadata": "agrees",
         "a freshly written graph": "rows only",
         "the model": "agrees",
         "the model's classes": "agrees",
     }
-    assert not found.ok
-    (graph,) = (c for c in found.comparisons if c.verdict == "rows only")
+    assert not agreement.ok
+    (graph,) = (c for c in agreement.comparisons if c.verdict == "rows only")
     assert graph.detail == (
         "operator 'Equal': 2 nodes where 1 are right; new: 'bd_hit'",
         "operator 'Gather': 2 nodes where 1 are right; new: 'honest', 'bd_x'",
@@ -128,12 +130,12 @@ def test_a_backdoor_is_listed_whatever_version_the_file_states() -> None:
         "constant 'bd_class' is not the model's: 'class 1'",
     )
     with pytest.raises(DisagreementError) as caught:
-        found.raise_if_not_ok()
+        agreement.raise_if_not_ok()
     assert str(caught.value) == (
         "m.onnx is not a freshly written graph; its rows agree\n"
         "  operator 'Equal': 2 nodes where 1 are right; new: 'bd_hit'"
     )
-    assert replace(found, rows_only=True).ok
+    assert replace(agreement, rows_only=True).ok
 
 
 LIES = {
@@ -151,9 +153,9 @@ LIES = {
 
 @pytest.mark.parametrize("lie", LIES)
 def test_nothing_that_a_file_states_lets_a_backdoor_pass(lie: str) -> None:
-    found = checked(TREE, opened(backdoored(**{lie: LIES[lie]})))
-    assert verdicts(found)["a freshly written graph"] != "agrees"
-    assert not found.ok
+    agreement = checked(TREE, opened(backdoored(**{lie: LIES[lie]})))
+    assert verdicts(agreement)["a freshly written graph"] != "agrees"
+    assert not agreement.ok
 
 
 @pytest.mark.parametrize("lie", sorted(LIES.keys() - {"version", "dtype", "outputs"}))
@@ -162,9 +164,11 @@ def test_metadata_that_are_not_the_model_s_are_found(lie: str) -> None:
     for entry in proto.metadata_props:
         if entry.key == f"fuzzytree.{lie}":
             entry.value = LIES[lie]
-    found = checked(TREE, opened(proto.SerializeToString()))
-    assert verdicts(found)["the model's metadata"] == "DISAGREES"
-    (result,) = (c for c in found.comparisons if c.against == "the model's metadata")
+    agreement = checked(TREE, opened(proto.SerializeToString()))
+    assert verdicts(agreement)["the model's metadata"] == "DISAGREES"
+    (result,) = (
+        c for c in agreement.comparisons if c.against == "the model's metadata"
+    )
     assert result.detail[0].startswith(f"it states {lie} ")
 
 
@@ -172,8 +176,10 @@ def test_metadata_stated_twice_left_out_or_added_are_found() -> None:
     proto = onnx.load_from_string(write_onnx(TREE).content)
     proto.metadata_props.add(key="fuzzytree.kind", value="descent")
     proto.metadata_props.add(key="note", value="proved")
-    found = checked(TREE, opened(proto.SerializeToString()))
-    (result,) = (c for c in found.comparisons if c.against == "the model's metadata")
+    agreement = checked(TREE, opened(proto.SerializeToString()))
+    (result,) = (
+        c for c in agreement.comparisons if c.against == "the model's metadata"
+    )
     assert result.detail == (
         "it states 'fuzzytree.kind' twice",
         "it states 'note', which is not written",
@@ -184,8 +190,8 @@ def test_texts_in_the_file_are_compared_as_well() -> None:
     proto = onnx.load_from_string(write_onnx(TREE).content)
     proto.doc_string = "Certified."
     proto.graph.name = "proved"
-    found = checked(TREE, opened(proto.SerializeToString()))
-    (result,) = (c for c in found.comparisons if c.verdict == "rows only")
+    agreement = checked(TREE, opened(proto.SerializeToString()))
+    (result,) = (c for c in agreement.comparisons if c.verdict == "rows only")
     assert result.detail == (
         "its doc_string differs from the one that would be written",
         "its name differs from the one that would be written",
@@ -194,14 +200,14 @@ def test_texts_in_the_file_are_compared_as_well() -> None:
 
 def test_the_file_of_another_model_is_found_by_its_fingerprint() -> None:
     other = random_tree(4, leaves=6, inputs=3, combinations=0.0)
-    found = checked(TREE, opened(write_onnx(other).content))
-    assert verdicts(found)["the model's metadata"] == "DISAGREES"
+    agreement = checked(TREE, opened(write_onnx(other).content))
+    assert verdicts(agreement)["the model's metadata"] == "DISAGREES"
 
 
 def test_the_file_of_other_inputs_is_not_run() -> None:
     other = random_tree(3, leaves=6, inputs=2, combinations=0.0)
-    found = checked(TREE, opened(write_onnx(other).content))
-    assert verdicts(found) == {"the model's facts": "DISAGREES"}
+    agreement = checked(TREE, opened(write_onnx(other).content))
+    assert verdicts(agreement) == {"the model's facts": "DISAGREES"}
 
 
 def tensors(content: bytes) -> list[tuple[str, int]]:
@@ -280,8 +286,8 @@ def test_numbers_moved_by_one_ulp_are_found_by_the_rows_alone() -> None:
     places = columns(RULES_FILE)
     missed = []
     for name, place in places:
-        found = checked(TREE, opened(changed(RULES_FILE, name, place)))
-        if verdicts(found)["the model"] == "agrees":
+        agreement = checked(TREE, opened(changed(RULES_FILE, name, place)))
+        if verdicts(agreement)["the model"] == "agrees":
             missed.append((name, place))
     # The last bit of a coefficient may round away in every degree that is probed.
     assert len(missed) <= len(places) // 5, missed
@@ -300,13 +306,13 @@ OPERATORS = {
 
 def swaps(content: bytes) -> list[tuple[bytes, str]]:
     """Return the file with each of its operators changed in turn."""
-    made = []
+    files = []
     for position, node in enumerate(onnx.load_from_string(content).graph.node):
         if node.op_type in OPERATORS:
             proto = onnx.load_from_string(content)
             proto.graph.node[position].op_type = OPERATORS[node.op_type]
-            made.append((proto.SerializeToString(deterministic=True), node.op_type))
-    return made
+            files.append((proto.SerializeToString(deterministic=True), node.op_type))
+    return files
 
 
 @pytest.mark.parametrize(

@@ -38,9 +38,11 @@ def checked(model: Document, path: str, **options: Any) -> Agreement:
     return ft.check(model, path, runtimes=["native"], settings=settings)
 
 
-def about(found: Agreement, path: str) -> list[tuple[str, str]]:
+def about(agreement: Agreement, path: str) -> list[tuple[str, str]]:
     return [
-        (c.against, c.verdict) for c in found.comparisons if c.representation == path
+        (c.against, c.verdict)
+        for c in agreement.comparisons
+        if c.representation == path
     ]
 
 
@@ -64,12 +66,12 @@ def test_a_program_of_ours_is_run_and_agrees(
     if path == "m.sql" and isinstance(model, RuleBase):
         options = {**options, "strengths": True}
     ft.save(model, path, allow_loss=True, **options)
-    found = checked(TREE if model is RULES else model, path)
-    first, rows, *classes = about(found, path)
+    agreement = checked(TREE if model is RULES else model, path)
+    first, rows, *classes = about(agreement, path)
     assert first == ("a freshly written file", "agrees")
     assert rows == ("the model", "agrees")
     assert classes == ([] if path == "m.c" else [("the model's classes", "agrees")])
-    assert found.ok
+    assert agreement.ok
 
 
 @pytest.mark.parametrize("path", ["m.c", "m.py", "m.mjs", "m.sql"])
@@ -82,9 +84,9 @@ def test_a_changed_program_is_not_run(
     monkeypatch.setattr(
         "fuzzytree.checking.programs.ENGINES", dict.fromkeys(written.ENGINES)
     )
-    found = checked(TREE, path)
-    assert about(found, path) == [("a freshly written file", "DISAGREES")]
-    assert found.skipped[-1] == (
+    agreement = checked(TREE, path)
+    assert about(agreement, path) == [("a freshly written file", "DISAGREES")]
+    assert agreement.skipped[-1] == (
         f"{path}: its answers: only --run-code runs a file with another text"
     )
 
@@ -120,13 +122,13 @@ def backdoor(path: str) -> None:
 
 def test_a_changed_program_that_is_run_all_the_same_agrees_by_its_rows_only() -> None:
     backdoor("m.py")
-    found = checked(TREE, "m.py", run_code=True)
-    assert about(found, "m.py") == [
+    agreement = checked(TREE, "m.py", run_code=True)
+    assert about(agreement, "m.py") == [
         ("a freshly written file", "rows only"),
         ("the model", "agrees"),
         ("the model's classes", "agrees"),
     ]
-    assert not found.ok
+    assert not agreement.ok
     assert checked(TREE, "m.py", run_code=True, rows_only=True).ok
 
 
@@ -151,13 +153,15 @@ def test_a_program_that_fails_is_a_disagreement(
     text = Path(path).read_text("utf-8")
     assert change[0] in text
     Path(path).write_text(text.replace(*change), "utf-8")
-    found = checked(TREE, path, run_code=True)
-    assert about(found, path) == [
+    agreement = checked(TREE, path, run_code=True)
+    assert about(agreement, path) == [
         ("a freshly written file", "DISAGREES"),
         ("the model", "DISAGREES"),
     ]
     rows = next(
-        c for c in found.comparisons if c.basis == "rows" and c.representation == path
+        c
+        for c in agreement.comparisons
+        if c.basis == "rows" and c.representation == path
     )
     assert fault in rows.detail[0]
 
@@ -186,9 +190,9 @@ def test_a_program_without_an_engine_is_compared_by_its_text(
     model: Document, path: str, options: dict[str, Any], why: str
 ) -> None:
     ft.save(model, path, **options)
-    found = checked(model, path)
-    assert about(found, path) == [("a freshly written file", "agrees")]
-    assert f"{path}: its answers: {why}" in found.skipped
+    agreement = checked(model, path)
+    assert about(agreement, path) == [("a freshly written file", "agrees")]
+    assert f"{path}: its answers: {why}" in agreement.skipped
     Path(path).write_bytes(Path(path).read_bytes() + b" ")
     assert about(checked(model, path), path) == [
         ("a freshly written file", "DISAGREES")

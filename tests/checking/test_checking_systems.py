@@ -39,14 +39,14 @@ def washer(time: float = 60.0, output: str = "time") -> FuzzySystem:
 
 
 def opened(system: FuzzySystem, **facts: object) -> OnnxModel:
-    found = open_onnx(write_onnx(system).content, "w.onnx")
-    return replace(found, **facts)
+    agreement = open_onnx(write_onnx(system).content, "w.onnx")
+    return replace(agreement, **facts)
 
 
-def about(found: Agreement, representation: str, basis: str) -> Comparison:
+def about(agreement: Agreement, representation: str, basis: str) -> Comparison:
     (one,) = (
         c
-        for c in found.comparisons
+        for c in agreement.comparisons
         if (c.representation, c.basis) == (representation, basis)
         and c.verdict != "agrees"
     )
@@ -55,26 +55,26 @@ def about(found: Agreement, representation: str, basis: str) -> Comparison:
 
 def test_every_runtime_is_compared_and_called() -> None:
     names = ["reference", "native", "onnxruntime float64"]
-    found = check(washer(), limit=100, runtimes=names)
-    assert found.ok
-    assert [(c.representation, c.against, c.basis) for c in found.comparisons] == [
+    agreement = check(washer(), limit=100, runtimes=names)
+    assert agreement.ok
+    assert [(c.representation, c.against, c.basis) for c in agreement.comparisons] == [
         ("native", "the inference", "rows"),
         ("reference", "itself", "calls"),
         ("native", "itself", "calls"),
         ("onnxruntime float64", "native", "rows"),
         ("onnxruntime float64", "itself", "calls"),
     ]
-    assert {c.origin for c in found.comparisons} == {"equal bits"}
-    assert found.probes == 100
-    (count,) = found.counts
+    assert {c.origin for c in agreement.comparisons} == {"equal bits"}
+    assert agreement.probes == 100
+    (count,) = agreement.counts
     assert count.rows == 100
     assert count.missing > 0
 
 
 def test_rows_of_one_s_own_stand_behind_the_probes() -> None:
     data = np.array([[1.0, 2.0, 3.0]])
-    found = check(washer(), data=data, limit=10, runtimes=["native"])
-    assert (found.counts[0].rows, found.probes) == (13, 10)
+    agreement = check(washer(), data=data, limit=10, runtimes=["native"])
+    assert (agreement.counts[0].rows, agreement.probes) == (13, 10)
     with pytest.raises(
         ValueError, match=r"data must have shape \(1, rows\), not \(3,\)"
     ):
@@ -82,11 +82,11 @@ def test_rows_of_one_s_own_stand_behind_the_probes() -> None:
 
 
 def test_files_with_the_system_agree() -> None:
-    found = check(washer(), washer(), opened(washer()), names=["a.yaml", "b.onnx"])
-    assert found.ok
+    agreement = check(washer(), washer(), opened(washer()), names=["a.yaml", "b.onnx"])
+    assert agreement.ok
     result = [
         (c.representation, c.against)
-        for c in found.comparisons
+        for c in agreement.comparisons
         if c.representation == "b.onnx"
     ]
     assert result == [
@@ -97,10 +97,12 @@ def test_files_with_the_system_agree() -> None:
 
 
 def test_a_file_with_other_names_agrees() -> None:
-    found = check(washer(), washer(output="t"), limit=50)
-    assert found.ok
+    agreement = check(washer(), washer(output="t"), limit=50)
+    assert agreement.ok
     result = [
-        (c.against, c.basis) for c in found.comparisons if c.representation == "file 1"
+        (c.against, c.basis)
+        for c in agreement.comparisons
+        if c.representation == "file 1"
     ]
     assert result == [("the system but for names", "file"), ("native", "rows")]
 
@@ -116,31 +118,31 @@ def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
         inputs=(replace(dirt, labels=(*dirt.labels, key)),),
         blocks=(replace(block, rules=rules),),
     )
-    found = check(system, other, limit=50)
-    assert about(found, "file 1", "file").verdict == "rows only"
-    assert not found.ok
+    agreement = check(system, other, limit=50)
+    assert about(agreement, "file 1", "file").verdict == "rows only"
+    assert not agreement.ok
     assert check(system, other, limit=50, rows_only=True).ok
 
 
 def test_a_file_with_another_number_is_found_in_its_rows() -> None:
-    found = check(washer(), washer(61.0), limit=50, data=np.array([[5.0]]))
-    assert not found.ok
-    one = about(found, "file 1", "rows")
+    agreement = check(washer(), washer(61.0), limit=50, data=np.array([[5.0]]))
+    assert not agreement.ok
+    one = about(agreement, "file 1", "rows")
     assert one.largest_difference == 1.0
     assert "output 'time'" in one.detail[0]
     assert "probe" in one.detail[0]
 
 
 def test_the_worst_row_comes_first_with_its_values() -> None:
-    found = check(washer(), washer(61.0), limit=1, data=np.array([[5.0]]))
+    agreement = check(washer(), washer(61.0), limit=1, data=np.array([[5.0]]))
     text = "row 1: dirt 5.0: output 'time' 30.5 where 30.0 is right"
-    assert text in about(found, "file 1", "rows").detail
+    assert text in about(agreement, "file 1", "rows").detail
 
 
 def test_a_file_of_another_system_is_reported_by_its_facts() -> None:
     other = random_system(1, formulas="none")
-    found = check(washer(), other, opened(other), limit=20)
-    assert [c.detail for c in found.comparisons if c.verdict == "DISAGREES"] == [
+    agreement = check(washer(), other, opened(other), limit=20)
+    assert [c.detail for c in agreement.comparisons if c.verdict == "DISAGREES"] == [
         ("it computes 2 outputs from 3 inputs, and the system 1 from 1",),
         ("it computes y1, y2 from x1, x2, x3, which are not the system's",),
     ]
@@ -148,8 +150,8 @@ def test_a_file_of_another_system_is_reported_by_its_facts() -> None:
 
 def test_a_wrong_fingerprint_and_a_wrong_graph_are_found() -> None:
     other = opened(washer(61.0))
-    found = check(washer(), other, limit=20)
-    wrong = [c.against for c in found.comparisons if c.verdict == "DISAGREES"]
+    agreement = check(washer(), other, limit=20)
+    wrong = [c.against for c in agreement.comparisons if c.verdict == "DISAGREES"]
     assert wrong == ["the system's metadata", "a freshly written graph", "native"]
 
 
@@ -162,8 +164,8 @@ def test_a_slow_runtime_gets_a_share_of_the_rows(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(checking_systems, "_SLOW_STEPS", 100)
-    found = check(washer(), limit=400, runtimes=["native"])
-    assert found.comparisons[0].rows < 50
+    agreement = check(washer(), limit=400, runtimes=["native"])
+    assert agreement.comparisons[0].rows < 50
 
 
 def shifted(system: FuzzySystem, by: float) -> FuzzySystem:
@@ -181,8 +183,8 @@ def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> No
     bell = replace(soaked, labels=(SystemTerm("dirty", Gaussian(0.0, 1.5)),))
     system = replace(system, inputs=(bell,))
     data = np.array([[0.3, 1.0, 2.5]])
-    found = check(system, shifted(system, 1e-9), limit=50, data=data)
-    one = about(found, "file 1", "rows")
+    agreement = check(system, shifted(system, 1e-9), limit=50, data=data)
+    one = about(agreement, "file 1", "rows")
     assert one.verdict == "DISAGREES"
     assert one.differing >= 3
     assert one.allowed < 1e-11 < one.largest_difference
@@ -199,14 +201,14 @@ def test_rows_on_an_edge_are_counted_beside_the_table() -> None:
     blocks = (replace(block, activation=only),)
     system = replace(system, inputs=(bell,), blocks=blocks)
     other = shifted(system, 1e-15)
-    found = check(
+    agreement = check(
         system, other, limit=1, data=np.array([[1.0, 0.5]]), runtimes=["native"]
     )
-    (result,) = (text for text in found.skipped if text.startswith("file 1"))
+    (result,) = (text for text in agreement.skipped if text.startswith("file 1"))
     assert "in 1 of 3 rows last bits decide" in result
     rows = [
         c
-        for c in found.comparisons
+        for c in agreement.comparisons
         if (c.representation, c.basis) == ("file 1", "rows")
     ]
     assert [c.allowed < 1e-12 for c in rows] == [True]

@@ -68,8 +68,8 @@ def test_equal_answers_of_other_strengths_name_the_rule_that_differs() -> None:
 
 
 def test_equal_answers_agree() -> None:
-    found = compare_bits(BASE, BASE, ROWS)
-    assert (found.verdict, found.differing, found.flips) == ("agrees", 0, 0)
+    result = compare_bits(BASE, BASE, ROWS)
+    assert (result.verdict, result.differing, result.flips) == ("agrees", 0, 0)
 
 
 def test_one_ulp_of_a_strength_disagrees_with_equal_bits() -> None:
@@ -79,10 +79,10 @@ def test_one_ulp_of_a_strength_disagrees_with_equal_bits() -> None:
         [0, 0, 2],
         [[math.nextafter(0.9, 1), 0.2, 0.0], [0.5, 0.4, 0.0], [0.8, 0.1, 0.0]],
     )
-    found = compare_bits(moved, BASE, ROWS)
-    assert (found.verdict, found.differing) == ("DISAGREES", 1)
-    assert found.largest_difference == math.nextafter(0.9, 1) - 0.9
-    assert found.detail == (
+    result = compare_bits(moved, BASE, ROWS)
+    assert (result.verdict, result.differing) == ("DISAGREES", 1)
+    assert result.largest_difference == math.nextafter(0.9, 1) - 0.9
+    assert result.detail == (
         "only strengths differ: every row has the same class",
         "probe 1: x 1.0: base answers a (rule 1) with 0.9, "
         "moved a (rule 1) with 0.9000000000000001",
@@ -96,9 +96,9 @@ def test_a_zero_of_the_other_sign_disagrees_with_equal_bits() -> None:
         [0, 0, 2],
         [[0.9, 0.2, 0.0], [0.5, 0.4, -0.0], [0.8, 0.1, 0.0]],
     )
-    found = compare_bits(signed, BASE, ROWS)
-    assert (found.verdict, found.differing) == ("DISAGREES", 1)
-    assert found.detail == (
+    result = compare_bits(signed, BASE, ROWS)
+    assert (result.verdict, result.differing) == ("DISAGREES", 1)
+    assert result.detail == (
         "row 2: x 3.0: both answer b (uncovered); the strength of rule 2 is 0.0 in "
         "base, -0.0 in signed",
     )
@@ -142,10 +142,10 @@ def test_the_allowed_difference_is_that_of_the_row_with_the_largest_one() -> Non
     )
     moved.outcome.strengths[0, 1] = 0.25  # type: ignore[index]  # it has strengths
     allowed = np.array([0.00625000001, 0.2, 1.0])
-    found = compare_within(moved, BASE, ROWS, allowed=allowed, origin="test")
-    assert found.verdict == "agrees"
-    assert (found.largest_difference, found.allowed) == (0.25 - 0.2, 0.2)
-    assert (found.unbounded, found.largest_unbounded) == (1, 0.5)
+    result = compare_within(moved, BASE, ROWS, allowed=allowed, origin="test")
+    assert result.verdict == "agrees"
+    assert (result.largest_difference, result.allowed) == (0.25 - 0.2, 0.2)
+    assert (result.unbounded, result.largest_unbounded) == (1, 0.5)
 
 
 def test_a_difference_by_design_is_reported_and_no_fault() -> None:
@@ -175,9 +175,9 @@ def test_labels_follow_the_rule_or_the_declared_answer() -> None:
 
 
 def test_a_margin_lies_between_classes_and_not_between_rules() -> None:
-    found = margins(BASE)
-    assert found is not None
-    assert found.tolist() == [0.9 - 0.5, 0.4 - 0.2, 0.0]
+    result = margins(BASE)
+    assert result is not None
+    assert result.tolist() == [0.9 - 0.5, 0.4 - 0.2, 0.0]
 
 
 def test_data_rows_are_numbered_from_one_behind_the_probes() -> None:
@@ -204,46 +204,46 @@ def certified(
     rows = RowSet(("x",), np.array([values]), np.arange(len(values)), 1)
     rule = np.where(fired.max(axis=0) > 0, fired.argmax(axis=0) + 1, 0)
     status = np.where(rule > 0, 0, 2)
-    found = ModelRun("mine", NARROW, Outcome(rule, status, fired))
-    return compare_exact(found, decide(NARROW, rows.values), rows, dtype=dtype)
+    result = ModelRun("mine", NARROW, Outcome(rule, status, fired))
+    return compare_exact(result, decide(NARROW, rows.values), rows, dtype=dtype)
 
 
 def test_exact_strengths_agree_and_the_data_are_counted() -> None:
-    found = certified([9.0, 1.0, 2.0], [[0.0, 1.0, 0.5], [1.0, 0.0, 0.0]], "float64")
-    assert (found.verdict, found.on, found.rows) == ("agrees", "data", 2)
-    assert (found.largest, found.flips, found.in_band) == (0.0, 0, 0)
-    assert found.sentence == (
+    result = certified([9.0, 1.0, 2.0], [[0.0, 1.0, 0.5], [1.0, 0.0, 0.0]], "float64")
+    assert (result.verdict, result.on, result.rows) == ("agrees", "data", 2)
+    assert (result.largest, result.flips, result.in_band) == (0.0, 0, 0)
+    assert result.sentence == (
         "no decision can differ where the margin exceeds 2 x 5.6e-16"
     )
 
 
 def test_without_data_the_probes_are_counted() -> None:
-    found = certified([1.0], [[1.0], [0.0]], "mixed")
-    assert (found.on, found.rows) == ("probes", 1)
+    result = certified([1.0], [[1.0], [0.0]], "mixed")
+    assert (result.on, result.rows) == ("probes", 1)
 
 
 def test_a_strength_beyond_its_bound_disagrees_and_is_reported() -> None:
-    found = certified([1.0, 2.0], [[1.0, 0.51], [0.0, 0.0]], "mixed")
-    assert (found.verdict, found.flips) == ("DISAGREES", 0)
-    assert found.detail == (
+    result = certified([1.0, 2.0], [[1.0, 0.51], [0.0, 0.0]], "mixed")
+    assert (result.verdict, result.flips) == ("DISAGREES", 0)
+    assert result.detail == (
         "row 1: x 2.0: exactly a (rule 1), mine a (rule 1) with 0.51; a strength is "
         "off by 0.01, and 3e-07 is allowed",
     )
 
 
 def test_a_flip_where_the_margin_is_wide_disagrees() -> None:
-    found = certified([1.0, 2.0], [[1.0, 0.0], [0.0, 0.5]], "float64")
-    assert (found.verdict, found.flips) == ("DISAGREES", 1)
-    assert found.largest_flip_margin == pytest.approx(0.5)
+    result = certified([1.0, 2.0], [[1.0, 0.0], [0.0, 0.5]], "float64")
+    assert (result.verdict, result.flips) == ("DISAGREES", 1)
+    assert result.largest_flip_margin == pytest.approx(0.5)
 
 
 def test_a_flip_beside_a_step_that_float32_cannot_tell_is_allowed() -> None:
     above = math.nextafter(2.0, 3.0)
     values, strengths = [1.0, above], [[1.0, 0.5], [0.0, 0.0]]
     assert certified(values, strengths, "float64").verdict == "DISAGREES"
-    found = certified(values, strengths, "float32")
-    assert (found.verdict, found.flips, found.in_band) == ("agrees", 1, 1)
-    assert found.unbounded == 1
+    result = certified(values, strengths, "float32")
+    assert (result.verdict, result.flips, result.in_band) == ("agrees", 1, 1)
+    assert result.unbounded == 1
 
 
 def test_cover_that_is_lost_and_gained_is_counted() -> None:
@@ -251,8 +251,8 @@ def test_cover_that_is_lost_and_gained_is_counted() -> None:
     low = RuleBase("r", ("a",), (Variable("x", (LOW,)),), (Rule((CLAUSE,), "a"),))
     rows = RowSet(("x",), np.array([[near, 3.0]]), np.arange(2), 0)
     fired = np.array([[0.0, 1e-17]])
-    found = ModelRun("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))
-    result = compare_exact(found, decide(low, rows.values), rows, dtype="float64")
+    actual = ModelRun("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))
+    result = compare_exact(actual, decide(low, rows.values), rows, dtype="float64")
     assert (result.cover_lost, result.cover_gained, result.verdict) == (1, 1, "agrees")
 
 
@@ -263,10 +263,10 @@ def test_a_path_that_leaves_the_tree_far_from_its_cuts_disagrees() -> None:
     rows = RowSet(tree.inputs, values, np.arange(3), 0)
     truth = decide(tree, values)
     wrong = Outcome(3 - truth.rule, truth.status)
-    found = ModelRun("mine", tree, wrong)
-    assert labels(found).tolist() != truth.label.tolist()
-    assert compare_exact(found, truth, rows, dtype="float64").verdict == "DISAGREES"
+    reading = ModelRun("mine", tree, wrong)
+    assert labels(reading).tolist() != truth.label.tolist()
+    assert compare_exact(reading, truth, rows, dtype="float64").verdict == "DISAGREES"
     near = RowSet(tree.inputs, values[:, :2], np.arange(2), 0)
-    part = found.part(slice(0, 2))
+    part = reading.part(slice(0, 2))
     result = compare_exact(part, decide(tree, near.values), near, dtype="float32")
     assert (result.verdict, result.flips, result.in_band) == ("agrees", 2, 2)

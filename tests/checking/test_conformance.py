@@ -161,10 +161,10 @@ def _reading_without_a_name() -> Format:
 
 def _reading_carriage_returns_as_another() -> Format:
     def read(content: bytes, name: str) -> Reading:
-        found = _read(content, name)
+        result = _read(content, name)
         if b"\r\n" in content:
-            return replace(found, model=replace(found.model, name="other"))
-        return found
+            return replace(result, model=replace(result.model, name="other"))
+        return result
 
     return _reading(read)
 

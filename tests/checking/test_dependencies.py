@@ -40,8 +40,8 @@ def graph(model: RuleBase) -> Graph:
     return next(one for one in needs(model).graphs if one.dtype == "float64")
 
 
-def because(found: Graph) -> dict[str, dict[str, int]]:
-    return {one.what: one.operators for one in found.because}
+def because(result: Graph) -> dict[str, dict[str, int]]:
+    return {one.what: one.operators for one in result.because}
 
 
 # --- needs
@@ -51,11 +51,11 @@ def test_an_input_that_no_rule_tests_is_listed_as_idle() -> None:
     mix = Variable("mix", (HARD,), parts=(Part("slip", 1.0), Part("speed", 2.0)))
     known = (FORCE, Variable("slip"), Variable("speed"), Variable("heat"), mix)
     rules = base((force("soft"),), (Clause("mix", ("hard",)),), variables=known)
-    found = needs(rules)
-    assert found.inputs == ("force", "slip", "speed")
-    assert found.idle_inputs == ("heat",)
-    assert found.combinations == ("mix",)
-    assert [one.where for one in found.idle] == [
+    result = needs(rules)
+    assert result.inputs == ("force", "slip", "speed")
+    assert result.idle_inputs == ("heat",)
+    assert result.combinations == ("mix",)
+    assert [one.where for one in result.idle] == [
         "term 'firm' of 'force'",
         "term 'hard' of 'force'",
         "input 'heat'",
@@ -63,8 +63,8 @@ def test_an_input_that_no_rule_tests_is_listed_as_idle() -> None:
 
 
 def test_a_graph_holds_nothing_for_what_the_rules_do_not_have() -> None:
-    found = graph(base((force("soft"),), (force("hard"),)))
-    assert found.left_out == (
+    result = graph(base((force("soft"),), (force("hard"),)))
+    assert result.left_out == (
         COMBINATIONS,
         "negation",
         "OR of terms",
@@ -72,8 +72,8 @@ def test_a_graph_holds_nothing_for_what_the_rules_do_not_have() -> None:
         "an answer of its own for missing values",
         "curves",
     )
-    assert found.because == ()
-    assert not {"Max", "Concat_2", "Slice"} & found.contents.operators.keys()
+    assert result.because == ()
+    assert not {"Max", "Concat_2", "Slice"} & result.contents.operators.keys()
 
 
 def test_the_operators_of_an_or_a_negation_and_a_missing_answer_are_listed() -> None:
@@ -82,11 +82,11 @@ def test_the_operators_of_an_or_a_negation_and_a_missing_answer_are_listed() -> 
         (force("firm", negated=True),),
         semantics=Semantics(missing="a"),
     )
-    found = because(graph(rules))
-    assert found["OR of terms"]["Max"] == 1
-    assert found["negation"]["Sub"] == 1
-    assert found["an answer of its own for missing values"]["Where"] == 1
-    assert "product as AND" not in found
+    result = because(graph(rules))
+    assert result["OR of terms"]["Max"] == 1
+    assert result["negation"]["Sub"] == 1
+    assert result["an answer of its own for missing values"]["Where"] == 1
+    assert "product as AND" not in result
 
 
 def test_the_operators_of_a_product_and_of_combinations_are_listed() -> None:
@@ -97,19 +97,19 @@ def test_the_operators_of_a_product_and_of_combinations_are_listed() -> None:
         variables=(FORCE, Variable("slip"), mix),
         semantics=Semantics("product"),
     )
-    found = because(graph(rules))
-    assert found["product as AND"] == {"Min": -1, "Mul": 1}
-    assert found[COMBINATIONS]["Add"] == 1
+    result = because(graph(rules))
+    assert result["product as AND"] == {"Min": -1, "Mul": 1}
+    assert result[COMBINATIONS]["Add"] == 1
 
 
 def test_ties_and_strengths_are_in_a_graph_on_request_alone() -> None:
-    found = graph(base((force("soft"),), (force("hard"),)))
-    assert [one.what for one in found.on_request] == [
+    result = graph(base((force("soft"),), (force("hard"),)))
+    assert [one.what for one in result.on_request] == [
         "output status",
         "output strengths",
     ]
-    assert found.contents.operators["ArgMax"] == 1
-    assert found.on_request[0].operators["ArgMax"] == 1
+    assert result.contents.operators["ArgMax"] == 1
+    assert result.on_request[0].operators["ArgMax"] == 1
 
 
 def test_an_input_of_combinations_alone_is_guarded_by_them() -> None:
@@ -137,10 +137,10 @@ SEEDS = st.integers(0, 10_000)
 @settings(max_examples=12, deadline=None)
 def test_a_pruned_model_answers_with_the_same_bits(seed: int) -> None:
     tree = random_tree(seed, leaves=1 + seed % 7, inputs=1 + seed % 4)
-    found = prove(
+    result = prove(
         tree, pruned(tree, uses=USES), uses=USES, runtimes=OUTCOMES, limit=300
     )
-    assert found.ok, found
+    assert result.ok, result
     for kind in ("relative", "raw"):
         rules = rules_from_tree(tree, kind)
         left = pruned(rules, inputs=True, rules=True)
@@ -162,9 +162,9 @@ def test_pruned_models_answer_alike_in_every_onnx_type(seed: int) -> None:
 def test_rows_that_only_the_pruned_model_answers_are_counted_as_a_change() -> None:
     rules = base(*ALL, variables=(FORCE, Variable("slip")))
     data = np.array([[1.0, 1.0], [0.0, np.nan]])
-    found = prove(rules, pruned(rules, inputs=True), data=data)
-    assert found.ok
-    same, changed = found.comparisons[1:]
+    result = prove(rules, pruned(rules, inputs=True), data=data)
+    assert result.ok
+    same, changed = result.comparisons[1:]
     assert (same.verdict, same.differing) == ("agrees", 0)
     assert changed.verdict == "differs by design"
     assert changed.differing == changed.rows > 0
@@ -173,8 +173,8 @@ def test_rows_that_only_the_pruned_model_answers_are_counted_as_a_change() -> No
 def test_the_strength_of_a_rule_that_is_gone_must_be_zero() -> None:
     rules = base((force("soft"),), (force("hard"),))
     one = replace(rules, rules=rules.rules[:1])
-    found = prove(rules, Pruned(one, (), (1,)))
-    proof, rows = found.comparisons
+    result = prove(rules, Pruned(one, (), (1,)))
+    proof, rows = result.comparisons
     assert proof.detail == ("rule 2 may fire and is gone",)
     assert rows.verdict == "DISAGREES"
 
@@ -182,8 +182,8 @@ def test_the_strength_of_a_rule_that_is_gone_must_be_zero() -> None:
 def test_a_used_term_that_was_dropped_is_caught_by_proof_and_by_rows() -> None:
     rules = base((force("soft", "firm"),), (force("hard"),))
     planted = base((force("soft"),), (force("hard"),))
-    found = prove(rules, Pruned(planted, ()))
-    assert [c.verdict for c in found.comparisons] == ["DISAGREES", "DISAGREES"]
+    result = prove(rules, Pruned(planted, ()))
+    assert [c.verdict for c in result.comparisons] == ["DISAGREES", "DISAGREES"]
 
 
 def test_a_cut_that_was_moved_is_caught() -> None:
@@ -208,8 +208,8 @@ def test_a_model_with_all_columns_answers_a_complete_row_alike() -> None:
     declared = with_all_columns(wide)
     assert declared.inputs == ("note", *tree.columns, "weight")
     assert list(stages(wide, wide)) == ["all columns", "as it is", "pruned"]
-    found = prove(declared, pruned(declared, inputs=True), limit=400)
-    assert found.ok
+    result = prove(declared, pruned(declared, inputs=True), limit=400)
+    assert result.ok
 
 
 def test_a_model_that_needs_every_column_has_two_stages() -> None:
@@ -235,12 +235,12 @@ def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
     table = tmp_path / "rows.csv"
     table.write_text("force,slip\n1,2\n3,4\n", "utf-8")
     rules = replace(base((force("soft"),)), columns=("force", "slip"))
-    made = stages(rules, pruned(rules).model)
-    found, omissions = savings.costs(
-        made, PATH, table=str(table), seconds=60.0, rounds=1
+    models = stages(rules, pruned(rules).model)
+    result, omissions = savings.costs(
+        models, PATH, table=str(table), seconds=60.0, rounds=1
     )
     assert omissions == ()
-    names = {(c.stage, c.runtime, c.what) for c in found}
+    names = {(c.stage, c.runtime, c.what) for c in result}
     whats = [
         ("native", "one row"),
         ("native", "10,000 rows"),
@@ -249,7 +249,7 @@ def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
         ("onnxruntime", "10,000 rows"),
         ("", "read the table"),
     ]
-    assert names == {(stage, *what) for stage in made for what in whats}
+    assert names == {(stage, *what) for stage in models for what in whats}
 
 
 def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
@@ -262,10 +262,10 @@ def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
 
 
 def test_what_the_time_does_not_reach_is_an_omission() -> None:
-    found, omissions = savings.costs(
+    result, omissions = savings.costs(
         {"as it is": base((force("soft"),))}, PATH, seconds=1e-9
     )
-    assert found == ()
+    assert result == ()
     assert "as it is rules native one row: the time was over" in omissions
 
 

@@ -67,7 +67,7 @@ def random_shape(chance: random.Random, middle: float, unit: float) -> Shape:
 
 def families() -> dict[str, list[Shape]]:
     chance = random.Random(0)
-    found: dict[str, list[Shape]] = {
+    result: dict[str, list[Shape]] = {
         "one": [sided(0.0, 1.0)],
         "duplicates": [*[sided(0.25, 1.0)] * 5, *[sided(0.5, 1.0)] * 2],
         "nested": [sided(0.0, 2.0**power) for power in range(-8, 8)],
@@ -83,8 +83,8 @@ def families() -> dict[str, list[Shape]]:
     }
     for seed, (middle, unit) in enumerate([(0.0, 1.0), (1e6, 3.0), (-5.0, 1e-6)]):
         shapes = [random_shape(chance, middle, unit) for _ in range(40)]
-        found[f"random {seed}"] = shapes
-    return found
+        result[f"random {seed}"] = shapes
+    return result
 
 
 FAMILIES = families()
@@ -114,18 +114,18 @@ def envelope_of(rules: RuleBase) -> tuple[Envelope, list[Clause]]:
 
 
 def marks_of(shapes: list[Shape]) -> list[float]:
-    found: list[float] = []
+    result: list[float] = []
     for shape in shapes[:40]:
         if isinstance(shape, LR):
             for side, sign in ((shape.left, -1.0), (shape.right, 1.0)):
                 steps = (0.0, 0.5, 1.0, side.reach)
-                found += [shape.mean + sign * side.spread * step for step in steps]
+                result += [shape.mean + sign * side.spread * step for step in steps]
             continue
         assert isinstance(shape, Band)
         for flank in (shape.left, shape.right):
-            found += [] if flank is None else [flank.start, flank.end]
-        found += [end for end in (shape.low, shape.high) if end is not None]
-    return found
+            result += [] if flank is None else [flank.start, flank.end]
+        result += [end for end in (shape.low, shape.high) if end is not None]
+    return result
 
 
 def values_near(shapes: list[Shape], grid: AxisCells) -> FloatArray:
@@ -139,8 +139,8 @@ def values_near(shapes: list[Shape], grid: AxisCells) -> FloatArray:
     far = [0.0, -0.0, 5e-324, 1e200, -1e200, LARGEST, -LARGEST]
     with np.errstate(over="ignore"):
         beside = np.nextafter(ends, np.inf), np.nextafter(ends, -np.inf)
-    found: FloatArray = np.concatenate([ends, *beside, between[::3], far])
-    return found[np.isfinite(found)]
+    result: FloatArray = np.concatenate([ends, *beside, between[::3], far])
+    return result[np.isfinite(result)]
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -173,8 +173,8 @@ def test_few_terms_have_the_largest_degree_of_all_to_the_bit(family: str) -> Non
         expected = 1.0 - expected if clause.negated else expected
         entries = number * envelope.grid.count + cells
         with np.errstate(all="ignore"):
-            found = exact_degrees(envelope, entries, values)
-        assert np.array_equal(found, expected)
+            result = exact_degrees(envelope, entries, values)
+        assert np.array_equal(result, expected)
         assert np.all(envelope.lower[entries].astype(np.float64) <= expected)
         assert np.all(envelope.upper[entries].astype(np.float64) >= expected)
 
@@ -206,9 +206,9 @@ def test_the_winner_is_that_of_firing_at_every_landmark(
 
 
 def assert_fired(rules: RuleBase, values: FloatArray) -> None:
-    found, expected = load_best_first(rules)(values), load(rules)(values)
-    assert np.array_equal(found.rule, expected.rule)
-    assert np.array_equal(found.status, expected.status)
+    result, expected = load_best_first(rules)(values), load(rules)(values)
+    assert np.array_equal(result.rule, expected.rule)
+    assert np.array_equal(result.status, expected.status)
 
 
 @pytest.mark.one_in(4)
@@ -245,9 +245,9 @@ def test_a_row_that_many_rules_reach_alike_is_a_tie_of_the_first(
         "x", ("y",), (Variable("x", terms),), rules, Semantics(conjunction)
     )
     values = np.array([[-9.0, -0.5, 0.0, 0.25, np.nan, 4.0, 5.0]])
-    found = load_best_first(model)(values)
-    assert found.rule.tolist() == [0, 1, 1, 1, 0, 1, 0]
-    assert found.status.tolist() == [2, 1, 1, 1, 3, 1, 2]
+    result = load_best_first(model)(values)
+    assert result.rule.tolist() == [0, 1, 1, 1, 0, 1, 0]
+    assert result.status.tolist() == [2, 1, 1, 1, 3, 1, 2]
 
 
 def test_a_rule_may_end_where_another_goes_on() -> None:
@@ -261,7 +261,7 @@ def test_a_rule_may_end_where_another_goes_on() -> None:
     )
     model = RuleBase("x", ("y",), (Variable("x", terms),), rules)
     values = np.array([[0.0, 0.5, 1.0, 6.0]])
-    found = load_best_first(model)(values)
-    assert found.rule.tolist() == [2, 1, 1, 0]
-    assert found.status.tolist() == [0, 1, 1, 2]
+    result = load_best_first(model)(values)
+    assert result.rule.tolist() == [2, 1, 1, 0]
+    assert result.status.tolist() == [0, 1, 1, 2]
     assert_fired(model, values)

@@ -33,10 +33,10 @@ def test_the_search_finds_the_winner_among_many_rules(
         conjunction="min" if conjunction == "min" else "product",
     )
     values = probe_values(rules, 2_000)
-    found, expected = load_best_first(rules)(values), load(rules)(values)
-    assert found.strengths is None
-    assert found.rule.tolist() == expected.rule.tolist()
-    assert found.status.tolist() == expected.status.tolist()
+    result, expected = load_best_first(rules)(values), load(rules)(values)
+    assert result.strengths is None
+    assert result.rule.tolist() == expected.rule.tolist()
+    assert result.status.tolist() == expected.status.tolist()
     assert len(set(expected.rule.tolist())) > 30
 
 
@@ -59,10 +59,10 @@ def test_the_first_of_rules_that_tie_is_found_by_search() -> None:
     rules = grid_rules(5)
     chance = np.random.default_rng(0)
     values = np.round(chance.uniform(-1.0, 5.0, (3, 4_000)) * 4.0) / 4.0
-    found, expected = load_best_first(rules)(values), load(rules)(values)
+    result, expected = load_best_first(rules)(values), load(rules)(values)
     native = find_runtime("native").load(rules)(values)
     assert np.count_nonzero(native.status == 1) > 100
-    for one in (found, expected):
+    for one in (result, expected):
         assert one.rule.tolist() == native.rule.tolist()
         assert one.status.tolist() == native.status.tolist()
 
@@ -71,13 +71,13 @@ def test_the_first_of_rules_that_tie_is_found_by_search() -> None:
 def test_rows_and_columns_keep_their_order() -> None:
     rules = rules_from_tree(random_tree(6, leaves=9, inputs=4))
     values = probe_values(rules, 300)
-    found = load(rules)(values)
-    assert found.strengths is not None
+    result = load(rules)(values)
+    assert result.strengths is not None
     for row in (0, 7, 299):
         one = load(rules)(values[:, row : row + 1])
-        assert one.rule[0] == found.rule[row]
+        assert one.rule[0] == result.rule[row]
         assert one.strengths is not None
-        np.testing.assert_array_equal(one.strengths[:, 0], found.strengths[:, row])
+        np.testing.assert_array_equal(one.strengths[:, 0], result.strengths[:, row])
 
 
 def test_a_tree_is_not_searched() -> None:

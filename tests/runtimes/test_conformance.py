@@ -115,21 +115,21 @@ def trees() -> list[FuzzyTree]:
 
 
 def models() -> list[Model]:
-    found: list[Model] = [*trees()]
+    result: list[Model] = [*trees()]
     for tree in trees()[1:4]:
-        found += [
+        result += [
             rules_from_tree(tree, "relative"),
             rules_from_tree(tree, "relative", conjunction="product"),
             rules_from_tree(tree, "raw"),
             rules_from_tree(tree, "raw", conjunction="product"),
         ]
-    found += [random_rules(seed) for seed in range(12)]
+    result += [random_rules(seed) for seed in range(12)]
     pointed = [
         rules_from_tree(trees()[2], "relative"),
         rules_from_tree(trees()[3], "raw", conjunction="product"),
         *(random_rules(seed) for seed in range(4)),
     ]
-    return [*found, *(with_points(rules, 7) for rules in pointed)]
+    return [*result, *(with_points(rules, 7) for rules in pointed)]
 
 
 def name_of(model: Model) -> str:
@@ -163,13 +163,13 @@ def run_or_skip(runtime: Runtime, model: Model, values: FloatArray) -> Outcome:
         pytest.skip(str(error))
 
 
-def assert_same_answers(found: Outcome, expected: Outcome) -> None:
-    assert found.rule.tolist() == expected.rule.tolist()
-    assert found.status.tolist() == expected.status.tolist()
-    if found.strengths is not None:
+def assert_same_answers(result: Outcome, expected: Outcome) -> None:
+    assert result.rule.tolist() == expected.rule.tolist()
+    assert result.status.tolist() == expected.status.tolist()
+    if result.strengths is not None:
         assert expected.strengths is not None
-        np.testing.assert_array_equal(found.strengths, expected.strengths)
-        assert same_bits(found.strengths, expected.strengths).all()
+        np.testing.assert_array_equal(result.strengths, expected.strengths)
+        assert same_bits(result.strengths, expected.strengths).all()
 
 
 ENDS = RuleBase(
@@ -199,9 +199,9 @@ ENDS = RuleBase(
 def test_no_strength_is_a_negative_zero(runtime: Runtime, count: int) -> None:
     ends = (3.0, 5.0, -4.0, math.nextafter(3.0, 4.0), -4.5, 0.0, 2.0, -1e300, 1e300)
     for end in ends:
-        found = run_or_skip(runtime, ENDS, np.full((1, count), end))
-        if found.strengths is not None:
-            assert not np.signbit(found.strengths).any(), end
+        result = run_or_skip(runtime, ENDS, np.full((1, count), end))
+        if result.strengths is not None:
+            assert not np.signbit(result.strengths).any(), end
 
 
 @pytest.mark.one_in(4)
@@ -227,9 +227,9 @@ def test_a_runtime_has_the_bits_of_numpy_in_the_same_type(
 ) -> None:
     model = MODELS[position]
     values, _ = believed(position)
-    found = run_or_skip(runtime, model, values)
+    result = run_or_skip(runtime, model, values)
     expected = find_runtime(f"native {runtime.dtype}").load(model)(values)
-    assert_same_answers(found, expected)
+    assert_same_answers(result, expected)
 
 
 @pytest.mark.one_in(3)
@@ -243,13 +243,13 @@ def test_a_strength_keeps_the_derived_bound_of_its_type(
         pytest.skip("a tree has no strengths")
     values, answers = believed(position)
     runtime = find_runtime(f"native {dtype}")
-    found = run_or_skip(runtime, model, values).strengths
+    result = run_or_skip(runtime, model, values).strengths
     expected = answers.strengths
-    assert found is not None
+    assert result is not None
     assert expected is not None
     allowed, origin = strength_bounds(model, dtype, values)
-    known = np.isfinite(expected).all(axis=0) & np.isfinite(found).all(axis=0)
-    error = np.abs(found - expected)[:, known].max(axis=0)
+    known = np.isfinite(expected).all(axis=0) & np.isfinite(result).all(axis=0)
+    error = np.abs(result - expected)[:, known].max(axis=0)
     assert np.all(error <= allowed[known]), origin
 
 
@@ -263,18 +263,18 @@ def test_a_strength_keeps_the_derived_bound_of_its_type(
 def test_a_runtime_with_a_bound_keeps_it(runtime: Runtime, position: int) -> None:
     model = MODELS[position]
     values, expected = believed(position)
-    found = run_or_skip(runtime, model, values)
-    assert found.strengths is not None
+    result = run_or_skip(runtime, model, values)
+    assert result.strengths is not None
     assert expected.strengths is not None
     assert runtime.bound is not None
     allowed, origin = runtime.bound(model)
     known = np.isfinite(expected.strengths)
-    assert np.array_equal(known, np.isfinite(found.strengths))
-    error = np.abs(found.strengths - expected.strengths)[known]
+    assert np.array_equal(known, np.isfinite(result.strengths))
+    error = np.abs(result.strengths - expected.strengths)[known]
     assert error.max(initial=0.0) <= allowed, origin
     if isinstance(model, RuleBase) and model.kind == "relative":
-        assert found.rule.tolist() == expected.rule.tolist()
-        assert found.status.tolist() == expected.status.tolist()
+        assert result.rule.tolist() == expected.rule.tolist()
+        assert result.status.tolist() == expected.status.tolist()
 
 
 SMALL: list[Model] = [
@@ -291,10 +291,10 @@ PAIRS = [
 
 @pytest.mark.parametrize(("runtime", "model"), PAIRS)
 def test_no_rows_give_no_answers(runtime: Runtime, model: Model) -> None:
-    found = runtime.load(model)(np.empty((len(model.inputs), 0)))
-    assert found.rule.shape == found.status.shape == (0,)
-    if found.strengths is not None and isinstance(model, RuleBase):
-        assert found.strengths.shape == (len(model.rules), 0)
+    result = runtime.load(model)(np.empty((len(model.inputs), 0)))
+    assert result.rule.shape == result.status.shape == (0,)
+    if result.strengths is not None and isinstance(model, RuleBase):
+        assert result.strengths.shape == (len(model.rules), 0)
 
 
 @pytest.mark.parametrize(("runtime", "model"), PAIRS)
@@ -367,14 +367,14 @@ def test_relative_rules_answer_like_the_tree_in_every_native_runtime(seed: int) 
     for conjunction in ("min", "product"):
         rules = rules_from_tree(tree, conjunction=conjunction)
         for name in ("native", "native mixed", "best-first"):
-            found = find_runtime(name).load(rules)(values)
-            assert found.rule.tolist() == expected.rule.tolist()
-            assert found.status.tolist() == expected.status.tolist()
+            result = find_runtime(name).load(rules)(values)
+            assert result.rule.tolist() == expected.rule.tolist()
+            assert result.status.tolist() == expected.status.tolist()
 
 
 def test_every_special_value_counts_as_the_model_says() -> None:
     tree = random_tree(2, leaves=7, combinations=0.0)
     values = np.zeros((len(tree.inputs), 3))
     values[0] = (math.nan, math.inf, -math.inf)
-    found = find_runtime("native").load(tree)(values)
-    assert (found.rule.tolist(), found.status.tolist()) == ([0] * 3, [3] * 3)
+    result = find_runtime("native").load(tree)(values)
+    assert (result.rule.tolist(), result.status.tolist()) == ([0] * 3, [3] * 3)

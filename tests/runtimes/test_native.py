@@ -120,9 +120,9 @@ def test_rows_beyond_a_chunk_are_answered_alike() -> None:
     many = np.tile(few, 60)
     for model in (tree, rules_from_tree(tree), rules):
         run = load(model)
-        expected, found = run(few), run(many)
-        assert found.rule.tolist() == expected.rule.tolist() * 60
-        assert found.status.tolist() == expected.status.tolist() * 60
+        expected, result = run(few), run(many)
+        assert result.rule.tolist() == expected.rule.tolist() * 60
+        assert result.status.tolist() == expected.status.tolist() * 60
 
 
 def test_an_overflowing_combination_is_missing() -> None:
@@ -135,8 +135,8 @@ def test_an_overflowing_combination_is_missing() -> None:
     rules = RuleBase("r", ("x",), (Variable("a"), Variable("b"), mix), (rule,))
     values = np.array([[1.0, 1e10, 1e10], [2.0, 1e10, 1.0]])
     for name in ("native", "best-first"):
-        found = find_runtime(name).load(rules)(values)
-        assert found.status.tolist() == [0, 3, 3]
+        result = find_runtime(name).load(rules)(values)
+        assert result.status.tolist() == [0, 3, 3]
 
 
 def overlapping(conjunction: str) -> RuleBase:
@@ -171,23 +171,23 @@ def test_best_first_finds_ties_and_the_first_of_equals(conjunction: str) -> None
     rules = overlapping(conjunction)
     grid = np.array([-1.0, 0.0, 0.5, 1.0, 1.25, 1.5, 3.0])
     values = np.array(np.meshgrid(grid, grid, grid)).reshape(3, -1)
-    found = load_best_first(rules)(values)
+    result = load_best_first(rules)(values)
     expected = load_reference(rules)(values)
-    assert found.rule.tolist() == expected.rule.tolist()
-    assert found.status.tolist() == expected.status.tolist()
-    assert 1 in found.status
+    assert result.rule.tolist() == expected.rule.tolist()
+    assert result.status.tolist() == expected.status.tolist()
+    assert 1 in result.status
 
 
 def test_best_first_sees_a_gap_between_plateaus() -> None:
     low = Term("low", Band(high=0.0))
     high = Term("high", Band(low=1.0, left=Flank(1.0, 0.5)))
     x = Variable("x", (low, high))
-    made = (Rule((Clause("x", ("low",)),), "l"), Rule((Clause("x", ("high",)),), "h"))
-    found = load_best_first(RuleBase("gap", ("l", "h"), (x,), made))(
+    model = (Rule((Clause("x", ("low",)),), "l"), Rule((Clause("x", ("high",)),), "h"))
+    result = load_best_first(RuleBase("gap", ("l", "h"), (x,), model))(
         np.array([[-1.0, 0.25, 0.75, 2.0]])
     )
-    assert found.rule.tolist() == [1, 0, 2, 2]
-    assert found.status.tolist() == [0, 2, 0, 0]
+    assert result.rule.tolist() == [1, 0, 2, 2]
+    assert result.status.tolist() == [0, 2, 0, 0]
 
 
 def test_float32_refuses_a_tree_whose_cuts_become_one() -> None:
@@ -233,6 +233,6 @@ def test_a_flank_that_exceeds_one_stays_below_one_in_each_type() -> None:
     x = Variable("x", (Term("low", SHAPES[2]),))
     rules = RuleBase("r", ("a",), (x,), (Rule((Clause("x", ("low",)),), "a"),))
     for name, expected in (("native", BELOW_ONE), ("native mixed", 1.0 - 2.0**-24)):
-        found = find_runtime(name).load(rules)(np.array([[1.5]])).strengths
-        assert found is not None
-        assert found.tolist() == [[expected]]
+        result = find_runtime(name).load(rules)(np.array([[1.5]])).strengths
+        assert result is not None
+        assert result.tolist() == [[expected]]

@@ -15,8 +15,8 @@ from fuzzytree.testing import random_tree
 
 def program(operation: str) -> Program:
     make = Maker()
-    found = make(operation, make.input("x"))
-    return make.program("p", ("x",), (Result("output", "y", found),))
+    result = make(operation, make.input("x"))
+    return make.program("p", ("x",), (Result("output", "y", result),))
 
 
 def test_functions_that_round_in_their_own_way_are_left_to_numpy() -> None:

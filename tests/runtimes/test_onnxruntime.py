@@ -132,11 +132,11 @@ def random_models(seed: int) -> tuple[Model, ...]:
     )
 
 
-def assert_equal_bits(found: Outcome, expected: Outcome) -> None:
-    assert np.array_equal(found.rule, expected.rule)
-    assert np.array_equal(found.status, expected.status)
-    if found.strengths is not None and expected.strengths is not None:
-        assert np.array_equal(found.strengths, expected.strengths, equal_nan=True)
+def assert_equal_bits(result: Outcome, expected: Outcome) -> None:
+    assert np.array_equal(result.rule, expected.rule)
+    assert np.array_equal(result.status, expected.status)
+    if result.strengths is not None and expected.strengths is not None:
+        assert np.array_equal(result.strengths, expected.strengths, equal_nan=True)
 
 
 @pytest.mark.one_in(5)
@@ -147,8 +147,8 @@ def test_double_gives_the_bits_of_the_reference(seed: int) -> None:
         expected = load_reference(model)(values)
         variants = ("float64", "plain" if isinstance(model, FuzzyTree) else "readable")
         for variant in variants:
-            found = find_runtime(f"onnxruntime {variant}").load(model)(values)
-            assert_equal_bits(found, expected)
+            result = find_runtime(f"onnxruntime {variant}").load(model)(values)
+            assert_equal_bits(result, expected)
 
 
 @pytest.mark.one_in(5)
@@ -158,8 +158,8 @@ def test_single_types_give_the_bits_of_numpy(seed: int, dtype: Dtype) -> None:
     for model in random_models(seed):
         values = probe_values(model, 1500)
         expected = find_runtime(f"native {dtype}").load(model)(values)
-        found = find_runtime(f"onnxruntime {dtype}").load(model)(values)
-        assert_equal_bits(found, expected)
+        result = find_runtime(f"onnxruntime {dtype}").load(model)(values)
+        assert_equal_bits(result, expected)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -248,23 +248,23 @@ def test_a_shipped_file_describes_itself_and_predicts_alone() -> None:
         written = write_onnx(
             model, outputs=("status", "label", "rule"), signature="all"
         )
-        found = open_onnx(written.content, "model.onnx")
-        assert isinstance(found, OnnxModel)
-        assert found.fingerprint == fingerprint(model)
-        assert found.classes == tree.classes
-        assert (found.inputs, found.columns) == (tree.inputs, tree.columns)
-        assert found.semantics == model.semantics
+        result = open_onnx(written.content, "model.onnx")
+        assert isinstance(result, OnnxModel)
+        assert result.fingerprint == fingerprint(model)
+        assert result.classes == tree.classes
+        assert (result.inputs, result.columns) == (tree.inputs, tree.columns)
+        assert result.semantics == model.semantics
         units = ["cm" if name in tree.inputs else "" for name in tree.columns]
-        assert found.units == tuple(units)
+        assert result.units == tuple(units)
         expected = load_reference(model)(values)
-        assert_equal_bits(found.run(values), expected)
+        assert_equal_bits(result.run(values), expected)
         rows = [dict(zip(tree.inputs, row, strict=True)) for row in values.T.tolist()]
         answers = [
             descend(model, r) if isinstance(model, FuzzyTree) else evaluate(model, r)
             for r in rows
         ]
-        assert found.labels is not None
-        assert found.labels(values) == tuple(answer.label for answer in answers)
+        assert result.labels is not None
+        assert result.labels(values) == tuple(answer.label for answer in answers)
 
 
 def test_a_file_without_status_separates_missing_from_uncovered() -> None:
@@ -272,8 +272,8 @@ def test_a_file_without_status_separates_missing_from_uncovered() -> None:
     rules = RuleBase(
         "r", ("a",), (Variable("x", (low,)),), (Rule((Clause("x", ("low",)),), "a"),)
     )
-    found = open_onnx(write_onnx(rules).content, "r.onnx")
-    assert found.run(np.array([[-1.0, 1.0, np.nan]])).status.tolist() == [0, 2, 3]
+    result = open_onnx(write_onnx(rules).content, "r.onnx")
+    assert result.run(np.array([[-1.0, 1.0, np.nan]])).status.tolist() == [0, 2, 3]
 
 
 def _other_graph() -> bytes:
@@ -281,8 +281,8 @@ def _other_graph() -> bytes:
     ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, [1]) for n in "ab"]
     graph = helper.make_graph([node], "g", ends[:1], ends[1:])
     imports = [helper.make_opsetid("", 17)]
-    made = helper.make_model(graph, opset_imports=imports, ir_version=8)
-    content: bytes = made.SerializeToString()
+    document = helper.make_model(graph, opset_imports=imports, ir_version=8)
+    content: bytes = document.SerializeToString()
     return content
 
 
@@ -482,10 +482,10 @@ def test_the_oldest_onnxruntime_gives_equal_bits(version: str, tmp_path: Path) -
     command = [str(python), str(script), str(tmp_path), version]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-    with np.load(tmp_path / "answers.npz") as found:
+    with np.load(tmp_path / "answers.npz") as result:
         for name, outputs in expected.items():
             for output, array in outputs.items():
-                old = found[f"{name} {output}"]
+                old = result[f"{name} {output}"]
                 is_real = array.dtype.kind == "f"
                 assert np.array_equal(old, array.astype(old.dtype), equal_nan=is_real)
 
@@ -516,10 +516,10 @@ def test_the_oldest_onnxruntime_runs_systems(tmp_path: Path) -> None:
     command = [str(python), str(script), str(tmp_path), version]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-    with np.load(tmp_path / "answers.npz") as found:
+    with np.load(tmp_path / "answers.npz") as result:
         for name, (right, allowed) in expected.items():
-            given = found[name + " outputs"]
-            is_same = (given == right) | (np.isnan(given) & np.isnan(right))
+            argument = result[name + " outputs"]
+            is_same = (argument == right) | (np.isnan(argument) & np.isnan(right))
             with np.errstate(invalid="ignore"):
-                is_near = np.abs(given - right) <= allowed
+                is_near = np.abs(argument - right) <= allowed
             assert (is_same | is_near).all(), name

@@ -76,8 +76,8 @@ def test_every_runtime_gives_the_numbers_of_the_inference(seed: int) -> None:
     rows = random_rows(system, seed, count=20)
     table = np.array([[row[name] for name in system.columns] for row in rows])
     right = np.array([infer(system, row).outputs for row in rows]).T
-    found = ft.run(system, table, columns=system.columns, runtime="reference")
-    assert np.array_equal(found.values, right, equal_nan=True)
+    result = ft.run(system, table, columns=system.columns, runtime="reference")
+    assert np.array_equal(result.values, right, equal_nan=True)
     native = ft.run(system, table, columns=system.columns)
     assert np.allclose(native.values, right, rtol=1e-9, equal_nan=True)
     assert native.activations is not None
@@ -107,8 +107,8 @@ def test_every_part_of_a_system_is_shown(seed: int) -> None:
 def test_reasons_tell_what_fired_and_what_did_not() -> None:
     system = SYSTEMS[0]
     table = np.array([[1.0, 1.0], [5.0, 9.9], [math.nan, 1.0], [3.0, 20.0]])
-    found = ft.run(system, table, columns=system.columns)
-    reasons = system_reasons(system, found)
+    result = ft.run(system, table, columns=system.columns)
+    reasons = system_reasons(system, result)
     assert reasons[0] == ("rule 1 (1): IF heat is low and damp is dry THEN fan is slow")
     assert reasons[1].startswith("rule 2 (0.25): IF heat is high")
     assert reasons[2] == "a value is missing or not finite"
@@ -117,13 +117,13 @@ def test_reasons_tell_what_fired_and_what_did_not() -> None:
 
 def test_an_array_as_wide_as_a_system_has_its_columns() -> None:
     tipper = ft.load(TIPPER)
-    found = ft.run(tipper, np.array([[3.0, 8.0], [9.0, 2.0]]))
+    result = ft.run(tipper, np.array([[3.0, 8.0], [9.0, 2.0]]))
     named = ft.run(
         tipper, np.array([[8.0, 3.0], [2.0, 9.0]]), columns=["food", "service"]
     )
-    assert isinstance(found, ft.Outputs)
+    assert isinstance(result, ft.Outputs)
     assert isinstance(named, ft.Outputs)
-    assert found.values.tolist() == named.values.tolist()
+    assert result.values.tolist() == named.values.tolist()
     with pytest.raises(ft.FuzzyTreeError) as caught:
         ft.run(tipper, np.zeros((1, 3)))
     assert str(caught.value) == (

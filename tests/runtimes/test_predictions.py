@@ -89,8 +89,8 @@ def test_strengths_of_classes_are_those_of_their_strongest_rules(seed: int) -> N
         for name in rules.classes
     }
     assert answers.class_strengths is not None
-    found = dict(zip(rules.classes, answers.class_strengths[:, 0], strict=True))
-    assert found == best
+    result = dict(zip(rules.classes, answers.class_strengths[:, 0], strict=True))
+    assert result == best
     assert answers.classes == [expected.label]
 
 
@@ -133,13 +133,13 @@ def test_a_frame_of_pandas_without_pandas_says_how_to_get_it(
 
 
 def test_answers_become_frames_with_nothing_where_nothing_is_known() -> None:
-    found = ft.run(RULES, VALUES, columns=["force"])
-    frame = found.to_pandas("class")
-    assert frame.columns.tolist() == [*found.columns("class")]
+    result = ft.run(RULES, VALUES, columns=["force"])
+    frame = result.to_pandas("class")
+    assert frame.columns.tolist() == [*result.columns("class")]
     assert frame["class"].isna().tolist() == [False, False, True]
     assert frame["strength of class soft"].dtype == np.float64
     assert frame["strength of class soft"].isna().tolist() == [False, False, True]
-    assert found.to_arrow("class").to_pydict() == {
+    assert result.to_arrow("class").to_pydict() == {
         "class": ["soft", "hard", None],
         "rule": [1, 0, 0],
         "status": ["tie", "uncovered", "missing"],

@@ -127,6 +127,6 @@ def test_a_width_whose_slope_overflows_is_refused() -> None:
 
 
 def test_a_width_whose_slope_just_fits_has_finite_strengths() -> None:
-    found = load(_falling(1e-307))(np.array([[0.0, 0.5e-307, 1e-307]]))
-    assert found.strengths is not None
-    assert np.isfinite(found.strengths).all()
+    result = load(_falling(1e-307))(np.array([[0.0, 0.5e-307, 1e-307]]))
+    assert result.strengths is not None
+    assert np.isfinite(result.strengths).all()

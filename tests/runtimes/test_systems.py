@@ -62,10 +62,10 @@ def test_numpy_is_as_near_to_the_inference_as_its_library_allows(seed: int) -> N
     rows = random_rows(system, seed, 9)
     rows += system_probes(system, limit=24, seed=seed)
     values = values_of(system, rows)
-    found = run_system(system, activations=True)(values)
+    result = run_system(system, activations=True)(values)
     right = infer_rows(system, activations=True)(values)
     bounds = error_bounds(from_system(system, activations=True), values)
-    assert within(found, right, bounds)
+    assert within(result, right, bounds)
     assert right.outputs[:, 0].tolist() == pytest.approx(
         list(infer(system, rows[0]).outputs), rel=0, abs=0, nan_ok=True
     )
@@ -107,11 +107,11 @@ def test_missing_rows_are_nan_and_have_that_status(runtime: Runtime) -> None:
     system = random_system(5, formulas="none")
     assert runtime.load_system is not None
     values = np.array([[0.0, math.nan], [0.0, 1.0], [math.inf, 0.0]])
-    found = runtime.load_system(system, activations=True)(values)
-    assert found.status.tolist() == [3, 3]
-    assert np.isnan(found.outputs).all()
-    assert found.activations is not None
-    assert np.isnan(found.activations).all()
+    result = runtime.load_system(system, activations=True)(values)
+    assert result.status.tolist() == [3, 3]
+    assert np.isnan(result.outputs).all()
+    assert result.activations is not None
+    assert np.isnan(result.activations).all()
 
 
 @pytest.mark.parametrize("runtime", RUNTIMES, ids=lambda one: one.name)
@@ -151,8 +151,8 @@ def test_functions_of_one_number_are_within_their_units(function: str) -> None:
         [chance.normal(size=2000), chance.normal(size=2000) * 300, sizes, -sizes]
     )
     values = np.concatenate([values, [0.5, 1.5, 2.5, -0.5, 0.0, -0.0, 709.8, -745.2]])
-    found = check(system, data=values.reshape(1, -1), limit=50)
-    assert found.ok, [one.detail for one in found.comparisons]
+    result = check(system, data=values.reshape(1, -1), limit=50)
+    assert result.ok, [one.detail for one in result.comparisons]
 
 
 @pytest.mark.one_in(2)
@@ -166,5 +166,5 @@ def test_functions_of_two_numbers_are_within_their_units(function: str) -> None:
     chance = np.random.default_rng(8)
     values = chance.normal(size=(2, 3000)) * [[5.0], [3.0]]
     values[:, ::7] = np.round(values[:, ::7])
-    found = check(system, data=values, limit=50)
-    assert found.ok, [one.detail for one in found.comparisons]
+    result = check(system, data=values, limit=50)
+    assert result.ok, [one.detail for one in result.comparisons]

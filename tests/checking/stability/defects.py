@@ -140,10 +140,10 @@ def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
         shapes = {(v.name, t.name): t.shape for v in model.variables for t in v.terms}
 
         def one(clause: Clause, axes: dict[str, float]) -> float:
-            found = [shapes[clause.variable, term] for term in clause.terms]
+            result = [shapes[clause.variable, term] for term in clause.terms]
             return max(
                 degree(shape, axes[clause.variable])
-                for shape in found
+                for shape in result
                 if isinstance(shape, Band | LR)
             )
 
@@ -156,9 +156,9 @@ def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
                 missing[row] = not all(map(math.isfinite, axes.values()))
                 for number, rule in enumerate(model.rules):
                     strengths[number, row] = min(one(c, axes) for c in rule.when)
-            found = winners(np.nan_to_num(strengths), missing)
+            result = winners(np.nan_to_num(strengths), missing)
             strengths[:, missing] = math.nan
-            return Outcome(found[0], found[1], strengths)
+            return Outcome(result[0], result[1], strengths)
 
         return answer
 

@@ -66,9 +66,9 @@ def learner_scaling(
     plans.append([(-1) ** column * 17 * (column + 1) for column in range(width)])
     faults: list[str] = []
     for ks in plans:
-        found = learn(np.ldexp(values, np.array(ks)), classes)
+        result = learn(np.ldexp(values, np.array(ks)), classes)
         exponents = {f"x{n}": k for n, k in enumerate(ks, 1)}
-        if found != scaled(tree, exponents):
+        if result != scaled(tree, exponents):
             faults.append(f"columns times 2**k, k {ks[:8]}, give another tree")
     trial = Trial("N1", "look for fixed thresholds", faults, cases=len(plans))
     return trial.result()
@@ -172,9 +172,9 @@ def window_counts(count: Count, *, delta: int = 1) -> Criterion:
     for said, values in tables:
         for n in (2, 3, 5):
             expected = rational_counts(values.tolist(), n, delta=delta)
-            found = [int(one) for one in count(values, n)]
-            if found != expected:
-                faults.append(f"{said}, n {n}: {found}, and {expected} is right")
+            result = [int(one) for one in count(values, n)]
+            if result != expected:
+                faults.append(f"{said}, n {n}: {result}, and {expected} is right")
     advice = "compare exactly near an edge"
     return Trial("N5", advice, faults, cases=3 * len(tables)).result()
 
@@ -219,9 +219,9 @@ def rational_counts(values: Sequence[float], n: int, *, delta: int = 1) -> list[
 def _answers(tree: FuzzyTree, values: FloatArray) -> IntArray:
     """Return the class number of each row, -1 for none."""
     columns = [int(name.removeprefix("x")) - 1 for name in tree.inputs]
-    found = baseline().load(tree)(values[:, columns].T)
+    result = baseline().load(tree)(values[:, columns].T)
     numbers = [-1, *(tree.classes.index(leaf.label) for leaf in tree.leaves)]
-    return np.array(numbers, np.int64)[found.rule]
+    return np.array(numbers, np.int64)[result.rule]
 
 
 def _weak_rows(tree: FuzzyTree, values: FloatArray) -> Iterator[str]:
@@ -238,11 +238,11 @@ def _weak_rows(tree: FuzzyTree, values: FloatArray) -> Iterator[str]:
             axis_values(tree.variables, dict(zip(tree.inputs, row, strict=True)))
             for row in rows.T.tolist()
         ]
-        seen = {row[variable.name] for row in met}
+        levels = {row[variable.name] for row in met}
         for term in group.terms:
             shape = term.shape
-            if isinstance(shape, LR) and len(seen) == 1:
-                value = next(iter(seen))
+            if isinstance(shape, LR) and len(levels) == 1:
+                value = next(iter(levels))
                 if broken("one", degree(shape, value)):
                     yield (
                         f"{group.variable} is {term.name} has degree "

@@ -33,9 +33,9 @@ def rows() -> FloatArray:
 
 
 def test_n1_finds_a_runtime_with_a_fixed_threshold(rows: FloatArray) -> None:
-    found, _ = scaling(RULES, [defects.ABSOLUTE], rows)
-    assert found.verdict == "FAILS"
-    assert found.detail[0].startswith("defective: rules, inputs times 2**-")
+    result, _ = scaling(RULES, [defects.ABSOLUTE], rows)
+    assert result.verdict == "FAILS"
+    assert result.detail[0].startswith("defective: rules, inputs times 2**-")
     assert scaling(RULES, [defects.NATIVE], rows)[0].verdict == "holds"
 
 
@@ -45,9 +45,9 @@ def test_n2b_finds_a_runtime_with_one_unit_for_all_inputs(rows: FloatArray) -> N
 
 
 def test_n3_finds_a_runtime_that_sums_over_the_batch(rows: FloatArray) -> None:
-    found = order(RULES, [defects.BATCH_MEAN], rows)
-    assert found.verdict == "FAILS"
-    assert "answered differently in a batch of 1" in " ".join(found.detail)
+    result = order(RULES, [defects.BATCH_MEAN], rows)
+    assert result.verdict == "FAILS"
+    assert "answered differently in a batch of 1" in " ".join(result.detail)
     assert order(RULES, [defects.NATIVE], rows).verdict == "holds"
 
 
@@ -62,9 +62,9 @@ def test_n3_finds_a_runtime_that_sums_over_the_batch(rows: FloatArray) -> None:
 def test_n4_finds_a_runtime_that_divides_by_nothing(
     rows: FloatArray, defect: Runtime, said: str
 ) -> None:
-    found = degenerate(RULES, [defect], rows)
-    assert found.verdict == "FAILS"
-    assert said in found.detail[0]
+    result = degenerate(RULES, [defect], rows)
+    assert result.verdict == "FAILS"
+    assert said in result.detail[0]
     for sound in (defects.NATIVE, defects.PLAIN):
         assert degenerate(RULES, [sound], rows).verdict == "holds"
 
@@ -72,9 +72,9 @@ def test_n4_finds_a_runtime_that_divides_by_nothing(
 @pytest.mark.heavy
 def test_n2_finds_a_runtime_that_evaluates_in_raw_values() -> None:
     none = np.empty((2, 0))
-    found, _ = offsets(RULES, [defects.RAW_POWERS], none)
-    assert found.verdict == "FAILS"
-    assert "are beyond the bound: strengths off by" in found.detail[0]
+    result, _ = offsets(RULES, [defects.RAW_POWERS], none)
+    assert result.verdict == "FAILS"
+    assert "are beyond the bound: strengths off by" in result.detail[0]
     assert offsets(RULES, [defects.PLAIN], none)[0].verdict == "holds"
 
 
@@ -89,32 +89,32 @@ def test_n2_finds_a_runtime_that_evaluates_in_raw_values() -> None:
 def test_n5_finds_a_runtime_whose_edges_are_not_exact(
     defect: Runtime, said: str
 ) -> None:
-    found = edges(RULES, [defect])
-    assert found.verdict == "FAILS"
-    assert said in " ".join(found.detail)
+    result = edges(RULES, [defect])
+    assert result.verdict == "FAILS"
+    assert said in " ".join(result.detail)
     assert edges(RULES, [defects.PLAIN]).verdict == "holds"
 
 
 def test_n6_finds_a_runtime_that_takes_nan_for_0(rows: FloatArray) -> None:
-    found = specials(RULES, [defects.NAN_IS_ZERO], rows)
-    assert found.verdict == "FAILS"
-    assert "break the policy on missing values" in found.detail[0]
+    result = specials(RULES, [defects.NAN_IS_ZERO], rows)
+    assert result.verdict == "FAILS"
+    assert "break the policy on missing values" in result.detail[0]
     assert specials(RULES, [defects.NATIVE], rows).verdict == "holds"
 
 
 def test_n8_finds_a_runtime_that_is_narrower_than_it_says(rows: FloatArray) -> None:
-    found = exactness(RULES, [defects.SINGLE], rows)
-    assert found.verdict == "FAILS"
-    assert "strengths off by" in found.detail[0]
+    result = exactness(RULES, [defects.SINGLE], rows)
+    assert result.verdict == "FAILS"
+    assert "strengths off by" in result.detail[0]
     assert exactness(RULES, [defects.NATIVE], rows).verdict == "holds"
 
 
 def test_n8_finds_a_runtime_that_multiplies_by_a_reciprocal() -> None:
     rules = defects.one_rule(Term("third", Band(high=0.0, right=Flank(0.0, 3.0))))
     values = probe_values(rules, 200)
-    found = exactness(rules, [defects.NATIVE, defects.RECIPROCAL], values)
-    assert found.verdict == "FAILS"
-    assert "defective: rules: other bits than native: rules in" in found.detail[0]
+    result = exactness(rules, [defects.NATIVE, defects.RECIPROCAL], values)
+    assert result.verdict == "FAILS"
+    assert "defective: rules: other bits than native: rules in" in result.detail[0]
     assert exactness(rules, [defects.NATIVE, defects.PLAIN], values).verdict == "holds"
 
 
@@ -132,8 +132,8 @@ def test_n8_finds_a_tree_that_turns_at_another_value() -> None:
     tree = random_tree(3, leaves=6, combinations=0.0)
     values = probe_values(tree, 400)
     shifted = defects.on_values(lambda v: np.nextafter(v, np.inf))
-    found = exactness(tree, [shifted], values)
-    assert found.verdict == "FAILS"
+    result = exactness(tree, [shifted], values)
+    assert result.verdict == "FAILS"
     assert exactness(tree, [defects.NATIVE], values).verdict == "holds"
 
 
@@ -149,9 +149,9 @@ def test_n8_finds_a_tree_that_turns_at_another_value() -> None:
 def test_n7_finds_a_curve_that_is_no_membership_function(
     shape: LR | Band, said: str
 ) -> None:
-    found, facts = curves(defects.one_rule(Term("odd", shape)))
-    assert found.verdict == "FAILS"
-    assert said in found.detail[0]
+    result, facts = curves(defects.one_rule(Term("odd", shape)))
+    assert result.verdict == "FAILS"
+    assert said in result.detail[0]
     assert facts[0].fails
     assert curves(RULES)[0].verdict == "holds"
 
@@ -159,9 +159,9 @@ def test_n7_finds_a_curve_that_is_no_membership_function(
 def test_n9_finds_a_writer_of_six_digits(rows: FloatArray) -> None:
     rules = defects.one_rule(Term("third", Band(high=1 / 3, right=Flank(1 / 3, 2 / 3))))
     values = probe_values(rules, 50)
-    found = roundtrips(rules, [defects.six_digits()], values)
-    assert found.verdict == "FAILS"
-    assert "the model that comes back is not equal" in found.detail[0]
+    result = roundtrips(rules, [defects.six_digits()], values)
+    assert result.verdict == "FAILS"
+    assert "the model that comes back is not equal" in result.detail[0]
     assert roundtrips(rules, [find_format("yaml")], values).verdict == "holds"
 
 
@@ -190,9 +190,9 @@ def test_n3_finds_a_learner_whose_sums_have_an_order() -> None:
 
 
 def test_n4_finds_a_learner_that_warns() -> None:
-    found = learners.learner_degenerate(defects.tiny_learner(is_loud=True))
-    assert found.verdict == "FAILS"
-    assert found.detail[0] == "a column of 0.1: it warns: invalid value"
+    result = learners.learner_degenerate(defects.tiny_learner(is_loud=True))
+    assert result.verdict == "FAILS"
+    assert result.detail[0] == "a column of 0.1: it warns: invalid value"
     assert learners.learner_degenerate(defects.tiny_learner()).verdict == "holds"
 
 

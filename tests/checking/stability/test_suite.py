@@ -58,13 +58,13 @@ def small_examined() -> Stability:
     return examine(small_rules(), runtimes=FAST, formats=all_formats())
 
 
-def verdicts(found: Stability) -> dict[str, str]:
-    return {one.code: one.verdict for one in found.criteria}
+def verdicts(result: Stability) -> dict[str, str]:
+    return {one.code: one.verdict for one in result.criteria}
 
 
-def failures(found: Stability) -> list[str]:
+def failures(result: Stability) -> list[str]:
     return [
-        text for one in found.criteria if one.verdict == "FAILS" for text in one.detail
+        text for one in result.criteria if one.verdict == "FAILS" for text in one.detail
     ]
 
 
@@ -72,9 +72,9 @@ def failures(found: Stability) -> list[str]:
 @pytest.mark.parametrize("seed", range(2))
 def test_all_criteria_hold_for_generated_trees(seed: int) -> None:
     tree = random_tree(seed, leaves=2 + 2 * seed, inputs=2 + seed)
-    found = examine(tree, runtimes=FAST, formats=all_formats())
-    assert failures(found) == []
-    assert found.ok
+    result = examine(tree, runtimes=FAST, formats=all_formats())
+    assert failures(result) == []
+    assert result.ok
 
 
 @pytest.mark.heavy
@@ -82,41 +82,41 @@ def test_all_criteria_hold_for_generated_trees(seed: int) -> None:
 def test_all_criteria_hold_in_every_runtime_for_generated_trees(seed: int) -> None:
     semantics = Semantics("product" if seed % 2 else "min")
     tree = random_tree(seed, leaves=3 + seed, combinations=0.5, semantics=semantics)
-    found = examine(tree, runtimes=all_runtimes(), formats=all_formats())
-    assert failures(found) == []
+    result = examine(tree, runtimes=all_runtimes(), formats=all_formats())
+    assert failures(result) == []
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("kind", ["tree", "raw"])
 def test_all_criteria_hold_for_the_wine_tree_and_its_raw_rules(kind: str) -> None:
     model: Model = wine() if kind == "tree" else ft.rules_from_tree(wine(), "raw")
-    found = examine(model, runtimes=FAST, formats=all_formats())
-    assert failures(found) == []
-    assert verdicts(found)["N10"] == "not applicable"
+    result = examine(model, runtimes=FAST, formats=all_formats())
+    assert failures(result) == []
+    assert verdicts(result)["N10"] == "not applicable"
 
 
 @pytest.mark.heavy
 def test_all_criteria_hold_in_every_runtime_for_the_wine_tree() -> None:
-    found = ft.stability(wine(), data=str(ROOT / "examples" / "wine" / "wine.csv"))
-    assert failures(found) == []
-    assert found.rows == 178
+    result = ft.stability(wine(), data=str(ROOT / "examples" / "wine" / "wine.csv"))
+    assert failures(result) == []
+    assert result.rows == 178
 
 
 def test_rules_of_every_kind_of_term_hold() -> None:
     assert failures(small_examined()) == []
     ramp = Points((0.0, 1.0, 1.0, 4.0), (0.0, 1.0, 0.5, 0.5))
-    found = examine(
+    result = examine(
         one_rule(Term("ramp", ramp), Term("step", Band(low=1.0))),
         runtimes=FAST,
         formats=all_formats(),
     )
-    assert failures(found) == []
-    assert verdicts(found)["N7"] == "not applicable"
+    assert failures(result) == []
+    assert verdicts(result)["N7"] == "not applicable"
 
 
 def test_a_tree_of_one_leaf_can_be_examined() -> None:
-    found = examine(random_tree(0, leaves=1), runtimes=FAST, formats=all_formats())
-    assert failures(found) == []
+    result = examine(random_tree(0, leaves=1), runtimes=FAST, formats=all_formats())
+    assert failures(result) == []
 
 
 def test_a_model_without_inputs_can_be_examined() -> None:
@@ -140,15 +140,15 @@ EXTREME: dict[str, Shape] = {
 @pytest.mark.parametrize("name", EXTREME)
 def test_numbers_at_the_ends_of_double_can_be_examined(name: str) -> None:
     model = one_rule(Term("t", EXTREME[name]))
-    found = examine(model, runtimes=FAST, formats=all_formats())
-    assert failures(found) == []
-    jsonschema.validate(json.loads(found.to_json()), SCHEMA)
+    result = examine(model, runtimes=FAST, formats=all_formats())
+    assert failures(result) == []
+    jsonschema.validate(json.loads(result.to_json()), SCHEMA)
 
 
 def test_only_selected_checks_are_applied() -> None:
-    found = examine(small_rules(), runtimes=FAST, formats=(), only=["n3", "N2"])
-    assert [one.code for one in found.criteria] == ["N2", "N2b", "N3"]
-    assert set(TITLES) >= {one.code for one in found.criteria}
+    result = examine(small_rules(), runtimes=FAST, formats=(), only=["n3", "N2"])
+    assert [one.code for one in result.criteria] == ["N2", "N2b", "N3"]
+    assert set(TITLES) >= {one.code for one in result.criteria}
 
 
 def test_an_unknown_criterion_is_refused() -> None:
@@ -185,19 +185,19 @@ def far_away(distance: float) -> RuleBase:
 
 def test_an_input_near_zero_is_safe_in_float32() -> None:
     values = np.linspace(0.0, 4.0, 50)[np.newaxis]
-    (found,) = stiffness(far_away(2.0), values, is_data=True)
-    assert found.advice == "float32 is safe"
-    assert found.ratio == pytest.approx(1.0 / 3.0)
+    (result,) = stiffness(far_away(2.0), values, is_data=True)
+    assert result.advice == "float32 is safe"
+    assert result.ratio == pytest.approx(1.0 / 3.0)
 
 
 def test_an_input_far_from_zero_gets_a_value_to_subtract() -> None:
     values = 1e9 + np.linspace(-1.0, 2.0, 50)[np.newaxis]
-    (found,) = stiffness(far_away(1e9), values, is_data=True)
-    assert found.advice == "use mixed, or subtract 1e+09 first"
-    assert found.offset is not None
-    assert abs(found.offset - 1e9) <= 2.0
-    assert found.predicted == 1.0
-    assert found.observed > 0.1
+    (result,) = stiffness(far_away(1e9), values, is_data=True)
+    assert result.advice == "use mixed, or subtract 1e+09 first"
+    assert result.offset is not None
+    assert abs(result.offset - 1e9) <= 2.0
+    assert result.predicted == 1.0
+    assert result.observed > 0.1
 
 
 def test_what_rounding_costs_is_never_above_what_was_predicted() -> None:
@@ -210,24 +210,24 @@ def test_what_rounding_costs_is_never_above_what_was_predicted() -> None:
 
 def test_an_input_whose_terms_only_step_has_no_spread() -> None:
     rules = one_rule(Term("step", Band(high=1.0)))
-    (found,) = stiffness(rules, np.array([[0.5, 1.0, 1.5]]), is_data=True)
-    assert (found.spread, found.ratio) == (None, None)
-    assert found.advice == "float32 is safe"
+    (result,) = stiffness(rules, np.array([[0.5, 1.0, 1.5]]), is_data=True)
+    assert (result.spread, result.ratio) == (None, None)
+    assert result.advice == "float32 is safe"
     study = examine(rules, runtimes=FAST, formats=(), only=["N3"])
     jsonschema.validate(json.loads(study.to_json()), SCHEMA)
 
 
 def test_a_distance_at_which_doubles_are_too_coarse_is_reported() -> None:
     values = 1e14 + np.arange(4.0)[np.newaxis]
-    (found,) = stiffness(far_away(1e14), values, is_data=True)
-    assert found.advice == "use mixed, and subtract 1e+14 where the values are made"
+    (result,) = stiffness(far_away(1e14), values, is_data=True)
+    assert result.advice == "use mixed, and subtract 1e+14 where the values are made"
 
 
 def test_a_curve_that_costs_too_much_in_float32_asks_for_double() -> None:
     wild = Band(high=0.0, right=Flank(0.0, 1.0, (1.0, 900.0, -900.0)))
     values = np.linspace(-1.0, 2.0, 50)[np.newaxis]
-    (found,) = stiffness(one_rule(Term("wild", wild)), values, is_data=True)
-    assert found.advice == "use double"
+    (result,) = stiffness(one_rule(Term("wild", wild)), values, is_data=True)
+    assert result.advice == "use double"
 
 
 # --- the learner of this package
@@ -238,8 +238,8 @@ def test_the_learner_holds() -> None:
     def learn(values: FloatArray, classes: Sequence[str]) -> FuzzyTree:
         return ft.learn(values, target=list(classes))
 
-    found = learner_criteria(learn, *learning_table())
-    assert [(one.code, one.verdict) for one in found] == [
+    result = learner_criteria(learn, *learning_table())
+    assert [(one.code, one.verdict) for one in result] == [
         (code, "holds") for code in ("N1", "N2", "N3", "N4")
     ]
 
