@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import msgspec
+import numpy as np
 
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
 from fuzzytree.exporters import FORMAT_VERSION, Output, write_onnx
@@ -30,9 +31,9 @@ from fuzzytree.model import (
     SystemRun,
     text_fault,
 )
+from fuzzytree.runtimes.rows import checked
 
 if TYPE_CHECKING:
-    import numpy as np
     import numpy.typing as npt
     import onnx
 
@@ -208,8 +209,6 @@ def _arrays(
     session: Session, facts: Facts, values: FloatArray, names: Sequence[str]
 ) -> dict[str, npt.NDArray[Any]]:
     """Return outputs by name, rows last."""
-    import numpy as np
-
     widths, count = _widths(facts), values.shape[1]
     arrays: dict[str, npt.NDArray[Any]] = {
         name: np.empty((widths[name], count))
@@ -230,9 +229,6 @@ def _widths(facts: Facts) -> dict[str, int]:
 
 
 def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:
-    import numpy as np
-
-    from fuzzytree.runtimes.rows import checked
 
     values = checked(values, facts.inputs)
     names = [name for name in facts.outputs if name != "label"]
@@ -248,9 +244,6 @@ def _refuse(session: Session, facts: Facts, values: FloatArray) -> Outcome:
 
 
 def _run_system(session: Session, facts: Facts, values: FloatArray) -> SystemOutcome:
-    import numpy as np
-
-    from fuzzytree.runtimes.rows import checked
 
     values = checked(values, facts.inputs)
     arrays = _arrays(session, facts, values, facts.outputs)
@@ -279,7 +272,6 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
 
 
 def _labels(session: Session, facts: Facts, values: FloatArray) -> Labels:
-    from fuzzytree.runtimes.rows import checked
 
     values = checked(values, facts.inputs)
     return tuple(
@@ -325,8 +317,6 @@ def _rows_at_once(facts: Facts) -> int:
 
 def _table(facts: Facts, values: FloatArray) -> npt.NDArray[np.generic]:
     """Return values of shape (inputs, rows) as the graph's input."""
-    import numpy as np
-
     dtype = np.dtype(np.float32 if facts.dtype == "float32" else np.float64)
     places = [facts.columns.index(name) for name in facts.inputs]
     table = np.zeros((values.shape[1], len(facts.columns)), dtype)
@@ -337,8 +327,6 @@ def _table(facts: Facts, values: FloatArray) -> npt.NDArray[np.generic]:
 
 def _is_answer(facts: Facts, result: Outputs, rows: int) -> bool:
     """Say whether outputs have the shapes and numbers that answers have."""
-    import numpy as np
-
     for name, width in _widths(facts).items():
         if name in result and result[name].shape != (rows, width):
             return False

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from fuzzytree.exporters import write_python
 from fuzzytree.model import Model, Outcome, Run, Runtime
+from fuzzytree.runtimes.rows import checked, outcome_of
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray
@@ -28,8 +29,6 @@ def load_content(content: bytes, model: Model) -> Run:
     answer = _answer_of(content)
 
     def run(values: FloatArray) -> Outcome:
-        from fuzzytree.runtimes.rows import checked, outcome_of
-
         answers = map(answer, checked(values, model.inputs).T.tolist())
         rows = [[*row[1:3], *(row[3] if len(row) == 4 else ())] for row in answers]
         return outcome_of(model, rows)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fuzzytree.model import (
     FuzzySystem,
     Model,
@@ -14,6 +16,7 @@ from fuzzytree.model import (
     SystemOutcome,
     SystemRun,
 )
+from fuzzytree.runtimes.rows import checked, outcome_of
 from fuzzytree.semantics import Answer, descend, evaluate, infer
 
 if TYPE_CHECKING:
@@ -24,8 +27,6 @@ def load(model: Model) -> Run:
     """Return a function that answers rows one after another."""
 
     def run(values: FloatArray) -> Outcome:
-        from fuzzytree.runtimes.rows import checked, outcome_of
-
         table = checked(values, model.inputs).T.tolist()
         rows = [dict(zip(model.inputs, row, strict=True)) for row in table]
         answers: list[Answer]
@@ -43,10 +44,6 @@ def infer_rows(system: FuzzySystem, /, *, activations: bool = False) -> SystemRu
     names = system.columns
 
     def run(values: FloatArray) -> SystemOutcome:
-        import numpy as np
-
-        from fuzzytree.runtimes.rows import checked
-
         table = checked(values, names).T.tolist()
         result = [infer(system, dict(zip(names, row, strict=True))) for row in table]
         outputs = np.array([one.outputs for one in result], np.float64)

@@ -16,8 +16,24 @@ import operator
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
 from fuzzytree.model import Clause, Model, Outcome, RuleBase, Run, Runtime, Shape
+from fuzzytree.runtimes.rows import (
+    axis_lines,
+    checked,
+    missing_rows,
+    plan_axes,
+    winners,
+)
+from fuzzytree.runtimes.sampling import (
+    clause_shapes,
+    line_error,
+    lines_bound,
+    samples,
+    universe,
+)
 from fuzzytree.runtimes.table import rules_only
 
 if TYPE_CHECKING:
@@ -53,15 +69,6 @@ def load(model: Model) -> Run:
         raise MissingExtraError(
             f"running scikit-fuzzy needs {install_hint('skfuzzy')}"
         ) from error
-    import numpy as np
-
-    from fuzzytree.runtimes.rows import (
-        axis_lines,
-        checked,
-        missing_rows,
-        plan_axes,
-        winners,
-    )
 
     antecedents, fired = _build(rules)
     system = control.ControlSystem()
@@ -112,8 +119,6 @@ def _carried(model: Model) -> RuleBase:
 
 def _clause_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
     """Return the shapes that clauses name: those of each variable, by term."""
-    from fuzzytree.runtimes.sampling import clause_shapes
-
     result: dict[str, dict[str, Shape]] = {}
     for (variable, term), shape in clause_shapes(rules).items():
         result.setdefault(variable, {})[term] = shape
@@ -122,18 +127,13 @@ def _clause_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
 
 def _universe(shapes: Sequence[Shape]) -> FloatArray:
     """Return the points of a variable: fewer on each piece the more terms there are."""
-    from fuzzytree.runtimes.sampling import universe
-
     share = _MOST_NUMBERS // (4 * len(shapes) ** 2)
     return universe(shapes, min(max(share, 4), _MOST_POINTS))
 
 
 def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
     """Return the library's antecedents, by name, and its rules."""
-    import numpy as np
     from skfuzzy import control
-
-    from fuzzytree.runtimes.sampling import samples
 
     is_product = rules.semantics.conjunction == "product"
     conjunction = np.multiply if is_product else np.fmin
@@ -163,8 +163,6 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
 
 def _is_too_steep(points: FloatArray, degrees: FloatArray) -> bool:
     """Return whether a line's slope overflows between two samples."""
-    import numpy as np
-
     with np.errstate(over="ignore"):
         slopes = np.diff(degrees) / np.diff(points)
     is_step = np.nextafter(points[:-1], np.inf) == points[1:]
@@ -186,8 +184,6 @@ def _either(terms: list[Any]) -> Any:
 
 def bound(model: Model) -> tuple[float, str]:
     """Return how far strengths may be from the reference's, and why."""
-    from fuzzytree.runtimes.sampling import line_error, lines_bound
-
     rules = _carried(model)
     errors: dict[tuple[str, str], float] = {}
     for name, shapes in _clause_shapes(rules).items():
