@@ -150,7 +150,7 @@ def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
             "peer",
             partial(peer.load, tree),
             note=note,
-            is_foreign=True,
+            modules=peer.modules,
             is_parallel=peer.is_parallel,
         )
         found.append(one)
@@ -186,7 +186,7 @@ def _of_rules(
             partial(load, rules),
             bound=bound,
             note=f"{_PYTHON}; {note}" if is_rowwise else note,
-            is_foreign=True,
+            modules=(module,),
         )
         found.append(one)
     return _with_evaluator(rules, partial(bounds, rules, "float64"), found, omitted)
@@ -211,7 +211,7 @@ def _with_evaluator(
         partial(evaluator.load_evaluator, model),
         bound=bound,
         note=f"{note} in double, its operators one by one in numpy",
-        is_foreign=True,
+        modules=("onnx",),
     )
     return [*found, one], omitted
 

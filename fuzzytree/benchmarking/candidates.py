@@ -107,7 +107,7 @@ def own(model: Model, bounds: Bounds, layouts: Layouts) -> Candidates:
             partial(load_runtime, runtime, form, layouts),
             bound=partial(_bound, runtime, form, bounds),
             note=runtime.note,
-            is_foreign=bool(runtime.modules),
+            modules=runtime.modules,
             is_parallel=runtime.prepare is not None,
         )
         for runtime in runtimes
@@ -180,6 +180,7 @@ def found_of(outcome: Outcome, model: Model) -> CandidateOutput:
     return CandidateOutput(predictions_of(outcome, model).codes, outcome.strengths)
 
 
+_GRAPHS = ("onnx", "onnxruntime")
 READING = "floor: the columns read once"
 SESSION = "floor: an empty session call"
 
@@ -199,13 +200,13 @@ def floors(question: Question) -> Candidates:
             READING, question, "floor", _load_reading, note="the sum of each column"
         )
     ]
-    if not all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
+    if not all(map(importlib.util.find_spec, _GRAPHS)):
         return candidates, [
             Omission(SESSION, f"not installed ({install_hint('onnx')})")
         ]
     note = "onnxruntime hands the same table back"
     session = Candidate(
-        SESSION, question, "floor", _load_session, note=note, is_foreign=True
+        SESSION, question, "floor", _load_session, note=note, modules=_GRAPHS
     )
     return [*candidates, session], []
 

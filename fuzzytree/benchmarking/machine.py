@@ -21,16 +21,17 @@ _SPREAD = 0.1  # width of an interval, as a share of its median, that is worth a
 _CPU_INFO = Path("/proc/cpuinfo")
 
 
-def machine(packages: Iterable[str] = ()) -> Machine:
+def machine(modules: Iterable[str] = ()) -> Machine:
     """Return what there is to know about this machine now.
 
-    Versions are those of the `packages` that are installed, beside `PACKAGES`.
+    Versions are those of the packages that have the `modules`, beside `PACKAGES`.
 
     Example:
-        >>> machine(["no such package"]).cores >= 1
+        >>> machine(["no_such_module"]).cores >= 1
         True
     """
-    names = sorted({*PACKAGES, *packages})
+    owners = importlib.metadata.packages_distributions()
+    names = sorted({*PACKAGES, *(p for one in {*modules} for p in owners.get(one, ()))})
     versions = {name: version for name in names if (version := _version(name))}
     return Machine(
         _processor(),

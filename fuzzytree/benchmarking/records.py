@@ -64,8 +64,8 @@ class Candidate(msgspec.Struct, frozen=True):
             takes its time and is called once the candidate has answered; it gives
             None, or is None, where nothing is certified.
         note: What a reader must know to compare it fairly.
-        is_foreign: Whether code of others runs, which may crash or hang the process;
-            a child process tries it before the study does. A peer always is.
+        modules: The modules of others whose code runs, which may crash or hang the
+            process: a child process tries it before the study does.
         is_parallel: Whether a second thread can make it faster; if not, it is timed
             with one only.
     """
@@ -76,7 +76,7 @@ class Candidate(msgspec.Struct, frozen=True):
     load: Callable[[int], LoadedCandidate]
     bound: Callable[[], Bound | None] | None = None
     note: str = ""
-    is_foreign: bool = False
+    modules: tuple[str, ...] = ()
     is_parallel: bool = False
 
 

@@ -46,10 +46,6 @@ _TRIED = 16  # rows that a child process answers
 _MOST_BYTES = 6 * 2**30  # for all layouts of the rows of a study
 _MOST_THREADS = 256  # thousands of them do nothing but wait for each other
 _SHARE = 0.1  # of the time: what a single candidate may take at most
-_PACKAGES = (
-    *("onnx", "onnxruntime", "scikit-fuzzy", "scipy"),
-    *("m2cgen", "pyfuzzylite", "scikit-learn", "simpful", "skl2onnx", "treelite"),
-)
 
 
 class BenchSettings(msgspec.Struct, frozen=True):
@@ -205,7 +201,7 @@ def run_study(
             model, values, plan or BenchSettings(), step, clock or system_clock()
         )
         run.omissions += omissions
-        before = machine(_PACKAGES)
+        before = machine(module for one in candidates for module in one.modules)
         try:
             run.try_foreign(candidates)
             run.judge(candidates)
@@ -261,7 +257,7 @@ class _Run:
 
     def try_foreign(self, candidates: Sequence[Candidate]) -> None:
         """Leave out what ends or blocks a child process."""
-        todo = [c for c in candidates if c.is_foreign or c.kind == "peer"]
+        todo = [c for c in candidates if c.modules or c.kind == "peer"]
         faults = trial.tried(
             self.model,
             [c.name for c in sorted(todo, key=_rank)],

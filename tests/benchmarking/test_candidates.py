@@ -128,7 +128,7 @@ def test_what_is_not_installed_is_an_omission(monkeypatch: pytest.MonkeyPatch) -
         "fuzzytree.benchmarking.candidates.is_installed", lambda one: not one.modules
     )
     result, omitted = own(TREE, lambda rules, dtype: None, Layouts())
-    assert not any(one.is_foreign for one in result)
+    assert not any(one.modules for one in result)
     whys = {one.name: one.why for one in omitted}
     assert whys["scikit-fuzzy"] == f"not installed ({install_hint('skfuzzy')})"
     assert whys["onnxruntime mixed"] == f"not installed ({install_hint('onnx')})"
@@ -187,7 +187,7 @@ def test_every_runtime_that_runs_foreign_code_is_tried_apart() -> None:
         runtime = one.name.partition(": ")[0]
         known = {r.name for r in all_runtimes()}
         if one.kind == "runtime" and runtime in known:
-            assert one.is_foreign == bool(find_runtime(runtime).modules)
+            assert one.modules == find_runtime(runtime).modules
 
 
 # --- the machine

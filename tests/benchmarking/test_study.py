@@ -187,7 +187,8 @@ def test_what_cannot_be_loaded_is_an_omission() -> None:
 
 def test_what_ends_its_process_is_an_omission() -> None:
     # A child process cannot make it again, as it cannot make what crashes.
-    study = studied(candidate("a peer", is_foreign=True), candidate())
+    peer = msgspec.structs.replace(candidate("a peer"), modules=("a_library",))
+    study = studied(peer, candidate())
     assert omitted(study) == {
         "a peer: rules": "it could not be made again in a child process"
     }
