@@ -18,6 +18,7 @@ from fuzzytree.auditing.recheck.outcomes import UndecidedError
 from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
 
 MOST_SETS = 50_000
+TOO_NEAR = "two critical levels are too near to distinguish"
 RuleBits = tuple[int, ...]
 """The functions of a rule on each axis, as bits; and how many are repeated."""
 
@@ -48,21 +49,20 @@ class Grid:
         self.levels = Levels()
         self.marks = {one: self.levels.add((one,), ZERO) for one in (ZERO, ONE, *extra)}
         self.axes: list[Axis] = []
-        pairs = zip(rules.rules, weights, strict=True)
-        every = [
-            one for rule, weight in pairs for one in self._weighted(rule.when, weight)
-        ]
+        shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+        every: dict[tuple[Clause, Fraction], Function] = {}
+        for rule, weight in zip(rules.rules, weights, strict=True):
+            for c, w in self._weighted(rule.when, weight):
+                group = tuple(shapes[c.variable, term] for term in c.terms)
+                every[c, w] = group, c.negated, w
         for variable in rules.variables:
-            clauses = [
-                c for c in dict.fromkeys(every) if c[0].variable == variable.name
-            ]
-            if clauses:
-                functions = _functions(variable, clauses)
-                known = {
-                    one: number for number, one in enumerate(dict.fromkeys(functions))
-                }
-                numbers = {c: known[f] for c, f in zip(clauses, functions, strict=True)}
-                result = cells([*known], lines[variable.name], self.levels)
+            of = {
+                one: f for one, f in every.items() if one[0].variable == variable.name
+            }
+            known = [*dict.fromkeys(of.values())]
+            if known:
+                result = cells(known, lines[variable.name], self.levels)
+                numbers = {one: known.index(f) for one, f in of.items()}
                 self.axes.append(Axis(numbers, result, []))
         self.levels.sort()
         for axis in self.axes:
@@ -127,7 +127,7 @@ class Grid:
             return True
         for band, (low, high) in enumerate(bands):
             if low < high and self.leaves(mine, rivals, band, is_gap=False):
-                raise UndecidedError("two critical levels are too near to distinguish")
+                raise UndecidedError(TOO_NEAR)
         return False
 
     def fires(self, mine: RuleBits) -> bool:
@@ -150,17 +150,15 @@ class Grid:
 
     def _zeros(self, axis: Axis, *, is_vague: bool) -> set[int]:
         """Return which functions are 0 together: in a cell, or at its right end."""
-        bands, zero = self.levels.bands, self.marks[ZERO]
-        lowest = self.levels.band[zero]
-        is_sharp = bands[lowest][0] == bands[lowest][1]
+        band, zero = self.levels.band, self.marks[ZERO]
+        low, high = self.levels.bands[band[zero]]
+        near = [number for number, one in enumerate(band) if one == band[zero]]
+        ends = {zero, *near} if is_vague or low == high else {zero}
         result: set[int] = set()
         for cell in axis.cells:
             pairs = zip(cell.left, cell.right, strict=True)
-            result.add(bits(ends == (zero, zero) for ends in pairs))
-            right = [self.levels.band[end] == lowest for end in cell.right]
-            if not is_vague and not is_sharp:
-                right = [end == zero for end in cell.right]
-            result.add(bits(right))
+            result.add(bits(pair == (zero, zero) for pair in pairs))
+            result.add(bits(end in ends for end in cell.right))
         return result
 
     def gap(self, level: Fraction, *, is_above: bool) -> int:
@@ -217,16 +215,6 @@ def _of_cell(cell: Span, band: int, is_gap: bool) -> list[int]:
                 every.append(crossing)
             crossing, last = crossing | bit, rank
     return [base, *(base | one for one in every), base | crossing]
-
-
-def _functions(
-    variable: Variable, clauses: Iterable[tuple[Clause, Fraction]]
-) -> list[Function]:
-    shapes = {term.name: term.shape for term in variable.terms}
-    return [
-        (tuple(shapes[term] for term in clause.terms), clause.negated, weight)
-        for clause, weight in clauses
-    ]
 
 
 def bits(flags: Iterable[int]) -> int:
@@ -297,17 +285,10 @@ class Ties:
                     self._step(1 + len(rivals))
                     if (own[0] | own[1]) & ~(above | equal):
                         continue
-                    axes: list[set[int]] = []
                     every = self.grid.sets(band, is_gap=True)
-                    for k, sets in enumerate(every):
-                        bits_of_rule = one[k] | other[k]
-                        met = (
-                            {s for s in sets if not bits_of_rule & ~s}
-                            if k != place
-                            else {above}
-                        )
-                        axes.append({bits(r[k] & ~s for r in rivals) for s in met})
-                    if reach(axes, len(rivals)):
+                    axes = [{(reached, 0) for reached in sets} for sets in every]
+                    axes[place] = {(above, equal)}
+                    if _is_tie((one, other), rivals, axes):
                         return True
         return False
 
@@ -319,23 +300,9 @@ class Ties:
         for band in sorted(flat - {self.lowest}):
             self._step(len(self.wide) * (1 + len(rivals)))
             low, high = self.grid.levels.bands[band]
-            axes: list[set[int]] = []
-            for k, sets in enumerate(self._at(band)):
-                bits_of_rule = one[k] | other[k]
-                axes.append(
-                    {
-                        bits(
-                            (*(r[k] & ~gt for r in rivals), one[k] & eq, other[k] & eq)
-                        )
-                        for gt, eq in sets
-                        if not bits_of_rule & ~(gt | eq)
-                    }
-                )
-            if reach(axes, len(rivals) + 2):
+            if _is_tie((one, other), rivals, self._at(band)):
                 if low < high:
-                    raise UndecidedError(
-                        "two critical levels are too near to distinguish"
-                    )
+                    raise UndecidedError(TOO_NEAR)
                 return True
         return False
 
@@ -357,6 +324,28 @@ class Ties:
                 for spans in self.wide
             ]
         return self.levels[band]
+
+
+def _is_tie(
+    both: tuple[RuleBits, RuleBits],
+    rivals: Sequence[RuleBits],
+    axes: Sequence[set[tuple[int, int]]],
+) -> bool:
+    """Return whether two rules are at a level and no rival is above it.
+
+    `axes`: of each axis, which functions can be above the level, and which at it.
+    """
+    sets: list[set[int]] = []
+    for k, patterns in enumerate(axes):
+        own = both[0][k], both[1][k]
+        sets.append(
+            {
+                bits((*(r[k] & ~above for r in rivals), own[0] & equal, own[1] & equal))
+                for above, equal in patterns
+                if not (own[0] | own[1]) & ~(above | equal)
+            }
+        )
+    return reach(sets, len(rivals) + 2)
 
 
 def _shared(cell: Span, one: int, other: int) -> Iterator[tuple[int, int, int]]:
