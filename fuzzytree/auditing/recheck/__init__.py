@@ -9,12 +9,9 @@ can, and says what it could not. Exit 0: all holds; 1: something does not, and a
 that is listed; 2: it could not be run.
 
 Read it in this order: the records (`audit_records`, `model_records`) and how files
-become them (`building`, `yaml`, `facts`, `models`, `conditions`, `systems`, `places`);
-what a model means (`polynomials`, `curves`, `enclosing`, `meaning`, `trees`, `views`);
-how a "never" is decided again (`roots`, `cells`, `grid`, `ties`, `areas`); the checks
-(`cases`, `head` with `fixed` and `fingerprints`, `answers`, `forms`, `claims`,
-`deciding` with `deciding_wins`, `deciding_pairs`, `deciding_terms`, `deciding_leaves`);
-how they end (`outcomes`, `report`).
+become them (`yaml`, `systems`, `models`); what a model means (`polynomials`,
+`enclosing`, `meaning`, `views`); how a "never" is decided again (`grid`); the checks
+(`cases`, `head`, `forms`, `deciding`, `answers`) and how they end (`outcomes`).
 """
 
 from __future__ import annotations
@@ -24,10 +21,9 @@ from pathlib import Path
 from fuzzytree.auditing.recheck.answers import check_answer
 from fuzzytree.auditing.recheck.audit_records import Audit
 from fuzzytree.auditing.recheck.cases import Case
-from fuzzytree.auditing.recheck.facts import built, read_json
 from fuzzytree.auditing.recheck.head import check_files, check_head
 from fuzzytree.auditing.recheck.model_records import System
-from fuzzytree.auditing.recheck.models import read_file
+from fuzzytree.auditing.recheck.models import built, read_file, read_json
 from fuzzytree.auditing.recheck.outcomes import (
     MOST_BYTES,
     CannotRunError,

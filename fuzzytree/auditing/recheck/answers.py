@@ -15,8 +15,14 @@ from fuzzytree.auditing.recheck.audit_records import (
     Witness,
     fraction,
 )
-from fuzzytree.auditing.recheck.cases import NEAR, Case
-from fuzzytree.auditing.recheck.claims import check_point, check_spans, corners, holds
+from fuzzytree.auditing.recheck.cases import (
+    NEAR,
+    Case,
+    check_point,
+    check_spans,
+    corners,
+    holds,
+)
 from fuzzytree.auditing.recheck.deciding import decide, highest, lead, shows
 from fuzzytree.auditing.recheck.forms import matches_facts
 from fuzzytree.auditing.recheck.head import SEVERITIES
@@ -66,17 +72,10 @@ def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     count = len(case.rules.rules)
     for number in answer.rules:
         expect(1 <= number <= count, f"{where}: there is no rule {number}")
-    variables = [
-        v
-        for representation in case.representations.values()
-        for v in representation.variables
-    ]
+    variables = [v for one in case.representations.values() for v in one.variables]
     terms = {(v.name, t.name) for v in variables for t in v.terms}
     for label in answer.terms:
         expect(tuple(label) in terms, f"{where}: there is no {label.term!r}")
-    if case.view is not None:
-        inputs = case.view.system.inputs
-        terms = {(v.name, label.name) for v in inputs for label in v.labels}
     units = {"", *(v.unit for v in case.variables.values())}
     for measure in answer.measures:
         _measure(report, measure, where)

@@ -20,11 +20,10 @@ from fuzzytree.auditing.recheck.cases import (
     counted,
     end_of,
     level_of,
+    point_of,
 )
-from fuzzytree.auditing.recheck.cells import FINE
-from fuzzytree.auditing.recheck.claims import point_of
 from fuzzytree.auditing.recheck.forms import clause_text, clauses_of
-from fuzzytree.auditing.recheck.grid import RuleBits
+from fuzzytree.auditing.recheck.grid import FINE, RuleBits
 from fuzzytree.auditing.recheck.meaning import Point, answer_of, leaf_of, strengths
 from fuzzytree.auditing.recheck.model_records import Clause, Rules, Tree, Variable
 from fuzzytree.auditing.recheck.outcomes import (
@@ -40,13 +39,17 @@ Interval = tuple[Fraction, Fraction, bool]  # True opens the low end
 
 def dead_leaf(case: Case, tree: Tree, answer: Answer) -> None:
     """Check that a leaf is not reached, or that the audit has all such leaves."""
-    reached = {n for n in case.numbers if _is_reached(case, tree, n)}
+    reached = {
+        number
+        for number in case.numbers
+        if all(_ways(case, number, variable) for variable in tree.variables)
+    }
     if answer.is_finding:
         case.never(not reached.isdisjoint(answer.rules), "the leaf is reached")
     elif not answer.rules:
         entries = {one.rules for one in case.coded("FT101") if one.is_finding}
-        hidden = [n for n in case.numbers if n not in reached]
-        missing = [n for n in hidden if (n,) not in entries]
+        hidden = {(number,) for number in {*case.numbers} - reached}
+        missing = [number for (number,) in sorted(hidden - entries)]
         require(not missing, f"leaves that are not reached are missing: {missing}")
 
 
@@ -80,11 +83,6 @@ def shows_difference(case: Case, answer: Answer, state: Witness) -> None:
     require(said["tree"] != said["raw rules"], "the two answers are the same")
 
 
-def _is_reached(case: Case, tree: Tree, number: int) -> bool:
-    """Return whether the intervals on the path to a leaf meet the domain."""
-    return all(_ways(case, number, variable) for variable in tree.variables)
-
-
 def _ways(case: Case, number: int, variable: Variable) -> list[Interval]:
     """Return the values of a variable that lead to a leaf."""
     line = case.line(variable)
@@ -111,47 +109,35 @@ def _met(one: Interval, low: float | None, high: float | None) -> Interval:
 
 def hidden(case: Case, answer: Answer) -> None:
     """Check the rules that hide another; or all pairs without a finding."""
-    if answer.rules:
-        _check_hidden(case, answer)
-    else:
-        _check_not_hidden(case, answer)
-
-
-def _check_hidden(case: Case, answer: Answer) -> None:
+    is_alike = answer.code == "FT104"
+    if not answer.rules:
+        _check_not_hidden(case, answer, is_alike=is_alike)
+        return
     weak, *strong = answer.rules
     for number in strong:
         is_one = case.then(number) == case.then(weak)
-        require(is_one == (answer.code == "FT104"), "the classes are not so")
+        require(is_one == is_alike, "the classes are not so")
         beats = case.beats(case.bits_of(weak), [case.bits_of(number)])
         case.never(beats, f"rule {weak} is somewhere stronger than rule {number}")
-        if answer.code == "FT105" and number > weak:
-            raise UndecidedError(
-                "that it is always strictly weaker is not checked here"
-            )
-    counted(answer, {"rules that subsume it": len(strong)}, answer.code == "FT104")
-    counted(answer, {"rules that mask it": len(strong)}, answer.code == "FT105")
+        if not is_alike and number > weak:
+            text = "that it is always strictly weaker is not checked here"
+            raise UndecidedError(text)
+    counted(answer, {"rules that subsume it": len(strong)}, is_alike)
+    counted(answer, {"rules that mask it": len(strong)}, not is_alike)
 
 
-def _check_not_hidden(case: Case, answer: Answer) -> None:
-    is_alike = answer.code == "FT104"
+def _check_not_hidden(case: Case, answer: Answer, *, is_alike: bool) -> None:
     pairs = [pair for pair in case.pairs(alike=is_alike) if case.fire(*pair)]
     silent = sum(not case.fire(number) for number in case.numbers)
     counts = {"pairs": len(pairs), "pairs too near to compare": 0}
-    counts["rules that never fire"] = silent
-    counted(answer, counts, 3)
+    counted(answer, counts | {"rules that never fire": silent}, 3)
     entries = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
-    for first, second in pairs:
-        if (first, second) in entries or (second, first) in entries:
+    for pair in pairs:
+        if pair in entries or pair[::-1] in entries:
             continue
-        one, other = case.bits_of(first), case.bits_of(second)
-        require(case.beats(other, [one]), f"rule {second} hides behind {first}")
-        if is_alike:
-            require(case.beats(one, [other]), f"rule {first} hides behind {second}")
-
-
-def _is_copy(answer: Answer) -> bool:
-    """Return whether a distance of 0 is among the measures of two rules."""
-    return any(measure.exact == "0" for measure in answer.measures)
+        for first, second in (pair, pair[::-1]) if is_alike else (pair,):
+            beats = case.beats(case.bits_of(second), [case.bits_of(first)])
+            require(beats, f"rule {second} hides behind {first}")
 
 
 def copied(case: Case, answer: Answer) -> None:
@@ -166,7 +152,7 @@ def copied(case: Case, answer: Answer) -> None:
     graver = "error" if case.view is None else "info"
     severity = "warning" if is_one else graver
     require(answer.severity == severity, "the classes are not so")
-    if not _is_copy(answer):
+    if all(measure.exact != "0" for measure in answer.measures):  # their distance
         raise UndecidedError("the distance of curves that differ is not measured here")
     one, other = case.bits_of(first), case.bits_of(second)
     if one != other:

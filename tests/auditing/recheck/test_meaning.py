@@ -10,8 +10,7 @@ import pytest
 from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.recheck import model_records
-from fuzzytree.auditing.recheck.cells import Line, crossings
-from fuzzytree.auditing.recheck.grid import Grid
+from fuzzytree.auditing.recheck.grid import Grid, Line, crossings
 from fuzzytree.auditing.recheck.meaning import answer_of, strengths
 from fuzzytree.auditing.recheck.polynomials import times
 from fuzzytree.model.rulebase import RuleBase

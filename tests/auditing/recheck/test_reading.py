@@ -18,10 +18,9 @@ from fuzzytree.auditing.recheck import (
     head,
     model_records,
 )
-from fuzzytree.auditing.recheck.facts import built, read_json
 from fuzzytree.auditing.recheck.head import compact
 from fuzzytree.auditing.recheck.meaning import rules_of
-from fuzzytree.auditing.recheck.models import read_file
+from fuzzytree.auditing.recheck.models import built, read_file, read_json
 from fuzzytree.auditing.recheck.yaml import read_yaml
 from fuzzytree.exporters import yaml
 from fuzzytree.model.rulebase import RuleBase, fingerprint

@@ -17,10 +17,9 @@ from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.audit_records import Audit
 from fuzzytree.auditing.recheck.enclosing import NORMS, bounds, hedged
-from fuzzytree.auditing.recheck.facts import built
 from fuzzytree.auditing.recheck.head import digest_of, fingerprint
 from fuzzytree.auditing.recheck.model_records import System
-from fuzzytree.auditing.recheck.models import read_file
+from fuzzytree.auditing.recheck.models import built, read_file
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
 from fuzzytree.auditing.recheck.systems import HEDGES, read_condition
 from fuzzytree.auditing.recheck.views import View

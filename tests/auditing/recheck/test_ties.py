@@ -7,8 +7,7 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.recheck import model_records
-from fuzzytree.auditing.recheck.cells import Line
-from fuzzytree.auditing.recheck.grid import Grid, Ties
+from fuzzytree.auditing.recheck.grid import Grid, Line, Ties
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from tests.auditing.engine.bases import random_base
 from tests.auditing.recheck.reading import read
