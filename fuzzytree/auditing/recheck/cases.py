@@ -219,11 +219,6 @@ class Case:
         """Return the functions that a rule uses on each axis, as bits."""
         return self.grid.of[number - 1]
 
-    def differ(self, numbers: Sequence[int]) -> None:
-        """Refuse rules that are not of two classes."""
-        classes = {self.then(number) for number in numbers}
-        require(len(classes) == 2, "the rules are of one class")
-
     def pairs(self, *, alike: bool) -> list[tuple[int, int]]:
         """Return the pairs of rules of one class, or of two."""
         pairs = itertools.combinations(self.numbers, 2)
@@ -246,12 +241,18 @@ class Case:
         """Return whether each of some rules fires somewhere."""
         return all(self.grid.fires(self.bits_of(n)) for n in numbers)
 
-    def beats(self, mine: RuleBits, rivals: Sequence[RuleBits]) -> bool:
-        """Return whether a rule is somewhere stronger than each rival.
+    def rivals(self, number: int) -> list[int]:
+        """Return the rules of other classes."""
+        return [n for n in self.numbers if self.then(n) != self.then(number)]
+
+    def beats(self, rule: int | RuleBits, numbers: Iterable[int]) -> bool:
+        """Return whether a rule is somewhere stronger than each of some others.
 
         Raises:
             UndecidedError: If that cannot be decided here.
         """
+        mine = self.bits_of(rule) if isinstance(rule, int) else rule
+        rivals = [self.bits_of(number) for number in numbers]
         if self.rules.semantics.conjunction == "min":
             return self.grid.wins(mine, rivals)
         if any(self.grid.is_below(mine, rival) for rival in rivals):

@@ -117,7 +117,7 @@ def hidden(case: Case, answer: Answer) -> None:
     for number in strong:
         is_one = case.then(number) == case.then(weak)
         require(is_one == is_alike, "the classes are not so")
-        beats = case.beats(case.bits_of(weak), [case.bits_of(number)])
+        beats = case.beats(weak, [number])
         case.never(beats, f"rule {weak} is somewhere stronger than rule {number}")
         if not is_alike and number > weak:
             text = "that it is always strictly weaker is not checked here"
@@ -136,7 +136,7 @@ def _check_not_hidden(case: Case, answer: Answer, *, is_alike: bool) -> None:
         if pair in entries or pair[::-1] in entries:
             continue
         for first, second in (pair, pair[::-1]) if is_alike else (pair,):
-            beats = case.beats(case.bits_of(second), [case.bits_of(first)])
+            beats = case.beats(second, [first])
             require(beats, f"rule {second} hides behind {first}")
 
 
@@ -154,9 +154,8 @@ def copied(case: Case, answer: Answer) -> None:
     require(answer.severity == severity, "the classes are not so")
     if all(measure.exact != "0" for measure in answer.measures):  # their distance
         raise UndecidedError("the distance of curves that differ is not measured here")
-    one, other = case.bits_of(first), case.bits_of(second)
-    if one != other:
-        is_more = case.beats(one, [other]) or case.beats(other, [one])
+    if case.bits_of(first) != case.bits_of(second):
+        is_more = case.beats(first, [second]) or case.beats(second, [first])
         require(not is_more, "the two rules are not alike")
 
 
@@ -218,7 +217,7 @@ def needless(case: Case, answer: Answer) -> None:
         require(not case.fire(*answer.rules), "the rule fires somewhere")
         return
     rest, number = case.grid.bits_of(_without(case, answer)), answer.rules[0]
-    if case.beats(rest, [case.bits_of(number)]):
+    if case.beats(rest, [number]):
         _decides_alike(case, number, rest)
 
 
@@ -229,12 +228,14 @@ def _decides_alike(case: Case, number: int, rest: RuleBits) -> None:
     or where no rule fired; it may where it ties with a later rule of another class.
     """
     grid, then = case.grid, case.then(number)
-    own = [case.bits_of(n) for n in case.numbers if case.then(n) == then]
-    others = [n for n in case.numbers if case.then(n) != then]
+    own = [n for n in case.numbers if case.then(n) == then]
     is_more = any(
         case.beats(_union(rest, case.bits_of(n)), own)
-        or (n > number and case.ties.tie(rest, case.bits_of(n), own))
-        for n in others
+        or (
+            n > number
+            and case.ties.tie(rest, case.bits_of(n), [*map(case.bits_of, own)])
+        )
+        for n in case.rivals(number)
     )
     if case.rules.semantics.uncovered != then:
         is_more |= grid.leaves(rest, grid.of, grid.gap(ZERO, is_above=True))
@@ -274,7 +275,7 @@ def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
     is_high = any(fraction(claim.level or "0") >= level for claim in met)
     is_found = is_high and answer.is_finding
     require(is_found, "it is not claimed that both reach the level")
-    case.differ(answer.rules)
+    require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
     if case.rules.semantics.conjunction == "min":
         highest(case, answer)
 
@@ -307,13 +308,11 @@ def overlaps(case: Case, answer: Answer) -> None:
         raise UndecidedError("a shared area is too near to the limit to decide")
     entries = [one for one in case.coded("FT403") if one.terms]
     entries = [one for one in entries if not isinstance(one.state, Declined)]
-    require(
-        {a.terms for a in entries} <= near.keys(), "two terms are easy to distinguish"
-    )
+    is_near = {one.terms for one in entries} <= near.keys()
+    require(is_near, "two terms are easy to distinguish")
     if not answer.terms:
-        require(
-            answer.is_finding == (len(near) > len(entries)), "a finding that is none"
-        )
+        is_more = len(near) > len(entries)
+        require(answer.is_finding == is_more, "a finding that is none")
         counts = {
             "pairs not listed": len(near) - len(entries),
             "pairs apart": len(known) - len(near),
@@ -330,11 +329,8 @@ def unused(case: Case, answer: Answer) -> None:
     """Compare the terms and variables that no rule uses with the findings."""
     every, used = case.terms, _used_terms(case.rules)
     if case.view is not None:  # the system itself is read, rules left out or not
-        every = [
-            Label(v.name, label.name)
-            for v in case.view.system.inputs
-            for label in v.labels
-        ]
+        inputs = case.view.system.inputs
+        every = [Label(v.name, label.name) for v in inputs for label in v.labels]
         used = case.view.questions()
     needed = {variable for variable, _ in used}
     names = [v.name for v in case.rules.variables]
@@ -342,11 +338,8 @@ def unused(case: Case, answer: Answer) -> None:
         if variable.name in needed:
             needed |= {part.input for part in variable.parts}
     idle = [f"variable {name!r}" for name in names if name not in needed]
-    idle += [
-        f"term {term!r} of {name!r}"
-        for name, term in every
-        if name in needed and (name, term) not in used
-    ]
+    rest = [pair for pair in every if pair[0] in needed and pair not in used]
+    idle += [f"term {term!r} of {name!r}" for name, term in rest]
     needed, used = needed.intersection(names), used.intersection(every)
     entries = [one.subject for one in case.coded("FT404") if one.is_finding]
     require(entries == idle, "other terms or variables are unused")
@@ -391,10 +384,7 @@ def dead(case: Case, answer: Answer) -> None:
         return
     require(len(answer.rules) > 0, "no rule is named")
     number = answer.rules[0]
-    rivals = [
-        case.bits_of(n) for n in case.numbers if case.then(n) != case.then(number)
-    ]
-    wins = case.beats(case.bits_of(number), rivals)
+    wins = case.beats(number, case.rivals(number))
     case.never(wins, "the rule wins somewhere")
 
 
@@ -411,15 +401,13 @@ def superfluous(case: Case, answer: Answer) -> None:
     """Check that a rule is nowhere stronger than all, or first of the strongest."""
     require(len(answer.rules) == 1 and answer.is_finding, "it is of no rule")
     number = answer.rules[0]
-    mine, then = case.bits_of(number), case.then(number)
-    others = [n for n in case.numbers if n != number]
-    wins = case.beats(mine, [case.bits_of(n) for n in others])
-    case.never(wins, "it is stronger than all somewhere")
-    later = [n for n in others if n > number and case.then(n) != then]
-    for other in (n for n in others if case.then(n) == then):
+    others, rivals = [n for n in case.numbers if n != number], case.rivals(number)
+    case.never(case.beats(number, others), "it is stronger than all somewhere")
+    later = [n for n in rivals if n > number]
+    for other in (n for n in others if n not in rivals):
         # one that hides it, with no other class between the two
         is_between = any(n < other for n in later)
-        if not is_between and not case.beats(mine, [case.bits_of(other)]):
+        if not is_between and not case.beats(number, [other]):
             return
     if any(case.tie(number, other) for other in later):
         raise UndecidedError("it ties with a later rule, and its place may decide")
@@ -427,17 +415,14 @@ def superfluous(case: Case, answer: Answer) -> None:
 
 def ties_of_classes(case: Case, answer: Answer) -> None:
     """Count the pairs of rules of two classes, and those with a finding."""
-    pairs = len(case.pairs(alike=False))
-    entries = sum(bool(one.rules) for one in case.coded("FT202"))
-    counted(answer, {"pairs": pairs, "pairs listed": entries}, 2)
+    pairs = case.pairs(alike=False)
+    known = [one.rules for one in case.coded("FT202") if one.rules]
+    counted(answer, {"pairs": len(pairs), "pairs listed": len(known)}, 2)
     require(not answer.is_finding, "that others do not tie is no finding")
-    known = {one.rules for one in case.coded("FT202") if one.rules}
-    total = next(
-        (m.value for m in answer.measures if m.name == "pairs that tie"), entries
-    )
-    if total != entries:
+    totals = [m.value for m in answer.measures if m.name == "pairs that tie"]
+    if totals and totals[0] != len(known):
         raise UndecidedError("which pairs are left out is not known")
-    for pair in case.pairs(alike=False):
+    for pair in pairs:
         if pair not in known:
             text = f"rules {pair[0]} and {pair[1]} tie as the strongest"
             case.never(case.tie(*pair), text)
@@ -462,13 +447,10 @@ def covered(case: Case, answer: Answer) -> None:
 
 def least_cover(case: Case, answer: Answer) -> None:
     """Check that the strength where it is least lies between the reported bounds."""
-    grid, entries = (
-        case.grid,
-        [level_of(m) for m in answer.measures if m.name in LEVELS],
-    )
-    require(
-        len(entries) == 2 and 0 <= entries[0] <= entries[1] <= 1, "no least strength"
-    )
+    grid, ends = case.grid, [m for m in answer.measures if m.name in LEVELS]
+    entries = [*map(level_of, ends)]
+    is_one = len(entries) == 2 and 0 <= entries[0] <= entries[1] <= 1
+    require(is_one, "no least strength")
     if entries[0] > 0:
         is_less = grid.leaves(None, grid.of, grid.gap(entries[0], is_above=False))
         case.never(is_less, "somewhere every rule is weaker than reported")
@@ -486,9 +468,9 @@ def shows_win(case: Case, answer: Answer, state: Witness) -> None:
         is_found = (number,) in fired and not answer.is_finding
         require(is_found, "it is not claimed that the rule fires")
         return
-    rivals = {n for n in case.numbers if n != number}
-    if answer.code != "FT103":
-        rivals = {n for n in rivals if case.then(n) != case.then(number)}
+    rivals = {*case.rivals(number)}
+    if answer.code == "FT103":
+        rivals = {*case.numbers} - {number}
     ties = [c for c in state.claims if c.kind == "ties" and number in c.rules]
     if answer.is_finding or (answer.code == "FT103" and ties):  # it ties, and is first
         require(bool(ties), "it is not claimed that the rule ties")
@@ -501,8 +483,7 @@ def shows_win(case: Case, answer: Answer, state: Witness) -> None:
 def lead(case: Case, number: int, point: Point) -> Fraction:
     """Return by how much a rule is above those of other classes at a point."""
     every = strengths(case.rules, point)
-    then = case.then(number)
-    others = (every[n - 1] for n in case.numbers if case.then(n) != then)
+    others = (every[n - 1] for n in case.rivals(number))
     return every[number - 1] - max(others, default=ZERO)
 
 
@@ -511,9 +492,8 @@ def shows_lead(case: Case, answer: Answer, state: Witness) -> None:
     require(len(answer.rules) == 1 and not answer.is_finding, "it is of no rule")
     result = lead(case, answer.rules[0], point_of(state.point))
     entries = [m.value for m in answer.measures if m.name == "largest lead, at least"]
-    is_so = (
-        len(entries) == 1 and result >= Fraction(entries[0]) >= case.audit.settings.lead
-    )
+    is_so = len(entries) == 1 and entries[0] >= case.audit.settings.lead
+    is_so = is_so and result >= Fraction(entries[0])
     require(is_so, "the rule does not lead by so much there")
     shows_win(case, answer, state)
 
@@ -524,7 +504,7 @@ def shows_tie(case: Case, answer: Answer, state: Witness) -> None:
     met = [c for c in ties if {*answer.rules} <= {*c.rules}]
     is_all = any({*c.rules, *c.rivals} == {*case.numbers} for c in met)
     require(is_all and answer.is_finding, "it is not claimed that the two tie")
-    case.differ(answer.rules)
+    require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
 
 
 def shows_gap(case: Case, answer: Answer, state: Witness) -> None:

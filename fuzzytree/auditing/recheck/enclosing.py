@@ -92,16 +92,15 @@ def _cosine(angle: Fraction) -> Between:
 def root(x: Fraction, power: int) -> Between:
     """Return between which numbers the root of x >= 0 lies."""
     whole = (x.numerator << (power * BITS)) // x.denominator
-    result = 1 << -(-whole.bit_length() // power)
-    while result and (better := _newton(whole, result, power)) < result:
-        result = better
-    low = Fraction(result, 1 << BITS)
-    return low, low if low**power == x else low + Fraction(1, 1 << BITS)
-
-
-def _newton(whole: int, result: int, power: int) -> int:
-    other: int = whole // result ** (power - 1)
-    return ((power - 1) * result + other) // power
+    result, above = 0, 1 << (whole.bit_length() // power + 1)
+    while above - result > 1:
+        middle = (result + above) // 2
+        if middle**power <= whole:
+            result = middle
+        else:
+            above = middle
+    low = Fraction(result, UNIT)
+    return low, low if low**power == x else low + Fraction(1, UNIT)
 
 
 def bounds(shape: Shape, x: Fraction) -> Between:
@@ -139,9 +138,15 @@ def _curve(kind: str, data: dict[str, Any], x: Fraction) -> Between:
             ends = [-2 * number["slope"] * end for end in logarithm(far)]
             return logistic(min(ends), max(ends))
         case "sigmoid":
-            return _sigmoid(number, x)
-        case "sigmoid difference" | "sigmoid product":
-            return _sigmoids(kind, data, x)
+            z = number["slope"] * (x - number["inflection"])
+            return logistic(z, z)
+        case "sigmoid product":
+            a, b = (bounds(data[name], x) for name in ("first", "second"))
+            return a[0] * b[0], a[1] * b[1]
+        case "sigmoid difference":
+            a, b = (bounds(data[name], x) for name in ("first", "second"))
+            low, high = a[0] - b[1], a[1] - b[0]
+            return max(low, -high, ZERO), max(abs(low), abs(high))
         case "cosine":
             turns = abs(x - number["center"]) / number["width"]
             if turns > Fraction(1, 2):
@@ -172,19 +177,6 @@ def _certain(one: Fraction) -> Between:
 
 def _gaussian(away: Fraction, deviation: Fraction) -> Between:
     return falling((away / deviation) ** 2 / 2)
-
-
-def _sigmoid(number: dict[str, Fraction], x: Fraction) -> Between:
-    z = number["slope"] * (x - number["inflection"])
-    return logistic(z, z)
-
-
-def _sigmoids(kind: str, data: dict[str, Any], x: Fraction) -> Between:
-    a, b = (bounds(data[name], x) for name in ("first", "second"))
-    if kind == "sigmoid product":
-        return a[0] * b[0], a[1] * b[1]
-    low, high = a[0] - b[1], a[1] - b[0]
-    return max(low, -high, ZERO), max(abs(low), abs(high))
 
 
 _RISING: dict[str, Callable[[Fraction], Between]] = {

@@ -292,11 +292,8 @@ def _complete(case: Case, report: Report) -> None:
 
 def _wins(case: Case, number: int) -> bool:
     """Return whether a rule is known to beat those of other classes somewhere."""
-    rivals = [
-        case.bits_of(n) for n in case.numbers if case.then(n) != case.then(number)
-    ]
     try:
-        return case.is_free and case.beats(case.bits_of(number), rivals)
+        return case.is_free and case.beats(number, case.rivals(number))
     except UndecidedError:
         return False
 

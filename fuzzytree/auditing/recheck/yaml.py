@@ -14,6 +14,9 @@ MOST_LEVELS = 32
 Yaml = str | int | float | list["Yaml"] | dict[str, "Yaml"]
 _KEY = re.compile(r"([a-z][a-z ]*):(?: +|$)")
 _QUOTED = re.compile(r"'((?:[^']|'')*)'|\"((?:[^\"\\]|\\.)*)\"")
+_PART = re.compile(
+    rf"(?<![^ \[{{,])(?:{_QUOTED.pattern}|(?P<open>['\"]))|(?<![^ ])(?P<comment>#)|."
+)
 _ESCAPE = re.compile(r"\\(x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|.)")
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "\\": "\\", '"': '"', "/": "/"}
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")
@@ -79,20 +82,11 @@ class _Blocks:
 
     def _without_comment(self, line: str, number: int) -> str:
         """Cut a comment off: a `#` at the start or behind a blank, not in quotes."""
-        if "#" not in line:
-            return line
-        place = 0
-        while place < len(line):
-            opens = place == 0 or line[place - 1] in " [{,"
-            if line[place] in "'\"" and opens:
-                quoted = _QUOTED.match(line, place)
-                if quoted is None:
-                    raise self.error(number, "a quote that does not end on its line")
-                place = quoted.end()
-            elif line[place] == "#" and (place == 0 or line[place - 1] == " "):
-                return line[:place]
-            else:
-                place += 1
+        for part in _PART.finditer(line) if "#" in line else ():
+            if part["comment"]:
+                return line[: part.start()]
+            if part["open"]:
+                raise self.error(number, "a quote that does not end on its line")
         return line
 
     def document(self) -> Yaml:
@@ -203,11 +197,9 @@ class _Flow:
         if quoted:
             self.at = quoted.end()
             return self.scalar(quoted[0])
-        end = self.at
-        while end < len(self.text) and self.text[end] not in ",]}[{":
-            end += 1
-        word, self.at = self.text[self.at : end].rstrip(" "), end
-        return self.scalar(word)
+        word = re.split(r"[,\]}\[{]", self.text[self.at :], maxsplit=1)[0]
+        self.at += len(word)
+        return self.scalar(word.rstrip(" "))
 
     def _items(self, close: str, level: int) -> Iterator[tuple[str, Yaml]]:
         self.at += 1
