@@ -75,4 +75,5 @@ from .yaml.nodes import MOST_NODES as MOST_NODES
 from .yaml.nodes import MappingNode as MappingNode
 from .yaml.nodes import Scalar as Scalar
 from .yaml.nodes import compose as compose
+from .yaml.yaml_reader import mapping_of_format as mapping_of_format
 from .yaml.yaml_reader import read_yaml as read_yaml

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Literal
 
@@ -13,18 +12,14 @@ from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.exporters import Entry, Noted, Short, joined
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.formats import (
-    FileMistake,
     FileRecord,
     KeyForm,
-    MappingNode,
     Name,
-    Scalar,
-    compose,
     entries,
     located,
+    mapping_of_format,
     record,
     report,
-    value_of,
 )
 from fuzzytree.model import Mistake
 from fuzzytree.tactile.boards import (
@@ -237,13 +232,7 @@ checksum='none', tail='')
     if len(content) > MOST_BYTES:
         text = f"{len(content):,} bytes are more than the {MOST_BYTES:,} of a board"
         raise ReadError(f"{name}: {text}")
-    root, found = compose(content, name)
-    if not isinstance(root, MappingNode):
-        text = f"a board must be a mapping that begins with 'format: {BOARD_FORMAT}'"
-        raise report(name, [*found, (root.line, root.column, text)])
-    wrong_format = [*_format_mistakes(root)]
-    if wrong_format:
-        raise report(name, [*found, *wrong_format])
+    root, found = mapping_of_format(content, name, BOARD_FORMAT, "board")
     file = record(entries(root, BoardFile, found), BoardFile, found)
     if file is None or found:
         raise report(name, found)
@@ -279,26 +268,6 @@ def _fields(part: FileRecord) -> dict[str, Any]:
     if "sizes" in found:
         found["sizes"] = found["sizes"] != "none"
     return {name: "" if one is None else one for name, one in found.items()}
-
-
-def _format_mistakes(root: MappingNode) -> Iterator[FileMistake]:
-    node = value_of(root, "format")
-    if node is None:
-        text = f"no 'format: {BOARD_FORMAT}' says what this file is"
-        yield root.line, root.column, text
-        return
-    given = node.text if isinstance(node, Scalar) else ""
-    if given == BOARD_FORMAT:
-        return
-    text = f"'format' must be {BOARD_FORMAT!r}"
-    if re.fullmatch(r"fuzzytree-board/[1-9][0-9]{0,8}", given):
-        text = (
-            f"a board of format {given!r} needs a newer fuzzytree, one that reads "
-            f"{given!r}; this one reads {BOARD_FORMAT!r}"
-        )
-    elif given.startswith("fuzzytree/"):
-        text = f"this is a model, and no board; {text}"
-    yield node.line, node.column, text
 
 
 def _renamed(family: str, mistakes: list[Mistake]) -> Iterator[Mistake]:

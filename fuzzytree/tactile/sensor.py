@@ -170,8 +170,7 @@ def pressed(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
         baseline = np.array(sensor.baseline, np.int64)
         values -= baseline.reshape(sensor.rows, sensor.columns)
     values[values <= sensor.threshold] = 0
-    for row, column in sensor.masked:
-        values[:, row, column] = 0
+    values[:, is_masked(sensor)] = 0
     return values
 
 
@@ -184,20 +183,24 @@ def offsets(sensor: Sensor) -> tuple[int, ...]:
         >>> offsets(Sensor(1, 2, masked=((0, 1),))), offsets(Sensor(1, 2))
         ((0, 255), ())
     """
-    count = sensor.rows * sensor.columns
-    found = [*(sensor.baseline or (0,) * count)]
-    for row, column in sensor.masked:
-        found[row * sensor.columns + column] = sensor.full
-    return tuple(found) if any(found) else ()
+    baseline = np.array(sensor.baseline or [0] * (sensor.rows * sensor.columns))
+    found = np.where(is_masked(sensor).reshape(-1), sensor.full, baseline)
+    return tuple(found.tolist()) if found.any() else ()
 
 
 def saturated(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
     """Return how many cells of each frame that are not masked read `full` or more."""
-    full = check_frames(sensor, frames) >= sensor.full
-    for row, column in sensor.masked:
-        full[:, row, column] = False
+    full = (check_frames(sensor, frames) >= sensor.full) & ~is_masked(sensor)
     count: npt.NDArray[np.int64] = full.sum(axis=(1, 2))
     return count
+
+
+def is_masked(sensor: Sensor) -> npt.NDArray[np.bool_]:
+    """Return which cells are masked: shape (rows, columns)."""
+    found = np.zeros((sensor.rows, sensor.columns), np.bool_)
+    for row, column in sensor.masked:
+        found[row, column] = True
+    return found
 
 
 @dataclass(frozen=True, slots=True)

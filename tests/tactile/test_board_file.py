@@ -214,7 +214,7 @@ def mistakes(content: bytes) -> list[str]:
         ),
         (
             "format: fuzzytree-board/2\n",
-            ["1:9: a board of format 'fuzzytree-board/2' needs a newer fuzzytree, one "
+            ["1:9: a file of format 'fuzzytree-board/2' needs a newer fuzzytree, one "
              "that reads 'fuzzytree-board/2'; this one reads 'fuzzytree-board/1'"],
         ),
         ("format: []\n", ["1:9: 'format' must be 'fuzzytree-board/1'"]),

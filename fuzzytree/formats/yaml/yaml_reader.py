@@ -66,12 +66,8 @@ def read_yaml(content: bytes, name: str) -> Reading:
         >>> read_yaml(write(tree).content, "tree.yaml").model == tree
         True
     """
-    root, found = compose(content, name)
-    if not isinstance(root, MappingNode):
-        text = "a model must be a mapping that begins with 'format: fuzzytree/1'"
-        raise report(name, [*found, (root.line, root.column, text)])
+    root, found = mapping_of_format(content, name, layout.YAML_FORMAT, "model")
     try:
-        _check_format(root)
         model = _READERS[_kind(root)](root, found)
     except _UnreadableError as error:
         raise report(name, [*found, *error.found]) from error.__cause__
@@ -93,21 +89,34 @@ class _UnreadableError(Exception):
         super().__init__()
 
 
-def _check_format(root: MappingNode) -> None:
+def mapping_of_format(
+    content: bytes, name: str, known: str, noun: str
+) -> tuple[MappingNode, list[FileMistake]]:
+    """Return the mapping that a YAML file is, and mistakes of its syntax.
+
+    Raises:
+        ReadError: If it is none, or does not say that its format is `known`.
+    """
+    root, found = compose(content, name)
+    if not isinstance(root, MappingNode):
+        text = f"a {noun} must be a mapping that begins with 'format: {known}'"
+        raise report(name, [*found, (root.line, root.column, text)])
     node = value_of(root, "format")
     if node is None:
-        text = "no 'format: fuzzytree/1' says what this file is"
-        raise _UnreadableError((root.line, root.column, text))
+        text = f"no 'format: {known}' says what this file is"
+        raise report(name, [*found, (root.line, root.column, text)])
     value = node.text if isinstance(node, Scalar) else ""
-    if value == layout.YAML_FORMAT:
-        return
-    text = f"'format' must be {layout.YAML_FORMAT!r}"
-    if re.fullmatch(r"fuzzytree/[1-9][0-9]{0,8}", value):
+    if value == known:
+        return root, found
+    text = f"'format' must be {known!r}"
+    if re.fullmatch(known.removesuffix("1") + "[1-9][0-9]{0,8}", value):
         text = (
             f"a file of format {value!r} needs a newer fuzzytree, one that reads "
-            f"{value!r}; this one reads {layout.YAML_FORMAT!r}"
+            f"{value!r}; this one reads {known!r}"
         )
-    raise _UnreadableError((node.line, node.column, text))
+    elif value.startswith("fuzzytree/"):
+        text = f"this is a model, and no {noun}; {text}"
+    raise report(name, [*found, (node.line, node.column, text)])
 
 
 def _kind(root: MappingNode) -> str:

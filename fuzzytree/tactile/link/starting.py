@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import Board
-from fuzzytree.tactile.sensor import Cells, check_frames
+from fuzzytree.tactile.sensor import Cells, check_frames, is_masked
 
 Places = npt.NDArray[np.bool_]
 
@@ -59,13 +59,13 @@ def remarks(board: Board, frames: Cells) -> list[str]:
     baseline = _baseline(board, frames)
     is_hot = _hot(board, baseline)
     spread = found.max(axis=0).astype(np.int64) - found.min(axis=0)
-    spread[_masked(board)] = 0
+    spread[is_masked(board.sensor)] = 0
     is_touched = spread > board.sensor.full // 4
     says: list[str] = []
     if is_hot.any():
         share = f"{board.start.hot:.0%} of full"
         says.append(f"at rest above {share}, masked: {named(_places(is_hot))}")
-    if _has_neighbours(is_hot):
+    if (is_hot[:, 1:] & is_hot[:, :-1]).any() or (is_hot[1:] & is_hot[:-1]).any():
         says.append("some of these lie side by side: does something lie on the sensor?")
     if is_touched.any():
         text = "moved by more than a quarter of full (was the sensor touched?)"
@@ -88,7 +88,7 @@ def still(board: Board, frames: Cells) -> Places:
     is_between = np.zeros_like(is_moved)
     is_between[1:-1] |= is_moved[2:] & is_moved[:-2]
     is_between[:, 1:-1] |= is_moved[:, 2:] & is_moved[:, :-2]
-    return is_between & ~is_moved & ~_masked(board)
+    return is_between & ~is_moved & ~is_masked(board.sensor)
 
 
 def named(places: Sequence[tuple[int, int]]) -> str:
@@ -114,25 +114,10 @@ def _baseline(board: Board, frames: Cells) -> npt.NDArray[np.int64]:
     return baseline
 
 
-def _masked(board: Board) -> Places:
-    sensor = board.sensor
-    is_masked = np.zeros((sensor.rows, sensor.columns), np.bool_)
-    for row, column in sensor.masked:
-        is_masked[row, column] = True
-    return is_masked
-
-
 def _hot(board: Board, baseline: npt.NDArray[np.int64]) -> Places:
     """Return which cells rest too high, of those that are not masked already."""
     is_hot: Places = baseline > board.start.hot * board.sensor.full
-    return is_hot & ~_masked(board)
-
-
-def _has_neighbours(is_so: Places) -> bool:
-    """Return whether two of the places lie side by side in a row or a column."""
-    in_rows = is_so[:, 1:] & is_so[:, :-1]
-    in_columns = is_so[1:] & is_so[:-1]
-    return bool(in_rows.any() or in_columns.any())
+    return is_hot & ~is_masked(board.sensor)
 
 
 def _places(is_so: Places) -> list[tuple[int, int]]:

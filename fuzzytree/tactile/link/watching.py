@@ -15,16 +15,11 @@ from fuzzytree.tactile.link.texts import SEPARATORS
 
 def frame_bytes(board: Board) -> int:
     """Return about how many bytes a frame has on the line: text and runs vary."""
-    cells = board.sensor.rows * board.sensor.columns
-    match board.protocol:
-        case Sentinel():
-            return cells + 1
-        case Text():
-            return cells * (len(str(board.sensor.full)) + 1)
-        case Marker() | Request() as protocol:
-            return layout_of(board, protocol).size
-        case _:
-            assert_never(board.protocol)
+    cells, protocol = board.sensor.rows * board.sensor.columns, board.protocol
+    if isinstance(protocol, Marker | Request):
+        return layout_of(board, protocol).size
+    width = len(str(board.sensor.full)) + 1
+    return cells * width if isinstance(protocol, Text) else cells + 1
 
 
 def described(board: Board, content: bytes, *, requests: int = 0) -> str:
@@ -153,12 +148,10 @@ def _wrong_cells(board: Board, cells: int) -> str:
 
 def _wrong_around(protocol: Marker) -> str:
     """Return what remains to be wrong where the length is right."""
-    parts = [
-        *(["the sizes"] if protocol.sizes else []),
-        *(["the checksum"] if protocol.checksum != "none" else []),
-        *(["the tail"] if protocol.tail else []),
-    ]
-    return f", as expected, but {' or '.join(parts)} did not fit" if parts else ""
+    has_checksum = protocol.checksum != "none"
+    parts = {"sizes": protocol.sizes, "checksum": has_checksum, "tail": protocol.tail}
+    names = [f"the {name}" for name, is_there in parts.items() if is_there]
+    return f", as expected, but {' or '.join(names)} did not fit" if names else ""
 
 
 def _around(board: Board, protocol: Marker | Request) -> int:
@@ -168,22 +161,15 @@ def _around(board: Board, protocol: Marker | Request) -> int:
 
 
 def _unpacked_length(frame: bytes, zero: int) -> int:
-    length = place = 0
-    while place < len(frame):
-        if frame[place] == zero and place + 1 < len(frame):
-            length += frame[place + 1]
-            place += 2
-        else:
-            length += 1
-            place += 1
+    length, values = 0, iter(frame)
+    for value in values:
+        length += next(values, 1) if value == zero else 1
     return length
 
 
 def _usual(numbers: Sequence[int]) -> int | None:
     """Return the most frequent number, if it comes more than once."""
-    if not numbers:
-        return None
-    number, count = Counter(numbers).most_common(1)[0]
+    number, count = Counter(numbers or [0]).most_common(1)[0]
     return number if count > 1 else None
 
 
