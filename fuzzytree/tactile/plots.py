@@ -106,7 +106,9 @@ def draw_frames(
     end = (largest if largest > 0.0 else 1.0) if full is None else full
     if not 0.0 < end < math.inf:
         raise ValueError(f"the end of the scale must be above 0, not {end:g}")
-    across = columns or _columns(len(drawn))
+    across = columns or len(drawn)
+    if not columns and across > 4:
+        across = math.ceil(math.sqrt(across))  # about a square
     with style():
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -140,11 +142,6 @@ def _check(frames: Sequence[Cells], **others: Sequence[object]) -> None:
             raise ValueError(f"{len(found)} {name} for {len(frames)} frames")
 
 
-def _columns(count: int) -> int:
-    """Return how many stand in a row: all up to four, then about a square."""
-    return count if count <= 4 else math.ceil(math.sqrt(count))
-
-
 def _panels(
     figure: Figure,
     frames: Sequence[Cells],
@@ -166,15 +163,8 @@ def _panels(
     if title:
         x, y = _MARGIN / total_width, 1.0 - _MARGIN / total_height
         words = short(title, max(int(total_width / _LETTER), 1))
-        figure.text(
-            x,
-            y,
-            words,
-            fontsize=SIZE + 3,
-            fontweight="bold",
-            va="top",
-            parse_math=False,
-        )
+        bold: dict[str, Any] = {"fontweight": "bold", "fontsize": SIZE + 3}
+        figure.text(x, y, words, va="top", parse_math=False, **bold)
     found: list[Axes] = []
     for number, (wide, high) in enumerate(sides):
         row, column = divmod(number, across)

@@ -217,8 +217,9 @@ def _cells(sensor: Sensor) -> Iterator[str]:
 def _sums(made: FrameProgram) -> Iterator[str]:
     """Yield the function that fills in the sums, in the order of the program."""
     place = {one.name: line for line, one in enumerate(made.sums)}
-    powers = {_power(one): place[one.name] for one in made.sums if _is_moment(one)}
-    parts = [one for one in made.sums if one.of == "cells" and not _is_moment(one)]
+    moments = [one.name for one in made.sums if one.name.startswith("sum ")]
+    powers = {(int(name[4]), int(name[5])): place[name] for name in moments}
+    parts = [one for one in made.sums if one.of == "cells" and one.name not in moments]
     kind = _whole_type(made)
     if parts:
         yield from _part_table(made.sensor, parts)
@@ -234,15 +235,6 @@ def _sums(made: FrameProgram) -> Iterator[str]:
         first = place[parts[0].name]
         yield from _part_loop(len(parts), first, kind)
     yield "}\n"
-
-
-def _is_moment(one: Sum) -> bool:
-    return one.name.startswith("sum ")
-
-
-def _power(one: Sum) -> tuple[int, int]:
-    """Return p and q of the sum of g x^p y^q."""
-    return int(one.name[4]), int(one.name[5])
 
 
 def _whole_type(made: FrameProgram) -> str:

@@ -215,10 +215,8 @@ class Live:
             return LiveResult(frame, None, -1, "", (), 0, late, str(error))
         code = int(found.codes[0])
         state, saturated = State(int(found.states[0])), int(found.saturated[0])
-        trouble = ""
-        if saturated:
-            cells = "1 cell takes" if saturated == 1 else f"{saturated} cells take"
-            trouble = f"{cells} no more: the frame is saturated"
+        cells = "1 cell takes" if saturated == 1 else f"{saturated} cells take"
+        trouble = f"{cells} no more: the frame is saturated" if saturated else ""
         return LiveResult(
             frame,
             state,

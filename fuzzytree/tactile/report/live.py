@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -192,8 +193,7 @@ def timing(view: LiveView) -> str:
     found = view.latency
     if found is None:
         return ""
-    parts = (found.median, found.most, found.largest)
-    median, most, largest = (f"{1e3 * part:.2f}" for part in parts)
+    median, most, largest = (f"{1e3 * part:.2f}" for part in astuple(found))
     spread = f"{median} ms (99 %: {most}, largest: {largest})"
     return f"{view.rate:.1f} frames/s; answer after {spread}"
 
@@ -241,28 +241,22 @@ def _facts(view: LiveView, lines: int, *, look: Look) -> list[str]:
     if answer is None or not answer.strengths:
         return found
     room = max(lines - len(found), 0)
-    places = _strongest(answer, room if room >= len(view.classes) else room - 1)
+    count = room if room >= len(view.classes) else max(room - 1, 0)
+    order = sorted(
+        range(len(answer.strengths)), key=lambda place: -answer.strengths[place]
+    )
+    places = sorted(order[:count])  # in the order of the classes
+    names = [visible(name) for name in view.classes]
+    width = min(max(map(cell_len, names)), _NAME)
     for place in places:
-        name = set_cell_size(visible(view.classes[place]), _name_width(view))
+        name = set_cell_size(names[place], width)
         own = answer.strengths[place]
-        bar = _bar(own, _SIDE - 9 - _name_width(view), look=look)
+        bar = _bar(own, _SIDE - 9 - width, look=look)
         style = bold if place == answer.code else ""
         found.append(f"{style}{name} {own:4.2f} {bar}{end if style else ''}")
     if len(places) < len(view.classes) and room:
         found.append(f"and {len(view.classes) - len(places)} weaker ones")
     return found
-
-
-def _name_width(view: LiveView) -> int:
-    return min(max(cell_len(visible(name)) for name in view.classes), _NAME)
-
-
-def _strongest(answer: LiveResult, count: int) -> list[int]:
-    """Return the places of the strongest classes, in the order of the classes."""
-    order = sorted(
-        range(len(answer.strengths)), key=lambda place: -answer.strengths[place]
-    )
-    return sorted(order[: max(count, 0)])
 
 
 def _bar(share: float, width: int, *, look: Look) -> str:
@@ -278,12 +272,8 @@ def _cut(text: str, columns: int) -> str:
     return text if cell_len(text) <= columns else set_cell_size(text, columns)
 
 
-LINE_FIELDS = ("time", "frame", "state", "class", "strength", "saturated")
-"""The fields of a line, in order."""
-
-
 def line_facts(answer: LiveResult) -> dict[str, object]:
-    """Return a recognised object as facts for other programs."""
+    """Return a recognised object as facts for other programs, the fields of a line."""
     state = "unknown" if answer.state is None else STATES[answer.state]
     return {
         "time": round(answer.frame.time, 6),
@@ -302,9 +292,8 @@ def line(answer: LiveResult) -> str:
     `\n` or `\r`, as in the text format of PostgreSQL; what else cannot be printed,
     such as commands for a terminal, as `\x1b` or `\u202e`.
     """
-    facts = line_facts(answer)
-    facts["class"] = escaped(answer.label)
-    return "\t".join(str(facts[field]) for field in LINE_FIELDS)
+    facts = line_facts(answer) | {"class": escaped(answer.label)}
+    return "\t".join(map(str, facts.values()))
 
 
 def escaped(text: str) -> str:

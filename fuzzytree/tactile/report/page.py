@@ -19,7 +19,13 @@ import msgspec
 
 from fuzzytree.errors import PortError
 from fuzzytree.files import reason
-from fuzzytree.tactile.recognition.live import SENTENCES, STATES, Live, LiveView
+from fuzzytree.tactile.recognition.live import (
+    SENTENCES,
+    STATES,
+    Live,
+    LiveResult,
+    LiveView,
+)
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.report.live import PALETTE, headline, shades, status
 
@@ -171,20 +177,16 @@ class _Handler(BaseHTTPRequestHandler):
         """Refuse what is no GET, or is meant for another host."""
         if not super().parse_request():
             return False
+        origin = self.headers.get("Origin", "").lower().removeprefix("http://")
         if self.command != "GET":
             self._refuse(HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
         elif self.headers.get("Host", "").lower() not in self.own.hosts:
             self._refuse(HTTPStatus.MISDIRECTED_REQUEST, "this is another host")
-        elif not self._is_of_own_page():
+        elif origin and origin not in self.own.hosts:  # the page of another site
             self._refuse(HTTPStatus.FORBIDDEN, "only this page is answered")
         else:
             return True
         return False
-
-    def _is_of_own_page(self) -> bool:
-        """Return whether the request does not come from the page of another site."""
-        origin = self.headers.get("Origin", "").lower()
-        return not origin or origin.removeprefix("http://") in self.own.hosts
 
     def do_GET(self) -> None:
         """Answer with the page, or with events."""
@@ -239,17 +241,11 @@ def _policy(page: str) -> str:
         content = found[1] if found else ""
         digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
         sources.append(f"{kind}-src 'sha256-{digest}'")
-    return "; ".join(
-        (
-            "default-src 'none'",
-            *sources,
-            "connect-src 'self'",
-            "img-src data:",
-            "base-uri 'none'",
-            "form-action 'none'",
-            "frame-ancestors 'none'",
-        )
+    rest = (
+        "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
     )
+    return "; ".join(("default-src 'none'", *sources, rest))
 
 
 def hello_facts(view: LiveView) -> dict[str, object]:
@@ -273,7 +269,7 @@ def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object
     facts: dict[str, object] = {
         "state": "waiting" if state is None else STATES[state],
         "headline": headline(view),
-        "sentence": _sentence(view),
+        "sentence": _sentence(answer),
         "code": answer.code if answer else -1,
         "strengths": answer.strengths if answer else (),
         "facts": [*_numbers(view)],
@@ -281,21 +277,15 @@ def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object
         "over": is_over,
     }
     if view.cells is not None:
-        points = shades(view.cells, view.full, _fitting(view.cells.size, times))
+        while times > 1 and view.cells.size * times**2 > _MOST_POINTS:
+            times -= 1
+        points = shades(view.cells, view.full, times)
         facts["shape"] = points.shape
         facts["points"] = base64.b64encode(points.tobytes()).decode()
     return facts
 
 
-def _fitting(cells: int, times: int) -> int:
-    """Return the most points for a cell's side with which a picture is bounded."""
-    while times > 1 and cells * times**2 > _MOST_POINTS:
-        times -= 1
-    return times
-
-
-def _sentence(view: LiveView) -> str:
-    answer = view.answer
+def _sentence(answer: LiveResult | None) -> str:
     if answer is None or answer.state is None:
         return ""
     if answer.state is State.OBJECT:
@@ -306,15 +296,11 @@ def _sentence(view: LiveView) -> str:
 def _numbers(view: LiveView) -> list[tuple[str, str]]:
     """Return the rate, the latency and the counters, as names and texts."""
     rows = [("frames a second", f"{view.rate:.1f}")]
-    found = view.latency
-    if found is not None:
-        parts = (("median", found.median), ("99 %", found.most))
-        for name, seconds in (*parts, ("largest", found.largest)):
+    if view.latency is not None:
+        names = ("median", "99 %", "largest")
+        for name, seconds in zip(names, dataclasses.astuple(view.latency), strict=True):
             rows.append((f"answer after, {name}", f"{1e3 * seconds:.2f} ms"))
     shown = ("frames", "damaged", "dropped", "stalls", "reconnects")
     rows += [(name, str(view.counters[name])) for name in shown]
     others = {**view.counters, "refused": view.refused}
-    for name in shown:
-        others.pop(name)
-    rows += [(name, str(count)) for name, count in others.items() if count]
-    return rows
+    return rows + [(k, str(n)) for k, n in others.items() if n and k not in shown]
