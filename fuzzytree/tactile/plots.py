@@ -69,7 +69,6 @@ def draw_frames(
     *,
     titles: Sequence[str] = (),
     title: str = "",
-    full: float | None = None,
     axes: Sequence[FrameAxis | None] = (),
     cells: Sequence[tuple[int, int]] = (),
     columns: int | None = None,
@@ -77,15 +76,13 @@ def draw_frames(
 ) -> Figure:
     """Draw frames beside each other, in one scale of colours.
 
-    What is 0 or less is white. What is above `full` has the darkest colour, and the
-    scale ends in an arrow.
+    What is 0 or less is white, and the largest number of all has the darkest colour.
 
     Args:
         frames: Each of shape (rows, columns), the first row at the top; they may have
             different shapes.
         titles: One above each, or none at all.
         title: Above all.
-        full: The end of the scale; the largest number of all frames unless given.
         axes: What to mark in each; empty for nothing.
         cells: The rows and columns of cells that the axes of each frame count in, if
             it was interpolated; its own shape unless given.
@@ -103,9 +100,7 @@ def draw_frames(
     drawn = [np.asarray(frame, np.float64) for frame in frames]
     _check(drawn, titles=titles, axes=axes, cells=cells)
     largest = max(float(frame.max()) for frame in drawn)
-    end = (largest if largest > 0.0 else 1.0) if full is None else full
-    if not 0.0 < end < math.inf:
-        raise ValueError(f"the end of the scale must be above 0, not {end:g}")
+    end = largest if largest > 0.0 else 1.0
     across = columns or len(drawn)
     if not columns and across > 4:
         across = math.ceil(math.sqrt(across))  # about a square
@@ -125,7 +120,7 @@ def draw_frames(
             if axes and (axis := axes[number]) is not None:
                 _mark(panel, axis, frame.shape, shapes[number])
             if panel is panels[-1]:
-                _draw_scale(figure, image, unit, is_open=largest > end)
+                _draw_scale(figure, image, unit)
     return figure
 
 
@@ -226,7 +221,7 @@ def _mark(
     panel.set_ylim(0.0, shape[0])
 
 
-def _draw_scale(figure: Figure, image: Any, unit: str, *, is_open: bool) -> None:
+def _draw_scale(figure: Figure, image: Any, unit: str) -> None:
     """Draw the scale of colours at the right, as high as the frames."""
     width, height = figure.get_size_inches()
     left = (width - _MARGIN - sum(_BAR[1:])) / width
@@ -235,7 +230,7 @@ def _draw_scale(figure: Figure, image: Any, unit: str, *, is_open: bool) -> None
     top = max(box.y1 for box in boxes)
     high = min(top - bottom, 2.0 * _PANEL / height)
     axes = figure.add_axes((left, top - high, _BAR[1] / width, high))
-    bar = figure.colorbar(image, cax=axes, extend="max" if is_open else "neither")
+    bar = figure.colorbar(image, cax=axes)
     bar.set_label(unit, fontsize=SIZE)
     bar.outline.set(color="#8c959f", linewidth=0.6)
     axes.tick_params(labelsize=SIZE - 1, length=2.5, color="#8c959f")

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.errors import InvalidModelError, ReadError
-from fuzzytree.files import PathLike, read_bounded, reason, write_atomically
+from fuzzytree.files import PathLike, read_bounded, reason
 from fuzzytree.tactile.link.recording import MAGIC, read_recording
 from fuzzytree.tactile.sensor import LARGEST_SIDE, Cells, Sensor
 
@@ -138,15 +138,6 @@ def packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
             np.lib.format.write_array(packed, values, (1, 0), allow_pickle=False)
             archive.writestr(member, packed.getvalue())
     return file.getvalue()
-
-
-def write_presses(path: PathLike, presses: Presses) -> None:
-    """Write an archive whole, or leave what stood there.
-
-    Raises:
-        WriteError: If it cannot be written.
-    """
-    write_atomically(path, presses_content(presses))
 
 
 def _arrays(content: bytes, name: str, label: str) -> Mapping[str, npt.NDArray[Any]]:

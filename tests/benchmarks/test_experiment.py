@@ -17,9 +17,10 @@ from experiment_study import Study
 import fuzzytree as ft
 from fuzzytree.schemas.generation import of_result
 from fuzzytree.tactile.board_file import load_board
-from fuzzytree.tactile.presses import Presses, read_presses, write_presses
+from fuzzytree.tactile.presses import Presses, read_presses
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from tests.cli.conftest import folder, originals
+from tests.tactile.archives import write_presses
 
 __all__ = ["folder", "originals"]
 Call = Callable[..., tuple[int, str, str]]

@@ -20,7 +20,6 @@ from fuzzytree.tactile.simulation.physics import (
     PAPER,
     PhysicsSettings,
     press,
-    press_object,
 )
 
 EVEN = msgspec.structs.replace(
@@ -85,7 +84,7 @@ def test_a_bar_that_reads_full_on_an_ideal_sensor_has_the_papers_means() -> None
     )
     width, height = 5.55, 1.735
     bar = Object("bar", (rectangle(width, height),), width * height)  # 1 N a cell
-    found = press_object(bar, 400, 0, ideal)
+    found = press(bar, 400, 0, ideal)
     means = features_of(found.sensor, found.frames, FEATURES).values.mean(axis=1)
     ratios = dict(zip(FEATURES, means / np.array(TABLE_2)[:, 0], strict=True))
     for name in ("S1", "S2", "S7", "S8", "S9", "S10", "S11"):

@@ -15,7 +15,8 @@ from experiment_tasks import (
 )
 
 from fuzzytree.errors import ReadError, TableError
-from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.presses import Presses
+from tests.tactile.archives import write_presses
 
 
 def saved(path: Path, *, subject: list[int] | None, names: str = "ab") -> Path:

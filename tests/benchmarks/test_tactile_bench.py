@@ -14,7 +14,8 @@ from tactile_timing import FramesStudy
 
 from fuzzytree.api.verbs import save
 from fuzzytree.schemas.generation import of_result
-from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.presses import Presses
+from tests.tactile.archives import write_presses
 from tests.tactile.frame_models import SMALL, learnt_tree
 
 pytestmark = pytest.mark.usefixtures("few_objects")

@@ -107,7 +107,7 @@ def slanted() -> FuzzyTree:
 
 
 def test_every_dot_of_a_frame_has_the_colour_of_its_cell() -> None:
-    (image,) = images(draw_frames([FRAME], full=8))
+    (image,) = images(draw_frames([FRAME]))
     dots = image.to_rgba(image.get_array(), norm=True)
     side = dots.shape[0] // 2
     scale = colours()
@@ -130,12 +130,6 @@ def test_all_frames_share_the_scale_of_the_largest() -> None:
     figure = draw_frames([FRAME, FRAME * 3])
     assert {image.get_clim() for image in images(figure)[:2]} == {(0.0, 24.0)}
     assert figure.axes[-1].get_ylabel() == "pressure"
-
-
-def test_the_scale_is_open_where_a_cell_is_above_its_end() -> None:
-    ends = [draw_frames([FRAME], full=end).axes[-1] for end in (8, 7)]
-    patches = [len(axes.patches) for axes in ends]
-    assert patches[1] > patches[0]
 
 
 def test_a_frame_without_pressure_is_white() -> None:
@@ -185,7 +179,6 @@ def test_titles_are_no_formulas_and_stay_within_the_picture() -> None:
         ([], {}, f"a picture has 1 to {MOST_FRAMES} frames, not 0"),
         ([FRAME, FRAME[0]], {}, "frame 2 of shape (2,) is no matrix of finite numbers"),
         ([FRAME], {"titles": ["a", "b"]}, "2 titles for 1 frames"),
-        ([FRAME], {"full": 0}, "the end of the scale must be above 0, not 0"),
     ],
 )
 def test_frames_that_are_none_are_refused(

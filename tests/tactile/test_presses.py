@@ -14,8 +14,8 @@ from fuzzytree.tactile.presses import (
     Presses,
     presses_content,
     read_presses,
-    write_presses,
 )
+from tests.tactile.archives import write_presses
 
 FRAMES = np.arange(24, dtype=np.uint16).reshape(2, 3, 4)
 

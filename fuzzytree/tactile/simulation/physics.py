@@ -254,7 +254,7 @@ def gains(settings: PhysicsSettings) -> FloatArray:
 
 
 def press(
-    name: str, count: int, seed: int = 0, settings: PhysicsSettings = PAPER
+    thing: str | Object, count: int, seed: int = 0, settings: PhysicsSettings = PAPER
 ) -> Simulated:
     """Press an object on the sensor again and again.
 
@@ -263,7 +263,7 @@ def press(
     settings, so two settings are compared on the same presses.
 
     Args:
-        name: One of `OBJECTS`.
+        thing: The name of one of `OBJECTS`, or an object of one's own.
         count: How many presses, 1 to 100000.
         seed: Of positions, angles, forces, tilts and noise.
         settings: Every other number.
@@ -275,20 +275,11 @@ def press(
         >>> press("circle", 2, seed=1).frames.shape
         (2, 16, 16)
     """
-    if name not in OBJECTS:
-        known = ", ".join(OBJECTS)
-        raise ValueError(f"no object {name!r}; the objects are {known}")
-    return press_object(OBJECTS[name], count, seed, settings)
-
-
-def press_object(
-    thing: Object, count: int, seed: int = 0, settings: PhysicsSettings = PAPER
-) -> Simulated:
-    """Press an object of one's own, as `press` does.
-
-    Raises:
-        ValueError: If the count is out of its range.
-    """
+    if isinstance(thing, str):
+        if thing not in OBJECTS:
+            known = ", ".join(OBJECTS)
+            raise ValueError(f"no object {thing!r}; the objects are {known}")
+        thing = OBJECTS[thing]
     if not 1 <= count <= MOST:
         raise ValueError(f"1 to {MOST} presses can be made at a time, not {count}")
     # The numbers of some presses are drawn at a time, before any setting scales them:

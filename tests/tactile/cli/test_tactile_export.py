@@ -10,9 +10,10 @@ import pytest
 from fuzzytree.api.verbs import save
 from fuzzytree.cli.program import main
 from fuzzytree.tactile.cli.sensors import frames_of_file
-from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.presses import Presses
 from fuzzytree.tactile.recognition import agreement
 from fuzzytree.tactile.sensor import Sensor
+from tests.tactile.archives import write_presses
 from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
 
 pytestmark = pytest.mark.usefixtures("few_objects")

@@ -13,8 +13,9 @@ import pytest
 from fuzzytree.cli.program import main
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link.recording import Recorder
-from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.presses import Presses
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+from tests.tactile.archives import write_presses
 
 NONE = np.zeros(0, np.int64)
 

@@ -11,7 +11,8 @@ import pytest
 
 from fuzzytree.cli.program import main
 from fuzzytree.tactile.interpolation import interpolated
-from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.presses import Presses
+from tests.tactile.archives import write_presses
 
 CELLS = np.zeros((3, 4, 5), np.uint8)
 CELLS[1, 1:3, 1:4] = [[9, 255, 3], [80, 90, 200]]

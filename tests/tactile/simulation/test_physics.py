@@ -33,7 +33,6 @@ from fuzzytree.tactile.simulation.physics import (
     fsr,
     gains,
     press,
-    press_object,
     quantised,
     read_matrix,
 )
@@ -167,9 +166,9 @@ def test_a_tilted_object_presses_more_on_one_side_and_never_pulls() -> None:
 def test_an_object_turned_by_a_quarter_gives_frames_turned_by_a_quarter() -> None:
     bar = Object("bar", (ShapePart(((-2.0, -1.0), (3.0, -0.7), (1.0, 1.5))),), 12.0)
     turned = Object("bar", bar.parts, 12.0, turned_deg=90.0)
-    frames = press_object(bar, 5, settings=IDEAL).frames
+    frames = press(bar, 5, settings=IDEAL).frames
     assert frames.any()
-    across = press_object(turned, 5, settings=IDEAL).frames
+    across = press(turned, 5, settings=IDEAL).frames
     assert np.array_equal(across, np.rot90(frames, axes=(1, 2)))
 
 
@@ -177,8 +176,8 @@ def test_a_column_with_a_load_makes_rows_and_columns_unequal() -> None:
     loaded = msgspec.structs.replace(IDEAL, wiring="grounded", load_ohm=5000.0)
     bar = Object("bar", (rectangle(6.0, 2.0),), 20.0)
     upright = Object("bar", bar.parts, 20.0, turned_deg=90.0)
-    lying = press_object(bar, 1, settings=loaded).frames.astype(int)
-    standing = press_object(upright, 1, settings=loaded).frames.astype(int)
+    lying = press(bar, 1, settings=loaded).frames.astype(int)
+    standing = press(upright, 1, settings=loaded).frames.astype(int)
     assert lying.sum() > 1.5 * standing.sum()
 
 
@@ -303,7 +302,7 @@ def test_an_object_lies_whole_on_the_sensor_wherever_it_roams(name: str) -> None
 
 def test_what_hangs_over_the_edge_is_reported() -> None:
     large = Object("board", (rectangle(20.0, 16.0),), 10.0)
-    found = press_object(large, 2, settings=IDEAL)
+    found = press(large, 2, settings=IDEAL)
     np.testing.assert_allclose(found.outside, 0.2)
 
 
