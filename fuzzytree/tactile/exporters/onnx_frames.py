@@ -12,12 +12,12 @@ rounding, so whatever order a library adds in, the sums have the same bits.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from fuzzytree.errors import DisagreementError
+from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters import (
     FORMAT_VERSION,
     check_outputs,
@@ -28,10 +28,11 @@ from fuzzytree.exporters import (
 from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, fingerprint
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
-from fuzzytree.tactile.features.plain import State, check_reject
-from fuzzytree.tactile.sensor import Sensor, offsets
+from fuzzytree.tactile.features.plain import Shown, State, check_reject, plain_shown
+from fuzzytree.tactile.sensor import Cells, Sensor, offsets
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     import onnx
 
     from fuzzytree.exporters import InputBlock, OnnxGraph
@@ -102,8 +103,6 @@ def write_frames(
     proto = _model_proto(made, model, outputs, reject, opset, ir, plain=plain)
     content: bytes = proto.SerializeToString(deterministic=True)
     if verify:
-        from fuzzytree.tactile.exporters.onnx_frames_proof import differences
-
         frames = proving_frames(made, model)
         for text in differences(content, made, model, frames, outputs, reject):
             raise DisagreementError(text)
@@ -374,3 +373,72 @@ def _all_strengths(sheet: OnnxGraph, model: Model, strengths: str, finite: str) 
         real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
         real = sheet.node("Where", finite, real, sheet.number(0.0))
     sheet.node("Transpose", real, perm=[1, 0], named="strengths")
+
+
+# --- the proof
+
+
+def differences(
+    content: bytes,
+    made: FrameProgram,
+    model: Model,
+    frames: Cells,
+    outputs: Sequence[Output],
+    reject: float,
+) -> Iterator[str]:
+    """Yield where a file gives other answers than plain Python, bit by bit.
+
+    Raises:
+        LossError: If onnxruntime does not load or run the file.
+    """
+    import onnxruntime
+
+    from fuzzytree.exporters import RUNTIME_ERRORS, first_line, open_bare
+
+    try:
+        arrays = open_bare(content)(list(outputs), {"frames": frames})
+    except RUNTIME_ERRORS as error:
+        raise LossError(
+            f"cannot write {model.name} as onnx: onnxruntime "
+            f"{onnxruntime.__version__} does not run it: {first_line(error)}"
+        ) from error
+    found = {name: np.asarray(one) for name, one in zip(outputs, arrays, strict=True)}
+    for number, name, text in apart(found, made, model, frames, reject):
+        yield (
+            f"the onnx file of {model.name} gives other {name} than plain Python for "
+            f"aimed frame {number}: {text}"
+        )
+
+
+def apart(
+    found: Mapping[Output, npt.NDArray[np.generic]],
+    made: FrameProgram,
+    model: Model,
+    frames: Cells,
+    reject: float,
+) -> Iterator[tuple[int, Output, str]]:
+    """Yield each answer that is not plain Python's: frame, output, and both in words.
+
+    Each output of `found` has an entry for each frame.
+    """
+    for number, frame in enumerate(frames):
+        right = plain_shown(made, model, frame, reject)
+        for name, answers in found.items():
+            given = np.asarray(answers[number]).tolist()
+            wanted = np.asarray(_expected(model, right, name)).tolist()
+            if given != wanted:
+                yield number, name, f"{given}, not {wanted}"
+
+
+def _expected(model: Model, shown: Shown, name: Output) -> object:
+    match name:
+        case "label":
+            return model.classes[shown.code] if shown.code >= 0 else ""
+        case "state":
+            return int(shown.state)
+        case "rule":
+            return shown.rule
+        case "features":
+            return shown.features
+        case "strengths":
+            return shown.strengths

@@ -13,7 +13,7 @@ from fuzzytree.checking import counted, judged
 from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.model import Agreement, Comparison, FuzzyTree, Model, fingerprint
 from fuzzytree.runtimes import loaded, parsed, texts_of
-from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
+from fuzzytree.tactile.exporters.onnx_frames import Output, apart, write_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
 from fuzzytree.tactile.recognition.recogniser import check_inputs
@@ -200,8 +200,6 @@ def _answers(
     model: Model, known: FramesFile, bare: Bare, frames: Cells, name: str
 ) -> Comparison:
     """Compare the predictions of some frames with plain Python, bit by bit."""
-    from fuzzytree.tactile.exporters.onnx_frames_proof import apart
-
     found = _run(bare, known, frames, name)
     made = frame_program(known.sensor, model.inputs)
     wrong: dict[int, list[tuple[Output, str]]] = {}

@@ -14,8 +14,7 @@ from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
-from fuzzytree.tactile.exporters.onnx_frames_proof import differences
+from fuzzytree.tactile.exporters.onnx_frames import Output, differences, write_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import aimed_frames, proving_frames
 from fuzzytree.tactile.features.plain import plain_features
