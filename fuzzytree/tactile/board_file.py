@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 from msgspec import Meta, field, structs
@@ -259,7 +258,11 @@ checksum='none', tail='')
     else:
         if not mistakes:
             return board
-    raise report(name, [*located(root, _renamed(family, mistakes))])
+    # Limits were checked with the form of the file: the keys of all that is left differ
+    # only by the family and by blanks.
+    keys = {"protocol": family, "data_bits": "data bits"}
+    named = [(tuple(keys.get(str(k), k) for k in path), t) for path, t in mistakes]
+    raise report(name, [*located(root, named)])
 
 
 def _fields(part: FileRecord) -> dict[str, Any]:
@@ -268,20 +271,6 @@ def _fields(part: FileRecord) -> dict[str, Any]:
     if "sizes" in found:
         found["sizes"] = found["sizes"] != "none"
     return {name: "" if one is None else one for name, one in found.items()}
-
-
-def _renamed(family: str, mistakes: list[Mistake]) -> Iterator[Mistake]:
-    """Yield mistakes with the keys of the file on their paths.
-
-    Limits were checked with the form of the file: the keys of all that is left differ
-    only by the family and by blanks.
-    """
-    for path, text in mistakes:
-        keys = [family if step == "protocol" else step for step in path]
-        yield (
-            tuple(k.replace("_", " ") if isinstance(k, str) else k for k in keys),
-            text,
-        )
 
 
 _TITLE: Final = "# A board of fuzzytree: what it sends, and how it is connected."

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -132,22 +131,16 @@ def _interpolate(cells: Any, plan: _Plan, points: Any) -> None:
     left = bordered.take(plan.left, axis=2)[:, :, None]
     right = bordered.take(plan.right, axis=2)[:, :, None]
     corners = left[:, :-1], right[:, :-1], left[:, 1:], right[:, 1:]
-    total = _weighted(corners, plan.cells)
+    upper_left, upper_right, lower_left, lower_right = (
+        corner * weight for corner, weight in zip(corners, plan.cells, strict=True)
+    )
+    # diagonals first: the same for turned or mirrored frames
+    upper_left += lower_right
+    upper_right += lower_left
+    upper_left += upper_right
     skip = slice(plan.skip, plan.skip + rows * times)
-    inner = total.reshape(count, -1, width)[:, skip].reshape(points.shape)
+    inner = upper_left.reshape(count, -1, width)[:, skip].reshape(points.shape)
     np.divide(inner, plan.sums, out=points)
-
-
-def _weighted(corners: Sequence[Any], cells: npt.NDArray[Any]) -> Any:
-    """Return weighted sums, diagonals first: the same for turned or mirrored frames."""
-    total = corners[0] * cells[0]
-    term = corners[3] * cells[3]
-    total += term
-    other = corners[1] * cells[1]
-    np.multiply(corners[2], cells[2], out=term)
-    other += term
-    total += other
-    return total
 
 
 def _checked(cells: Any, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:

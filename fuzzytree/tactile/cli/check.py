@@ -56,19 +56,13 @@ def command(options: TactileCheckOptions) -> int:
     from fuzzytree.tactile.presses import read_frames
     from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
 
-    is_named = any(
-        one is not None
-        for one in (options.board, options.size, options.full, options.threshold)
-    )
-    sensor = sensor_of_options(options) if is_named else None
-    source = frames_model(options.model)
-    contents = {name: read_bounded(name) for name in options.files}
-    frames = None if options.data is None else read_frames(options.data).presses.frames
+    settings = (options.board, options.size, options.full, options.threshold)
+    is_named = settings != (None,) * 4
     found = check_onnx_files(
-        source,
-        contents,
-        frames,
-        sensor=sensor,
+        frames_model(options.model),
+        {name: read_bounded(name) for name in options.files},
+        None if options.data is None else read_frames(options.data).presses.frames,
+        sensor=sensor_of_options(options) if is_named else None,
         reject=options.reject,
         rows_only=options.rows_only,
     )

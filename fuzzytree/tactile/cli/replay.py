@@ -83,7 +83,8 @@ def command(options: TactileReplayOptions) -> None:
             return
         found = review(file)
         if options.as_json:
-            answer_json(_facts(file, found))
+            facts = {"board": file.board, "started": _started(file)}
+            answer_json({**facts, **asdict(found)})
         else:
             answer("\n".join(_lines(options.recording, file, found)))
         if options.output is not None:
@@ -97,10 +98,6 @@ def command(options: TactileReplayOptions) -> None:
             say_rows(
                 ("wrote", options.output, hint if is_bare else ""), quiet=options.quiet
             )
-
-
-def _facts(file: RecordingFile, found: Review) -> dict[str, object]:
-    return {"board": file.board, "started": _started(file), **asdict(found)}
 
 
 def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
-from functools import cached_property
 
 from fuzzytree.tactile.features.names import Feature, features_of_names
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
@@ -54,18 +53,14 @@ class _Frame:
         ]
         self.lines = cells
         self.force = sum(value for _, _, value in self.cells)
-
-    @cached_property
-    def centre(self) -> Point:
-        """The centre of pressure from the cell at the lower left."""
-        x = sum(x * value for x, _, value in self.cells)
-        y = sum(y * value for _, y, value in self.cells)
-        return Fraction(x, self.force), Fraction(y, self.force)
+        # the centre of pressure, from the cell at the lower left, times the force
+        self.x = sum(x * value for x, _, value in self.cells)
+        self.y = sum(y * value for _, y, value in self.cells)
 
     def moment(self, p: int, q: int) -> Point:
         """Return C_pq with cells as they read: the sum of z^p conj(z)^q g."""
         away = [
-            (x * self.force - self._scaled[0], y * self.force - self._scaled[1], value)
+            (x * self.force - self.x, y * self.force - self.y, value)
             for x, y, value in self.cells
         ]
         real = imaginary = 0
@@ -78,11 +73,6 @@ class _Frame:
         unit = self.force ** (p + q)
         return Fraction(real, unit), Fraction(imaginary, unit)
 
-    @cached_property
-    def _scaled(self) -> tuple[int, int]:
-        x, y = self.centre
-        return int(x * self.force), int(y * self.force)
-
     def feature(self, feature: Feature) -> Fraction:
         """Return a feature of a frame on which something presses."""
         value = self._value(feature)
@@ -93,12 +83,11 @@ class _Frame:
 
     def _value(self, feature: Feature) -> Fraction:
         unit = self.force if feature.per_force else self.sensor.full
-        base = feature.base
+        base, rows, columns = feature.base, self.sensor.rows, self.sensor.columns
         if feature.kind == "cell":
             return Fraction(self.lines[feature.row][feature.column], unit)
         if feature.kind == "block":
             return self._block(feature) / unit
-        x, y = self.centre
         match base:
             case "force":
                 return Fraction(self.force, unit)
@@ -107,9 +96,9 @@ class _Frame:
             case "area":
                 return Fraction(len(self.cells))
             case "x":
-                return x - Fraction(self.sensor.columns - 1, 2)
+                return Fraction(self.x, self.force) - Fraction(columns - 1, 2)
             case "y":
-                return y - Fraction(self.sensor.rows - 1, 2)
+                return Fraction(self.y, self.force) - Fraction(rows - 1, 2)
             case "angle":
                 real, imaginary = self.moment(2, 0)
                 return degrees(imaginary, real) / 2

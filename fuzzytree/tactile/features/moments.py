@@ -44,13 +44,13 @@ class Noise:
         total = terms[0]
         for term in terms[1:]:
             value = self._make("add", total.value, term.value)
-            total = self._rounded(value, [total.error, term.error])
+            total = self.rounded(value, [total.error, term.error])
         return total
 
     def difference(self, one: Noisy, two: Noisy) -> Noisy:
         """Return one - two."""
         value = self._make("subtract", one.value, two.value)
-        return self._rounded(value, [one.error, two.error])
+        return self.rounded(value, [one.error, two.error])
 
     def times(self, factor: float, one: Noisy) -> Noisy:
         """Return a number times a small whole number or power of two."""
@@ -60,7 +60,7 @@ class Noise:
         if one.error is not None:
             size = self._make.constant(abs(factor))
             errors.append(self._make("multiply", one.error, size))
-        return self._rounded(value, errors)
+        return self.rounded(value, errors)
 
     def product(self, one: Noisy, two: Noisy) -> Noisy:
         """Return one * two."""
@@ -75,7 +75,7 @@ class Noise:
         if one.error is not None:
             size = make("absolute", two.value)
             errors.append(make("multiply", size, one.error))
-        return self._rounded(value, errors)
+        return self.rounded(value, errors)
 
     def settled(self, one: Noisy) -> int:
         """Return the value, exactly 0 where it is not beyond its bound."""
@@ -86,7 +86,8 @@ class Noise:
         is_noise = make("at_most", make("absolute", one.value), floor)
         return make("where", is_noise, make.constant(0.0), one.value)
 
-    def _rounded(self, value: int, errors: list[int | None]) -> Noisy:
+    def rounded(self, value: int, errors: list[int | None]) -> Noisy:
+        """Return a rounded number, from the errors of what it was made of."""
         make = self._make
         own = make("multiply", make("absolute", value), make.constant(UNIT))
         known = [error for error in errors if error is not None]
@@ -186,15 +187,14 @@ class Centred:
         self.total = make("where", self.is_pressed, force, one)
         at = [make("divide", self._raw(p, q), self.total) for p, q in ((1, 0), (0, 1))]
         self.near = (make("round", at[0]), make("round", at[1]))
-        left = [make("divide", self._moved(p, q), self.total) for p, q in _FIRST]
+        left = [
+            make("divide", self._shifted(p, q, p, q), self.total) for p, q in _FIRST
+        ]
         self.rest = (left[0], left[1])
 
     def centre(self) -> tuple[int, int]:
         """Return x and y of the centre, from the cell that the sums are about."""
-        x, y = (
-            self.make("add", near, rest)
-            for near, rest in zip(self.near, self.rest, strict=True)
-        )
+        x, y = (self.make("add", self.near[k], self.rest[k]) for k in (0, 1))
         return x, y
 
     def moment(self, p: int, q: int) -> Noisy:
@@ -204,26 +204,21 @@ class Centred:
     def _raw(self, p: int, q: int) -> int:
         return self.make.input(sum_name(p, q))
 
-    def _moved(self, p: int, q: int) -> int:
-        """Return the exact sum about the cell next to the centre."""
-        return self._shifted(p, q, p, q)
-
     def _shifted(self, p: int, q: int, by_x: int, by_y: int) -> int:
         """Return a sum after some of its p moves in x and q moves in y.
 
-        One move takes the sum of `u x` to that of `u (x - near)`, exactly.
+        After all of them it is about the cell next to the centre. One move takes the
+        sum of `u x` to that of `u (x - near)`, exactly.
         """
         if by_y:
             one = self._shifted(p, q, by_x, by_y - 1)
             other = self._shifted(p, q - 1, by_x, by_y - 1)
-            return self._move(one, other, self.near[1])
-        if by_x:
+        elif by_x:
             one = self._shifted(p, q, by_x - 1, 0)
             other = self._shifted(p - 1, q, by_x - 1, 0)
-            return self._move(one, other, self.near[0])
-        return self._raw(p, q)
-
-    def _move(self, one: int, other: int, by: int) -> int:
+        else:
+            return self._raw(p, q)
+        by = self.near[1 if by_y else 0]
         return self.make("subtract", one, self.make("multiply", by, other))
 
     def _centred(self, p: int, q: int, by_x: int, by_y: int) -> Noisy:
@@ -233,12 +228,12 @@ class Centred:
         if by_y:
             one = self._centred(p, q, by_x, by_y - 1)
             other = self._centred(p, q - 1, by_x, by_y - 1)
-            return self._settle(one, other, self.rest[1])
-        if by_x:
+        elif by_x:
             one = self._centred(p, q, by_x - 1, 0)
             other = self._centred(p - 1, q, by_x - 1, 0)
-            return self._settle(one, other, self.rest[0])
-        return Noisy(self._moved(p, q))
+        else:
+            return Noisy(self._shifted(p, q, p, q))
+        return self._settle(one, other, self.rest[1 if by_y else 0])
 
     def _settle(self, one: Noisy, other: Noisy, rest: int) -> Noisy:
         """Return one - rest * other; the rest itself is rounded once."""
@@ -249,11 +244,8 @@ class Centred:
         size = make("multiply", make("absolute", other.value), make.constant(2 * UNIT))
         if other.error is not None:
             size = make("add", size, other.error)
-        errors = [make("multiply", make("absolute", rest), size)]
-        if one.error is not None:
-            errors.append(one.error)
-        own = make("multiply", make("absolute", value), make.constant(UNIT))
-        return Noisy(value, make.chain("add", [*errors, own]))
+        errors = [make("multiply", make("absolute", rest), size), one.error]
+        return self.noise.rounded(value, errors)
 
 
 def complex_moment(moments: Centred, p: int, q: int) -> tuple[Noisy, Noisy]:

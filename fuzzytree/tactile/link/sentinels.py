@@ -48,15 +48,11 @@ class SentinelDecoder(Decoder):
             data = bytes(self._buffer[:stop])
             del self._buffer[:stop]
             frames = self._decoded(np.frombuffer(data, np.uint8))
-        self._drop_endless()
-        return frames
-
-    def _drop_endless(self) -> None:
-        """Drop the beginning of a frame that is longer than any: 2 bytes a cell."""
-        if len(self._buffer) > 2 * self._cells:
+        if len(self._buffer) > 2 * self._cells:  # longer than any frame
             self.counters.damaged += not (self._is_astray or self._is_joined)
             self._is_astray = True
             self._skip(len(self._buffer))
+        return frames
 
     def _decoded(self, data: npt.NDArray[np.uint8]) -> list[Cells]:
         """Return the whole frames of bytes that end with the end of a frame."""

@@ -113,9 +113,8 @@ class TextDecoder(Decoder):
             return []
         self._block.append(numbers)
         self._held += size
-        return self._whole() if len(self._block) == self._lines else []
-
-    def _whole(self) -> list[Cells]:
+        if len(self._block) < self._lines:
+            return []
         values = np.array(self._block)
         self.framed += self._held
         self._block, self._held = [], 0

@@ -18,8 +18,6 @@ from fuzzytree.tactile.runtimes.frames import Features, FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from fuzzytree.model import FloatArray, IntArray
 
 
@@ -123,21 +121,16 @@ class Recogniser:
         states = np.where(features.is_pressed, states, State.NOTHING)
         is_missing = outcome.status == Status.MISSING  # a feature beyond doubles
         states = np.where(is_missing & features.is_pressed, State.UNKNOWN, states)
+        by_class = np.zeros((len(self.model.classes), len(rules)))
+        np.fmax.at(by_class, self._class_of, strengths)  # NaN, missing, counts 0
         return Recognition(
             self.model.classes,
             np.where(states == State.OBJECT, codes, -1),
             states.astype(np.int64),
-            self._by_class(strengths, features.is_pressed),
+            np.where(features.is_pressed, by_class, 0.0),
             saturated(self.sensor, frames),
             features,
         )
-
-    def _by_class(
-        self, strengths: FloatArray, is_pressed: npt.NDArray[np.bool_]
-    ) -> FloatArray:
-        found = np.zeros((len(self.model.classes), strengths.shape[1]))
-        np.fmax.at(found, self._class_of, strengths)  # NaN, which is missing, counts 0
-        return np.where(is_pressed, found, 0.0)
 
 
 def usual_floor(model: Model) -> float:

@@ -399,19 +399,16 @@ class Device(contextlib.AbstractContextManager["Device"]):
                     self.over.set()
                     self._stop.wait(_POLL_S)
                     continue
-                if gone_s := self._sent(self._next()):
+                if self._coming or self._ahead is None:
+                    cells = self._coming.popleft()
+                else:
+                    cells, self._ahead = self._ahead, next(self._frames, None)
+                if gone_s := self._sent(cells):
                     return gone_s
                 if not self._coming and self._ahead is None:
                     self.over.set()
             self._counts.closes += not self._wire.is_open
         return 0.0
-
-    def _next(self) -> Cells:
-        """Return the frame to send; there is one."""
-        if self._coming or self._ahead is None:
-            return self._coming.popleft()
-        cells, self._ahead = self._ahead, next(self._frames, None)
-        return cells
 
     def _is_due(self) -> bool:
         """Return whether to send a frame now; without requests always True."""
