@@ -89,7 +89,7 @@ def report(name: str, mistakes: Sequence[FileMistake]) -> ReadError:
     if len(lines) > MOST_SHOWN:
         rest = len(lines) - MOST_SHOWN
         more = "1 more mistake" if rest == 1 else f"{rest} more mistakes"
-        lines[MOST_SHOWN:] = [f"{name}: and {more}"]
+        lines[MOST_SHOWN:] = [f"{name}: and at least {more}"]
     return ReadError("\n".join(lines))
 
 

@@ -148,5 +148,6 @@ from .tree import Sets as Sets
 from .tree import Use as Use
 from .tree import interval_names as interval_names
 from .tree import intervals as intervals
+from .tree import node_mistakes as node_mistakes
 from .tree import outline as outline
 from .tree import with_label_type as with_label_type

@@ -23,6 +23,7 @@ _LARGEST_COEFFICIENT = 1e6  # keeps every polynomial finite, in float32 too
 
 MOST_POINTS = 4096
 
+_MOST_MISTAKES = 200  # looking for similar names takes long
 _MOST_COMPARED = 1000  # names among which a similar one is sought
 
 _CONTROL = re.compile(
@@ -274,13 +275,11 @@ class RuleBase(Value, frozen=True):
 
     def __post_init__(self) -> None:
         """Refuse a rule base that contradicts itself."""
-        mistakes = [
-            *naming_mistakes(self.name, self.classes, self.semantics),
-            *variable_mistakes(self.variables, self.columns),
-            *_rule_mistakes(self),
-        ]
-        if mistakes:
-            raise InvalidModelError(mistakes)
+        refuse(
+            naming_mistakes(self.name, self.classes, self.semantics),
+            variable_mistakes(self.variables, self.columns),
+            _rule_mistakes(self),
+        )
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -384,6 +383,17 @@ def is_label(name: str, label_type: LabelType | msgspec.UnsetType) -> bool:
     except ValueError:
         return False
     return True
+
+
+def refuse(*mistakes: Iterable[Mistake]) -> None:
+    """Refuse a model with the first few hundred of its mistakes, if it has any.
+
+    Raises:
+        InvalidModelError: With the mistakes.
+    """
+    first = [*itertools.islice(itertools.chain(*mistakes), _MOST_MISTAKES)]
+    if first:
+        raise InvalidModelError(first)
 
 
 def naming_mistakes(

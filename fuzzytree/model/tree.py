@@ -11,12 +11,11 @@ from __future__ import annotations
 import importlib
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
 import msgspec
 
-from fuzzytree.errors import InvalidModelError
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
@@ -29,6 +28,7 @@ from fuzzytree.model.rulebase import (
     Variable,
     clause_mistakes,
     naming_mistakes,
+    refuse,
     shapes_of,
     summary,
     term_names,
@@ -128,17 +128,14 @@ class FuzzyTree(Value, frozen=True):
 
     def __post_init__(self) -> None:
         """Refuse a tree that contradicts itself."""
-        mistakes = [
-            *naming_mistakes(self.name, self.classes, self.semantics),
-            *variable_mistakes(self.variables, self.columns),
-            *_set_mistakes(self),
-            *_leaf_mistakes(self),
-            *_node_mistakes(self),
-        ]
-        if not mistakes:
-            mistakes = [*_order_mistakes(self), *_plateau_mistakes(self)]
-        if mistakes:
-            raise InvalidModelError(mistakes)
+        refuse(
+            naming_mistakes(self.name, self.classes, self.semantics),
+            variable_mistakes(self.variables, self.columns),
+            _set_mistakes(self),
+            _leaf_mistakes(self),
+            node_mistakes(self.nodes, self.variables, self.sets),
+        )
+        refuse(_order_mistakes(self), _plateau_mistakes(self))
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -268,10 +265,13 @@ def _leaf_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
             )
 
 
-def _node_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
-    terms = term_names(tree.variables)
-    sets = term_names(Variable(s.variable, s.terms) for s in tree.sets)
-    for number, node in enumerate(tree.nodes, 1):
+def node_mistakes(
+    nodes: Sequence[Node], variables: Iterable[Variable], groups: Sequence[Sets] | None
+) -> Iterator[Mistake]:
+    """Yield what is wrong with nodes; fitted sets of None are not looked at."""
+    terms = term_names(variables)
+    sets = term_names(Variable(s.variable, s.terms) for s in groups or ())
+    for number, node in enumerate(nodes, 1):
         path: Path = ("nodes", number - 1)
         where = f"node {number}"
         if node.variable not in terms:
@@ -282,7 +282,7 @@ def _node_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
             step = (*path, "branches", index)
             clause = Clause(node.variable, branch.terms)
             yield from clause_mistakes(step, where, clause, terms)
-            if branch.sets or tree.sets:
+            if groups is not None and (branch.sets or groups):
                 clause = Clause(node.variable, branch.sets)
                 yield from clause_mistakes(step, f"{where}, sets", clause, sets)
             if (branch.node is None) == (branch.leaf is None):

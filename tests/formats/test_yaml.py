@@ -181,8 +181,8 @@ def test_thousands_of_mistakes_are_listed_in_part_and_at_once() -> None:
     message = error_of(text).splitlines()
     assert time.process_time() - start < 10
     assert len(message) == 101
-    assert message[0].startswith("x.yaml:6033:8: rule 1: 'petal length is lowish 0'")
-    assert message[-1] == "x.yaml: and 11900 more mistakes"
+    assert message[0].startswith("x.yaml:6033:8: rule 1: 'petal length' has no term")
+    assert message[-1] == "x.yaml: and at least 4100 more mistakes"
 
 
 @pytest.mark.parametrize("longest", [8, 200])

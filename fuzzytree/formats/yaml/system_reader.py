@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from fuzzytree.errors import InvalidModelError
@@ -22,7 +22,6 @@ from fuzzytree.formats.yaml.binding import (
     shortened,
     variables_at,
 )
-from fuzzytree.formats.yaml.clauses import is_flood
 from fuzzytree.formats.yaml.conditions import (
     SentenceError,
     parse_conclusions,
@@ -64,8 +63,6 @@ from fuzzytree.model import (
     SystemTerm,
     Trapezoid,
     TwoGaussians,
-    names_in,
-    questions,
 )
 
 
@@ -106,11 +103,6 @@ def read_system(
     blocks = _blocks(kept, file_mistakes, mistakes, broken, _spare(outputs or ()))
     file_mistakes += located(root, mistakes)
     if head is None or inputs is None or outputs is None or blocks is None:
-        return None
-    unknown = [*_unknown(inputs, outputs, blocks)]
-    variables: list[SystemInput | SystemOutput] = [*inputs, *outputs]
-    if is_flood(unknown, sum(1 + len(one.labels) for one in variables)):
-        file_mistakes += located(root, unknown)
         return None
     try:
         return FuzzySystem(head.name, inputs, outputs, blocks, head.note or "")
@@ -295,48 +287,3 @@ def _rule(
     if len(mistakes) > count:
         return None
     return SystemRule(when, then, one.weight, one.name or "")
-
-
-def _unknown(
-    inputs: Sequence[SystemInput],
-    outputs: Sequence[SystemOutput],
-    blocks: Sequence[RuleBlock],
-) -> Iterator[Mistake]:
-    """Yield the names that nothing declares, without looking for similar ones."""
-    variables: list[SystemInput | SystemOutput] = [*inputs, *outputs]
-    known = {one.name: {label.name for label in one.labels} for one in variables}
-    for position, variable in enumerate(variables):
-        for label in variable.labels:
-            if isinstance(label.curve, Formula):
-                for name in names_in(label.curve.expression):
-                    if name != "x" and name not in known:
-                        path = _path(position, len(inputs))
-                        yield path, f"a formula needs {shortened(name)}"
-    concludable = {one.name for one in outputs}
-    for position, block in enumerate(blocks):
-        for index, rule in enumerate(block.rules):
-            references = [(one.variable, one.label) for one in questions(rule.when)]
-            wrong = [
-                *(pair for pair in references if not _is_known(*pair, known)),
-                *(
-                    (one.output, one.label)
-                    for one in rule.then
-                    if one.output not in concludable
-                    or not _is_known(one.output, one.label, known)
-                ),
-            ]
-            for name, term in wrong:
-                text = f"{shortened(f'{name} is {term}')} names what is not declared"
-                yield ("blocks", position, "rules", index), text
-
-
-def _path(position: int, inputs: int) -> Path:
-    if position < inputs:
-        return "inputs", position
-    return "outputs", position - inputs
-
-
-def _is_known(
-    variable: str, label: str | None, known: Mapping[str, Collection[str]]
-) -> bool:
-    return variable in known and (label is None or label in known[variable])

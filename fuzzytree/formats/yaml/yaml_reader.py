@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final, TypeVar
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.formats.text_files import FileMistake, report
+from fuzzytree.formats.text_files import MOST_SHOWN, FileMistake, report
 from fuzzytree.formats.yaml import layout, values
 from fuzzytree.formats.yaml.binding import (
     Entries,
@@ -21,17 +22,8 @@ from fuzzytree.formats.yaml.binding import (
     variables_at,
 )
 from fuzzytree.formats.yaml.clauses import (
-    Vocabulary,
-    clauses_of_nodes,
-    clauses_of_rules,
-    is_flood,
     read_rules,
-    sets_of_nodes,
-    unknown_classes,
-    unknown_inputs,
-    unknown_terms,
     vocabulary_of,
-    words,
 )
 from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
 from fuzzytree.formats.yaml.nodes import MappingNode, Node, Scalar, compose
@@ -47,6 +39,7 @@ from fuzzytree.model import (
     Term,
     Variable,
     naming_mistakes,
+    node_mistakes,
     variable_mistakes,
 )
 
@@ -141,14 +134,6 @@ def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase 
     mistakes: list[Mistake] = []
     rules = read_rules(bound, head.classes[0], vocabulary, mistakes)
     file_mistakes += located(root, mistakes)
-    unknown = [
-        *unknown_inputs(variables, head.columns),
-        *unknown_classes(rules, head.classes),
-        *unknown_terms(clauses_of_rules(rules), vocabulary),
-    ]
-    if is_flood(unknown, _names_declared(head, vocabulary)):
-        file_mistakes += located(root, unknown)
-        return None
     return _built(
         lambda: RuleBase(
             name=head.name,
@@ -179,27 +164,17 @@ def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | No
     nodes, leaves, fitted = _whole(questions), _whole(ends), _whole(groups)
     tree_nodes = tuple(map(values.node, nodes or ()))
     sets = tuple(map(values.sets, fitted or ()))
-    vocabulary = vocabulary_of(variables)
-    patterns = {group.variable: words(t.name for t in group.terms) for group in sets}
-    astray = [
-        *unknown_terms(clauses_of_nodes(tree_nodes), vocabulary),
-        *(
-            unknown_terms(sets_of_nodes(tree_nodes), patterns)
-            if fitted is not None
-            else ()
-        ),
-    ]
-    unknown = [*unknown_inputs(variables, head.columns), *astray]
-    if is_flood(unknown, _names_declared(head, vocabulary, patterns)):
-        file_mistakes += located(root, unknown)
-        return None
     meaning = values.semantics(semantics)
     if nodes is None or leaves is None or fitted is None or broken:
+        of_nodes = node_mistakes(
+            tree_nodes, variables, None if fitted is None else sets
+        )
         mistakes = [
             *naming_mistakes(head.name, head.classes, meaning),
             *variable_mistakes(variables, head.columns),
+            *itertools.islice(of_nodes, MOST_SHOWN),
         ]
-        file_mistakes += located(root, [*mistakes, *astray], broken)
+        file_mistakes += located(root, mistakes, broken)
         return None
     return _built(
         lambda: FuzzyTree(
@@ -231,11 +206,6 @@ def _built(
     except InvalidModelError as error:
         file_mistakes += located(root, error.mistakes, broken)
         return None
-
-
-def _names_declared(head: layout.Head, *vocabularies: Vocabulary) -> int:
-    of_variables = sum(1 + len(w.terms) for v in vocabularies for w in v.values())
-    return len(head.classes) + len(head.columns) + of_variables
 
 
 _READERS: Final[

@@ -15,7 +15,6 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
-from fuzzytree.errors import InvalidModelError
 from fuzzytree.model.rulebase import (
     Mistake,
     Part,
@@ -25,6 +24,7 @@ from fuzzytree.model.rulebase import (
     name_mistakes,
     part_mistakes,
     range_mistakes,
+    refuse,
     summary,
     text_fault,
     unit_mistakes,
@@ -227,9 +227,7 @@ class FuzzySystem(Value, frozen=True):
 
     def __post_init__(self) -> None:
         """Refuse a system that contradicts itself."""
-        mistakes = list(_system_mistakes(self))
-        if mistakes:
-            raise InvalidModelError(mistakes)
+        refuse(_system_mistakes(self))
 
     @property
     def columns(self) -> tuple[str, ...]:
