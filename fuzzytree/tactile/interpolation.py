@@ -37,31 +37,18 @@ MOST_POINTS = 2**24
 _BLOCK = 2**15  # points that are computed at once: they stay in the cache
 
 
-class Weights(NamedTuple):
-    """How much the four cells around a point weigh, for each phase.
+def weights(times: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Return how much the four cells around a point weigh, and what to divide by.
 
     A phase is where a point lies between the centres of neighbouring cells: there are
-    `times` of them downwards and as many to the right.
-
-    Attributes:
-        cells: Whole numbers of shape (4, times, times): upper left, upper right,
-            lower left and lower right cell; by phase downwards and to the right.
-        sums: Shape (times, times): what to divide by.
-    """
-
-    cells: npt.NDArray[np.int64]
-    sums: npt.NDArray[np.int64]
-
-
-def weights(times: int) -> Weights:
-    """Return the degrees of the four cells around a point, times `2 times`.
-
-    Args:
-        times: How many points a cell gets on each side, at least 1.
+    `times` of them downwards and as many to the right. The weights are the degrees
+    times `2 times`, of shape (4, times, times): upper left, upper right, lower left and
+    lower right cell; by phase downwards and to the right. The sums have the shape
+    (times, times).
 
     Example:
-        >>> one = weights(2)  # a quarter and three quarters of a cell away
-        >>> one.cells[:, 0, 0].tolist(), int(one.sums[0, 0])
+        >>> cells, sums = weights(2)  # a quarter and three quarters of a cell away
+        >>> cells[:, 0, 0].tolist(), int(sums[0, 0])
         ([3, 1, 1, 1], 6)
     """
     whole = 2 * times
@@ -69,7 +56,7 @@ def weights(times: int) -> Weights:
     near, far = whole - away, away  # the degree of the cell before, and behind
     pairs = ((near, near), (near, far), (far, near), (far, far))
     cells = np.array([np.minimum(down[:, None], right) for down, right in pairs])
-    return Weights(cells, cells.sum(axis=0))
+    return cells, cells.sum(axis=0)
 
 
 def interpolated(

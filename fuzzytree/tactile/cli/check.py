@@ -19,6 +19,7 @@ from fuzzytree.cli import (
 )
 from fuzzytree.tactile.cli.sensors import (
     SensorOptions,
+    data_option,
     frames_model,
     sensor_of_options,
 )
@@ -29,9 +30,7 @@ class TactileCheckOptions(SensorOptions):
 
     model: str = argument(metavar="MODEL")
     files: Sequence[str] = argument(metavar="FILE.onnx...", nargs=-1, required=True)
-    data: str | None = option(
-        "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
-    )
+    data: str | None = data_option
     reject: float = option(
         "--reject",
         type=click.FloatRange(0.0, 1.0),

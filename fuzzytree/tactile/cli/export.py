@@ -26,6 +26,7 @@ from fuzzytree.cli import (
 from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import (
     SensorOptions,
+    data_option,
     frames_model,
     frames_of_file,
     sensor_of_options,
@@ -49,9 +50,7 @@ class TactileExportOptions(SensorOptions):
         type=click.Choice(["onnx", "c"]),
         help="Format; default by the suffix of OUT.",
     )
-    data: str | None = option(
-        "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
-    )
+    data: str | None = data_option
     settings: Sequence[str] = option(
         "--set",
         metavar="NAME=VALUE",

@@ -91,11 +91,7 @@ def command(options: TactileFeaturesOptions) -> int:
 
 
 def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the class, empty if not stated, and the path of each file.
-
-    Raises:
-        click.UsageError: If there are several files, and one is of no class.
-    """
+    """Return the class, empty if not stated, and the path of each file."""
     found: list[tuple[str, str]] = []
     for text in frames:
         word, sign, path = text.partition("=")
@@ -112,9 +108,7 @@ def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
 def _check_alike(frames: Sequence[str], parts: Sequence[SensorFrames]) -> None:
     """Refuse files that make no table together.
 
-    Raises:
-        ReadError: If sensors differ in more than what rests on them, or if some files
-            state subjects and others do not.
+    Sensors may only differ in what rests on them, and all state subjects or none does.
     """
 
     def kind(part: SensorFrames) -> str:

@@ -167,11 +167,7 @@ def _times(text: str) -> list[int]:
 def _chosen(
     options: TactileInterpolateOptions, values: Pressed, *, is_picture: bool
 ) -> int | None:
-    """Return the frame to take; None for all.
-
-    Raises:
-        click.UsageError: If there is no such frame.
-    """
+    """Return the frame to take; None for all."""
     frame = options.frame
     if frame is None:
         return int(values.any(axis=(1, 2)).argmax()) if is_picture else None

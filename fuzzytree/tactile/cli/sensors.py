@@ -17,6 +17,11 @@ if TYPE_CHECKING:
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
 
 
+data_option = option(
+    "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
+)
+
+
 class SensorOptions:
     """The options that say which sensor it is."""
 

@@ -23,7 +23,7 @@ from fuzzytree.tactile.features.moments import (
     signed_log,
     sum_name,
 )
-from fuzzytree.tactile.features.names import Feature, features_of_names
+from fuzzytree.tactile.features.names import Feature, feature_of
 from fuzzytree.tactile.sensor import Sensor
 
 PRESSED = "pressed"
@@ -86,7 +86,7 @@ def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
         >>> [one.name for one in made.sums]
         ['sum 00', 'sum 10', 'sum 01', 'sum 20', 'sum 02', 'cell r0 c2']
     """
-    features = features_of_names(names)
+    features = [feature_of(name) for name in names]
     for feature in features:
         _check_place(sensor, feature)
     every = tuple(_every_sum(sensor, features))

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 
-from fuzzytree.tactile.features.names import Feature, features_of_names
+from fuzzytree.tactile.features.names import Feature, feature_of
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
 _DIGITS = Context(prec=80)
@@ -37,7 +37,7 @@ def exact_features(
     shown = _Frame(sensor, cells)
     if not shown.force:
         return (Fraction(0),) * len(names)
-    return tuple(shown.feature(feature) for feature in features_of_names(names))
+    return tuple(shown.feature(feature) for feature in map(feature_of, names))
 
 
 class _Frame:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Literal
 
@@ -128,15 +128,6 @@ def feature_of(name: str) -> Feature:
     numbers = {key: int(digits) for key, digits in match.groupdict().items()}
     kind: Kind = "cell" if cell else "block"
     return Feature(name, base, kind, is_log=is_log, per_force=per_force, **numbers)
-
-
-def features_of_names(names: Sequence[str]) -> tuple[Feature, ...]:
-    """Return the features of some names.
-
-    Raises:
-        TableError: If one is none; it says which.
-    """
-    return tuple(feature_of(name) for name in names)
 
 
 def _unknown(name: str, base: str) -> str:

@@ -20,7 +20,7 @@ from fuzzytree.model import Agreement, Comparison, Model, RuleBase, fingerprint
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
 from fuzzytree.tactile.features.exact import exact_features
-from fuzzytree.tactile.features.names import Feature, features_of_names
+from fuzzytree.tactile.features.names import Feature, feature_of
 from fuzzytree.tactile.features.plain import State, plain_answer
 from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
@@ -64,7 +64,7 @@ def errors(
         return tuple(0.0 if value == 0.0 else math.inf for value in values)
     sizes = _sizes(cells)
     found: list[float] = []
-    every = zip(features_of_names(names), values, exact, strict=True)
+    every = zip(map(feature_of, names), values, exact, strict=True)
     for feature, value, right in every:
         apart = abs(Fraction(value) - right)
         if feature.base == "angle":
