@@ -8,23 +8,12 @@ from typing import Final, Literal
 
 import msgspec
 
-from fuzzytree.exporters.fll_text import KNOWN
 from fuzzytree.formats import METHOD_WORDS, S_WORDS, T_WORDS
 from fuzzytree.model import (
     FUNCTIONS,
-    Arc,
-    Bell,
-    Cosine,
     DefuzzifierMethod,
-    Gaussian,
-    SemiEllipse,
-    Sigmoid,
-    SigmoidDifference,
-    Singleton,
     SNorm,
     TNorm,
-    Trapezoid,
-    TwoGaussians,
 )
 
 Dialect = Literal["portable", "iec", "fuzzylite", "jfuzzylogic"]
@@ -40,7 +29,6 @@ class FclWords(msgspec.Struct, frozen=True):
         acts: The words for ACT.
         accus: The words for ACCU.
         methods: The words for METHOD.
-        curves: The classes of curves that it has, beside points.
         joiner: What stands between conclusions; empty where a rule has one.
         is_lower: Whether rules are written in lower case, and have no `;`.
         has_hedges: Whether it knows fuzzylite's hedges.
@@ -56,7 +44,6 @@ class FclWords(msgspec.Struct, frozen=True):
     acts: Mapping[TNorm, str]
     accus: Mapping[SNorm, str]
     methods: Mapping[DefuzzifierMethod, str]
-    curves: tuple[type, ...] = ()
     joiner: str = ", "
     is_lower: bool = False
     has_hedges: bool = False
@@ -136,7 +123,6 @@ WORDS: Mapping[Dialect, FclWords] = MappingProxyType(
             acts=_FUZZYLITE_ANDS,
             accus=_FUZZYLITE_ORS,
             methods=_methods("COGS COG COA LM RM MM COGSS"),
-            curves=tuple(one for one in KNOWN if one not in (Arc, SemiEllipse)),
             joiner=" and ",
             is_lower=True,
             has_hedges=True,
@@ -151,10 +137,6 @@ WORDS: Mapping[Dialect, FclWords] = MappingProxyType(
             acts=_ACTS,
             accus=_s_norms("MAX BSUM NSUM PROBOR SUM"),
             methods=_methods("COGS COG COA LM RM MM"),
-            curves=(
-                *(Trapezoid, Gaussian, TwoGaussians, Bell, Sigmoid, Cosine),
-                *(SigmoidDifference, Singleton),
-            ),
             reserved=_JFUZZYLOGIC,
         ),
     }

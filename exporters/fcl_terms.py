@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from msgspec.structs import replace
 
@@ -10,7 +10,10 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
 from fuzzytree.exporters.fuzzy_files import refuse, with_labels
+from fuzzytree.formats import FCL_SHAPES, in_words, is_plain
 from fuzzytree.model import (
+    LR,
+    Band,
     Bell,
     Call,
     Cosine,
@@ -18,13 +21,11 @@ from fuzzytree.model import (
     Expression,
     Formula,
     FuzzySystem,
-    Gaussian,
     Linear,
     Loss,
     Name,
     Number,
     Points,
-    Sigmoid,
     SigmoidDifference,
     Singleton,
     SystemInput,
@@ -73,33 +74,23 @@ def term_text(
 
 
 def _shape_text(curve: Curve) -> str | None:
-    parts: tuple[float, ...]
+    parts: Sequence[float]
     match curve:
-        case Trapezoid(a=a, b=b, c=c, d=d) if a is not None and d is not None:
+        case Band() | LR() | Points():
+            return None
+        case Trapezoid(a=float(a), b=b, c=c, d=float(d)):
             word, parts = ("TRIAN", (a, b, d)) if b == c else ("TRAPE", (a, b, c, d))
-        case Gaussian(mean=mean, deviation=deviation):
-            word, parts = "GAUSS", (mean, deviation)
-        case TwoGaussians() if curve.left <= curve.right:
-            word = "GAUSS2"
-            left, right = curve.left, curve.right
-            parts = (left, curve.left_deviation, right, curve.right_deviation)
-        case Bell(center=center, width=width, slope=slope) if slope >= 0.0:
-            word, parts = "GBELL", (width, slope, center)
-        case Sigmoid(inflection=inflection, slope=slope):
-            word, parts = "SIGM", (slope, inflection)
-        case SigmoidDifference(first=one, second=two) if _is_plain(one, two):
-            word = "DSIGM"
-            parts = (one.slope, one.inflection, two.slope, two.inflection)
         case Cosine(center=center, width=width):
             word, parts = "COSINE", (width / 2.0, center)
-        case _:
+        case TwoGaussians() if curve.left > curve.right:
             return None
-    return " ".join([word, *map(number, parts)])
-
-
-def _is_plain(one: Sigmoid, two: Sigmoid) -> bool:
-    """Return whether the first sigmoid is nowhere below the second one."""
-    return one.slope == two.slope > 0.0 and one.inflection <= two.inflection
+        case Bell(slope=slope) if slope < 0.0:
+            return None
+        case SigmoidDifference() if not is_plain(curve):
+            return None
+        case _:
+            word, parts = in_words(curve, FCL_SHAPES) or ("", [])
+    return " ".join([word, *map(number, parts)]) or None
 
 
 _OPERATORS = frozenset({"+", "-", "*", "/", "^"})
@@ -175,8 +166,7 @@ def _pointed(
     tolerance: float,
     losses: list[Loss],
 ) -> SystemTerm:
-    is_kept = isinstance(label.curve, (Points, *words.curves))
-    if is_kept and term_text(variable, label, words, {}) is not None:
+    if term_text(variable, label, words, {}) is not None:
         return label
     where = f"term {label.name!r} of {variable.name!r}"
     result = points_for(label.curve, tolerance)

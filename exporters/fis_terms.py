@@ -3,57 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from types import MappingProxyType
-from typing import Final
+from collections.abc import Iterable
 
-from fuzzytree.formats import FIS_FAR, Dialect, curve_of, fuzzylite_text_of
+from fuzzytree.formats import (
+    FIS_FAR,
+    FIS_KINDS,
+    Dialect,
+    curve_of,
+    fuzzylite_text_of,
+    in_words,
+)
 from fuzzytree.model import (
+    LR,
+    Band,
     Bell,
     Binary,
-    Concave,
-    Cosine,
     Curve,
     Formula,
     FuzzySystem,
-    Gaussian,
     Linear,
     Loss,
     PiCurve,
     Points,
     SCurve,
-    Sigmoid,
     SigmoidDifference,
-    SigmoidProduct,
     Singleton,
-    Spike,
+    SystemCurve,
     Trapezoid,
-    TwoGaussians,
 )
 from fuzzytree.semantics import pointed, shape_of
 
 Term = tuple[str, str]
 """A kind such as `trimf`, and its numbers as text."""
-
-_SHARED: Final[tuple[type, ...]] = (
-    Trapezoid,
-    Singleton,
-    Binary,
-    Gaussian,
-    TwoGaussians,
-    Bell,
-    Sigmoid,
-    SigmoidProduct,
-    SCurve,
-    PiCurve,
-)
-_KNOWN: Final[Mapping[Dialect, tuple[type, ...]]] = MappingProxyType(
-    {
-        "octave": _SHARED,
-        "matlab": (*_SHARED, SigmoidDifference),
-        "fuzzylite": (*_SHARED, SigmoidDifference, Cosine, Spike, Concave, Formula),
-    }
-)
 
 
 def with_known_curves(
@@ -64,14 +45,10 @@ def with_known_curves(
     Raises:
         LossError: If a curve cannot become points within the tolerance.
     """
-    unknown = {
-        type(label.curve)
-        for variable in system.variables
-        for label in variable.labels
-        if term_of(label.curve, dialect) is None
-    }
-    allowed = tuple(one for one in _KNOWN[dialect] if one not in unknown)
-    return pointed(system, tolerance, allowed=allowed)
+    curves = [label.curve for one in system.variables for label in one.labels]
+    unknown = {type(one) for one in curves if term_of(one, dialect) is None}
+    known = {type(one) for one in curves} - unknown
+    return pointed(system, tolerance, allowed=tuple(known))
 
 
 def term_of(curve: Curve, dialect: Dialect) -> Term | None:
@@ -86,6 +63,8 @@ def term_of(curve: Curve, dialect: Dialect) -> Term | None:
         True
     """
     match curve:
+        case Band() | LR():
+            return None
         case Points(values=values, degrees=degrees):
             pairs = zip(values, degrees, strict=True)
             exact = _corners_of(curve)
@@ -117,37 +96,23 @@ def number_of(curve: Curve, dialect: Dialect) -> Term | None:
             return term_of(curve, dialect) if dialect == "fuzzylite" else None
 
 
-def _formed(curve: Curve, dialect: Dialect) -> Term | None:
+def _formed(curve: SystemCurve, dialect: Dialect) -> Term | None:
     match curve:
-        case Gaussian(mean=mean, deviation=deviation):
-            return "gaussmf", _text((deviation, mean))
-        case TwoGaussians(left=a, left_deviation=s, right=b, right_deviation=t):
-            return "gauss2mf", _text((s, a, t, b))
-        case Bell(center=center, width=width, slope=slope):
-            if dialect == "octave" and slope != int(slope):
-                return None
-            return "gbellmf", _text((width, slope, center))
-        case Sigmoid(inflection=c, slope=a):
-            return "sigmf", _text((a, c))
-        case SigmoidDifference(first=first, second=second) if dialect != "octave":
-            numbers = first.slope, first.inflection, second.slope, second.inflection
-            return "dsigmf", _text(numbers)
-        case SigmoidProduct(first=first, second=second):
-            numbers = first.slope, first.inflection, second.slope, second.inflection
-            return "psigmf", _text(numbers)
         case SCurve(start=start, end=end) if start != end:
             kind = "smf" if start < end else "zmf"
             return kind, _text((min(start, end), max(start, end)))
-        case PiCurve(a=a, b=b, c=c, d=d) if a < b and c < d:
-            return "pimf", _text((a, b, c, d))
-        case Cosine(center=center, width=width) if dialect == "fuzzylite":
-            return "cosinemf", _text((center, width))
-        case Spike(center=center, width=width) if dialect == "fuzzylite":
-            return "spikemf", _text((center, width))
-        case Concave(inflection=inflection, end=end) if dialect == "fuzzylite":
-            return "concavemf", _text((inflection, end))
-        case _:
+        case PiCurve(a=a, b=b, c=c, d=d) if a == b or c == d:
             return None
+        case Bell(slope=slope) if dialect == "octave" and slope != int(slope):
+            return None
+        case SigmoidDifference() if dialect == "octave":
+            return None
+        case _:
+            is_known = dialect == "fuzzylite"
+            kinds = FIS_KINDS.items()
+            known = {k: v.word for k, v in kinds if is_known or not v.is_private}
+            result = in_words(curve, known)
+            return None if result is None else (result[0], _text(result[1]))
 
 
 _Corners = tuple[float, float, float, float]

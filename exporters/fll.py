@@ -9,13 +9,12 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Final
+from typing import Final, get_args
 
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll_text import (
-    KNOWN,
     degree_text,
     has_not,
     hedge_losses,
@@ -50,6 +49,7 @@ from fuzzytree.model import (
     RuleBase,
     RuleBlock,
     Singleton,
+    SystemCurve,
     SystemInput,
     SystemOutput,
     SystemRule,
@@ -124,7 +124,7 @@ def write(
         if scores != "winner":
             raise ValueError("scores: are of rules; a system has outputs of its own")
         refuse_singletons(model, "fll")
-        system, lost = pointed(model, tolerance, allowed=KNOWN)
+        system, lost = pointed(model, tolerance, allowed=get_args(SystemCurve))
         losses += lost
         system, lost = _with_pointed_numbers(system, tolerance)
         losses += lost

@@ -6,25 +6,27 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from msgspec.structs import astuple, replace
+from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.formats import FLL_HEDGES, fuzzylite_text_of, parse
+from fuzzytree.formats import (
+    FLL_CLASSES,
+    FLL_HEDGES,
+    fuzzylite_text_of,
+    in_words,
+    parse,
+)
 from fuzzytree.model import (
     LR,
     And,
     Arc,
     Band,
-    Bell,
     Binary,
     Call,
     Concave,
     Condition,
-    Cosine,
-    Curve,
     Expression,
     Formula,
-    Gaussian,
     Hedge,
     Is,
     Linear,
@@ -33,21 +35,16 @@ from fuzzytree.model import (
     Not,
     Number,
     Or,
-    PiCurve,
     Points,
     RuleBlock,
     SCurve,
-    SemiEllipse,
     Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
     Singleton,
-    Spike,
+    SystemCurve,
     SystemOutput,
     SystemRule,
     SystemTerm,
     Trapezoid,
-    TwoGaussians,
     joints,
     questions,
 )
@@ -174,14 +171,6 @@ def hedge_losses(rules: Sequence[SystemRule]) -> Iterator[Loss]:
             yield Loss(f"rule {number}", f"FLL has no {names}: left out")
 
 
-KNOWN: tuple[type, ...] = (
-    *(Trapezoid, Gaussian, TwoGaussians, Bell, Sigmoid, SigmoidDifference),
-    *(SigmoidProduct, SCurve, PiCurve, Cosine, Concave, Spike, Arc, SemiEllipse),
-    *(Binary, Singleton, Formula, Linear),
-)
-"""The curves that FLL has, beside points."""
-
-
 def degree_text(label: SystemTerm, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term; None if FLL has no such term."""
     match label.curve:
@@ -230,16 +219,7 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-_CLASSES: Mapping[type, str] = {
-    **{one: one.__name__ for one in (Gaussian, Bell, Sigmoid, Cosine, Concave, Spike)},
-    **{one: one.__name__ for one in (Arc, SemiEllipse)},
-    TwoGaussians: "GaussianProduct",
-    PiCurve: "PiShape",
-}
-"""The classes whose numbers are the fields of a curve, in order."""
-
-
-def _parts(curve: Curve) -> tuple[str | float, ...]:
+def _parts(curve: SystemCurve) -> tuple[str | float, ...]:
     match curve:
         case Trapezoid(a=a, b=b, c=c, d=d):
             low = -math.inf if a is None else a
@@ -249,9 +229,6 @@ def _parts(curve: Curve) -> tuple[str | float, ...]:
             return (
                 ("Triangle", low, b, high) if b == c else ("Trapezoid", low, b, c, high)
             )
-        case SigmoidDifference(first=one, second=two) | SigmoidProduct(one, two):
-            kind = type(curve).__name__
-            return kind, one.inflection, one.slope, two.slope, two.inflection
         case SCurve(start=start, end=end):
             rises = start <= end
             return ("SShape", start, end) if rises else ("ZShape", end, start)
@@ -260,7 +237,8 @@ def _parts(curve: Curve) -> tuple[str | float, ...]:
         case Singleton(value=value):
             return "Rectangle", value, value
         case _:
-            return _CLASSES[type(curve)], *astuple(curve)
+            name, numbers = in_words(curve, FLL_CLASSES) or ("", [])
+            return name, *numbers
 
 
 def _points(points: Points) -> tuple[str | float, ...]:

@@ -7,7 +7,10 @@ from .fcl.fcl_dialects import S_WORDS as S_WORDS
 from .fcl.fcl_dialects import T_WORDS as T_WORDS
 from .fcl.fcl_reader import FACTS as FACTS
 from .fcl.fcl_reader import read_fcl as read_fcl
+from .curve_words import in_words as in_words
 from .fcl.fcl_rules import ALWAYS as ALWAYS
+from .fcl.fcl_terms import FCL_SHAPES as FCL_SHAPES
+from .fcl.fcl_terms import is_plain as is_plain
 from .fis.fis_reader import DEFAULTS as DEFAULTS
 from .fis.fis_reader import DIALECT as DIALECT
 from .fis.fis_reader import always_concluded as always_concluded
@@ -17,6 +20,7 @@ from .fis.fis_words import CONCLUDING_HEDGES as CONCLUDING_HEDGES
 from .fis.fis_words import DIALECTS as DIALECTS
 from .fis.fis_words import FIS_FAR as FIS_FAR
 from .fis.fis_words import FIS_HEDGES as FIS_HEDGES
+from .fis.fis_words import FIS_KINDS as FIS_KINDS
 from .fis.fis_words import FIS_METHODS as FIS_METHODS
 from .fis.fis_words import FIS_SNORMS as FIS_SNORMS
 from .fis.fis_words import FIS_TNORMS as FIS_TNORMS
@@ -27,6 +31,7 @@ from .fll.fll_differences import differences as differences
 from .fll.fll_differences import fuzzylite_losses as fuzzylite_losses
 from .fll.fll_reader import read_fll as read_fll
 from .fll.fll_rules import RULE_WORDS as RULE_WORDS
+from .fll.fll_terms import FLL_CLASSES as FLL_CLASSES
 from .fll.fll_words import ACTIVATIONS as ACTIVATIONS
 from .fll.fll_words import FLL_HEDGES as FLL_HEDGES
 from .fll.fll_words import FLL_METHODS as FLL_METHODS

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import get_args
+
 from msgspec.structs import replace
 
-from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
+from fuzzytree.exporters.fcl_dialects import Dialect
 from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS
 from fuzzytree.model import (
     Activation,
     And,
     Arc,
+    Bell,
     Concave,
     Condition,
+    Cosine,
     Defuzzifier,
     FuzzySystem,
+    Gaussian,
     Is,
     Not,
     Or,
     SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
     Singleton,
+    SystemCurve,
     SystemOutput,
     SystemTerm,
     Trapezoid,
+    TwoGaussians,
     questions,
 )
 from fuzzytree.model.rulebase import Points
@@ -57,11 +68,19 @@ def tamed(system: FuzzySystem, dialect: Dialect) -> FuzzySystem:
     return FuzzySystem(system.name, inputs, outputs, blocks)
 
 
+CURVES: Mapping[Dialect, set[type]] = {
+    "fuzzylite": {*get_args(SystemCurve)} - {Arc, SemiEllipse},
+    "jfuzzylogic": {
+        *(Trapezoid, Gaussian, TwoGaussians, Bell, Sigmoid, Cosine),
+        *(SigmoidDifference, Singleton),
+    },
+}
+
+
 def _curved(labels: tuple[SystemTerm, ...], dialect: Dialect) -> tuple[SystemTerm, ...]:
-    kept = (Points, *WORDS[dialect].curves)
+    kept = {Points, *CURVES.get(dialect, ())}
     return tuple(
-        one if isinstance(one.curve, kept) else replace(one, curve=PLAIN)
-        for one in labels
+        one if type(one.curve) in kept else replace(one, curve=PLAIN) for one in labels
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.fis.fis_reader import read_fis
-from fuzzytree.formats.fis.fis_words import FIS_FAR, KINDS, Dialect, curve_of
+from fuzzytree.formats.fis.fis_words import FIS_FAR, FIS_KINDS, Dialect, curve_of
 from fuzzytree.model import (
     And,
     Bell,
@@ -155,7 +155,7 @@ def test_every_kind_of_curve(
     kind: str, numbers: tuple[float, ...], curve: Curve
 ) -> None:
     assert curve_of(kind, [*map(float, numbers)]) == curve
-    assert kind in KINDS or kind == "discretemf"
+    assert kind in FIS_KINDS or kind == "discretemf"
 
 
 HEDGED = SUGENO.replace("1 1, 1 (1) : 1", "1.30 -1.20, 1.30 (1) : 1")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import msgspec
 from lark import Token
 
+from fuzzytree.formats.curve_words import CurveWord, fields
 from fuzzytree.formats.fcl.fcl_dialects import Dialect
 from fuzzytree.formats.fcl.fcl_syntax import TermStatement, place
 from fuzzytree.formats.fll.fll_terms import CLASSES, FllTerm, TermScope, read_term
@@ -67,11 +68,11 @@ def read(text: TermStatement, where: TermScope, dialect: Dialect) -> FclTerm:
         for word in words:
             formula = formula.ljust(word.column - words[0].column) + word.text
         return FclTerm(read_term(name, kind, words, where, formula))
-    if str(first) not in CLASSES and first.upper() in _SHAPES:
+    if str(first) not in CLASSES and first.upper() in FCL_SHAPES:
         return _shape(text, where)
     exact = next((one for one in CLASSES if one.upper() == first.upper()), "")
     if not exact:
-        known = ["FUNCTION", *_SHAPES, *CLASSES]
+        known = ["FUNCTION", *FCL_SHAPES, *CLASSES]
         sentence = f"no shape {str(first)!r}; {name_choice(str(first)[:99], known)}"
         raise PartError((*place(first), sentence))
     kind = Word(exact, *place(first))
@@ -126,22 +127,19 @@ def _formula_words(text: TermStatement, dialect: Dialect) -> list[Word]:
 
 def _shape(text: TermStatement, where: TermScope) -> FclTerm:
     first, *rest = text.tokens
-    count, make = _SHAPES[first.upper()]
+    word = FCL_SHAPES[first.upper()]
     numbers = [_number(one) for one in rest]
-    if len(numbers) != count:
-        sentence = f"{first} takes {count} numbers, not {len(numbers)}"
+    if len(numbers) != word.arity:
+        sentence = f"{first} takes {word.arity} numbers, not {len(numbers)}"
         raise PartError((*place(first), sentence))
     try:
-        curve = make(numbers)
+        curve = word.make(numbers)
     except ValueError as error:
         raise PartError((*place(first), str(error))) from error
     loss = ""
-    if isinstance(curve, SigmoidDifference):
-        one, two = curve.first, curve.second
-        is_plain = one.slope == two.slope > 0 and one.inflection <= two.inflection
-        if not is_plain:
-            loss = "where the first sigmoid is below the second one, the difference "
-            loss += "counts and not 0, as jFuzzyLogic has it"
+    if isinstance(curve, SigmoidDifference) and not is_plain(curve):
+        loss = "where the first sigmoid is below the second one, the difference "
+        loss += "counts and not 0, as jFuzzyLogic has it"
     return FclTerm(_checked(first, str(text.name), curve, where), loss)
 
 
@@ -151,19 +149,23 @@ def _two_gaussians(n: Sequence[float]) -> Curve:
     return TwoGaussians(*n)
 
 
-_SHAPES: Final[Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]]] = {
-    "TRIAN": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
-    "TRAPE": (4, lambda n: Trapezoid(*n)),
-    "GAUSS": (2, lambda n: Gaussian(*n)),
-    "GAUSS2": (4, _two_gaussians),
-    "GBELL": (3, lambda n: Bell(n[2], n[0], n[1])),
-    "SIGM": (2, lambda n: Sigmoid(n[1], n[0])),
-    "DSIGM": (
-        4,
-        lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
-    ),
-    "COSINE": (2, lambda n: Cosine(n[1], 2.0 * n[0])),
+FCL_SHAPES: Final[Mapping[str, CurveWord]] = {
+    "TRIAN": CurveWord(3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
+    "TRAPE": CurveWord(4, lambda n: Trapezoid(*n)),
+    "GAUSS": fields(Gaussian, 0, 1),
+    "GAUSS2": CurveWord(4, _two_gaussians, TwoGaussians, (0, 1, 2, 3)),
+    "GBELL": fields(Bell, 1, 2, 0),
+    "SIGM": fields(Sigmoid, 1, 0),
+    "DSIGM": fields(SigmoidDifference, 1, 0, 3, 2),
+    "COSINE": CurveWord(2, lambda n: Cosine(n[1], 2.0 * n[0])),
 }
+"""The curves of jFuzzyLogic."""
+
+
+def is_plain(curve: SigmoidDifference) -> bool:
+    """Return whether the first sigmoid is nowhere below the second one."""
+    one, two = curve.first, curve.second
+    return one.slope == two.slope > 0.0 and one.inflection <= two.inflection
 
 
 def extent(curve: Curve) -> tuple[float, float] | None:

@@ -305,8 +305,8 @@ def _curve(
     place = (entry.line, written.column)
     if kind == "function":
         return _formula(written, place, notes)
-    if kind not in words.KINDS and kind not in words.OTHER_KINDS:
-        known = [*words.KINDS, *words.OTHER_KINDS]
+    if kind not in words.FIS_KINDS and kind not in words.OTHER_KINDS:
+        known = [*words.FIS_KINDS, *words.OTHER_KINDS]
         what = f"no kind of curve {kind[:40]!r}; {name_choice(kind[:40], known)}"
         notes.mistake(entry.position, what)
         return None

@@ -7,11 +7,10 @@ their own, and mean some of the shared ones otherwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Final, Literal, get_args
+from collections.abc import Mapping, Sequence
+from typing import Final, Literal, NamedTuple, get_args
 
-import msgspec
-
+from fuzzytree.formats.curve_words import CurveWord, fields
 from fuzzytree.model import (
     MOST_POINTS,
     Bell,
@@ -102,11 +101,11 @@ CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
 """The same behind the comma of a Sugeno rule in Octave, which takes the root there."""
 
 
-class CurveKind(msgspec.Struct, frozen=True):
+class CurveKind(NamedTuple):
     """A kind of curve: the names of its numbers, and how they make one."""
 
     numbers: str
-    make: Callable[[Sequence[float]], Curve]
+    word: CurveWord
     is_private: bool = False
 
 
@@ -151,47 +150,46 @@ def _falling(start: float, end: float) -> Curve:
     return Binary((start + end) / 2, is_above=False)
 
 
-KINDS: Final[Mapping[str, CurveKind]] = {
-    "trimf": CurveKind("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
-    "trapmf": CurveKind("a b c d", lambda n: trapezoid(*n)),
-    "linzmf": CurveKind("a b", lambda n: _ramp(n[1], n[0])),
-    "linsmf": CurveKind("a b", lambda n: _ramp(*n)),
-    "gaussmf": CurveKind("deviation mean", lambda n: Gaussian(n[1], abs(n[0]))),
+def _rectangle(numbers: Sequence[float]) -> Curve:
+    start, end = numbers
+    return Trapezoid(start, start, end, end)
+
+
+def _binary(numbers: Sequence[float]) -> Curve:
+    start, direction = numbers
+    return Binary(start, is_above=direction > start)
+
+
+_TWO_SIGMOIDS = "slope inflection slope inflection"
+FIS_KINDS: Final[Mapping[str, CurveKind]] = {
+    "trimf": CurveKind("a b c", CurveWord(3, lambda n: trapezoid(*n[:2], *n[1:]))),
+    "trapmf": CurveKind("a b c d", CurveWord(4, lambda n: trapezoid(*n))),
+    "linzmf": CurveKind("a b", CurveWord(2, lambda n: _ramp(n[1], n[0]))),
+    "linsmf": CurveKind("a b", CurveWord(2, lambda n: _ramp(*n))),
+    "gaussmf": CurveKind("deviation mean", fields(Gaussian, 1, 0, by_size=True)),
     "gauss2mf": CurveKind(
         "deviation mean deviation mean",
-        lambda n: TwoGaussians(n[1], abs(n[0]), n[3], abs(n[2])),
+        fields(TwoGaussians, 1, 0, 3, 2, by_size=True),
     ),
-    "gbellmf": CurveKind("width slope center", lambda n: Bell(n[2], abs(n[0]), n[1])),
-    "sigmf": CurveKind("slope inflection", lambda n: Sigmoid(n[1], n[0])),
-    "dsigmf": CurveKind(
-        "slope inflection slope inflection",
-        lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
-    ),
-    "psigmf": CurveKind(
-        "slope inflection slope inflection",
-        lambda n: SigmoidProduct(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
-    ),
-    "smf": CurveKind("start end", lambda n: _rising(*n)),
-    "zmf": CurveKind("start end", lambda n: _falling(*n)),
-    "pimf": CurveKind("a b c d", lambda n: PiCurve(*n)),
-    "rampmf": CurveKind("start end", lambda n: _ramp(*n), is_private=True),
-    "rectmf": CurveKind(
-        "start end", lambda n: Trapezoid(n[0], n[0], n[1], n[1]), is_private=True
-    ),
-    "cosinemf": CurveKind("center width", lambda n: Cosine(*n), is_private=True),
-    "spikemf": CurveKind("center width", lambda n: Spike(*n), is_private=True),
-    "concavemf": CurveKind("inflection end", lambda n: Concave(*n), is_private=True),
-    "binarymf": CurveKind(
-        "start direction",
-        lambda n: Binary(n[0], is_above=n[1] > n[0]),
-        is_private=True,
-    ),
+    "gbellmf": CurveKind("width slope center", fields(Bell, 1, 2, 0, by_size=True)),
+    "sigmf": CurveKind("slope inflection", fields(Sigmoid, 1, 0)),
+    "dsigmf": CurveKind(_TWO_SIGMOIDS, fields(SigmoidDifference, 1, 0, 3, 2)),
+    "psigmf": CurveKind(_TWO_SIGMOIDS, fields(SigmoidProduct, 1, 0, 3, 2)),
+    "smf": CurveKind("start end", CurveWord(2, lambda n: _rising(*n))),
+    "zmf": CurveKind("start end", CurveWord(2, lambda n: _falling(*n))),
+    "pimf": CurveKind("a b c d", fields(PiCurve, 0, 1, 2, 3)),
+    "rampmf": CurveKind("start end", CurveWord(2, lambda n: _ramp(*n)), True),
+    "rectmf": CurveKind("start end", CurveWord(2, _rectangle), True),
+    "cosinemf": CurveKind("center width", fields(Cosine, 0, 1), True),
+    "spikemf": CurveKind("center width", fields(Spike, 0, 1), True),
+    "concavemf": CurveKind("inflection end", fields(Concave, 0, 1), True),
+    "binarymf": CurveKind("start direction", CurveWord(2, _binary), True),
 }
 """The curves with a fixed number of parameters, by their name in a file."""
 
 OTHER_KINDS: Final = ("discretemf", "constant", "linear", "function")
 PRIVATE: Final = frozenset(
-    {name for name, kind in KINDS.items() if kind.is_private}
+    {name for name, kind in FIS_KINDS.items() if kind.is_private}
     | {"discretemf", "function"}
 )
 """Kinds that MATLAB lacks; all of them are fuzzylite's."""
@@ -200,7 +198,7 @@ _MAY_BE_INFINITE: Final = frozenset({"trapmf", "binarymf"})
 
 
 def curve_of(kind: str, numbers: Sequence[float]) -> Curve | str:
-    """Return the curve that a kind of `KINDS` or `discretemf` makes of its numbers.
+    """Return the curve that a kind of `FIS_KINDS` or `discretemf` makes of its numbers.
 
     Returns:
         The curve, or a sentence on what is wrong with the numbers.
@@ -215,13 +213,13 @@ def curve_of(kind: str, numbers: Sequence[float]) -> Curve | str:
         return "the numbers must be finite"
     if kind == "discretemf":
         return _points(numbers)
-    words = KINDS[kind].numbers
-    needed = len(words.split())
+    words, word, _ = FIS_KINDS[kind]
+    needed = word.arity
     if len(numbers) != needed:
         return f"a {kind!r} has {needed} numbers ({words}), not {len(numbers)}"
     if any(number != number for number in numbers):
         return "the numbers must be finite"
-    curve = KINDS[kind].make(numbers)
+    curve = word.make(numbers)
     for text in curve_mistakes(curve):
         return text
     return curve

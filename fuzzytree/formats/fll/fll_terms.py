@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 import msgspec
 
+from fuzzytree.formats.curve_words import CurveWord, fields
 from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import FileMistake, PartError, Word, number_of
 from fuzzytree.model import (
@@ -110,13 +111,16 @@ def read_term(
             if not numbers:
                 raise _error(kind, "Discrete takes pairs of a value and a degree")
             curve = Points(stepped(numbers[::2]), tuple(numbers[1::2]))
-        case known if known in _CLASSES:
-            count, make = _CLASSES[known]
+        case known if known in FLL_CLASSES:
+            count = FLL_CLASSES[known].arity
             wanted = f"{count} numbers, or {count + 1} with the height"
             _check_count(kind, numbers, (count, count + 1), wanted)
             if len(numbers) > count:
                 height = numbers.pop()
-            curve = _made(kind, make, numbers)
+            try:
+                curve = FLL_CLASSES[known].make(numbers)
+            except ValueError as error:
+                raise _error(kind, str(error)) from error
             if place.is_inverse and known in ("SShape", "ZShape"):
                 # Where it has a degree has a formula, though it ends before it starts.
                 start, end = numbers if known == "SShape" else reversed(numbers)
@@ -161,15 +165,6 @@ def _numbers(words: Sequence[Word]) -> list[float]:
     if mistakes:
         raise PartError(*mistakes)
     return values
-
-
-def _made(
-    kind: Word, make: Callable[[Sequence[float]], Curve], numbers: Sequence[float]
-) -> Curve:
-    try:
-        return make(numbers)
-    except ValueError as error:
-        raise _error(kind, str(error)) from error
 
 
 def _function(
@@ -254,36 +249,29 @@ def _z_shape(numbers: Sequence[float]) -> Curve:
     return Points((start, start), (1.0, 0.0))
 
 
-def _sigmoids(numbers: Sequence[float]) -> tuple[Sigmoid, Sigmoid]:
-    left, rising, falling, right = numbers
-    return Sigmoid(left, rising), Sigmoid(right, falling)
-
-
-_CLASSES: Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]] = {
-    "Arc": (2, lambda n: Arc(*n)),
-    "Bell": (3, lambda n: Bell(n[0], abs(n[1]), n[2])),
-    "Binary": (2, _binary),
-    "Concave": (2, lambda n: Concave(*n)),
-    "Cosine": (2, lambda n: Cosine(*n)),
-    "Gaussian": (2, lambda n: Gaussian(n[0], abs(n[1]))),
-    "GaussianProduct": (
-        4,
-        lambda n: TwoGaussians(n[0], abs(n[1]), n[2], abs(n[3])),
-    ),
-    "PiShape": (4, lambda n: PiCurve(*n)),
-    "Ramp": (2, _ramp),
-    "Rectangle": (2, _rectangle),
-    "SemiEllipse": (2, lambda n: SemiEllipse(*sorted(n))),
-    "Sigmoid": (2, lambda n: Sigmoid(*n)),
-    "SigmoidDifference": (4, lambda n: SigmoidDifference(*_sigmoids(n))),
-    "SigmoidProduct": (4, lambda n: SigmoidProduct(*_sigmoids(n))),
-    "Spike": (2, lambda n: Spike(n[0], abs(n[1]))),
-    "SShape": (2, _s_shape),
-    "Trapezoid": (4, _trapezoid),
-    "Triangle": (3, lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
-    "ZShape": (2, _z_shape),
+FLL_CLASSES: Final[Mapping[str, CurveWord]] = {
+    "Arc": fields(Arc, 0, 1),
+    "Bell": fields(Bell, 0, 1, 2, by_size=True),
+    "Binary": CurveWord(2, _binary),
+    "Concave": fields(Concave, 0, 1),
+    "Cosine": fields(Cosine, 0, 1),
+    "Gaussian": fields(Gaussian, 0, 1, by_size=True),
+    "GaussianProduct": fields(TwoGaussians, 0, 1, 2, 3, by_size=True),
+    "PiShape": fields(PiCurve, 0, 1, 2, 3),
+    "Ramp": CurveWord(2, _ramp),
+    "Rectangle": CurveWord(2, _rectangle),
+    "SemiEllipse": CurveWord(2, lambda n: SemiEllipse(*sorted(n)), SemiEllipse, (0, 1)),
+    "Sigmoid": fields(Sigmoid, 0, 1),
+    "SigmoidDifference": fields(SigmoidDifference, 0, 1, 3, 2),
+    "SigmoidProduct": fields(SigmoidProduct, 0, 1, 3, 2),
+    "Spike": fields(Spike, 0, 1, by_size=True),
+    "SShape": CurveWord(2, _s_shape),
+    "Trapezoid": CurveWord(4, _trapezoid),
+    "Triangle": CurveWord(3, lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
+    "ZShape": CurveWord(2, _z_shape),
 }
-CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *_CLASSES)
+"""The classes with a fixed number of parameters."""
+CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *FLL_CLASSES)
 """The classes of terms, by their names in files."""
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import get_args
+
+from msgspec.structs import astuple
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.formulas import FormulaError, parse
@@ -30,39 +32,25 @@ from fuzzytree.formats.yaml.conditions import (
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode
 from fuzzytree.model import (
     Activation,
-    Arc,
     Band,
-    Bell,
     Binary,
-    Concave,
     Conclusion,
     Condition,
-    Cosine,
     Curve,
     Defuzzifier,
     Formula,
     FuzzySystem,
-    Gaussian,
-    Linear,
     Mistake,
-    Number,
     Part,
     Path,
-    PiCurve,
     RuleBlock,
-    SCurve,
-    SemiEllipse,
     Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
-    Singleton,
-    Spike,
+    SystemCurve,
     SystemInput,
     SystemOutput,
     SystemRule,
     SystemTerm,
     Trapezoid,
-    TwoGaussians,
 )
 
 
@@ -163,48 +151,41 @@ def _labels(
 
 
 def _curve(one: layout.LabelOfVariable) -> Curve:
-    """Return the one curve that is given."""
-    for field, build in _CURVES.items():
-        value = getattr(one, field)
-        if value is not None:
-            return build(value)
+    """Return the one curve that is given; the layout has checked its form."""
+    if one.trapezoid is not None:
+        return _trapezoid(*one.trapezoid)
+    if one.triangle is not None:
+        a, b, d = one.triangle
+        return Trapezoid(a, b, b, d)
+    if one.at_least is not None:
+        return Binary(one.at_least)
+    if one.at_most is not None:
+        return Binary(one.at_most, is_above=False)
+    for kind in get_args(SystemCurve):
+        field = str(kind.__struct_config__.tag).replace(" ", "_")
+        value = getattr(one, field, None)
+        if value is not None and kind is not Formula:
+            curve: Curve = kind(*_arguments(value))
+            return curve
     return values.shape(one)
 
 
-def _trapezoid(corners: Sequence[float]) -> Trapezoid:
-    a, b, c, d = corners
+def _arguments(value: object) -> tuple[object, ...]:
+    """Return the numbers of a curve, and the sigmoids that it consists of."""
+    match value:
+        case layout.FileRecord():
+            return astuple(value)
+        case tuple():
+            both = layout.SigmoidCurve
+            return tuple(
+                Sigmoid(*astuple(v)) if isinstance(v, both) else v for v in value
+            )
+        case _:
+            return (value,)
+
+
+def _trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
     return Trapezoid(None if a == -math.inf else a, b, c, None if d == math.inf else d)
-
-
-def _sigmoid(one: layout.SigmoidCurve) -> Sigmoid:
-    return Sigmoid(one.inflection, one.slope)
-
-
-_CURVES: Final[Mapping[str, Callable[[Any], Curve]]] = {
-    "trapezoid": _trapezoid,
-    "triangle": lambda one: Trapezoid(one[0], one[1], one[1], one[2]),
-    "gaussian": lambda one: Gaussian(one.mean, one.deviation),
-    "two_gaussians": lambda one: TwoGaussians(
-        one.left, one.left_deviation, one.right, one.right_deviation
-    ),
-    "bell": lambda one: Bell(one.center, one.width, one.slope),
-    "sigmoid": _sigmoid,
-    "sigmoid_difference": lambda one: SigmoidDifference(*map(_sigmoid, one)),
-    "sigmoid_product": lambda one: SigmoidProduct(*map(_sigmoid, one)),
-    "s": lambda one: SCurve(one.start, one.end),
-    "pi": lambda one: PiCurve(*one),
-    "cosine": lambda one: Cosine(one.center, one.width),
-    "concave": lambda one: Concave(one.inflection, one.end),
-    "spike": lambda one: Spike(one.center, one.width),
-    "arc": lambda one: Arc(one.start, one.end),
-    "semi_ellipse": lambda one: SemiEllipse(one.start, one.end),
-    "at_least": lambda one: Binary(one, is_above=True),
-    "at_most": lambda one: Binary(one, is_above=False),
-    "singleton": Singleton,
-    "linear": lambda one: Linear(one.weights, one.offset),
-    "formula": lambda one: Formula(Number(0.0)),  # until it is parsed
-}
-"""What each field of `LabelOfVariable` becomes; the layout has checked its form."""
 
 
 def _spare(outputs: Sequence[SystemOutput]) -> SystemRule | None:
