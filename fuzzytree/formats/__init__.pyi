@@ -1,3 +1,4 @@
+from .curve_words import in_words as in_words
 from .fcl.fcl_dialects import DEFUZZIFIERS as DEFUZZIFIERS
 from .fcl.fcl_dialects import JFUZZYLOGIC_PAIRS as JFUZZYLOGIC_PAIRS
 from .fcl.fcl_dialects import MARK as MARK
@@ -7,7 +8,6 @@ from .fcl.fcl_dialects import S_WORDS as S_WORDS
 from .fcl.fcl_dialects import T_WORDS as T_WORDS
 from .fcl.fcl_reader import FACTS as FACTS
 from .fcl.fcl_reader import read_fcl as read_fcl
-from .curve_words import in_words as in_words
 from .fcl.fcl_rules import ALWAYS as ALWAYS
 from .fcl.fcl_terms import FCL_SHAPES as FCL_SHAPES
 from .fcl.fcl_terms import is_plain as is_plain

@@ -21,7 +21,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.semantics.conversion import as_system
+from fuzzytree.semantics import as_system
 from fuzzytree.semantics.conversion.points import straightened
 from fuzzytree.semantics.samples import all_samples
 

@@ -28,7 +28,8 @@ from fuzzytree.model import (
     RuleBlock,
 )
 from fuzzytree.model.rulebase import Points, RuleBase
-from fuzzytree.semantics.conversion import as_system, flattened, winner
+from fuzzytree.semantics import as_system, flattened
+from fuzzytree.semantics.conversion.scores import winner
 from fuzzytree.semantics.inference import infer, input_values
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.random_systems import random_rows, random_system

@@ -53,7 +53,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.contracts import Written
 from fuzzytree.model.rulebase import Points, RuleBase
-from fuzzytree.semantics.conversion import as_system, flattened, pointed
+from fuzzytree.semantics import as_system, flattened, pointed
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import evaluate

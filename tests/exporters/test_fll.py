@@ -45,7 +45,7 @@ from fuzzytree.model import (
     Trapezoid,
 )
 from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
-from fuzzytree.semantics.conversion import FACTS, Scores, as_system, pointed
+from fuzzytree.semantics import FACTS, Scores, as_system, pointed
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_rows, random_tree

@@ -39,7 +39,7 @@ from fuzzytree.model import (
     TwoGaussians,
 )
 from fuzzytree.model.rulebase import Clause, Kind, Points, Rule
-from fuzzytree.semantics.conversion import pointed
+from fuzzytree.semantics import pointed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 

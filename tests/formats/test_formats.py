@@ -28,7 +28,7 @@ from fuzzytree.model.contracts import Document, Loss, Written
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.formats import SIGNS, Found, ability_rows
-from fuzzytree.semantics.conversion import as_system, flattened
+from fuzzytree.semantics import as_system, flattened
 from fuzzytree.semantics.inference import input_values
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.samples import all_samples

@@ -22,7 +22,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.model import FuzzySystem, SystemRule, questions
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.semantics.conversion import as_system
+from fuzzytree.semantics import as_system
 from fuzzytree.testing import random_tree
 from tests.interop.corpus import ALL
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.semantics.conversion import as_system, flattened
+from fuzzytree.semantics import as_system, flattened
 from fuzzytree.semantics.inference import input_values
 
 DECIMALS = 17

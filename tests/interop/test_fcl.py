@@ -19,7 +19,8 @@ from fuzzytree.exporters.fll import write as write_fll
 from fuzzytree.formats.fcl.fcl_reader import read_fcl
 from fuzzytree.model import And, Condition, Defuzzifier, FuzzySystem, Or
 from fuzzytree.model.rulebase import Kind, Points
-from fuzzytree.semantics.conversion import as_system, pointed, winner
+from fuzzytree.semantics import as_system, pointed
+from fuzzytree.semantics.conversion.scores import winner
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import evaluate

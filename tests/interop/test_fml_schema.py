@@ -20,7 +20,7 @@ from fuzzytree.exporters.fml import write
 from fuzzytree.formats.fml.fml_reader import read_fml
 from fuzzytree.formats.fml.fml_words import NAMESPACE
 from fuzzytree.model.rulebase import Kind
-from fuzzytree.semantics.conversion import pointed
+from fuzzytree.semantics import pointed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.exporters.test_fml import random_fml

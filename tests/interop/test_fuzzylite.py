@@ -24,7 +24,8 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.semantics.conversion import Scores, pointed, winner
+from fuzzytree.semantics import Scores, pointed
+from fuzzytree.semantics.conversion.scores import winner
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probes

@@ -17,7 +17,8 @@ from fuzzytree.formats.fis.fis_reader import read_fis
 from fuzzytree.learning import learn_arrays
 from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import Kind, RuleBase
-from fuzzytree.semantics.conversion import as_system, flattened, winner
+from fuzzytree.semantics import as_system, flattened
+from fuzzytree.semantics.conversion.scores import winner
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import evaluate

@@ -38,7 +38,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.semantics.conversion import (
+from fuzzytree.semantics import (
     Always,
     Scores,
     as_rules,
@@ -47,9 +47,9 @@ from fuzzytree.semantics.conversion import (
     cast_remarks,
     facts_of,
     flattened,
-    winner,
 )
 from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.semantics.conversion.scores import winner
 from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probes

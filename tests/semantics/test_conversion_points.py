@@ -41,7 +41,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.rulebase import Band, Flank, Points, Variable
 from fuzzytree.numerics.approximation import by_points
-from fuzzytree.semantics.conversion import pointed
+from fuzzytree.semantics import pointed
 from fuzzytree.semantics.conversion.points import points_for
 from fuzzytree.semantics.inference.degrees import curve_degree
 from fuzzytree.semantics.lowering import rules_from_tree

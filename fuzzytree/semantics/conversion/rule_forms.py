@@ -39,7 +39,7 @@ def joined_outputs(system: FuzzySystem) -> frozenset[str]:
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.semantics.conversion import as_system
+        >>> from fuzzytree.semantics import as_system
         >>> from fuzzytree.testing import random_tree
         >>> joined_outputs(as_system(rules_from_tree(random_tree(0))))
         frozenset()
@@ -64,7 +64,7 @@ def joined_by_number(system: FuzzySystem) -> FuzzySystem:
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.semantics.conversion import as_system
+        >>> from fuzzytree.semantics import as_system
         >>> from fuzzytree.testing import random_tree
         >>> system = as_system(rules_from_tree(random_tree(0)))
         >>> joined_by_number(system) == system

@@ -41,7 +41,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.semantics.conversion import as_system
+from fuzzytree.semantics import as_system
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
 

@@ -38,7 +38,7 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.rulebase import sentence
 from fuzzytree.numerics.exact import exact_answer
-from fuzzytree.semantics.conversion import as_system
+from fuzzytree.semantics import as_system
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
