@@ -144,7 +144,7 @@ def _bracket(case: Case, report: Report, answer: Answer, state: Bracket) -> None
             is_reached = lead(case, answer.rules[0], point) >= Fraction(state.low)
             require(is_reached, "the rule does not lead by so much there")
     if answer.code != "FT201" or state.low:
-        raise UndecidedError("a bracket is not made again here")
+        raise UndecidedError("a bracket is not computed again here")
     highest(case, answer)
 
 

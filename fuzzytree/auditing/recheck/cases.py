@@ -112,7 +112,7 @@ class Case:
         """The rules in cells.
 
         Raises:
-            UndecidedError: If these are too many, or a rule is not made of clauses.
+            UndecidedError: If these are too many, or a rule does not consist of clauses.
         """
         if isinstance(self._grid, UndecidedError):
             raise self._grid
@@ -257,7 +257,7 @@ class Case:
             return self.grid.wins(mine, rivals)
         if any(self.grid.is_below(mine, rival) for rival in rivals):
             return False
-        text = "under product only one rule that hides another is seen here"
+        text = "under product only one rule that hides another is recognised here"
         raise UndecidedError(text)
 
     def tie(self, one: int, other: int) -> bool:
@@ -266,7 +266,7 @@ class Case:
         return self.ties.tie(self.bits_of(one), self.bits_of(other), rivals)
 
     def never(self, is_so: bool, otherwise: str) -> None:
-        """Refuse what was found although it should never happen, if inputs are free."""
+        """Refuse what happens although it never should, if inputs are free."""
         if is_so and not self.is_free:
             text = "combinations share inputs, which needs more than cells"
             raise UndecidedError(text)

@@ -273,8 +273,8 @@ def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
     level = Fraction(case.audit.settings.level)
     met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
     is_high = any(fraction(claim.level or "0") >= level for claim in met)
-    is_found = is_high and answer.is_finding
-    require(is_found, "it is not claimed that both reach the level")
+    is_claimed = is_high and answer.is_finding
+    require(is_claimed, "it is not claimed that both reach the level")
     require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
     if case.rules.semantics.conjunction == "min":
         highest(case, answer)
@@ -455,8 +455,8 @@ def least_cover(case: Case, answer: Answer) -> None:
         is_less = grid.leaves(None, grid.of, grid.gap(entries[0], is_above=False))
         case.never(is_less, "somewhere every rule is weaker than reported")
     if entries[1] < 1 and case.is_free:
-        is_seen = grid.leaves(None, grid.of, grid.gap(entries[1], is_above=True))
-        require(is_seen, "everywhere some rule is stronger than reported")
+        is_low = grid.leaves(None, grid.of, grid.gap(entries[1], is_above=True))
+        require(is_low, "everywhere some rule is stronger than reported")
 
 
 def shows_win(case: Case, answer: Answer, state: Witness) -> None:
@@ -465,8 +465,8 @@ def shows_win(case: Case, answer: Answer, state: Witness) -> None:
     number = answer.rules[0]
     if case.view is not None:
         fired = [claim.rules for claim in state.claims if claim.kind == "beats"]
-        is_found = (number,) in fired and not answer.is_finding
-        require(is_found, "it is not claimed that the rule fires")
+        is_claimed = (number,) in fired and not answer.is_finding
+        require(is_claimed, "it is not claimed that the rule fires")
         return
     rivals = {*case.rivals(number)}
     if answer.code == "FT103":

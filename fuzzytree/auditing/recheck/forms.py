@@ -1,7 +1,7 @@
 """What an answer of each code can say, and in which state: the forms of sentences.
 
 A sentence is read only to hold it against the facts beside it. One of no form below is
-not taken for wrong, for words may change; it is told as not checked.
+not taken for wrong, for words may change; it is reported as not checked.
 """
 
 from __future__ import annotations
@@ -193,9 +193,9 @@ FT404 P -info | terms and variables | variables in use; terms in use
 FT501 P -info | the rule base | *
   [audited as ]{rules:n rule} with {clauses:n clause}[, index of Nauck
   {index of Nauck:s}]
-FT701 S {seen}info | <rows with a missing value|rows outside the domain>
+FT701 S {hit}info | <rows with a missing value|rows outside the domain>
   on {hits:d} of {rows:d} rows a value is <missing|outside the domain>
-FT701 S {seen}info | <uncovered|weak|tied|close> rows
+FT701 S {hit}info | <uncovered|weak|tied|close> rows
   on {hits:d} of {rows:d} rows {...}
 FT701 S -info | <uncovered|weak|tied|close> points
   on {hits:d} of {rows:d} points {...}
@@ -211,7 +211,7 @@ FT701 D -info | covered <rows|points>
 FTD D -info | {subject}
   {subject} is <left out|bounded {...}>: {reason}
 """
-"""A form: its code, the states it is told in by their first letters, the severity of a
+"""A form: its code, the first letters of its states, the severity of a
 finding (+) or of none (-); the subject; the measures. Then the sentence.
 
 `{_}` stands for any number and `{...}` for any words; all else in braces is a fact. A
@@ -319,7 +319,7 @@ def _facts(case: Case, answer: Answer) -> Facts:
     if isinstance(state, Sampled):
         result |= {"hits": state.hits, "rows": state.rows}
         won = result.get("rows won", result.get("rows fired"))
-        result |= {"seen": "+" if state.hits else "-", "idle": "-" if won else "+"}
+        result |= {"hit": "+" if state.hits else "-", "idle": "-" if won else "+"}
     return result
 
 

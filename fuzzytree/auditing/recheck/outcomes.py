@@ -48,7 +48,7 @@ OTHERS = {
 
 
 class Report:
-    """What a re-check found.
+    """The results of a re-check.
 
     Attributes:
         wrong: What does not hold, a sentence each.
