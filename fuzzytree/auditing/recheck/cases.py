@@ -112,7 +112,7 @@ class Case:
         """The rules in cells.
 
         Raises:
-            UndecidedError: If these are too many, or a rule does not consist of clauses.
+            UndecidedError: If there are too many, or a rule has no clauses.
         """
         if isinstance(self._grid, UndecidedError):
             raise self._grid
@@ -246,11 +246,7 @@ class Case:
         return [n for n in self.numbers if self.then(n) != self.then(number)]
 
     def beats(self, rule: int | RuleBits, numbers: Iterable[int]) -> bool:
-        """Return whether a rule is somewhere stronger than each of some others.
-
-        Raises:
-            UndecidedError: If that cannot be decided here.
-        """
+        """Return whether a rule is somewhere stronger than each of some others."""
         mine = self.bits_of(rule) if isinstance(rule, int) else rule
         rivals = [self.bits_of(number) for number in numbers]
         if self.rules.semantics.conjunction == "min":
@@ -414,11 +410,7 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
 
 
 def _certain(small: Between | Fraction, large: Between | Fraction) -> bool:
-    """Return whether one number is below another one, each between two ends.
-
-    Raises:
-        UndecidedError: If the ends leave it open.
-    """
+    """Return whether one number is below another one, each between two ends."""
     one = small if isinstance(small, tuple) else (small, small)
     other = large if isinstance(large, tuple) else (large, large)
     if one[1] < other[0]:

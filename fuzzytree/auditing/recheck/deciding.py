@@ -183,11 +183,7 @@ def apart(case: Case, answer: Answer) -> None:
 
 
 def highest(case: Case, answer: Answer) -> None:
-    """Check that two rules reach no higher level together than the reported one.
-
-    Raises:
-        UndecidedError: If that cannot be decided here.
-    """
+    """Check that two rules reach no higher level together than the reported one."""
     if case.rules.semantics.conjunction != "min":
         raise UndecidedError("conflicts under product are not decided again here")
     tops = [one for one in answer.measures if one.name in LEVELS]

@@ -18,6 +18,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
+from operator import or_
 from typing import NamedTuple
 
 from fuzzytree.auditing.recheck.model_records import Clause, Rules, Shape
@@ -235,6 +237,9 @@ RuleBits = tuple[int, ...]
 """The functions of a rule on each axis, as bits; and how many are repeated."""
 
 
+Pattern = tuple[int, int]
+"""The functions that are above a level, or at it where none stays; those that stay."""
+
 Span = list[tuple[int, int, int, int]]
 """Of a cell the rank of each function, the highest first; its bands; its bit."""
 
@@ -281,7 +286,7 @@ class Grid:
             axis.spans.extend(map(self._spans, axis.cells))
         pairs = zip(rules.rules, weights, strict=True)
         self.of = [self.bits_of(rule.when, weight) for rule, weight in pairs]
-        self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
+        self.patterns: dict[tuple[int, bool], list[set[Pattern]]] = {}
 
     def _weighted(
         self, when: Iterable[Clause], weight: Fraction
@@ -310,7 +315,7 @@ class Grid:
             result.append((rank, min(one, other), max(one, other), 1 << number))
         return sorted(result, key=lambda span: -span[0])
 
-    def sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
+    def sets(self, band: int, *, is_gap: bool) -> list[set[Pattern]]:
         """Return per axis which sets of functions can be at a level or above.
 
         The level is any between a band and the next one, or any within the band.
@@ -318,7 +323,11 @@ class Grid:
         key = (band, is_gap)
         if key not in self.patterns:
             self.patterns[key] = [
-                {one for cell in axis.spans for one in _of_cell(cell, band, is_gap)}
+                {
+                    (reached, 0)
+                    for cell in axis.spans
+                    for reached in _of_cell(cell, band, is_gap)
+                }
                 for axis in self.axes
             ]
         return self.patterns[key]
@@ -405,14 +414,7 @@ class Grid:
         is_gap: bool = True,
     ) -> bool:
         """Return whether at a level a rule can be there and each rival below."""
-        axes: list[set[int]] = []
-        for place, sets in enumerate(self.sets(band, is_gap=is_gap)):
-            own = mine[place] if mine else 0
-            met = [reached for reached in sets if reached & own == own]
-            axes.append(
-                {bits(of[place] & ~reached for of in rivals) for reached in met}
-            )
-        return reach(axes, len(rivals))
+        return _are_at([mine] if mine else [], rivals, self.sets(band, is_gap=is_gap))
 
 
 def _of_cell(cell: Span, band: int, is_gap: bool) -> list[int]:
@@ -469,7 +471,7 @@ class Ties:
         self.grid, self.left = grid, MOST_STEPS
         self.wide = [axis.spans[:-1] or axis.spans for axis in grid.axes]
         self.lowest = grid.levels.band[grid.marks[ZERO]]
-        self.levels: dict[int, list[set[tuple[int, int]]]] = {}
+        self.levels: dict[int, list[set[Pattern]]] = {}
 
     def tie(self, one: RuleBits, other: RuleBits, rivals: Sequence[RuleBits]) -> bool:
         """Return whether both are equal on an open set, and no rival is stronger.
@@ -497,10 +499,9 @@ class Ties:
                     self._step(1 + len(rivals))
                     if (own[0] | own[1]) & ~(above | equal):
                         continue
-                    every = self.grid.sets(band, is_gap=True)
-                    axes = [{(reached, 0) for reached in sets} for sets in every]
+                    axes = [*self.grid.sets(band, is_gap=True)]
                     axes[place] = {(above, equal)}
-                    if _is_tie((one, other), rivals, axes):
+                    if _are_at((one, other), rivals, axes, is_tie=True):
                         return True
         return False
 
@@ -512,7 +513,7 @@ class Ties:
         for band in sorted(flat - {self.lowest}):
             self._step(len(self.wide) * (1 + len(rivals)))
             low, high = self.grid.levels.bands[band]
-            if _is_tie((one, other), rivals, self._at(band)):
+            if _are_at((one, other), rivals, self._at(band), is_tie=True):
                 if low < high:
                     raise UndecidedError(TOO_NEAR)
                 return True
@@ -528,7 +529,7 @@ class Ties:
             if least == most and bits_of_rule[place] & bit
         }
 
-    def _at(self, band: int) -> list[set[tuple[int, int]]]:
+    def _at(self, band: int) -> list[set[Pattern]]:
         """Return per axis what is above a level in parts of cells, and what at it."""
         if band not in self.levels:
             self.levels[band] = [
@@ -538,26 +539,28 @@ class Ties:
         return self.levels[band]
 
 
-def _is_tie(
-    both: tuple[RuleBits, RuleBits],
+def _are_at(
+    rules: Sequence[RuleBits],
     rivals: Sequence[RuleBits],
-    axes: Sequence[set[tuple[int, int]]],
+    axes: Sequence[set[Pattern]],
+    *,
+    is_tie: bool = False,
 ) -> bool:
-    """Return whether two rules are at a level and no rival is above it.
+    """Return whether rules can be at a level, in a tie exactly, and no rival above it.
 
     `axes`: of each axis, which functions can be above the level, and which at it.
     """
     sets: list[set[int]] = []
+    ties = rules if is_tie else ()
     for k, patterns in enumerate(axes):
-        own = both[0][k], both[1][k]
-        sets.append(
-            {
-                bits((*(r[k] & ~above for r in rivals), own[0] & equal, own[1] & equal))
-                for above, equal in patterns
-                if not (own[0] | own[1]) & ~(above | equal)
-            }
-        )
-    return reach(sets, len(rivals) + 2)
+        own = reduce(or_, (rule[k] for rule in rules), 0)
+        met = [one for one in patterns if not own & ~(one[0] | one[1])]
+        flags = [
+            [*(r[k] & ~above for r in rivals), *(r[k] & equal for r in ties)]
+            for above, equal in met
+        ]
+        sets.append({*map(bits, flags)})
+    return reach(sets, len(rivals) + len(ties))
 
 
 def _shared(cell: Span, one: int, other: int) -> Iterator[tuple[int, int, int]]:
@@ -579,7 +582,7 @@ def _shared(cell: Span, one: int, other: int) -> Iterator[tuple[int, int, int]]:
             yield band, above & ~equal, equal
 
 
-def _patterns(cell: Span, band: int) -> Iterator[tuple[int, int]]:
+def _patterns(cell: Span, band: int) -> Iterator[Pattern]:
     """Yield which functions are above a level in parts of a cell, and which at it."""
     above = equal = 0
     for _, least, most, bit in cell:

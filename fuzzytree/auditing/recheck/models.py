@@ -420,10 +420,6 @@ def readings(text: str, known: Known) -> Iterator[records.Clause]:
 
 def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
     """Yield every list of terms, joined by ` or `, that a text can mean."""
-    words = text.split(" or ")
-    if len(words) > 1 and not any(" or " in f" {name} " for name in known):
-        yield from [tuple(words)] if set(words) <= set(known) else []
-        return
     todo: list[tuple[int, tuple[str, ...]]] = [(0, ())]
     while todo:
         start, terms = todo.pop()

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from fuzzytree.auditing.recheck.model_records import (
     LR,
@@ -78,9 +78,12 @@ def divided(poly: Poly, divisor: Poly) -> tuple[Poly, Poly]:
     return tuple(out), trimmed(rest)
 
 
-def shifted(poly: Poly, x: Fraction) -> list[Fraction]:
+Number = TypeVar("Number", int, Fraction)
+
+
+def shifted(poly: Sequence[Number], x: Number) -> list[Number]:
     """Return a polynomial of the distance from x."""
-    result = [*poly]
+    result: list[Number] = list(poly)
     for start in range(len(poly)):
         for place in range(len(poly) - 2, start - 1, -1):
             result[place] += x * result[place + 1]
@@ -160,25 +163,31 @@ def roots(poly: Poly, low: Fraction, high: Fraction) -> list[Root]:
         x = -poly[0] / poly[1]
         return [Root(poly, x, x)] if low < x < high else []
     result: list[Root] = []
-    todo, least = [(low, high)] if len(poly) > 2 else [], (high - low) / 2**16
+    middle, half = (low + high) / 2, (high - low) / 2
+    near = [c * half**place for place, c in enumerate(shifted(poly, middle))]
+    bottom = math.lcm(*(c.denominator for c in near))
+    # Of each part, the polynomial in u from -1 to 1, times a number.
+    todo = [(low, high, [int(c * bottom) for c in near])] if len(poly) > 2 else []
+    least = half / 2**16
     while todo:
-        a, b = todo.pop()
-        middle, half = (a + b) / 2, (b - a) / 2
-        if half < least:
-            shared, least = common(poly, derivative(poly)), ZERO
-            if len(shared) > 1:  # several times the same root: once is enough
-                return roots(divided(poly, shared)[0], low, high)
-        around = shifted(poly, middle)
-        most = [abs(c) * half**place for place, c in enumerate(around)]
+        a, b, whole = todo.pop()
+        most = [*map(abs, whole)]
         if 2 * most[0] > sum(most):  # it keeps its sign
             continue
         if 2 * most[1] > sum(place * one for place, one in enumerate(most)):
-            if at(poly, a) * at(poly, b) < 0:  # it rises, or falls
+            # it rises, or falls
+            if sum(whole) * (sum(whole[::2]) - sum(whole[1::2])) < 0:
                 result.append(Root(poly, a, b))
             continue
-        if around[0] == 0:
+        if b - a < least:
+            shared, least = common(poly, derivative(poly)), ZERO
+            if len(shared) > 1:  # several times the same root: once is enough
+                return roots(divided(poly, shared)[0], low, high)
+        middle = (a + b) / 2
+        if whole[0] == 0:
             result.append(Root(poly, middle, middle))
-        todo += [(a, middle), (middle, b)]
+        twice = [c << (len(whole) - place) for place, c in enumerate(whole, 1)]
+        todo += [(a, middle, shifted(twice, -1)), (middle, b, shifted(twice, 1))]
     return result
 
 

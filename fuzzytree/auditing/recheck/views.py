@@ -111,11 +111,7 @@ class View:
         return (subject, Label(variable, term)) in self.left_out
 
     def _ways_of(self, owner: Owner) -> list[Way]:
-        """Return the ways of a rule; none if it is left out, or never fires.
-
-        Raises:
-            DoesNotHoldError: If it is left out, and need not be.
-        """
+        """Return the ways of a rule; none if it is left out, or never fires."""
         is_left_out = (owner.name,) in self.left_out
         try:
             ways = [] if not owner.weight else self._ways(owner.when, owner.block)
@@ -140,11 +136,7 @@ class View:
     def _ways(
         self, condition: Condition | None, block: Block, *, negated: bool = False
     ) -> list[Way]:
-        """Return the ways in which a condition holds, or does not; none if never.
-
-        Raises:
-            UndecidedError: If it has no exact ones.
-        """
+        """Return the ways in which a condition holds, or does not; none if never."""
         match condition:
             case None:
                 return [()]
