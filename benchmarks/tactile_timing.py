@@ -219,7 +219,8 @@ def _steps(
         sizes[C] = len(content)
 
         def loop(frames: Cells) -> None:
-            ends = [array.ctypes.data for array in np.empty((3, len(frames)), np.int64)]
+            found = np.empty((3, len(frames)), np.int64)  # lives until the loop ended
+            ends = [line.ctypes.data for line in found]
             many(frames.ctypes.data, len(frames), None, *ends)
 
         found[C] = loop
