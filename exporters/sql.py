@@ -19,7 +19,6 @@ from fuzzytree.exporters.program_text import title_of
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     Flank,
     Format,
     FuzzyTree,
@@ -176,9 +175,30 @@ def _axes(query: Query, model: Model) -> Iterator[str]:
 
 def _tree_steps(query: Query, tree: FuzzyTree) -> Iterator[str]:
     line = {v.name: f"x_{number}" for number, v in enumerate(tree.variables, 1)}
+
+    def halves(node: Node, low: int, high: int, level: int) -> str:
+        """Return the leaf for a stretch of a node's intervals, by bisection."""
+        pad = "  " * (level % 20)
+        owners = {node.owners[k] for k in range(low, high + 1)}
+        if len(owners) == 1:
+            branch = node.branches[owners.pop()]
+            if branch.leaf is not None:
+                return f"{pad}{branch.leaf}"
+            node = tree.nodes[(branch.node or 0) - 1]
+            return halves(node, 0, len(node.cuts), level)
+        middle = (low + high) // 2
+        test = f"{line[node.variable]} <= {query.number(node.cuts[middle])}"
+        below = halves(node, low, middle, level + 1)
+        above = halves(node, middle + 1, high, level + 1)
+        return (
+            f"{pad}CASE WHEN {test} THEN -- {node.variable!r}\n{below}\n"
+            f"{pad}ELSE\n{above}\n{pad}END"
+        )
+
     yield query.step("answers", is_heavy=True)
     yield "  SELECT known.*,\n  CASE WHEN is_known = 0 THEN 0 ELSE"
-    yield _case(query, tree, line, 1, 1) if tree.nodes else "  1"
+    root = tree.nodes[0] if tree.nodes else None
+    yield "  1" if root is None else halves(root, 0, len(root.cuts), 1)
     yield "  END AS leaf\n  FROM known\n)"
     ends = [
         f"WHEN {number} THEN {query.text(leaf.label)}"
@@ -188,45 +208,6 @@ def _tree_steps(query: Query, tree: FuzzyTree) -> Iterator[str]:
         ["CASE leaf", f"WHEN 0 THEN {query.text(tree.semantics.missing)}", *ends, "END"]
     )
     yield from _last(query, label, "leaf", "CASE WHEN is_known = 1 THEN 0 ELSE 3 END")
-
-
-def _case(
-    query: Query, tree: FuzzyTree, line: dict[str, str], number: int, level: int
-) -> str:
-    node = tree.nodes[number - 1]
-    return _halves(query, tree, line, node, (0, len(node.cuts)), level)
-
-
-def _halves(
-    query: Query,
-    tree: FuzzyTree,
-    line: dict[str, str],
-    node: Node,
-    span: tuple[int, int],
-    level: int,
-) -> str:
-    """Return the leaf for a stretch of a node's intervals, by bisection."""
-    low, high = span
-    pad = "  " * (level % 20)
-    owners = {node.owners[k] for k in range(low, high + 1)}
-    if len(owners) == 1:
-        branch = node.branches[owners.pop()]
-        if branch.leaf is not None:
-            return f"{pad}{branch.leaf}"
-        return _case(query, tree, line, branch.node or 0, level)
-    middle = (low + high) // 2
-    cut = query.number(node.cuts[middle])
-    below = _halves(query, tree, line, node, (low, middle), level + 1)
-    above = _halves(query, tree, line, node, (middle + 1, high), level + 1)
-    comment = _comment(node.variable)
-    return (
-        f"{pad}CASE WHEN {line[node.variable]} <= {cut} THEN{comment}\n{below}\n"
-        f"{pad}ELSE\n{above}\n{pad}END"
-    )
-
-
-def _comment(text: str) -> str:
-    return f" -- {text!r}"
 
 
 def _last(query: Query, label: str, rule: str, status: str) -> Iterator[str]:
@@ -259,14 +240,19 @@ def _rule_steps(
     yield query.step("terms", is_heavy=True)
     yield _commented(["parts.*", *texts]) + "\n  FROM parts\n),"
     yield query.step("clauses", is_heavy=True)
-    result = [f"{_clause(query, c, degrees)} AS {place[c]}" for c in clauses]
+    result: list[str] = []
+    for clause in clauses:
+        highest = query.greatest(*(degrees[clause.variable, t] for t in clause.terms))
+        whole = f"1e0 - {highest}" if clause.negated else highest
+        result.append(f"{whole} AS {place[clause]}")
     yield f"  SELECT\n{_listed(['terms.*', *result])}\n  FROM terms\n),"
     yield query.step("fired", is_heavy=True)
-    fired = [
-        f"{_strength(query, rules, [place[c] for c in rule.when])} AS s_{number}"
-        f" -- {sentence(rule)!r}"
-        for number, rule in enumerate(rules.rules, 1)
-    ]
+    fired: list[str] = []
+    for number, rule in enumerate(rules.rules, 1):
+        parts = [place[clause] for clause in rule.when] or ["1e0"]
+        is_product = rules.semantics.conjunction == "product"
+        strength = " * ".join(parts) if is_product else query.least(*parts)
+        fired.append(f"{strength} AS s_{number} -- {sentence(rule)!r}")
     yield _commented(["clauses.*", *fired]) + "\n  FROM clauses\n),"
     yield from _decision(query, rules, with_strengths=with_strengths)
 
@@ -279,19 +265,6 @@ def _commented(lines: Sequence[str]) -> str:
         comma = "," if number < len(lines) else ""
         shown.append(f"  {code}{comma}{mark}{comment}")
     return "  SELECT\n" + "\n".join(shown)
-
-
-def _clause(query: Query, clause: Clause, degrees: dict[tuple[str, str], str]) -> str:
-    highest = query.greatest(*(degrees[clause.variable, t] for t in clause.terms))
-    return f"1e0 - {highest}" if clause.negated else highest
-
-
-def _strength(query: Query, rules: RuleBase, degrees: list[str]) -> str:
-    if not degrees:
-        return "1e0"
-    if rules.semantics.conjunction == "product":
-        return " * ".join(degrees)
-    return query.least(*degrees)
 
 
 def _decision(query: Query, rules: RuleBase, *, with_strengths: bool) -> Iterator[str]:
