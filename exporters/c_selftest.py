@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CTreeTest, Tables
-from fuzzytree.exporters.c_text import CNumbers, fill
+from fuzzytree.exporters.c_text import CNumbers, bits_of, fill
 from fuzzytree.exporters.program_text import answer_of, digest_of
 from fuzzytree.model import FuzzyTree, Model, Variable
 from fuzzytree.semantics import Answer, Row, Status, few_probes
@@ -50,13 +50,15 @@ def examples_of(
 ) -> list[Example]:
     """Return rows and predictions: of the reference, or in float of the tables."""
     result: list[Example] = []
-    rows = rows_of(model, len(tables.label) if tables else 1)
-    for row in rows:
+    rules = len(tables.label) if tables else 1
+    limit = max(_FEWEST_ROWS, min(_MOST_ROWS, _STRENGTHS // rules))
+    for row in few_probes(model, limit):
         if numbers.kind is np.float64:
             row_values = row
             prediction = answer_of(model, row_values)
         else:
-            row_values = {name: _as_float(value) for name, value in row.items()}
+            with np.errstate(over="ignore"):
+                row_values = {k: float(np.float32(value)) for k, value in row.items()}
             prediction = _computed(model, tests, tables, line, numbers, row_values)
         label = number_of(prediction.label, model)
         digest = digest_of(words_of(prediction.strengths, numbers))
@@ -65,11 +67,6 @@ def examples_of(
             Example(values, label, prediction.rule, int(prediction.status), digest)
         )
     return result
-
-
-@np.errstate(over="ignore")
-def _as_float(value: float) -> float:
-    return float(np.float32(value))
 
 
 def number_of(label: str | None, model: Model) -> int:
@@ -105,12 +102,6 @@ def _computed(
     winner = fired.index(best)
     status = Status.TIE if fired.count(best) > 1 else Status.DECIDED
     return Answer(winner + 1, model.rules[winner].then, status, fired)
-
-
-def rows_of(model: Model, rules: int) -> list[Row]:
-    """Return rows for a self-test; the more rules, the fewer rows."""
-    limit = max(_FEWEST_ROWS, min(_MOST_ROWS, _STRENGTHS // max(rules, 1)))
-    return few_probes(model, limit)
 
 
 def words_of(strengths: Sequence[float], numbers: CNumbers) -> list[int]:
@@ -204,7 +195,7 @@ def selftest_code(
         digest = f", UINT32_C({one.digest:#010x})" if has_strengths else ""
         shown = ", ".join(map(numbers.shown, one.row)) or "no inputs"
         yield f"    /* {shown} */\n"
-        yield f"    {{{{{_bits(one.row, numbers)}}}, "
+        yield f"    {{{bits_of(one.row, numbers)}, "
         yield f"{one.label}, {one.rule}, {one.status}{digest}}},\n"
     yield "};\n"
     yield fill(_LOAD.replace("UINT", kind), prefix)
@@ -218,14 +209,6 @@ def selftest_code(
     main = _MAIN.replace("RULES_CHECK\n", check)
     yield fill(main.replace("STRENGTHS", ", or strengths" if check else ""), prefix)
     yield "#endif\n"
-
-
-def _bits(row: Sequence[float], numbers: CNumbers) -> str:
-    """Return the bits of some numbers as constants."""
-    size = np.dtype(numbers.kind).itemsize
-    array = np.array(row, numbers.kind).view(f"u{size}")
-    words = [f"UINT{8 * size}_C({bits:#0{2 * size + 2}x})" for bits in array.tolist()]
-    return ", ".join(words) or "0"
 
 
 Real = np.float64 | np.float32

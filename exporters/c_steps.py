@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.exporters.c_text import DOUBLE, fill, real_lines
+from fuzzytree.exporters.c_text import DOUBLE, bits_of, fill, real_lines
 from fuzzytree.exporters.program_text import StepText, SystemExample, system_examples
 from fuzzytree.model import FuzzySystem
 from fuzzytree.semantics import Program, Step, from_system, system_probes
@@ -448,7 +448,7 @@ def system_selftest(
     for operands, result, bound, status in examples:
         shown = ", ".join(map(repr, operands)) or "no inputs"
         yield f"    /* {shown}: {', '.join(map(repr, result))} */\n"
-        parts = ", ".join(map(_bits, (operands, result, bound)))
+        parts = ", ".join(map(bits_of, (operands, result, bound)))
         yield f"    {{{parts}, {status}}},\n"
     yield "};\n"
     yield fill(_MAIN, prefix)
@@ -473,12 +473,3 @@ def _examples(system: FuzzySystem, *, activations: bool) -> list[SystemExample]:
     every.sort(key=lambda one: max(one[2]))
     step = max(len(every) // (2 * _ROWS), 1)
     return every[: _ROWS * step : step]
-
-
-def _bits(values: Sequence[float]) -> str:
-    words: list[str] = []
-    for value in values:
-        plain = math.nan if math.isnan(value) else value
-        (bits,) = struct.unpack("<Q", struct.pack("<d", plain))
-        words.append(f"UINT64_C({bits:#018x})")
-    return f"{{{', '.join(words) or '0'}}}"

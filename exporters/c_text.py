@@ -96,6 +96,16 @@ def remark(text: str) -> str:
     return one_line(text, ("*/", "/*", "??"))
 
 
+def bits_of(values: Sequence[float], numbers: CNumbers = DOUBLE) -> str:
+    """Return the bits of some numbers as constants; all NaN are one."""
+    size = np.dtype(numbers.kind).itemsize
+    array = np.array(values, numbers.kind)
+    array[np.isnan(array)] = np.nan
+    bits = array.view(f"u{size}").tolist()
+    words = [f"UINT{8 * size}_C({one:#0{2 * size + 2}x})" for one in bits]
+    return f"{{{', '.join(words) or '0'}}}"
+
+
 def integer_type(largest: int) -> str:
     """Return the smallest type of whole numbers from 0 on.
 

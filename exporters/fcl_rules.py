@@ -164,14 +164,8 @@ def rule_losses(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
         return
     outputs = {one.name for one in system.outputs}
     for number, rule in enumerate(rules, 1):
-        unknown = sorted(
-            {
-                hedge
-                for one in questions(rule.when)
-                for hedge in one.hedges
-                if hedge != "not"
-            }
-        )
+        hedges = {hedge for one in questions(rule.when) for hedge in one.hedges}
+        unknown = sorted(hedges - {"not"})
         then = sorted({hedge for one in rule.then for hedge in one.hedges})
         if unknown or then:
             names = ", ".join(map(repr, [*unknown, *then]))
@@ -227,9 +221,8 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
             )
         if output.clips and words.name != "fuzzylite":
             yield Loss(where, "its value is not clamped to its range")
-        if not _says_nothing(output, words) and not _is_always_concluded(
-            output, system
-        ):
+        has_default = output.default is not None or words.name == "fuzzylite"
+        if not has_default and not _is_always_concluded(output, system):
             yield Loss(where, "NaN where no rule fires: engines keep the value before")
         if words.name == "fuzzylite":
             yield from fuzzylite_losses(output)
@@ -248,11 +241,6 @@ def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
         if pairs[norm] != block.disjunction:
             what = f"AND {norm!r} brings OR {pairs[norm]!r} with it, and not "
             yield Loss(f"rule block {k}", what + repr(block.disjunction))
-
-
-def _says_nothing(output: SystemOutput, words: FclWords) -> bool:
-    """Return whether a file states the value of an output where no rule fires."""
-    return output.default is not None or words.name == "fuzzylite"
 
 
 def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:

@@ -177,7 +177,7 @@ def _lines(system: FuzzySystem, terms: FisTerms) -> list[FisRule]:
             )
             continue
         for label in output.labels:
-            if _term(output, label, terms.dialect) is None:
+            if not _terms(output, [label], terms.dialect):
                 reasons.append(
                     f"term {label.name!r} of {output.name!r}: {terms.dialect} has no "
                     "such conclusion"
@@ -233,8 +233,7 @@ def _default_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             what = f"FIS has no default, {output.default!r}, where no rule fires"
             yield Loss(where, what)
         elif dialect == "matlab" and output.name not in always:
-            result = [_term(output, label, dialect) for label in output.labels]
-            number = middle(*_range(output, result))
+            number = middle(*_range(output, _terms(output, output.labels, dialect)))
             if number != output.default:
                 default = output.default
                 other = "no number" if default is None else repr(default)
@@ -296,11 +295,17 @@ def _private_losses(terms: FisTerms, dialect: Dialect) -> Iterator[Loss]:
                 )
 
 
-def _term(
-    output: SystemOutput, label: SystemTerm, dialect: Dialect
-) -> tuple[str, str] | None:
-    find = number_of if output.defuzzifier.is_weighted else term_of
-    return find(label.curve, dialect)
+def _terms(
+    one: SystemInput | SystemOutput, labels: Sequence[SystemTerm], dialect: Dialect
+) -> list[tuple[str, str]]:
+    """Return the terms of a variable; those that a dialect has none for are left out.
+
+    `_lines` and `with_known_curves` refuse or replace them before a file is written.
+    """
+    is_weighted = isinstance(one, SystemOutput) and one.defuzzifier.is_weighted
+    find = number_of if is_weighted else term_of
+    results = (find(label.curve, dialect) for label in labels)
+    return [result for result in results if result is not None]
 
 
 def _text(
@@ -324,13 +329,11 @@ def _text(
     }
     blocks = [[f"# {comment}" for comment in comments], _section("System", head)]
     for number, one in enumerate(system.inputs, 1):
-        result = [term_of(label.curve, dialect) for label in terms.labels[one.name]]
-        blocks.append(
-            _variable(f"Input{number}", one, (terms.labels[one.name], result), names)
-        )
+        labels = terms.labels[one.name]
+        blocks.append(_variable(f"Input{number}", one, labels, names, dialect))
     for number, output in enumerate(system.outputs, 1):
-        result = [_term(output, label, dialect) for label in output.labels]
-        block = _variable(f"Output{number}", output, (output.labels, result), names)
+        labels = output.labels
+        block = _variable(f"Output{number}", output, labels, names, dialect)
         if dialect == "fuzzylite" and output.default is not None:
             block.insert(3, f"Default={output.default!r}")
         blocks.append(block)
@@ -352,18 +355,18 @@ def _section(title: str, entries: Mapping[str, str]) -> list[str]:
 def _variable(
     title: str,
     one: SystemInput | SystemOutput,
-    about: tuple[Sequence[SystemTerm], Sequence[tuple[str, str] | None]],
+    labels: Sequence[SystemTerm],
     names: FileNames,
+    dialect: Dialect,
 ) -> list[str]:
-    labels, result = about
-    low, high = _range(one, result)
+    terms = _terms(one, labels, dialect)
+    low, high = _range(one, terms)
     entries = {
         "Name": f"'{names.variables[one.name]}'",
         "Range": f"[{low!r} {high!r}]",
         "NumMFs": str(len(labels)),
     }
-    for number, (label, term) in enumerate(zip(labels, result, strict=True), 1):
-        assert term is not None  # `_lines` and `with_known_curves` have seen to it
+    for number, (label, term) in enumerate(zip(labels, terms, strict=True), 1):
         name = names.labels[one.name][label.name]
         entries[f"MF{number}"] = f"'{name}':'{term[0]}',[{term[1]}]"
     lines = _section(title, entries)
@@ -373,18 +376,17 @@ def _variable(
 
 
 def _range(
-    one: SystemInput | SystemOutput, terms: Iterable[tuple[str, str] | None]
+    one: SystemInput | SystemOutput, terms: Iterable[tuple[str, str]]
 ) -> tuple[float, float]:
     """Return a range; an end that is unknown is `FAR` away for an input.
 
     Of an output it is guessed from the numbers of its terms.
     """
     numbers: list[float] = []
-    for kind, text in (term for term in terms if term is not None):
-        if kind == "function" or kind == "linear":
-            continue
-        result = [*map(float, text.split())]
-        numbers += result[::2] if kind == "discretemf" else result
+    for kind, text in terms:
+        if kind not in ("function", "linear"):
+            result = [*map(float, text.split())]
+            numbers += result[::2] if kind == "discretemf" else result
     near = [number for number in numbers if abs(number) < 1e290]
     if isinstance(one, SystemInput):
         near = [-FIS_FAR, FIS_FAR]

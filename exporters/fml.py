@@ -207,12 +207,10 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
         if block.activation != Activation():
             what = f"all rules are activated, not by {block.activation.method}"
             yield Loss(f"block {number} of rules", what)
-        norms = (block.disjunction,)
-        for norm in norms:
-            if norm is not None and norm not in FML_SNORMS.values():
-                yield Loss(
-                    f"block {number} of rules", f"FML has no {norm}; MAX stands for it"
-                )
+        norm = block.disjunction
+        if norm is not None and norm not in FML_SNORMS.values():
+            what = f"FML has no {norm}; MAX stands for it"
+            yield Loss(f"block {number} of rules", what)
 
 
 def _root(system: FuzzySystem, rules: FmlRules, names: _Ids) -> XmlElement:

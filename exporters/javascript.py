@@ -48,7 +48,6 @@ from fuzzytree.model import (
     FuzzyTree,
     Model,
     RuleBase,
-    Variable,
     Written,
     fingerprint,
     sentence,
@@ -117,13 +116,17 @@ def _body(model: Document) -> Iterator[str]:
         yield from system_parts(model, ROWS)
         return
     inputs = [variable for variable in model.variables if not variable.parts]
-    mixed = [variable for variable in model.variables if variable.parts]
     places = places_of(model.variables)
+    mixes = (
+        f"{literal(combination_row(v, places))}, // {text_of(v.name)}"
+        for v in model.variables
+        if v.parts
+    )
     yield from table("INPUTS", map(named, inputs))
     yield from table("CLASSES", (f"{text_of(label)}," for label in model.classes))
     yield f"const WHEN_MISSING = {literal(model.semantics.missing)};\n"
     yield "\n/* Place of an input, weight and centre of each part. */"
-    yield from table("COMBINATIONS", (_combination(v, places) for v in mixed))
+    yield from table("COMBINATIONS", mixes)
     if isinstance(model, RuleBase):
         yield from _rule_tables(model, places)
     else:
@@ -138,11 +141,6 @@ def _body(model: Document) -> Iterator[str]:
     yield f"\n/* Inputs, and the {what} that they lead to. */"
     yield from table("EXAMPLES", _examples(model))
     yield TEST
-
-
-def _combination(variable: Variable, places: dict[str, int]) -> str:
-    row = combination_row(variable, places)
-    return f"{literal(row)}, // {text_of(variable.name)}"
 
 
 def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:

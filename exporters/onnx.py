@@ -121,7 +121,9 @@ def write_onnx(
         >>> written.losses
         ()
     """
-    outputs = _usual_outputs(model) if outputs is None else outputs
+    if outputs is None:
+        is_system = isinstance(model, FuzzySystem)
+        outputs = ("outputs", "status") if is_system else ("label", "rule")
     _check_options(model, dtype, opset, ir, signature, outputs)
     _check_variants(model, opset, ir, readable=readable, plain=plain)
     require("onnx", "writing onnx needs")
@@ -152,12 +154,6 @@ def write_onnx(
                 is_exact=dtype == "float64" or (dtype == "mixed" and _is_tree(model)),
             )
     return Written(content, lost)
-
-
-def _usual_outputs(model: Model | FuzzySystem) -> Sequence[Output]:
-    if isinstance(model, FuzzySystem):
-        return ("outputs", "status")
-    return ("label", "rule")
 
 
 def _is_tree(model: Model | FuzzySystem) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -13,13 +12,14 @@ import onnxruntime
 
 from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters.program_text import answer_of
-from fuzzytree.model import LR, Band, FuzzySystem, Model, Points, RuleBase, Term
+from fuzzytree.model import FuzzySystem, Model, RuleBase
 from fuzzytree.numerics import RealKind
 from fuzzytree.semantics import (
     Program,
     error_bounds,
     from_system,
     infer,
+    landmarks,
     system_probes,
 )
 
@@ -159,7 +159,8 @@ def _sample_rows(model: Model) -> Iterator[dict[str, float]]:
     if isinstance(model, RuleBase):
         size = sum(len(c.terms) for rule in model.rules for c in rule.when) or 1
     points = {
-        v.name: sorted(_landmarks(v.terms)) or [v.low or 0.0, v.high or 1.0]
+        v.name: sorted({point for term in v.terms for point in landmarks(term.shape)})
+        or [v.low or 0.0, v.high or 1.0]
         for v in model.variables
         if not v.parts
     }
@@ -170,21 +171,6 @@ def _sample_rows(model: Model) -> Iterator[dict[str, float]]:
         }
     if points:
         yield dict.fromkeys(points, math.nan)
-
-
-def _landmarks(terms: Sequence[Term]) -> set[float]:
-    result: set[float] = set()
-    for term in terms:
-        match term.shape:
-            case Band(low=low, high=high, left=left, right=right):
-                ends = [flank.end for flank in (left, right) if flank is not None]
-                result.update(ends, (v for v in (low, high) if v is not None))
-            case LR(mean=mean, left=left, right=right):
-                result.update((mean, mean - left.spread / 2, mean + right.spread / 2))
-            case Points(values=values):
-                result.update(values)
-                result.update(a + (b - a) / 2 for a, b in itertools.pairwise(values))
-    return result
 
 
 def _compare(model: Model, row: dict[str, float], outputs: dict[str, object]) -> None:

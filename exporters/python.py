@@ -208,8 +208,12 @@ def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
     """
     del allow_loss
     inputs = [variable for variable in model.variables if not variable.parts]
-    mixed = [variable for variable in model.variables if variable.parts]
     places = places_of(model.variables)
+    mixes = (
+        f"{_literal(combination_row(v, places))},  # {v.name!r}"
+        for v in model.variables
+        if v.parts
+    )
     if isinstance(model, RuleBase):
         tables, functions = _rule_tables(model, places), _RULES
     else:
@@ -219,7 +223,7 @@ def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
             *_heading(model),
             _START,
             *_lines("INPUTS", (_literal(v.name) + f",  # {v.unit!r}" for v in inputs)),
-            *_lines("COMBINATIONS", (_combination(v, places) for v in mixed)),
+            *_lines("COMBINATIONS", mixes),
             *tables,
             f"WHEN_MISSING = {model.semantics.missing!r}\n",
             _AXES,
@@ -261,10 +265,6 @@ def _literal(value: object) -> str:
             return f"({inside},)" if len(members) == 1 else f"({inside})"
         case _:
             return repr(value)
-
-
-def _combination(variable: Variable, places: dict[str, int]) -> str:
-    return f"{_literal(combination_row(variable, places))},  # {variable.name!r}"
 
 
 def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:

@@ -90,7 +90,12 @@ def write(
     names = (keep,) if isinstance(keep, str) else tuple(keep)
     query = Query(dialect, table, names or model.inputs)
     if isinstance(model, RuleBase):
-        _refuse_large(model)
+        if len(model.rules) > MOST_RULES:
+            raise LossError(
+                f"cannot write {model.name} as sql: it has {len(model.rules)} rules, "
+                f"and engines allow {MOST_RULES} as columns of a query; write the tree "
+                "instead"
+            )
         steps = _rule_steps(query, model, with_strengths=strengths)
     else:
         if strengths:
@@ -98,24 +103,12 @@ def write(
         _refuse_deep(model)
         steps = _tree_steps(query, model)
     text = "\n".join([*_heading(model, dialect), *_axes(query, model), *steps, ""])
-    return Written(text.encode("utf-8"), remarks=_remarks(dialect))
-
-
-def _remarks(dialect: str) -> tuple[str, ...]:
-    if dialect == "postgresql":
-        return (
-            "PostgreSQL raises an error where a number overflows or a product "
-            "underflows, and other engines go on",
-        )
-    return ()
-
-
-def _refuse_large(rules: RuleBase) -> None:
-    if len(rules.rules) > MOST_RULES:
-        raise LossError(
-            f"cannot write {rules.name} as sql: it has {len(rules.rules)} rules, and "
-            f"engines allow {MOST_RULES} as columns of a query; write the tree instead"
-        )
+    remark = (
+        "PostgreSQL raises an error where a number overflows or a product underflows, "
+        "and other engines go on"
+    )
+    remarks = (remark,) if dialect == "postgresql" else ()
+    return Written(text.encode("utf-8"), remarks=remarks)
 
 
 def _refuse_deep(tree: FuzzyTree) -> None:
