@@ -169,7 +169,8 @@ def write_c(
     if isinstance(model, FuzzySystem):
         if dtype != "float64":
             raise ValueError("fuzzy systems are written in float64 only")
-        text = "".join(_system_text(model, prefix, activations=activations))
+        body = "".join(_system_text(model, activations=activations))
+        text = "".join(_heading(model)) + fill(body, prefix)
         return Written(text.encode("ascii"))
     if activations:
         raise ValueError("activations are those of fuzzy systems")
@@ -194,19 +195,17 @@ def beginning(own: str, name: str | None) -> str:
     return prefix
 
 
-def _system_text(
-    system: FuzzySystem, prefix: str, *, activations: bool
-) -> Iterator[str]:
-    yield from _heading(system)
-    yield fill(_USE, prefix) + fill(_DECLARE, prefix)
-    yield fill("typedef double name_real;\n\n", prefix)
+def _system_text(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
+    """Yield what stands behind the heading of a system."""
+    yield _USE + _DECLARE
+    yield "typedef double name_real;\n\n"
     count = len(system.outputs) + activations * len(system.rules)
-    yield fill(f"#define NAME_INPUTS {len(system.columns)}u\n", prefix)
-    yield fill(f"#define NAME_OUTPUTS {count}u\n", prefix)
-    yield fill(SYSTEM_TYPES + _DEFINE, prefix)
-    yield fill(_checks(DOUBLE, is_arithmetic=True), prefix)
-    yield from system_code(system, prefix, activations=activations)
-    yield from system_selftest(system, prefix, activations=activations)
+    yield f"#define NAME_INPUTS {len(system.columns)}u\n"
+    yield f"#define NAME_OUTPUTS {count}u\n"
+    yield SYSTEM_TYPES + _DEFINE
+    yield _checks(DOUBLE, is_arithmetic=True)
+    yield from system_code(system, activations=activations)
+    yield from system_selftest(system, activations=activations)
     yield "\n#endif\n"
 
 
@@ -243,12 +242,13 @@ class CFile:
         mixed = any(variable.parts for variable in self.model.variables)
         yield from self.declarations()
         yield from self.definitions(is_arithmetic=mixed or self.tables is not None)
-        yield from selftest_code(
-            examples_of(self.model, self.tests, self.tables, self.line, self.numbers),
-            self.numbers,
-            self.prefix,
-            has_strengths=self.tables is not None,
+        examples = examples_of(
+            self.model, self.tests, self.tables, self.line, self.numbers
         )
+        for text in selftest_code(
+            examples, self.numbers, has_strengths=self.tables is not None
+        ):
+            yield self._fill(text)
         yield "\n#endif\n"
 
     def declarations(self) -> Iterator[str]:
@@ -259,12 +259,26 @@ class CFile:
 
     def definitions(self, *, is_arithmetic: bool) -> Iterator[str]:
         """Yield the tables and functions of the model."""
-        yield self._fill(_DEFINE)
-        yield self._fill(_checks(self.numbers, is_arithmetic=is_arithmetic))
-        yield from self._defaults()
-        variables = self.model.variables
-        yield from axes_code(variables, self.line, self.numbers, self.prefix)
-        yield from self._code(taking(variables))
+        yield from map(self._fill, self._definitions(is_arithmetic=is_arithmetic))
+
+    def _definitions(self, *, is_arithmetic: bool) -> Iterator[str]:
+        yield _DEFINE + _checks(self.numbers, is_arithmetic=is_arithmetic)
+        model, semantics = self.model, self.model.semantics
+        defaults = {"MISSING": semantics.missing}
+        if self.tables is not None:
+            defaults["UNCOVERED"] = semantics.uncovered
+        yield "\n/* The class where a value is missing, or no rule fires. */\n"
+        for word, label in defaults.items():
+            yield f"#define NAME_WHEN_{word} {number_of(label, model)}\n"
+        yield from axes_code(model.variables, self.line, self.numbers)
+        axes = _TAKE_COMBINED if any(v.parts for v in model.variables) else _TAKE
+        if isinstance(model, FuzzyTree):
+            yield from tree_code(model, self.tests, self.numbers, axes)
+        elif self.tables is not None:
+            is_product = semantics.conjunction == "product"
+            yield from rules_code(
+                self.tables, self.numbers, axes, is_product=is_product
+            )
 
     def _fill(self, template: str) -> str:
         return fill(template, self.prefix)
@@ -290,27 +304,6 @@ class CFile:
         yield self._fill(_TYPES).replace("RULE,", "rule," if rules else "leaf,")
         yield self._fill(_STRENGTHS_TYPE) if rules else ""
         yield "\n#ifdef __cplusplus\n}\n#endif\n"
-
-    def _defaults(self) -> Iterator[str]:
-        semantics = self.model.semantics
-        defaults = {"MISSING": semantics.missing}
-        if self.tables is not None:
-            defaults["UNCOVERED"] = semantics.uncovered
-        yield "\n/* The class where a value is missing, or no rule fires. */\n"
-        for word, label in defaults.items():
-            yield self._fill(
-                f"#define NAME_WHEN_{word} {number_of(label, self.model)}\n"
-            )
-
-    def _code(self, axes: str) -> Iterator[str]:
-        model = self.model
-        if isinstance(model, FuzzyTree):
-            yield from tree_code(model, self.line, self.numbers, self.prefix, axes)
-        elif self.tables is not None:
-            is_product = model.semantics.conjunction == "product"
-            yield from rules_code(
-                self.tables, self.numbers, self.prefix, axes, is_product=is_product
-            )
 
 
 def _heading(model: Document) -> Iterator[str]:
@@ -412,20 +405,14 @@ _TAKE_COMBINED = """\
 """
 
 
-def taking(variables: Sequence[Variable]) -> str:
-    """Return statements that put the values into `value`, or return the answer."""
-    return _TAKE_COMBINED if any(v.parts for v in variables) else _TAKE
-
-
 def axes_code(
     variables: Sequence[Variable],
     line: Mapping[str, int],
     numbers: CNumbers,
-    prefix: str,
 ) -> Iterator[str]:
     """Yield the check that all values are finite, and the combinations."""
     if not variables:
-        yield fill(_NO_INPUTS, prefix)
+        yield _NO_INPUTS
         return
     if numbers.name == "double":
         words = ("uint64_t", "(uint32_t)(look.bits >> 32)", "21")
@@ -436,7 +423,7 @@ def axes_code(
         text = text.replace(mark, word)
     mixed = [variable for variable in variables if variable.parts]
     if not mixed:
-        yield fill(text, prefix) + fill(_INPUTS, prefix) + "\n"
+        yield text + _INPUTS + "\n"
         return
     parts = [part for variable in mixed for part in variable.parts]
     ends: list[int] = []
@@ -444,12 +431,12 @@ def axes_code(
         ends.append((ends[-1] if ends else 0) + len(variable.parts))
     weights = numbers.rounded([part.weight for part in parts], is_divisor=True)
     centres = numbers.rounded([part.centre for part in parts])
-    yield from real_table(f"{prefix}_weight", weights, "Of combinations.", numbers)
-    yield from real_table(f"{prefix}_centre", centres, "Of combinations.", numbers)
+    yield from real_table("name_weight", weights, "Of combinations.", numbers)
+    yield from real_table("name_centre", centres, "Of combinations.", numbers)
     inputs = [line[part.input] for part in parts]
-    yield from whole_table(f"{prefix}_part", inputs, "Their inputs.")
-    yield from whole_table(f"{prefix}_part_end", ends, "Behind each combination.")
-    yield fill(text, prefix) + fill(_COMBINED, prefix) + "\n"
+    yield from whole_table("name_part", inputs, "Their inputs.")
+    yield from whole_table("name_part_end", ends, "Behind each combination.")
+    yield text + _COMBINED + "\n"
 
 
 _WALK = """
@@ -489,36 +476,31 @@ TAKE_AXES
 
 
 def tree_code(
-    tree: FuzzyTree,
-    line: Mapping[str, int],
-    numbers: CNumbers,
-    prefix: str,
-    axes: str,
+    tree: FuzzyTree, tests: Sequence[CTreeTest], numbers: CNumbers, axes: str
 ) -> Iterator[str]:
     """Yield the tables of a tree and the function that walks through them."""
-    tests = cut_tests(tree, line)
     numbered = {label: place for place, label in enumerate(tree.classes)}
     labels = [numbered[leaf.label] for leaf in tree.leaves]
     if not tests:
         plain = axes.replace("    const name_real *value = x;\n", "")
         text = _ONE_LEAF.replace("LABEL", str(labels[0]))
-        yield fill(text.replace("TAKE_AXES\n", plain), prefix)
+        yield text.replace("TAKE_AXES\n", plain)
         return
     ends = [place for test in tests for place in (test.no, test.yes)]
     lines = [test.line for test in tests]
     cuts = numbers.rounded([test.cut for test in tests])
-    yield fill(f"#define NAME_QUESTIONS {len(tests)}u\n\n", prefix)
-    yield fill(_TABLES, prefix)
+    yield f"#define NAME_QUESTIONS {len(tests)}u\n\n"
+    yield _TABLES
     for name, values in (("line", lines), ("next", ends), ("label", labels)):
         yield f"    {integer_type(max(values))} {name}[{len(values)}];\n"
     yield f"    {numbers.name} cut[{len(cuts)}];\n"
-    yield fill("} name_tree = {\n", prefix)
+    yield "} name_tree = {\n"
     for values in (lines, ends, labels):
         yield from ("    {\n", *whole_lines(values), "    },\n")
     yield from ("    {\n", *real_lines(cuts, numbers), "    }\n};\n")
     kind = place_type(2 * len(tests) + len(labels))
     walk = _WALK.replace("PLACE_TYPE", kind).replace("TAKE_AXES\n", axes)
-    yield fill(walk, prefix)
+    yield walk
 
 
 FORMAT = Format(

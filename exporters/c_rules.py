@@ -19,7 +19,6 @@ from fuzzytree.exporters.c_tables import (
 )
 from fuzzytree.exporters.c_text import (
     CNumbers,
-    fill,
     place_type,
     real_table,
     whole_table,
@@ -282,18 +281,17 @@ GUESS
 def rules_code(
     tables: Tables,
     numbers: CNumbers,
-    prefix: str,
     axes: str,
     *,
     is_product: bool,
 ) -> Iterator[str]:
     """Yield the tables of a rule base and the functions that fire it."""
-    yield from _data(tables, numbers, prefix)
+    yield from _data(tables, numbers)
     for template in _functions(tables, numbers):
         text = template.replace("JOIN", "a * b" if is_product else "b < a ? b : a")
         text = text.replace("TAKE_AXES\n", axes)
         text = text.replace("AT ", f"{_place_type(tables)} ")
-        yield fill(text, prefix)
+        yield text
 
 
 def _place_type(tables: Tables) -> str:
@@ -301,7 +299,7 @@ def _place_type(tables: Tables) -> str:
     return place_type(max(tallest, len(tables.places.clause), len(tables.label)))
 
 
-def _data(tables: Tables, numbers: CNumbers, prefix: str) -> Iterator[str]:
+def _data(tables: Tables, numbers: CNumbers) -> Iterator[str]:
     places = tables.places
     for name, size in (
         ("RULES", len(tables.label)),
@@ -310,11 +308,11 @@ def _data(tables: Tables, numbers: CNumbers, prefix: str) -> Iterator[str]:
         ("CLAUSES", len(tables.negated)),
     ):
         if name != "RULES":  # declared already
-            yield fill(f"#define NAME_{name} {size}u\n", prefix)
+            yield f"#define NAME_{name} {size}u\n"
     about = "The numbers of ends of plateaus, of sides of sets, and of points."
     yield "\n"
     if tables.kind:
-        yield from real_table(f"{prefix}_number", tables.number, about, numbers)
+        yield from real_table("name_number", tables.number, about, numbers)
     for name, values, about in (
         ("kind", tables.kind or None, "What each of them is."),
         ("count", tables.count or None, "How many coefficients or points it has."),
@@ -331,7 +329,7 @@ def _data(tables: Tables, numbers: CNumbers, prefix: str) -> Iterator[str]:
         ("label", tables.label, "The class of each rule."),
     ):
         if values is not None:
-            yield from whole_table(f"{prefix}_{name}", values or [0], about)
+            yield from whole_table(f"name_{name}", values or [0], about)
 
 
 def _functions(tables: Tables, numbers: CNumbers) -> Iterator[str]:

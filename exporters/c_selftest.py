@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CTreeTest, Tables
-from fuzzytree.exporters.c_text import CNumbers, bits_of, fill
+from fuzzytree.exporters.c_text import CNumbers, bits_of
 from fuzzytree.exporters.program_text import answer_of, digest_of
 from fuzzytree.model import FuzzyTree, Model, Variable
 from fuzzytree.semantics import Answer, Row, Status, few_probes
@@ -178,19 +178,19 @@ RULES_CHECK
 
 
 def selftest_code(
-    examples: Sequence[Example], numbers: CNumbers, prefix: str, *, has_strengths: bool
+    examples: Sequence[Example], numbers: CNumbers, *, has_strengths: bool
 ) -> Iterator[str]:
     """Yield the self-test, behind a macro."""
     size = max(len(examples[0].row), 1)
     kind = "uint64_t" if numbers.kind is np.float64 else "uint32_t"
-    yield fill("\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n", prefix)
+    yield "\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n"
     yield "\n/* The bits of the inputs; class, rule and status"
     yield ", and a digest of strengths. */\n" if has_strengths else ". */\n"
     yield "static const struct {\n"
     yield f"    {kind} x[{size}];\n"
     yield "    int label;\n    long rule;\n    int status;\n"
     yield "    uint32_t digest;\n" if has_strengths else ""
-    yield fill(f"}} name_example[{len(examples)}] = {{\n", prefix)
+    yield f"}} name_example[{len(examples)}] = {{\n"
     for one in examples:
         digest = f", UINT32_C({one.digest:#010x})" if has_strengths else ""
         shown = ", ".join(map(numbers.shown, one.row)) or "no inputs"
@@ -198,16 +198,16 @@ def selftest_code(
         yield f"    {{{bits_of(one.row, numbers)}, "
         yield f"{one.label}, {one.rule}, {one.status}{digest}}},\n"
     yield "};\n"
-    yield fill(_LOAD.replace("UINT", kind), prefix)
+    yield _LOAD.replace("UINT", kind)
     if has_strengths:
         words = ["look.bits"]
         if numbers.kind is np.float64:
             words = ["(uint32_t)look.bits", "(uint32_t)(look.bits >> 32)"]
         lines = "\n".join(_WORD.replace("WORD", word) for word in words)
-        yield fill(_DIGEST.replace("UINT ", f"{kind} ").replace("WORDS", lines), prefix)
+        yield _DIGEST.replace("UINT ", f"{kind} ").replace("WORDS", lines)
     check = _RULES_CHECK if has_strengths else ""
     main = _MAIN.replace("RULES_CHECK\n", check)
-    yield fill(main.replace("STRENGTHS", ", or strengths" if check else ""), prefix)
+    yield main.replace("STRENGTHS", ", or strengths" if check else "")
     yield "#endif\n"
 
 

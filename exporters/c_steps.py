@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.exporters.c_text import DOUBLE, bits_of, fill, real_lines
+from fuzzytree.exporters.c_text import DOUBLE, bits_of, real_lines
 from fuzzytree.exporters.program_text import StepText, SystemExample, system_examples
 from fuzzytree.model import FuzzySystem
 from fuzzytree.semantics import Program, Step, from_system, system_probes
@@ -168,16 +168,16 @@ class CSteps(StepText):
             self.needs.isdisjoint(self.library) and all(map(math.isfinite, numbers))
         )
 
-    def helper_text(self, prefix: str) -> Iterator[str]:
+    def helper_text(self) -> Iterator[str]:
         """Yield the helpers that the steps call, but for functions of the library."""
         for name, text in HELPERS.items():
             if name in self.needs and name not in self.library:
-                yield fill(text, prefix)
+                yield text
 
-    def table_text(self, prefix: str) -> Iterator[str]:
+    def table_text(self) -> Iterator[str]:
         """Yield the tables."""
         for name, values in self.tables:
-            yield f"static const double {prefix}_{name}[{len(values)}] = {{\n"
+            yield f"static const double name_{name}[{len(values)}] = {{\n"
             yield from real_lines(values, DOUBLE)
             yield "};\n"
 
@@ -399,9 +399,7 @@ int main(void)
 """
 
 
-def system_code(
-    system: FuzzySystem, prefix: str, *, activations: bool
-) -> Iterator[str]:
+def system_code(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
     """Yield the tables, helpers and the function of a system."""
     program = from_system(system, activations=activations)
     steps = CSteps(program)
@@ -409,15 +407,14 @@ def system_code(
     if steps.needs_library:
         yield "#include <math.h>\n"
     yield "\n"
-    yield from steps.table_text(prefix)
-    yield from steps.helper_text(prefix)
-    yield fill("\nint name_infer(const name_real *x, name_real *outputs)\n{\n", prefix)
+    yield from steps.table_text()
+    yield from steps.helper_text()
+    yield "\nint name_infer(const name_real *x, name_real *outputs)\n{\n"
     if any("for (i" in line for line in steps.body):
         yield "    unsigned long i;\n"
     if not program.inputs:
         yield "    (void)x;\n"
-    for line in (*steps.body, *ends):
-        yield fill(line, prefix)
+    yield from (*steps.body, *ends)
     yield "}\n"
 
 
@@ -429,29 +426,27 @@ def _ends(program: Program, steps: CSteps) -> Iterator[str]:
     yield f"    return (int)({steps.value(status)});\n"
 
 
-def system_selftest(
-    system: FuzzySystem, prefix: str, *, activations: bool
-) -> Iterator[str]:
+def system_selftest(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
     """Yield the self-test of a system, behind a macro.
 
     Outputs must be equal, or as near as functions of different libraries allow.
     """
     examples = _examples(system, activations=activations)
     inputs, outputs = max(len(system.columns), 1), len(examples[0][1])
-    yield fill("\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n", prefix)
+    yield "\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n"
     yield "\n/* Bits of the inputs, the outputs and their largest errors; the status.\n"
     yield " * Errors are allowed only where a mathematical library is called. */\n"
     yield "static const struct {\n"
     yield f"    uint64_t x[{inputs}];\n    uint64_t outputs[{outputs}];\n"
     yield f"    uint64_t most[{outputs}];\n    int status;\n"
-    yield fill(f"}} name_example[{len(examples)}] = {{\n", prefix)
+    yield f"}} name_example[{len(examples)}] = {{\n"
     for operands, result, bound, status in examples:
         shown = ", ".join(map(repr, operands)) or "no inputs"
         yield f"    /* {shown}: {', '.join(map(repr, result))} */\n"
         parts = ", ".join(map(bits_of, (operands, result, bound)))
         yield f"    {{{parts}, {status}}},\n"
     yield "};\n"
-    yield fill(_MAIN, prefix)
+    yield _MAIN
 
 
 def _examples(system: FuzzySystem, *, activations: bool) -> list[SystemExample]:

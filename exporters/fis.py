@@ -332,8 +332,8 @@ def _text(
         labels = terms.labels[one.name]
         blocks.append(_variable(f"Input{number}", one, labels, names, dialect))
     for number, output in enumerate(system.outputs, 1):
-        labels = output.labels
-        block = _variable(f"Output{number}", output, labels, names, dialect)
+        title = f"Output{number}"
+        block = _variable(title, output, output.labels, names, dialect)
         if dialect == "fuzzylite" and output.default is not None:
             block.insert(3, f"Default={output.default!r}")
         blocks.append(block)

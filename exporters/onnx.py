@@ -121,9 +121,9 @@ def write_onnx(
         >>> written.losses
         ()
     """
-    if outputs is None:
-        is_system = isinstance(model, FuzzySystem)
-        outputs = ("outputs", "status") if is_system else ("label", "rule")
+    is_system = isinstance(model, FuzzySystem)
+    usual: Sequence[Output] = ("outputs", "status") if is_system else ("label", "rule")
+    outputs = usual if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
     _check_variants(model, opset, ir, readable=readable, plain=plain)
     require("onnx", "writing onnx needs")

@@ -175,7 +175,7 @@ def _text(
     steps = CSteps(made.program, _LIBRARY)
     ends = [*_features(made, steps)]
     yield "\n#include <math.h>\n" if steps.needs_library else ""
-    yield from steps.helper_text(prefix)
+    yield from (fill(text, prefix) for text in steps.helper_text())
     yield from (fill(text, prefix) for text in _cells(sensor))
     yield from (fill(text, prefix) for text in _sums(made))
     yield from (fill(text, prefix) for text in ends)
