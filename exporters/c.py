@@ -12,13 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 from fuzzytree.exporters.c_rules import rules_code
-from fuzzytree.exporters.c_selftest import examples_of, number_of, selftest_code
+from fuzzytree.exporters.c_selftest import number_of, selftest_code
 from fuzzytree.exporters.c_steps import (
     SYSTEM_TYPES,
     system_code,
     system_selftest,
 )
-from fuzzytree.exporters.c_tables import CTreeTest, Tables, cut_tests, tables_of
+from fuzzytree.exporters.c_tables import CModel, CTreeTest
 from fuzzytree.exporters.c_text import (
     DOUBLE,
     SINGLE,
@@ -34,7 +34,7 @@ from fuzzytree.exporters.c_text import (
     whole_lines,
     whole_table,
 )
-from fuzzytree.exporters.program_text import places_of, title_of
+from fuzzytree.exporters.program_text import title_of
 from fuzzytree.model import (
     Document,
     Format,
@@ -224,31 +224,19 @@ def _checks(numbers: CNumbers, *, is_arithmetic: bool) -> str:
     return text.replace("KIND", numbers.name).replace("FUSES", fuses)
 
 
-class CFile:
-    """A file in the making: the model, and its tables, which several parts read."""
+class CFile(CModel):
+    """A file in the making."""
 
     def __init__(self, model: Model, numbers: CNumbers, prefix: str) -> None:
-        self.model, self.numbers, self.prefix = model, numbers, prefix
-        self.line = places_of(model.variables)
-        self.tests: list[CTreeTest] = []
-        self.tables: Tables | None = None
-        if isinstance(model, RuleBase):
-            self.tables = tables_of(model, self.line, numbers)
-        else:
-            self.tests = cut_tests(model, self.line)
+        super().__init__(model, numbers)
+        self.prefix = prefix
 
     def text(self) -> Iterator[str]:
         """Yield the file."""
         mixed = any(variable.parts for variable in self.model.variables)
         yield from self.declarations()
         yield from self.definitions(is_arithmetic=mixed or self.tables is not None)
-        examples = examples_of(
-            self.model, self.tests, self.tables, self.line, self.numbers
-        )
-        for text in selftest_code(
-            examples, self.numbers, has_strengths=self.tables is not None
-        ):
-            yield self._fill(text)
+        yield from map(self._fill, selftest_code(self))
         yield "\n#endif\n"
 
     def declarations(self) -> Iterator[str]:

@@ -7,15 +7,14 @@ numpy's on numbers of the type, in the order in which C performs it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
-import msgspec
 import numpy as np
 
-from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CTreeTest, Tables
+from fuzzytree.exporters.c_tables import HIGH_END, LOW_END, POINTS, CModel, Tables
 from fuzzytree.exporters.c_text import CNumbers, bits_of
 from fuzzytree.exporters.program_text import answer_of, digest_of
-from fuzzytree.model import FuzzyTree, Model, Variable
+from fuzzytree.model import FuzzyTree, Model
 from fuzzytree.semantics import Answer, Row, Status, few_probes
 
 _MOST_ROWS = 160
@@ -23,85 +22,29 @@ _FEWEST_ROWS = 8
 _STRENGTHS = 20_000  # of all rows together
 
 
-class Example(msgspec.Struct, frozen=True):
-    """A row and its prediction.
-
-    Attributes:
-        row: The inputs, in order.
-        label: The class, or None.
-        rule: The number of the rule or leaf, or 0.
-        status: A `fuzzytree.semantics.reference.Status`.
-        digest: That of all strengths; 0 for a tree.
-    """
-
-    row: tuple[float, ...]
-    label: int
-    rule: int
-    status: int
-    digest: int = 0
-
-
-def examples_of(
-    model: Model,
-    tests: Sequence[CTreeTest],
-    tables: Tables | None,
-    line: Mapping[str, int],
-    numbers: CNumbers,
-) -> list[Example]:
-    """Return rows and predictions: of the reference, or in float of the tables."""
-    result: list[Example] = []
-    rules = len(tables.label) if tables else 1
+def _examples(file: CModel) -> Iterator[tuple[list[float], list[str]]]:
+    """Yield rows and predictions: of the reference, or in float of the tables."""
+    model, numbers = file.model, file.numbers
+    rules = len(file.tables.label) if file.tables else 1
     limit = max(_FEWEST_ROWS, min(_MOST_ROWS, _STRENGTHS // rules))
     for row in few_probes(model, limit):
         if numbers.kind is np.float64:
-            row_values = row
-            prediction = answer_of(model, row_values)
+            values, answer = row, answer_of(model, row)
         else:
             with np.errstate(over="ignore"):
-                row_values = {k: float(np.float32(value)) for k, value in row.items()}
-            prediction = _computed(model, tests, tables, line, numbers, row_values)
-        label = number_of(prediction.label, model)
-        digest = digest_of(words_of(prediction.strengths, numbers))
-        values = tuple(row_values[name] for name in model.inputs)
-        result.append(
-            Example(values, label, prediction.rule, int(prediction.status), digest)
-        )
-    return result
+                values = {k: float(np.float32(value)) for k, value in row.items()}
+            answer = computed(file, values)
+        label = number_of(answer.label, model)
+        ends = [str(label), str(answer.rule), str(int(answer.status))]
+        if file.tables:
+            digest = digest_of(words_of(answer.strengths, numbers))
+            ends.append(f"UINT32_C({digest:#010x})")
+        yield [values[name] for name in model.inputs], ends
 
 
 def number_of(label: str | None, model: Model) -> int:
     """Return the number of a class, -1 for none."""
     return -1 if label is None else model.classes.index(label)
-
-
-def _computed(
-    model: Model,
-    tests: Sequence[CTreeTest],
-    tables: Tables | None,
-    line: Mapping[str, int],
-    numbers: CNumbers,
-    row: Row,
-) -> Answer:
-    """Return the prediction of the tables in their number type."""
-    row_values = [row[name] for name in model.inputs]
-    values = axis_values(model.variables, line, row_values, numbers)
-    if isinstance(model, FuzzyTree) or tables is None:
-        if values is None:
-            return Answer(0, model.semantics.missing, Status.MISSING)
-        rule = leaf(tests, values, numbers)
-        labels = model.leaves if isinstance(model, FuzzyTree) else ()
-        return Answer(rule, labels[rule - 1].label, Status.DECIDED)
-    if values is None:
-        lost = (math.nan,) * len(model.rules)
-        return Answer(0, model.semantics.missing, Status.MISSING, lost)
-    is_product = model.semantics.conjunction == "product"
-    fired = strengths(tables, values, numbers, is_product=is_product)
-    best = max(fired)
-    if best == 0.0:
-        return Answer(0, model.semantics.uncovered, Status.UNCOVERED, fired)
-    winner = fired.index(best)
-    status = Status.TIE if fired.count(best) > 1 else Status.DECIDED
-    return Answer(winner + 1, model.rules[winner].then, status, fired)
 
 
 def words_of(strengths: Sequence[float], numbers: CNumbers) -> list[int]:
@@ -177,26 +120,22 @@ RULES_CHECK
 """
 
 
-def selftest_code(
-    examples: Sequence[Example], numbers: CNumbers, *, has_strengths: bool
-) -> Iterator[str]:
+def selftest_code(file: CModel) -> Iterator[str]:
     """Yield the self-test, behind a macro."""
-    size = max(len(examples[0].row), 1)
+    numbers, has_strengths = file.numbers, file.tables is not None
+    examples = [*_examples(file)]
     kind = "uint64_t" if numbers.kind is np.float64 else "uint32_t"
     yield "\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n"
     yield "\n/* The bits of the inputs; class, rule and status"
     yield ", and a digest of strengths. */\n" if has_strengths else ". */\n"
     yield "static const struct {\n"
-    yield f"    {kind} x[{size}];\n"
+    yield f"    {kind} x[{max(len(file.model.inputs), 1)}];\n"
     yield "    int label;\n    long rule;\n    int status;\n"
     yield "    uint32_t digest;\n" if has_strengths else ""
     yield f"}} name_example[{len(examples)}] = {{\n"
-    for one in examples:
-        digest = f", UINT32_C({one.digest:#010x})" if has_strengths else ""
-        shown = ", ".join(map(numbers.shown, one.row)) or "no inputs"
-        yield f"    /* {shown} */\n"
-        yield f"    {{{bits_of(one.row, numbers)}, "
-        yield f"{one.label}, {one.rule}, {one.status}{digest}}},\n"
+    for row, ends in examples:
+        yield f"    /* {', '.join(map(numbers.shown, row)) or 'no inputs'} */\n"
+        yield f"    {{{', '.join([bits_of(row, numbers), *ends])}}},\n"
     yield "};\n"
     yield _LOAD.replace("UINT", kind)
     if has_strengths:
@@ -215,54 +154,69 @@ Real = np.float64 | np.float32
 
 
 @np.errstate(all="ignore")
-def axis_values(
-    variables: Sequence[Variable],
-    line: Mapping[str, int],
-    row: Sequence[float],
-    numbers: CNumbers,
-) -> list[Real] | None:
+def computed(file: CModel, row: Row) -> Answer:
+    """Return the prediction of the tables of a file in their number type."""
+    model, tables = file.model, file.tables
+    values = _axis_values(file, row)
+    if isinstance(model, FuzzyTree) or tables is None:
+        if values is None:
+            return Answer(0, model.semantics.missing, Status.MISSING)
+        rule = _leaf(file, values)
+        labels = model.leaves if isinstance(model, FuzzyTree) else ()
+        return Answer(rule, labels[rule - 1].label, Status.DECIDED)
+    if values is None:
+        lost = (math.nan,) * len(model.rules)
+        return Answer(0, model.semantics.missing, Status.MISSING, lost)
+    fired = _strengths(file, tables, values)
+    best = max(fired)
+    if best == 0.0:
+        return Answer(0, model.semantics.uncovered, Status.UNCOVERED, fired)
+    winner = fired.index(best)
+    status = Status.TIE if fired.count(best) > 1 else Status.DECIDED
+    return Answer(winner + 1, model.rules[winner].then, status, fired)
+
+
+def _axis_values(file: CModel, row: Row) -> list[Real] | None:
     """Return the value of each variable; None if one is not finite."""
-    row_values = [numbers.kind(value) for value in row]
-    result = list(row_values)
-    for variable in variables:
+    numbers = file.numbers
+    result: list[Real] = [numbers.kind(row[name]) for name in file.model.inputs]
+    for variable in file.model.variables:
         total: Real | None = None
         for part in variable.parts:
             (weight,) = numbers.rounded([part.weight], is_divisor=True)
             (centre,) = numbers.rounded([part.centre])
-            one = numbers.kind(weight) * (
-                row_values[line[part.input]] - numbers.kind(centre)
-            )
+            distance = result[file.line[part.input]] - numbers.kind(centre)
+            one = numbers.kind(weight) * distance
             total = one if total is None else total + one
         if total is not None:
             result.append(total)
     return result if all(map(np.isfinite, result)) else None
 
 
-def leaf(tests: Sequence[CTreeTest], values: Sequence[Real], numbers: CNumbers) -> int:
+def _leaf(file: CModel, values: Sequence[Real]) -> int:
     """Return the number of the leaf that a walk arrives at, from 1."""
-    place = 0
+    tests, place = file.tests, 0
     while place < len(tests):
         one = tests[place]
-        (cut,) = numbers.rounded([one.cut])
-        place = one.yes if values[one.line] > numbers.kind(cut) else one.no
+        (cut,) = file.numbers.rounded([one.cut])
+        place = one.yes if values[one.line] > file.numbers.kind(cut) else one.no
     return place - len(tests) + 1
 
 
-@np.errstate(all="ignore")
-def strengths(
-    tables: Tables, values: Sequence[Real], numbers: CNumbers, *, is_product: bool
+def _strengths(
+    file: CModel, tables: Tables, values: Sequence[Real]
 ) -> tuple[float, ...]:
     """Return the strength of each rule."""
-    one = numbers.kind(1)
-    path = [one] * (max(tables.places.depth) + 1)
+    is_product = file.model.semantics.conjunction == "product"
+    one, places = file.numbers.kind(1), tables.places
+    path = [one] * (max(places.depth) + 1)
     result = [one] * len(tables.label)
     degrees: dict[int, Real] = {}
-    places = tables.places
     for clause, depth, rule in zip(
         places.clause, places.depth, places.rule, strict=True
     ):
         if clause not in degrees:
-            degrees[clause] = _clause(tables, clause, values, numbers)
+            degrees[clause] = _clause(tables, clause, values, file.numbers)
         degree, before = degrees[clause], path[depth - 1]
         path[depth] = before * degree if is_product else min(before, degree)
         if rule:

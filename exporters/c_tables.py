@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fuzzytree.exporters.c_text import CNumbers
+from fuzzytree.exporters.program_text import places_of
 from fuzzytree.model import (
     LR,
     Band,
     Clause,
     Flank,
     FuzzyTree,
+    Model,
     Node,
     Points,
     RuleBase,
@@ -251,3 +253,25 @@ def _halved(node: Node, line: int, ends: list[int], start: int) -> list[CTreeTes
         return [CTreeTest(line, node.cuts[middle], no, yes), *left, *right]
 
     return arrange(0, len(node.cuts), start)
+
+
+class CModel:
+    """A model with the tables of its file.
+
+    Attributes:
+        model: The model.
+        numbers: The type of its numbers.
+        line: The place of each variable's value.
+        tests: Of a tree.
+        tables: Of a rule base, else None.
+    """
+
+    def __init__(self, model: Model, numbers: CNumbers) -> None:
+        self.model, self.numbers = model, numbers
+        self.line = places_of(model.variables)
+        self.tests: list[CTreeTest] = []
+        self.tables: Tables | None = None
+        if isinstance(model, RuleBase):
+            self.tables = tables_of(model, self.line, numbers)
+        else:
+            self.tests = cut_tests(model, self.line)

@@ -9,9 +9,9 @@ import pytest
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c import FORMAT, write_c
-from fuzzytree.exporters.c_selftest import axis_values, leaf, strengths, words_of
+from fuzzytree.exporters.c_selftest import computed, words_of
 from fuzzytree.exporters.c_steps import number_text
-from fuzzytree.exporters.c_tables import cut_tests, tables_of
+from fuzzytree.exporters.c_tables import CModel, tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
 from fuzzytree.exporters.program_text import digest_of, places_of
 from fuzzytree.model.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
@@ -114,18 +114,10 @@ def test_numbers_are_written_with_all_their_bits() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_tables_of_a_tree_say_what_the_reference_says(seed: int) -> None:
     tree = random_tree(seed, leaves=9, combinations=0.3)
-    line = places_of(tree.variables)
-    tests = cut_tests(tree, line)
-    assert len(tests) == sum(len(node.cuts) for node in tree.nodes)
+    file = CModel(tree, DOUBLE)
+    assert len(file.tests) == sum(len(node.cuts) for node in tree.nodes)
     for row in probes(tree, limit=300):
-        found = descend(tree, row)
-        given = [row[name] for name in tree.inputs]
-        values = axis_values(tree.variables, line, given, DOUBLE)
-        if found.status is Status.MISSING:
-            assert values is None
-        else:
-            assert values is not None
-            assert leaf(tests, values, DOUBLE) == found.rule
+        assert computed(file, row) == descend(tree, row)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -141,18 +133,12 @@ def test_the_tables_of_rules_say_what_the_reference_says(
         conjunction="product" if is_product else "min",
     )
     rules = with_points(rules, seed)
-    line = places_of(rules.variables)
-    tables = tables_of(rules, line, DOUBLE)
+    file = CModel(rules, DOUBLE)
     for row in probes(rules, limit=200):
-        found = evaluate(rules, row)
-        given = [row[name] for name in rules.inputs]
-        values = axis_values(rules.variables, line, given, DOUBLE)
-        if found.status is Status.MISSING:
-            assert values is None
-            continue
-        assert values is not None
-        fired = strengths(tables, values, DOUBLE, is_product=is_product)
-        assert fired == found.strengths
+        answer, right = computed(file, row), evaluate(rules, row)
+        assert (answer.rule, answer.status) == (right.rule, right.status)
+        if right.status is not Status.MISSING:
+            assert answer.strengths == right.strengths
 
 
 def test_rules_that_begin_alike_share_their_beginning() -> None:
