@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
-from fuzzytree.exporters.fml_rules import FmlRule, FmlRules, rules_of
+from fuzzytree.exporters.fml_rules import FmlRule, FmlRules
 from fuzzytree.exporters.fuzzy_files import FileNames, inverse, without_heights
 from fuzzytree.exporters.xml_text import XmlElement, element, text_element, text_of
 from fuzzytree.formats import (
@@ -111,7 +111,7 @@ def write(
     losses += lost
     system, lost = _with_known_curves(system, tolerance)
     losses += [*lost, *_losses(system)]
-    result = rules_of(system)
+    result = FmlRules(system)
     losses += result.losses
     if losses and not allow_loss:
         raise refusal(model.name, "fml", losses)

@@ -86,71 +86,146 @@ Base = tuple[str, RuleBlock, tuple[FmlRule, ...]]
 """The kind (mamdani, tsk, tsukamoto), the block it comes from, and its rules."""
 
 
-class FmlRules(msgspec.Struct, frozen=True):
-    """All rules, the terms that they need, by variable, and what was lost."""
+class FmlRules:
+    """The rules of a system in FML.
 
-    bases: tuple[Base, ...]
-    made: dict[str, list[CircularTerm]]
-    losses: list[Loss]
-
-
-def rules_of(system: FuzzySystem) -> FmlRules:
-    """Return the rules of a system.
+    Attributes:
+        bases: The rules.
+        made: The terms that they need, by variable.
+        losses: What was lost.
 
     Raises:
         LossError: With every rule that has no place in FML.
     """
-    kinds = {one.name: _kind(one) for one in system.outputs}
-    taken = {one.name: [label.name for label in one.labels] for one in system.inputs}
-    rules = FmlRules((), {}, [])
-    bases: list[Base] = []
-    reasons: list[str] = []
-    number = 0
-    for block in system.blocks:
-        result: dict[str, list[FmlRule]] = {}
-        for rule in block.rules:
-            number += 1
-            try:
-                several = _placed(rule, block, system, kinds, (rules.made, taken))
-            except LossError as error:
-                reasons.append(f"rule {number}: {error}")
-                continue
-            if len(several) > len({kind for kind, _ in several}):
-                count = len(several)
-                what = f"it is {count} rules, joined by maximum: that is equivalent"
-                rules.losses.append(Loss(f"rule {number}", what, 0.0))
-            for kind, one in several:
-                result.setdefault(kind, []).append(one)
-        bases += [(kind, block, tuple(several)) for kind, several in result.items()]
-    reasons += [
-        f"output {name!r}: its terms are of several kinds, and FML has one for each"
-        for name, kind in kinds.items()
-        if kind == "mixed"
-    ]
-    if len(system.variables) < 2:
-        reasons.append("FML needs at least two variables")
-    if not any(several for _, _, several in bases) and not reasons:
-        reasons.append("FML needs at least one rule")
-    refuse(system.name, "fml", reasons)
-    return FmlRules(tuple(bases), rules.made, rules.losses)
 
+    def __init__(self, system: FuzzySystem) -> None:
+        self.bases: list[Base] = []
+        self.made: dict[str, list[CircularTerm]] = {}
+        self.losses: list[Loss] = []
+        self._system = system
+        self._kinds = {one.name: _kind(one) for one in system.outputs}
+        self._taken = {
+            one.name: [label.name for label in one.labels] for one in system.inputs
+        }
+        reasons: list[str] = []
+        number = 0
+        for block in system.blocks:
+            result: dict[str, list[FmlRule]] = {}
+            for rule in block.rules:
+                number += 1
+                try:
+                    several = self._placed(rule, block)
+                except LossError as error:
+                    reasons.append(f"rule {number}: {error}")
+                    continue
+                if len(several) > len({kind for kind, _ in several}):
+                    count = len(several)
+                    what = f"it is {count} rules, joined by maximum: that is equivalent"
+                    self.losses.append(Loss(f"rule {number}", what, 0.0))
+                for kind, one in several:
+                    result.setdefault(kind, []).append(one)
+            self.bases += [(kind, block, tuple(own)) for kind, own in result.items()]
+        reasons += [
+            f"output {name!r}: its terms are of several kinds, and FML has one for each"
+            for name, kind in self._kinds.items()
+            if kind == "mixed"
+        ]
+        if len(system.variables) < 2:
+            reasons.append("FML needs at least two variables")
+        if not self.bases and not reasons:
+            reasons.append("FML needs at least one rule")
+        refuse(system.name, "fml", reasons)
 
-def _placed(
-    rule: SystemRule,
-    block: RuleBlock,
-    system: FuzzySystem,
-    kinds: dict[str, str],
-    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
-) -> list[tuple[str, FmlRule]]:
-    """Return a rule by the kind of its outputs; several if it mixes and and or."""
-    try:
-        return [*_rules(rule, block, kinds, known)]
-    except LossError:
-        is_curve = all(kinds[one.output] == "mamdani" for one in rule.then)
-        rules = split(rule, block, system) if is_curve else ()
-        if len(rules) < 2:
-            raise
-    return [pair for one in rules for pair in _rules(one, block, kinds, known)]
+    def _placed(self, rule: SystemRule, block: RuleBlock) -> list[tuple[str, FmlRule]]:
+        """Return a rule by the kind of its outputs; several if it mixes and and or."""
+        try:
+            return [*self._rules(rule, block)]
+        except LossError:
+            is_curve = all(self._kinds[one.output] == "mamdani" for one in rule.then)
+            rules = split(rule, block, self._system) if is_curve else ()
+            if len(rules) < 2:
+                raise
+        return [pair for one in rules for pair in self._rules(one, block)]
+
+    def _rules(
+        self, rule: SystemRule, block: RuleBlock
+    ) -> Iterator[tuple[str, FmlRule]]:
+        """Yield a rule for each kind of output that it concludes."""
+        if rule.when is None:
+            raise LossError("it has no condition, and a rule of FML must have one")
+        if any(one.hedges for one in rule.then):
+            raise LossError("FML has no hedges of conclusions")
+        is_or, kinds = isinstance(rule.when, Or), self._kinds
+        clauses = [self._clause(part, block) for part in operands(rule.when, block)]
+        for kind in dict.fromkeys(kinds[one.output] for one in rule.then):
+            then = [one for one in rule.then if kinds[one.output] == kind]
+            concluded = tuple((one.output, one.label) for one in then)
+            yield kind, FmlRule(tuple(clauses), concluded, rule.weight, is_or)
+
+    def _clause(self, condition: Condition, block: RuleBlock) -> Clause:
+        match condition:
+            case Is(variable=variable) if variable in self._kinds:
+                raise LossError(f"it tests the output {variable!r}")
+            case Is(variable=variable, label=label, hedges=hedges):
+                return self._question(variable, label, hedges)
+            case Not(part=Is(variable=variable, label=label, hedges=hedges)):
+                return self._question(variable, label, ("not", *hedges))
+            case Not(part=And() | Or() as part):
+                variable, label, _ = self._circular(part, block)
+                return variable, label, "not"
+            case And() | Or():
+                return self._circular(condition, block)
+            case _:
+                raise LossError("it has a not within a not")
+
+    def _question(
+        self, variable: str, label: str | None, hedges: Sequence[Hedge]
+    ) -> Clause:
+        if hedges[-1:] == ("any",) and len(hedges) == 1:
+            names = self._taken[variable]
+            if not names:
+                raise LossError(f"{variable!r} has no term that a rule could test")
+            return variable, label or names[0], "any"
+        if label is None or len(hedges) > 1 or any(one not in _WORDS for one in hedges):
+            raise LossError(f"FML has no way to say {' '.join(hedges)!r}")
+        return variable, label, _WORDS[hedges[0]] if hedges else ""
+
+    def _circular(self, condition: And | Or, block: RuleBlock) -> Clause:
+        """Return a clause on a term that combines several of one variable."""
+        propositions = [*questions(condition)]
+        variables = {one.variable for one in propositions}
+        if len(variables) > 1 or len(propositions) != len(condition.parts):
+            raise LossError("it mixes and, or and not over several inputs")
+        (variable,) = variables
+        parts: list[tuple[str, bool]] = []
+        for part in condition.parts:
+            match part:
+                case Is(label=str(label), hedges=()):
+                    parts.append((label, False))
+                case (
+                    Is(label=str(label), hedges=("not",))
+                    | Not(part=Is(label=str(label), hedges=()))
+                ):
+                    parts.append((label, True))
+                case _:
+                    raise LossError(f"terms of {variable!r} are joined with hedges")
+        is_or = isinstance(condition, Or)
+        norms = FML_SNORMS if is_or else FML_TNORMS
+        meant = block.disjunction if is_or else block.conjunction
+        norm = inverse(norms, meant)
+        if not norm:
+            raise LossError(f"FML has no {meant}")
+        word = "or" if is_or else "and"
+        if len(parts) == 1:
+            return variable, parts[0][0], "not" if parts[0][1] else ""
+        for one in self.made.setdefault(variable, []):
+            if (one.parts, one.word, one.norm) == (tuple(parts), word, norm):
+                return variable, one.name, ""
+        shown = f" {word} ".join(f"{'not ' * is_not}{label}" for label, is_not in parts)
+        name = unlike(shown[:60], self._taken[variable])
+        self._taken[variable].append(name)
+        self.made[variable].append(CircularTerm(name, tuple(parts), word, norm))
+        return variable, name, ""
 
 
 def _kind(output: SystemOutput) -> str:
@@ -165,106 +240,3 @@ def _kind(output: SystemOutput) -> str:
         for curve in curves
     )
     return "tsukamoto" if is_monotone else "mixed"
-
-
-def _rules(
-    rule: SystemRule,
-    block: RuleBlock,
-    kinds: dict[str, str],
-    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
-) -> Iterator[tuple[str, FmlRule]]:
-    """Yield a rule for each kind of output that it concludes."""
-    if rule.when is None:
-        raise LossError("it has no condition, and a rule of FML must have one")
-    if any(one.hedges for one in rule.then):
-        raise LossError("FML has no hedges of conclusions")
-    is_or = isinstance(rule.when, Or)
-    clauses: list[Clause] = []
-    for part in operands(rule.when, block):
-        clauses.append(_clause(part, block, kinds, known))
-    for kind in dict.fromkeys(kinds[one.output] for one in rule.then):
-        concluded = tuple(
-            (one.output, one.label) for one in rule.then if kinds[one.output] == kind
-        )
-        yield kind, FmlRule(tuple(clauses), concluded, rule.weight, is_or)
-
-
-def _clause(
-    condition: Condition,
-    block: RuleBlock,
-    kinds: dict[str, str],
-    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
-) -> Clause:
-    match condition:
-        case Is(variable=variable) if variable in kinds:
-            raise LossError(f"it tests the output {variable!r}")
-        case Is(variable=variable, label=label, hedges=hedges):
-            return _question(variable, label, hedges, known)
-        case Not(part=Is(variable=variable, label=label, hedges=hedges)):
-            return _question(variable, label, ("not", *hedges), known)
-        case Not(part=And() | Or() as part):
-            variable, label, _ = _made(part, block, known)
-            return variable, label, "not"
-        case And() | Or():
-            return _made(condition, block, known)
-        case _:
-            raise LossError("it has a not within a not")
-
-
-def _question(
-    variable: str,
-    label: str | None,
-    hedges: Sequence[Hedge],
-    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
-) -> Clause:
-    if hedges[-1:] == ("any",) and len(hedges) == 1:
-        names = known[1][variable]
-        if not names:
-            raise LossError(f"{variable!r} has no term that a rule could test")
-        return variable, label or names[0], "any"
-    if label is None or len(hedges) > 1 or any(one not in _WORDS for one in hedges):
-        raise LossError(f"FML has no way to say {' '.join(hedges)!r}")
-    return variable, label, _WORDS[hedges[0]] if hedges else ""
-
-
-def _made(
-    condition: And | Or,
-    block: RuleBlock,
-    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
-) -> Clause:
-    """Return a clause on a term that combines several of one variable."""
-    propositions = [*questions(condition)]
-    variables = {one.variable for one in propositions}
-    if len(variables) > 1 or len(propositions) != len(condition.parts):
-        raise LossError("it mixes and, or and not over several inputs")
-    (variable,) = variables
-    parts: list[tuple[str, bool]] = []
-    for part in condition.parts:
-        match part:
-            case Is(label=str(label), hedges=()):
-                parts.append((label, False))
-            case (
-                Is(label=str(label), hedges=("not",))
-                | Not(part=Is(label=str(label), hedges=()))
-            ):
-                parts.append((label, True))
-            case _:
-                raise LossError(f"terms of {variable!r} are joined with hedges")
-    is_or = isinstance(condition, Or)
-    norms = FML_SNORMS if is_or else FML_TNORMS
-    meant = block.disjunction if is_or else block.conjunction
-    norm = inverse(norms, meant)
-    if not norm:
-        raise LossError(f"FML has no {meant}")
-    word = "or" if is_or else "and"
-    if len(parts) == 1:
-        return variable, parts[0][0], "not" if parts[0][1] else ""
-    made, taken = known
-    for one in made.setdefault(variable, []):
-        if (one.parts, one.word, one.norm) == (tuple(parts), word, norm):
-            return variable, one.name, ""
-    shown = f" {word} ".join(f"{'not ' * is_not}{label}" for label, is_not in parts)
-    name = unlike(shown[:60], taken[variable])
-    taken[variable].append(name)
-    made[variable].append(CircularTerm(name, tuple(parts), word, norm))
-    return variable, name, ""
