@@ -137,8 +137,8 @@ def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[
         said = ", ".join(f"{code} ({count})" for code, count in codes.items())
         rest = counted(len(findings) - _MOST_SHORT, "more finding")
         yield from wrapped(f"{rest}: {said}; --verbose lists all", WIDTH, rest="  ")
-    given = [o for o in audit.answers if (o.code, o.subject) == ("FT204", "row")]
-    yield from _brief("the row of --row", given, paint)
+    of_row = [o for o in audit.answers if (o.code, o.subject) == ("FT204", "row")]
+    yield from _brief("the row of --row", of_row, paint)
     states = Counter(state_word(one.state) for one in audit.answers)
     counts = [f"{states[word]} {word}" for word in STATES if states[word]]
     yield f"{counted(len(audit.answers), 'question')}: {', '.join(counts) or 'none'}"
@@ -167,8 +167,8 @@ def summary_lines(audit: Audit) -> Iterator[str]:
 
 def audit_verdict(audit: Audit, gone: Collection[str] = ()) -> str:
     """Return what an audit found, in a sentence, and what one might do next."""
-    found = audit.open_findings
-    said = _by_severity(found) if found else "nothing found"
+    findings = audit.open_findings
+    said = _by_severity(findings) if findings else "nothing found"
     if audit.accepted:
         said += f" beside {len(audit.accepted)} accepted"
     if audit.was_interrupted:
@@ -178,8 +178,8 @@ def audit_verdict(audit: Audit, gone: Collection[str] = ()) -> str:
     if gone:
         ids = counted(len(gone), "accepted finding")
         said += f"; {ids} no longer found, which --write-baseline forgets"
-    if found:
-        gravest = min(found, key=_gravity).code
+    if findings:
+        gravest = min(findings, key=_gravity).code
         said += f"; `fuzzytree explain {gravest}` explains the gravest"
     elif audit.is_complete:
         said += f"; {_asked_text(audit)}"
@@ -312,8 +312,8 @@ def _quoted(place: FileLocation, source: Sequence[str]) -> Iterator[str]:
 
 def _counts(answers: Sequence[Answer]) -> Iterator[str]:
     words = [state_word(answer.state) for answer in answers]
-    found = sum(answer.is_finding for answer in answers)
-    counts = [len(answers), found]
+    findings = sum(answer.is_finding for answer in answers)
+    counts = [len(answers), findings]
     counts += [words.count(word) for word in STATES]
     yield from (str(count) if count else "-" for count in counts)
 
@@ -322,13 +322,13 @@ def _gravity(answer: Answer) -> int:
     return [*SEVERITIES].index(answer.severity)
 
 
-def _by_severity(found: Sequence[Answer]) -> str:
+def _by_severity(findings: Sequence[Answer]) -> str:
     counts = [
-        counted(sum(one.severity == severity for one in found), SEVERITIES[severity])
+        counted(sum(one.severity == severity for one in findings), SEVERITIES[severity])
         for severity in SEVERITIES
-        if any(one.severity == severity for one in found)
+        if any(one.severity == severity for one in findings)
     ]
-    return f"{counted(len(found), 'finding')}: {', '.join(counts)}"
+    return f"{counted(len(findings), 'finding')}: {', '.join(counts)}"
 
 
 def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
@@ -342,15 +342,15 @@ def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
     if is_whole:
         yield from _brief("answers that are no findings", answers, paint)
         return
-    given = [one for one in answers if (one.code, one.subject) == ("FT204", "row")]
-    rest = [one for one in answers if one not in given]
+    of_row = [one for one in answers if (one.code, one.subject) == ("FT204", "row")]
+    rest = [one for one in answers if one not in of_row]
     unsure = [one for one in rest if isinstance(one.state, Bracket)]
     shown = [*_first(unsure)][:_MOST_CALM]
-    yield from _brief("the row that was given", given, paint)
+    yield from _brief("the row that was given", of_row, paint)
     yield from _brief("open", shown, paint, len(unsure) - len(shown))
     if sure := len(rest) - len(unsure):
         verb = "is no finding" if sure == 1 else "are no findings"
-        what = "more answer" if given or shown else "answer"
+        what = "more answer" if of_row or shown else "answer"
         yield f"{counted(sure, what)} {verb}; --all lists each"
         yield ""
 
@@ -374,10 +374,10 @@ def _brief(
 
 def _first(answers: Sequence[Answer]) -> Iterator[Answer]:
     """Yield the first few answers of each code."""
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for answer in answers:
-        seen[answer.code] += 1
-        if seen[answer.code] <= _MOST_ALIKE:
+        counts[answer.code] += 1
+        if counts[answer.code] <= _MOST_ALIKE:
             yield answer
 
 

@@ -287,10 +287,10 @@ def _mapped(
 ) -> list[Axis]:
     """Return the variables that a map may show; of one who differs, all if two."""
     tested = dict.fromkeys(clause.variable for r in rules.rules for clause in r.when)
-    found = {axis.name: axis for axis in shown}
+    axes = {axis.name: axis for axis in shown}
     if whose and len(tested) == 2:
-        found |= {name: scene.axes[name] for name in tested if name in scene.axes}
-    return [axis for axis in found.values() if axis.name in tested]
+        axes |= {name: scene.axes[name] for name in tested if name in scene.axes}
+    return [axis for axis in axes.values() if axis.name in tested]
 
 
 def _maps(

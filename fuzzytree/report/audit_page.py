@@ -224,8 +224,8 @@ def _command(answers: Sequence[Answer]) -> str:
 
     The command of an answer is that of the audit with `--select` and its code.
     """
-    found = {one.repeat.removesuffix(f" --select {one.code}") for one in answers}
-    return found.pop() if len(found) == 1 else ""
+    commands = {one.repeat.removesuffix(f" --select {one.code}") for one in answers}
+    return commands.pop() if len(commands) == 1 else ""
 
 
 _MOST_URGENT = 12  # findings that are named
@@ -297,33 +297,33 @@ def _urgent(
 _MOST_CALM = 12  # comparisons that agree and are not folded
 
 
-def agreement_section(found: Agreement) -> Markup:
+def agreement_section(agreement: Agreement) -> Markup:
     """Return the result of a check as a table."""
-    calm = [one for one in found.comparisons if one.verdict == "agrees"]
+    calm = [one for one in agreement.comparisons if one.verdict == "agrees"]
     if len(calm) <= _MOST_CALM:
         calm = []
-    wrong = [one for one in found.comparisons if one not in calm]
-    details = [line for one in found.comparisons for line in one.detail]
-    details += [line for one in found.certificates for line in one.detail]
+    wrong = [one for one in agreement.comparisons if one not in calm]
+    details = [line for one in agreement.comparisons for line in one.detail]
+    details += [line for one in agreement.certificates for line in one.detail]
     return part(
         "agreement",
-        agreement_text(found),
+        agreement_text(agreement),
         [*map(comparison_row, wrong)],
         [*map(comparison_row, calm)],
-        [*map(certified_row, found.certificates)],
+        [*map(certified_row, agreement.certificates)],
         details,
-        found.skipped,
+        agreement.skipped,
     )
 
 
-def stability_section(found: Stability) -> Markup:
+def stability_section(study: Stability) -> Markup:
     """Return the result of a study as a table of its stability checks."""
-    probes, tried = counted(found.probes, "probe"), counted(found.tried, "row")
+    probes, tried = counted(study.probes, "probe"), counted(study.tried, "row")
     return part(
         "stability",
-        f"{stability_text(found)} ({probes}, {tried})",
-        [*map(criterion_row, found.criteria)],
-        [*advice(found)],
-        [f"{one.code}: {line}" for one in found.criteria for line in one.detail],
-        [f"{one.code}: {line}" for one in found.criteria for line in one.skipped],
+        f"{stability_text(study)} ({probes}, {tried})",
+        [*map(criterion_row, study.criteria)],
+        [*advice(study)],
+        [f"{one.code}: {line}" for one in study.criteria for line in one.detail],
+        [f"{one.code}: {line}" for one in study.criteria for line in one.skipped],
     )

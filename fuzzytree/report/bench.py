@@ -42,33 +42,33 @@ _LEGEND = (
 
 
 def study_lines(
-    found: Study, *, is_verbose: bool = False, is_full: bool = False
+    study: Study, *, is_verbose: bool = False, is_full: bool = False
 ) -> Iterator[str]:
     """Yield a study: what to use, the unbeaten candidates, how many were left out.
 
     Args:
-        found: The study.
+        study: The study.
         is_verbose: Whether to print every table, omission and advice.
         is_full: Whether to list variants too that are beaten in both run time and
             error; it includes the rest.
     """
-    advice = found.advice[-1] if found.advice else _nothing(found)
+    advice = study.advice[-1] if study.advice else _nothing(study)
     yield from wrapped(advice, _WIDTH, rest="  ")
-    yield f"{found.model}: {found.data}; {found.seconds:.0f} s"
+    yield f"{study.model}: {study.data}; {study.seconds:.0f} s"
     if is_verbose or is_full:
-        yield from _tables(found, is_full=is_full)
+        yield from _tables(study, is_full=is_full)
         return
-    if found.points:
-        yield from aligned([_UNBEATEN, *_unbeaten(found)][: _MOST_UNBEATEN + 1])
-    yield from _more("doubtful: ", found.warnings[:2], len(found.warnings) - 2)
-    names = {one.name for one in found.omissions}
+    if study.points:
+        yield from aligned([_UNBEATEN, *_unbeaten(study)][: _MOST_UNBEATEN + 1])
+    yield from _more("doubtful: ", study.warnings[:2], len(study.warnings) - 2)
+    names = {one.name for one in study.omissions}
     if names:
         yield f"{counted(len(names), 'candidate')} left out"
     yield "--verbose lists every time, error, omission and advice"
 
 
-def _nothing(found: Study) -> str:
-    return "measured" if found.points else "nothing could be measured"
+def _nothing(study: Study) -> str:
+    return "measured" if study.points else "nothing could be measured"
 
 
 def _more(title: str, shown: Sequence[str], rest: int) -> Iterator[str]:
@@ -78,14 +78,14 @@ def _more(title: str, shown: Sequence[str], rest: int) -> Iterator[str]:
         yield f"{title}{rest} more; --verbose lists all"
 
 
-def _unbeaten(found: Study) -> Iterator[tuple[str, ...]]:
+def _unbeaten(study: Study) -> Iterator[tuple[str, ...]]:
     """Yield the fastest unbeaten candidate of each question and number of rows."""
     timed = {
         (point.name, one.rows, one.threads): (point, one)
-        for point in found.points
+        for point in study.points
         for one in point.timings
     }
-    for front in found.fronts:
+    for front in study.fronts:
         key = (front.rows, front.threads)
         members = [timed[name, *key] for name in front.names if (name, *key) in timed]
         if not members:
@@ -106,20 +106,20 @@ def _unbeaten(found: Study) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _tables(found: Study, *, is_full: bool) -> Iterator[str]:
-    yield from aligned(machine_rows(found.machine))
-    for rows, threads in _sizes(found.points):
+def _tables(study: Study, *, is_full: bool) -> Iterator[str]:
+    yield from aligned(machine_rows(study.machine))
+    for rows, threads in _sizes(study.points):
         yield ""
         yield f"{rows:,} row{'' if rows == 1 else 's'}, {counted(threads, 'thread')}"
-        table = [*_table(found, rows, threads, is_full=is_full)]
+        table = [*_table(study, rows, threads, is_full=is_full)]
         width = max(map(len, table))
         yield from aligned([(*row, *[""] * (width - len(row))) for row in table])
-    if found.points:
+    if study.points:
         yield ""
         yield from _LEGEND
-    yield from _section("left out", _grouped(found.omissions))
-    yield from _section("doubtful", found.warnings)
-    yield from _section("advice", found.advice)
+    yield from _section("left out", _grouped(study.omissions))
+    yield from _section("doubtful", study.warnings)
+    yield from _section("advice", study.advice)
 
 
 def machine_rows(machine: Machine) -> Iterator[tuple[str, str]]:
@@ -144,13 +144,13 @@ def _sizes(points: Iterable[Point]) -> list[tuple[int, int]]:
 
 
 def _table(
-    found: Study, rows: int, threads: int, *, is_full: bool
+    study: Study, rows: int, threads: int, *, is_full: bool
 ) -> Iterator[tuple[str, ...]]:
     """Yield the cells of one table, question by question, the fastest first."""
     yield ("", *_HEAD)
     timed: Timed = {
         point.name: (point, timing)
-        for point in found.points
+        for point in study.points
         for timing in point.timings
         if (timing.rows, timing.threads) == (rows, threads)
     }
@@ -161,7 +161,7 @@ def _table(
         else:
             questions[point.question] = None
     for question in questions:
-        best = _best(found, question, rows, threads)
+        best = _best(study, question, rows, threads)
         yield from _rows(question, timed, best, is_full=is_full)
 
 
@@ -188,9 +188,9 @@ def _rows(
         yield (f"  and {counted(beaten, 'variant')} that something beats",)
 
 
-def _best(found: Study, question: Question, rows: int, threads: int) -> Sequence[str]:
+def _best(study: Study, question: Question, rows: int, threads: int) -> Sequence[str]:
     key = (question, rows, threads)
-    for front in found.fronts:
+    for front in study.fronts:
         if (front.question, front.rows, front.threads) == key:
             return front.names
     return ()
@@ -229,15 +229,15 @@ def _errors(point: Point) -> tuple[str, ...]:
 
 def _grouped(omissions: Iterable[Omission]) -> Iterator[str]:
     """Yield each reason once, with all that were left out for it."""
-    found: dict[str, dict[str, list[str]]] = {}
+    groups: dict[str, dict[str, list[str]]] = {}
     for one in omissions:
         short, _, question = one.name.rpartition(": ")
-        who = found.setdefault(one.why, {})
+        who = groups.setdefault(one.why, {})
         if question in get_args(Question):
             who.setdefault(short, []).append(question)
         else:
             who.setdefault(one.name, [])
-    for why, who in found.items():
+    for why, who in groups.items():
         names = [
             f"{k} ({', '.join(questions)})" if questions else k
             for k, questions in who.items()

@@ -22,38 +22,38 @@ _MOST_INPUTS = 12  # of a point or a region
 _INDENT = " " * 11
 
 
-def diff_lines(found: Difference, *, is_verbose: bool = False) -> Iterator[str]:
+def diff_lines(difference: Difference, *, is_verbose: bool = False) -> Iterator[str]:
     """Yield a difference: its verdict, the decisions, and what has changed.
 
     Args:
-        found: The difference.
+        difference: The difference.
         is_verbose: Whether to print every change, and the point of every witness.
     """
-    yield diff_verdict(found)
-    yield _model_text("old", found.old)
-    yield _model_text("new", found.new)
-    if found.data is not None:
-        yield f"rows     {found.rows} of {found.data.name}"
+    yield diff_verdict(difference)
+    yield _model_text("old", difference.old)
+    yield _model_text("new", difference.new)
+    if difference.data is not None:
+        yield f"rows     {difference.rows} of {difference.data.name}"
     if is_verbose:
         shown = [
-            f"{s.variable} {s.low:.6g} to {s.high:.6g}" for s in found.domain.sides
+            f"{s.variable} {s.low:.6g} to {s.high:.6g}" for s in difference.domain.sides
         ]
         domain = ", ".join(shown) or "no inputs"
         yield from wrapped(domain, WIDTH, "domain   ", " " * 9)
     yield "decisions"
-    answers = sorted(found.answers, key=lambda one: isinstance(one.state, Witness))
+    answers = sorted(difference.answers, key=lambda one: isinstance(one.state, Witness))
     most = len(answers) if is_verbose else _MOST_ANSWERS
     points = 0  # of witnesses that are printed
     for answer in answers[:most]:
         points += isinstance(answer.state, Witness)
         yield from _answer_lines(answer, has_point=is_verbose or points <= 1)
     yield from _more(len(answers) - most, "answer")
-    if found.changes:
+    if difference.changes:
         yield "changes"
-    most = len(found.changes) if is_verbose else _MOST_CHANGES
-    for change in found.changes[:most]:
+    most = len(difference.changes) if is_verbose else _MOST_CHANGES
+    for change in difference.changes[:most]:
         yield from _change_lines(change, has_place=is_verbose)
-    yield from _more(len(found.changes) - most, "change")
+    yield from _more(len(difference.changes) - most, "change")
 
 
 def _more(count: int, noun: str) -> Iterator[str]:
@@ -61,17 +61,17 @@ def _more(count: int, noun: str) -> Iterator[str]:
         yield f"  and {counted(count, f'more {noun}')}; --verbose lists all"
 
 
-def diff_verdict(found: Difference) -> str:
+def diff_verdict(difference: Difference) -> str:
     """Return what a difference comes to, in a sentence.
 
     What is not proved is said not to be.
     """
-    counts = _counts_text(found.changes)
-    match found.verdict:
+    counts = _counts_text(difference.changes)
+    match difference.verdict:
         case "changed":
-            what = "outputs" if found.old.form == "system" else "decisions"
+            what = "outputs" if difference.old.form == "system" else "decisions"
             return f"{what} have changed; {counts}"
-        case "equal" if not found.changes:
+        case "equal" if not difference.changes:
             return "decisions are proved equal, and nothing else has changed"
         case "equal":
             return f"decisions are proved equal; {counts}"

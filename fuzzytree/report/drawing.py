@@ -151,8 +151,8 @@ class Curve(NamedTuple):
 
     def corners_between(self, low: float, high: float) -> list[float]:
         """Return the corners between two values; some of them if they are many."""
-        found = [one for one in self.corners if low <= one <= high]
-        return found[:: 1 + len(found) // _CORNERS]
+        inside = [one for one in self.corners if low <= one <= high]
+        return inside[:: 1 + len(inside) // _CORNERS]
 
 
 class Axis(NamedTuple):
@@ -177,11 +177,11 @@ def axes_of(
 ) -> dict[str, Axis]:
     """Return every input and combination of a model as it is drawn, by name."""
     if isinstance(model, FuzzySystem):
-        found = (_system_axis(one) for one in model.inputs)
+        variables = (_system_axis(one) for one in model.inputs)
     else:
-        found = (_axis(one) for one in model.variables)
+        variables = (_axis(one) for one in model.variables)
     axes: dict[str, Axis] = {}
-    for axis in found:
+    for axis in variables:
         side = domain.side(axis.name)
         if side is not None:
             axes[axis.name] = axis._replace(low=side.low, high=side.high)

@@ -106,27 +106,27 @@ def _extra(extra: str | None, missing: set[str]) -> str:
     return f"{extra} (not installed)" if extra in missing else extra
 
 
-def _limits(found: Iterable[tuple[str, tuple[str, ...]]]) -> Iterator[str]:
-    for name, cannot in found:
+def _limits(limits: Iterable[tuple[str, tuple[str, ...]]]) -> Iterator[str]:
+    for name, cannot in limits:
         for text in cannot:
             yield f"  {name}: {text}"
 
 
-def ability_lines(found: Found) -> Iterator[str]:
+def ability_lines(abilities: Found) -> Iterator[str]:
     """Yield the table of what each format can carry: a line for each kind of model."""
-    rows = [*ability_rows(found)]
+    rows = [*ability_rows(abilities)]
     if rows:
         yield from aligned(rows)
         yield ""
     yield from aligned((f"  {SIGNS[one]}", text) for one, text in MEANINGS.items())
-    for name, reason in found.items():
+    for name, reason in abilities.items():
         if isinstance(reason, str):
             yield f"  {name}: {reason}"
 
 
-def ability_rows(found: Found) -> Iterator[Sequence[str]]:
+def ability_rows(abilities: Found) -> Iterator[Sequence[str]]:
     """Yield the names of formats, then the signs of each kind of model."""
-    known = {name: one for name, one in found.items() if not isinstance(one, str)}
+    known = {name: one for name, one in abilities.items() if not isinstance(one, str)}
     if not known:
         return
     yield ["", *known]
@@ -136,7 +136,7 @@ def ability_rows(found: Found) -> Iterator[Sequence[str]]:
 
 def detail_lines(
     form: Format,
-    found: tuple[Ability, ...] | str,
+    abilities: tuple[Ability, ...] | str,
     options: Sequence[OptionFacts],
     dialects: Found,
     *,
@@ -146,7 +146,7 @@ def detail_lines(
 
     Args:
         form: The format.
-        found: What it can carry, or why that is not known.
+        abilities: What it can carry, or why that is not known.
         options: The options of its writer.
         dialects: What it can carry in each of its dialects, if it has several.
         is_verbose: Whether to print the outcome for each kind of model.
@@ -163,18 +163,18 @@ def detail_lines(
             (f"  {one.name}", _default(one), one.help or "") for one in options
         )
     yield ""
-    if isinstance(found, str):
-        yield found
+    if isinstance(abilities, str):
+        yield abilities
         return
     if not is_verbose:
-        outcomes: list[Outcome] = [one.outcome for one in found]
-        yield f"{counted(len(found), 'kind')} of models; --verbose lists them"
+        outcomes: list[Outcome] = [one.outcome for one in abilities]
+        yield f"{counted(len(abilities), 'kind')} of models; --verbose lists them"
         yield from aligned(
             (f"  {outcomes.count(name)}", name, MEANINGS[name])
             for name in dict.fromkeys(outcomes)
         )
         return
-    rows = [(f"  {one.sample}", *_outcome(one)) for one in found]
+    rows = [(f"  {one.sample}", *_outcome(one)) for one in abilities]
     yield from aligned(rows)
     if dialects:
         yield ""

@@ -12,33 +12,33 @@ from fuzzytree.semantics import Removed
 _MOST = 6  # parts printed one by one, unless all are
 
 
-def report_lines(found: Footprint, *, is_verbose: bool = False) -> Iterator[str]:
+def report_lines(footprint: Footprint, *, is_verbose: bool = False) -> Iterator[str]:
     """Yield which inputs a model needs, what can be left out, the proof, the sizes.
 
     Args:
-        found: The report.
+        footprint: The report.
         is_verbose: Whether to print each comparison, graph and file.
     """
-    needs = found.needs
+    needs = footprint.needs
     most = None if is_verbose else _MOST
-    yield _verdict(found)
+    yield _verdict(footprint)
     yield from _head(needs)
-    yield from _removed_lines("left out", found.removed, most)
-    more = [one for one in needs.idle if one not in found.removed]
+    yield from _removed_lines("left out", footprint.removed, most)
+    more = [one for one in needs.idle if one not in footprint.removed]
     if more:
         yield from _removed_lines("left in, and could go on request", more, most)
-    yield from agreement_lines(found.proof, is_verbose=is_verbose)
+    yield from agreement_lines(footprint.proof, is_verbose=is_verbose)
     if is_verbose and needs.graphs:
         yield ""
         yield from _graph_lines(needs.graphs)
     yield ""
-    rows = [*_size_rows(found.sizes)]
+    rows = [*_size_rows(footprint.sizes)]
     yield from aligned(rows if is_verbose else rows[:_SIZES])
-    if found.costs:
+    if footprint.costs:
         yield ""
-        yield from aligned(_cost_rows(found.costs))
+        yield from aligned(_cost_rows(footprint.costs))
         yield "median of one call in one thread; in brackets the 95 % interval"
-    missing = [*dict.fromkeys([*needs.omissions, *found.omissions])]
+    missing = [*dict.fromkeys([*needs.omissions, *footprint.omissions])]
     yield from (f"not reported: {text}" for text in missing[:most])
     if missing[len(missing) if most is None else most :]:
         yield f"and {len(missing) - _MOST} more; --verbose lists all"
@@ -47,13 +47,13 @@ def report_lines(found: Footprint, *, is_verbose: bool = False) -> Iterator[str]
 _SIZES = 5  # rows of the table of sizes: head, columns, bytes, terms, the first file
 
 
-def _verdict(found: Footprint) -> str:
+def _verdict(footprint: Footprint) -> str:
     """Return how many inputs are needed, and what can be left out."""
-    needs = found.needs
+    needs = footprint.needs
     of = f" of {needs.columns} columns" if needs.columns else ""
-    count = len(found.removed)
+    count = len(footprint.removed)
     parts = f"{counted(count, 'part')} can be left out" if count else "all parts needed"
-    wrong = sum(c.verdict == "DISAGREES" for c in found.proof.comparisons)
+    wrong = sum(c.verdict == "DISAGREES" for c in footprint.proof.comparisons)
     agrees = "" if not wrong else f"; the pruned model differs in {wrong} comparisons"
     return f"{needs.model}: needs {len(needs.inputs)}{of}; {parts}{agrees}"
 

@@ -32,14 +32,14 @@ def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
             return part("rule_base", _lines(head_lines(model)), model, terms)
 
 
-def agreement_html(found: Agreement) -> Markup:
+def agreement_html(agreement: Agreement) -> Markup:
     """Return the result of a check as a table."""
-    return agreement_section(found)
+    return agreement_section(agreement)
 
 
-def audit_html(found: Audit) -> Markup:
+def audit_html(audit: Audit) -> Markup:
     """Return an audit: its verdict, and all else as it is printed."""
-    verdict, *rest = audit_lines(found)
+    verdict, *rest = audit_lines(audit)
     return joined([tag("p", verdict), _lines(rest)])
 
 

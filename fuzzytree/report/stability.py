@@ -17,66 +17,66 @@ _OFFSET = ("form", "spread/distance", "float32", "mixed", "double", "flips in fl
 _CURVE = ("curve", "form", "size", "leaves [0, 1]", "rises", "advice")
 
 
-def stability_lines(found: Stability, *, is_verbose: bool = False) -> Iterator[str]:
+def stability_lines(study: Stability, *, is_verbose: bool = False) -> Iterator[str]:
     """Yield a study: verdict, checks, and the inputs and curves with a problem.
 
     Args:
-        found: The study.
+        study: The study.
         is_verbose: Whether to print every measurement, and not only the problems.
     """
-    rows = f", {counted(found.rows, 'row')} of data" if found.rows else ""
-    rows += f", {found.tried} of them tried" if found.tried < found.rows else ""
-    runtimes = counted(len(found.runtimes), "runtime")
-    probes = counted(found.probes, "probe")
-    yield f"{found.model}: {stability_verdict(found)} ({probes}{rows}; {runtimes})"
+    rows = f", {counted(study.rows, 'row')} of data" if study.rows else ""
+    rows += f", {study.tried} of them tried" if study.tried < study.rows else ""
+    runtimes = counted(len(study.runtimes), "runtime")
+    probes = counted(study.probes, "probe")
+    yield f"{study.model}: {stability_verdict(study)} ({probes}{rows}; {runtimes})"
     if is_verbose:
-        yield f"runtimes: {', '.join(found.runtimes) or 'none'}"
-    yield from aligned([CRITERION, *map(criterion_row, found.criteria)])
-    for one in found.criteria:
+        yield f"runtimes: {', '.join(study.runtimes) or 'none'}"
+    yield from aligned([CRITERION, *map(criterion_row, study.criteria)])
+    for one in study.criteria:
         yield from _detail(one, is_verbose=is_verbose)
-    yield from _inputs(found, is_verbose=is_verbose)
-    if is_verbose and found.offsets:
-        yield from _offset_lines(found.offsets)
-    faults = [one for one in found.curves if is_verbose or one.fails]
+    yield from _inputs(study, is_verbose=is_verbose)
+    if is_verbose and study.offsets:
+        yield from _offset_lines(study.offsets)
+    faults = [one for one in study.curves if is_verbose or one.fails]
     if faults:
         shown = faults if is_verbose else faults[:_CURVES_SHOWN]
         yield from aligned([_CURVE, *map(_curve_row, shown)])
         if len(shown) < len(faults):
             yield f"{len(faults) - len(shown)} more curves; --verbose lists all"
-    todo = [*advice(found)]
+    todo = [*advice(study)]
     yield from (f"what to do: {text}" for text in todo[: None if is_verbose else 5])
     if len(todo) > 5 and not is_verbose:
         yield f"{len(todo) - 5} more things to do; --verbose lists all"
 
 
-def stability_verdict(found: Stability) -> str:
+def stability_verdict(study: Stability) -> str:
     """Return how many stability checks pass, and which fail."""
-    total = counted(len(found.criteria), "stability check")
-    failed = [one.code for one in found.criteria if one.verdict == "FAILS"]
+    total = counted(len(study.criteria), "stability check")
+    failed = [one.code for one in study.criteria if one.verdict == "FAILS"]
     if failed:
         verb = "fails" if len(failed) == 1 else "fail"
         return f"{len(failed)} of {total} {verb}: {', '.join(failed)}"
-    passed = sum(one.verdict == "holds" for one in found.criteria)
+    passed = sum(one.verdict == "holds" for one in study.criteria)
     return f"{passed} of {total} {'passes' if passed == 1 else 'pass'}, none fails"
 
 
-def _inputs(found: Stability, *, is_verbose: bool) -> Iterator[str]:
+def _inputs(study: Stability, *, is_verbose: bool) -> Iterator[str]:
     """Yield what float32 costs each input, or how many inputs it is safe for."""
-    unsafe = [one for one in found.stiff if one.advice != _SAFE]
-    shown = found.stiff if is_verbose else unsafe[:_INPUTS_SHOWN]
+    unsafe = [one for one in study.stiff if one.advice != _SAFE]
+    shown = study.stiff if is_verbose else unsafe[:_INPUTS_SHOWN]
     if shown:
         yield from aligned([_STIFF, *map(_stiff_row, shown)])
-    if found.stiff and not is_verbose:
-        count = len(found.stiff) - len(unsafe)
-        yield f"float32 is safe for {count} of {counted(len(found.stiff), 'input')}"
+    if study.stiff and not is_verbose:
+        count = len(study.stiff) - len(unsafe)
+        yield f"float32 is safe for {count} of {counted(len(study.stiff), 'input')}"
 
 
-def advice(found: Stability) -> Iterator[str]:
+def advice(study: Stability) -> Iterator[str]:
     """Yield what to do, the most urgent first."""
-    for one in found.criteria:
+    for one in study.criteria:
         if one.advice:
             yield f"{one.code}: {one.advice}"
-    for stiff in found.stiff:
+    for stiff in study.stiff:
         if stiff.advice != _SAFE:
             yield f"{stiff.input}: {stiff.advice}"
 

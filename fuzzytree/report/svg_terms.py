@@ -302,10 +302,10 @@ def windows(
         is_sliver |= 0.0 < end - start < 0.04 * (high - low)
         room = 1.5 * (end - start)
         near.append((max(start - room, low), min(end + room, high)))
-    found = [("on the domain", Window(whole[0], whole[1]))]
+    shown = [("on the domain", Window(whole[0], whole[1]))]
     if is_sliver and all(a < b for a, b in near):
-        found.append(("near the region", Window(near[0], near[1])))
-    return found
+        shown.append(("near the region", Window(near[0], near[1])))
+    return shown
 
 
 def map_picture(
@@ -388,8 +388,8 @@ def decisions(
     uncovered = rules.semantics.uncovered
     none = -1 if uncovered is None else codes[uncovered]
     classes = np.array([none, *(codes[rule.then] for rule in rules.rules)])
-    found: IntArray = classes[outcome.rule].reshape(x.shape)
-    return found
+    grid: IntArray = classes[outcome.rule].reshape(x.shape)
+    return grid
 
 
 def _middles(ends: tuple[float, float]) -> list[float]:
@@ -438,8 +438,8 @@ def _innermost(is_here: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> list
         if not inner.any():
             break
         kept = inner
-    found = np.argwhere(kept)
-    row, place = found[len(found) // 2].tolist()
+    cells = np.argwhere(kept)
+    row, place = cells[len(cells) // 2].tolist()
     return [row - 1, place - 1]
 
 

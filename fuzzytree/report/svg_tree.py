@@ -83,7 +83,7 @@ def class_mark(code: int) -> str:
 def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
     """Return all nodes and leaves, depth first; `placed` puts them in their places."""
     codes = {label: code for code, label in enumerate(tree.classes)}
-    found: list[Box] = []
+    boxes: list[Box] = []
     todo: list[tuple[int | None, int | None, str, Box | None]]
     todo = [(1, None, "", None) if tree.nodes else (None, 1, "", None)]
     while todo:
@@ -113,9 +113,9 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
         box.above = above
         if above:
             above.below.append(box)
-        found.append(box)
-    _add_up(found)
-    return found
+        boxes.append(box)
+    _add_up(boxes)
+    return boxes
 
 
 def _add_up(boxes: Sequence[Box]) -> None:

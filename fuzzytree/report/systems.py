@@ -120,12 +120,12 @@ def system_rule_facts(system: FuzzySystem) -> list[dict[str, object]]:
     ]
 
 
-def system_reasons(system: FuzzySystem, found: Outputs) -> list[str]:
+def system_reasons(system: FuzzySystem, outputs: Outputs) -> list[str]:
     """Return, for each row, the rules that were activated, each with its degree."""
     texts = [rule_text(rule) for rule in system.rules]
-    if found.activations is None:
-        return [""] * len(found)
-    rows = zip(found.activations.T.tolist(), found.status.tolist(), strict=True)
+    if outputs.activations is None:
+        return [""] * len(outputs)
+    rows = zip(outputs.activations.T.tolist(), outputs.status.tolist(), strict=True)
     return [_reason(texts, degrees, status) for degrees, status in rows]
 
 

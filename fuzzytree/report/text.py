@@ -327,22 +327,24 @@ def _side_text(side: Side) -> str:
 
 
 def agreement_lines(
-    found: Agreement, *, is_verbose: bool = False, is_full: bool = False
+    agreement: Agreement, *, is_verbose: bool = False, is_full: bool = False
 ) -> Iterator[str]:
     """Yield a check: its verdict, counts of what agrees, and all that does not.
 
     Args:
-        found: The check.
+        agreement: The check.
         is_verbose: Whether each comparison has a line, and not only a count.
         is_full: Whether to print the rows that differ by an allowed amount, too.
     """
-    yield f"{found.model}: {agreement_verdict(found)} ({_basis_text(found)})"
-    wrong = [c for c in found.comparisons if c.verdict in ("DISAGREES", "rows only")]
+    verdict, basis = agreement_verdict(agreement), _basis_text(agreement)
+    yield f"{agreement.model}: {verdict} ({basis})"
+    comparisons = agreement.comparisons
+    wrong = [c for c in comparisons if c.verdict in ("DISAGREES", "rows only")]
     if is_verbose or is_full:
-        shown: Sequence[Comparison] = found.comparisons
+        shown: Sequence[Comparison] = agreement.comparisons
         yield from aligned([COMPARISON, *map(comparison_row, shown)])
     else:
-        yield from aligned([_GROUP, *_groups(found.comparisons)])
+        yield from aligned([_GROUP, *_groups(agreement.comparisons)])
         shown = wrong[:_MOST_WRONG]
         if shown:
             yield from aligned([COMPARISON, *map(comparison_row, shown)])
@@ -351,18 +353,18 @@ def agreement_lines(
         if comparison.detail and (is_full or comparison in wrong):
             yield f"{comparison.representation} compared with {comparison.against}:"
             yield from (f"  {line}" for line in comparison.detail)
-    for count in found.counts:
+    for count in agreement.counts:
         yield (
             f"{count.representation}: {counted(count.rows, 'row')}, {count.ties} tied, "
             f"{count.uncovered} with no rule fired, "
             f"{count.missing} with a missing input"
         )
-    if found.coverage is not None:
-        yield from found.coverage.sentences
-    most = len(found.skipped) if is_verbose else _MOST_SKIPPED
-    yield from (f"not examined: {text}" for text in found.skipped[:most])
-    yield from _more(len(found.skipped[most:]), "item", "not examined")
-    yield from _bound_lines(found.certificates, is_verbose=is_verbose)
+    if agreement.coverage is not None:
+        yield from agreement.coverage.sentences
+    most = len(agreement.skipped) if is_verbose else _MOST_SKIPPED
+    yield from (f"not examined: {text}" for text in agreement.skipped[:most])
+    yield from _more(len(agreement.skipped[most:]), "item", "not examined")
+    yield from _bound_lines(agreement.certificates, is_verbose=is_verbose)
 
 
 def _groups(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, ...]]:
@@ -417,34 +419,34 @@ COMPARISON = (
 )
 
 
-def agreement_verdict(found: Agreement) -> str:
+def agreement_verdict(agreement: Agreement) -> str:
     """Return how many comparisons of a check disagree, and how many bounds fail."""
-    wrong = sum(one.verdict == "DISAGREES" for one in found.comparisons)
-    broken = sum(one.verdict == "DISAGREES" for one in found.certificates)
+    wrong = sum(one.verdict == "DISAGREES" for one in agreement.comparisons)
+    broken = sum(one.verdict == "DISAGREES" for one in agreement.certificates)
     verb = "disagree" if wrong > 1 else "disagrees"
-    count = counted(len(found.comparisons), "comparison")
+    count = counted(len(agreement.comparisons), "comparison")
     said = f"{wrong or 'none'} of {count} {verb}"
-    rows_only = sum(one.verdict == "rows only" for one in found.comparisons)
+    rows_only = sum(one.verdict == "rows only" for one in agreement.comparisons)
     if rows_only:
         said += f"; in {counted(rows_only, 'file')} only the rows agree"
-        said += "" if found.rows_only else ", which --rows-only accepts"
+        said += "" if agreement.rows_only else ", which --rows-only accepts"
     if broken:
         said += f"; {counted(broken, 'rounding bound')} exceeded"
     return said
 
 
-def _basis_text(found: Agreement) -> str:
+def _basis_text(agreement: Agreement) -> str:
     rows = max(
         (
-            found.probes,
-            *(one.rows for one in found.counts),
-            *(one.rows for one in found.comparisons if one.basis == "rows"),
+            agreement.probes,
+            *(one.rows for one in agreement.counts),
+            *(one.rows for one in agreement.comparisons if one.basis == "rows"),
         )
     )
-    data = rows - found.probes
-    text = counted(found.probes, "probe")
+    data = rows - agreement.probes
+    text = counted(agreement.probes, "probe")
     text += f", {counted(data, 'row')} of data" if data else ""
-    return text + (f", {counted(found.cells, 'cell')}" if found.cells else "")
+    return text + (f", {counted(agreement.cells, 'cell')}" if agreement.cells else "")
 
 
 def comparison_row(one: Comparison) -> tuple[str, ...]:

@@ -53,25 +53,25 @@ class _Read(msgspec.Struct, frozen=True):
 class _Rule(msgspec.Struct, frozen=True):
     """A rule's words, an empty one behind them, and what they may say.
 
-    `found` collects names that do not exist, so that all of them are reported.
+    `mistakes` collects names that do not exist, so that all of them are reported.
     """
 
     words: tuple[Word, ...]
     vocabulary: Vocabulary
-    found: list[FileMistake]
+    mistakes: list[FileMistake]
 
     def note(self, mistake: FileMistake) -> None:
         """Keep a mistake behind which reading can go on."""
-        self.found.append(mistake)
-        if len(self.found) >= MOST_SHOWN:
-            raise PartError(*self.found)
+        self.mistakes.append(mistake)
+        if len(self.mistakes) >= MOST_SHOWN:
+            raise PartError(*self.mistakes)
 
     def error(self, place: int, wanted: str) -> PartError:
         """Return the error of a word where another must stand."""
         word = self.words[place]
         what = repr(word.text) if word.text else "the end"
         mistake = word.mistake(f"{what} where {wanted} must stand")
-        return PartError(*self.found, mistake)
+        return PartError(*self.mistakes, mistake)
 
 
 def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> SystemRule:
@@ -102,8 +102,8 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
         weight, place = _weight(rule, place + 1), place + 2
     if place < len(words):
         raise rule.error(place, "'and', 'with' or the end")
-    if rule.found:
-        raise PartError(*rule.found)
+    if rule.mistakes:
+        raise PartError(*rule.mistakes)
     always = isinstance(read.condition, Is) and read.condition.hedges == ("any",)
     return SystemRule(None if always else read.condition, tuple(then), weight)
 

@@ -176,7 +176,7 @@ class _Sentence:
             raise self.unexpected(wanted)
 
     def unexpected(self, wanted: str) -> SentenceError:
-        """Return what was found in the place of what was wanted."""
+        """Return that a token stands where another must."""
         result = repr(self.next.text) if self.next.text else "the end"
         before = " ".join(token.text for token in self.tokens[: self.place][-6:])
         behind = f" behind {before!r}" if before else ""

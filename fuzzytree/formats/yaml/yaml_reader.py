@@ -59,13 +59,13 @@ def read_yaml(content: bytes, name: str) -> Reading:
         >>> read_yaml(write(tree).content, "tree.yaml").model == tree
         True
     """
-    root, found = mapping_of_format(content, name, layout.YAML_FORMAT, "model")
+    root, mistakes = mapping_of_format(content, name, layout.YAML_FORMAT, "model")
     try:
-        model = _READERS[_kind(root)](root, found)
+        model = _READERS[_kind(root)](root, mistakes)
     except _UnreadableError as error:
-        raise report(name, [*found, *error.found]) from error.__cause__
-    if found or model is None:
-        raise report(name, found)
+        raise report(name, [*mistakes, *error.mistakes]) from error.__cause__
+    if mistakes or model is None:
+        raise report(name, mistakes)
 
     def locate(path: Path) -> tuple[int, int]:
         node = find(root, path)
@@ -77,8 +77,8 @@ def read_yaml(content: bytes, name: str) -> Reading:
 class _UnreadableError(Exception):
     """What stops a file from being read at all."""
 
-    def __init__(self, *found: FileMistake) -> None:
-        self.found = found
+    def __init__(self, *mistakes: FileMistake) -> None:
+        self.mistakes = mistakes
         super().__init__()
 
 
@@ -90,17 +90,17 @@ def mapping_of_format(
     Raises:
         ReadError: If it is none, or does not say that its format is `known`.
     """
-    root, found = compose(content, name)
+    root, mistakes = compose(content, name)
     if not isinstance(root, MappingNode):
         text = f"a {noun} must be a mapping that begins with 'format: {known}'"
-        raise report(name, [*found, (root.line, root.column, text)])
+        raise report(name, [*mistakes, (root.line, root.column, text)])
     node = value_of(root, "format")
     if node is None:
         text = f"no 'format: {known}' says what this file is"
-        raise report(name, [*found, (root.line, root.column, text)])
+        raise report(name, [*mistakes, (root.line, root.column, text)])
     value = node.text if isinstance(node, Scalar) else ""
     if value == known:
-        return root, found
+        return root, mistakes
     text = f"'format' must be {known!r}"
     if re.fullmatch(known.removesuffix("1") + "[1-9][0-9]{0,8}", value):
         text = (
@@ -109,7 +109,7 @@ def mapping_of_format(
         )
     elif value.startswith("fuzzytree/"):
         text = f"this is a model, and no {noun}; {text}"
-    raise report(name, [*found, (node.line, node.column, text)])
+    raise report(name, [*mistakes, (node.line, node.column, text)])
 
 
 def _kind(root: MappingNode) -> str:

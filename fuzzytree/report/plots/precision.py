@@ -113,8 +113,8 @@ def work_precision(study: Study, *, rows: int, threads: int = 1) -> Figure:
         whole = figure.get_figheight()
         figure.subplots_adjust(0.115, 0.75 / whole, 0.985, 1.0 - 0.62 / whole, 0, 0.1)
         ratios = {"height_ratios": heights}
-        found = figure.subplots(len(measures), sharex=True, gridspec_kw=ratios)
-        axes: dict[Measure, Axes] = dict(zip(measures, _flat(found), strict=True))
+        panels = figure.subplots(len(measures), sharex=True, gridspec_kw=ratios)
+        axes: dict[Measure, Axes] = dict(zip(measures, _flat(panels), strict=True))
         _scale_times([*axes.values()], marks, [time for _, time in floors])
         places: dict[str, float] = {}  # the height of each candidate's marker
         for measure, panel in axes.items():
@@ -138,7 +138,7 @@ def marks_of(study: Study, rows: int, threads: int) -> Iterator[Mark]:
         if (front.rows, front.threads) == key
         for name in front.names
     }
-    found: list[Mark] = []
+    marks: list[Mark] = []
     for point, timing in _timed(study, rows, threads):
         if point.error is None or not point.error.rows:
             continue
@@ -147,9 +147,9 @@ def marks_of(study: Study, rows: int, threads: int) -> Iterator[Mark]:
         if point.question == "tree" or error is None:
             measure, error = "class", point.error.flips / point.error.rows
         height = error if error <= 1.0 else 1.0  # NaN and infinity are drawn at 1
-        found.append(Mark(point, timing, measure, height, point.name in fronts))
+        marks.append(Mark(point, timing, measure, height, point.name in fronts))
     yield from sorted(
-        found, key=lambda m: (not m.is_front, m.nanoseconds, m.point.name)
+        marks, key=lambda m: (not m.is_front, m.nanoseconds, m.point.name)
     )
 
 
