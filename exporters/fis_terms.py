@@ -55,6 +55,7 @@ def term_of(curve: Curve, dialect: Dialect) -> Term | None:
     """Return a curve as a file writes it; None if the dialect cannot.
 
     Example:
+        >>> from fuzzytree.model import Cosine
         >>> term_of(Trapezoid(0.0, 1.0, 1.0, 2.5), "octave")
         ('trimf', '0.0 1.0 2.5')
         >>> term_of(Points((1.0, 2.0), (1.0, 0.0)), "matlab")

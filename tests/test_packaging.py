@@ -66,8 +66,9 @@ def test_every_file_that_is_no_code_is_package_data() -> None:
             is_code = path.suffix in {".py", ".pyc"} or path.is_dir()
             if is_code or (folder == "fuzzytree" and _is_linked(path)):
                 continue
-            package = ".".join([name, *path.relative_to(ROOT / folder).parent.parts])
-            patterns = [*data.get(package, []), *data["*"]]
+            parts = path.relative_to(ROOT / folder).parent.parts
+            packages = [".".join([name, *parts[:end]]) for end in range(len(parts) + 1)]
+            patterns = [one for key in (*packages, "*") for one in data.get(key, [])]
             assert any(map(path.match, patterns)), path
 
 
