@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from msgspec.structs import replace
 
@@ -12,15 +12,12 @@ from fuzzytree.errors import LossError
 from fuzzytree.model import (
     And,
     Band,
-    Branch,
     Call,
     Clause,
     Conclusion,
     Condition,
     Curve,
     Document,
-    Expression,
-    Flank,
     Formula,
     FuzzySystem,
     FuzzyTree,
@@ -236,7 +233,22 @@ def _systems(rules: RuleBase) -> Iterator[FuzzySystem]:
 
 
 Names = Mapping[str, str]
-Labels = Mapping[str, Names]
+
+
+class _NewNames(NamedTuple):
+    """The new names of a model's parts, by their old ones.
+
+    Attributes:
+        variables: Of the variables.
+        terms: Of the terms of each variable.
+        sets: Of the fitted sets of each variable of a tree.
+        classes: Of the classes; None stays None.
+    """
+
+    variables: Names
+    terms: Mapping[str, Names]
+    sets: Mapping[str, Names]
+    classes: Mapping[str | None, str | None]
 
 
 def canonical_form(model: Document) -> Document:
@@ -254,79 +266,79 @@ def canonical_form(model: Document) -> Document:
         >>> canonical_form(one) == canonical_form(two)
         True
     """
-    match model:
-        case FuzzySystem():
-            return _system(model)
-        case RuleBase():
-            return _rules(model)
-        case FuzzyTree():
-            return _tree(model)
+    terms: dict[str, tuple[Term | SystemTerm, ...]] = {}
+    if isinstance(model, FuzzySystem):
+        terms = {one.name: one.labels for one in model.variables}
+    else:
+        terms = {one.name: one.terms for one in model.variables}
+    sets = model.sets if isinstance(model, FuzzyTree) else ()
+    classes = () if isinstance(model, FuzzySystem) else model.classes
+    names = _NewNames(
+        _numbered("v", terms),
+        {name: _numbered("t", (t.name for t in own)) for name, own in terms.items()},
+        {s.variable: _numbered("t", (t.name for t in s.terms)) for s in sets},
+        {None: None} | {name: f"c{k}" for k, name in enumerate(classes, 1)},
+    )
+    form: Document = _renamed(model, names)
+    return form
 
 
 def _numbered(letter: str, names: Iterable[str]) -> Names:
     return {name: f"{letter}{k}" for k, name in enumerate(names, 1)}
 
 
-def _rules(rules: RuleBase) -> RuleBase:
-    names = _numbered("v", (v.name for v in rules.variables))
-    terms = {v.name: _numbered("t", (t.name for t in v.terms)) for v in rules.variables}
-    classes = _numbered("c", rules.classes)
-    return RuleBase(
-        name="m",
-        classes=tuple(classes.values()),
-        variables=_variables(rules.variables, names, terms),
-        rules=tuple(
-            Rule(_clauses(rule.when, names, terms), classes[rule.then])
-            for rule in rules.rules
-        ),
-        semantics=_semantics(rules.semantics, classes),
-    )
+def _renamed(part: Any, names: _NewNames) -> Any:
+    """Return a part of a tree or rules with new names, without what decides nothing."""
 
+    def new(one: Any) -> Any:
+        return _renamed(one, names)
 
-def _tree(tree: FuzzyTree) -> FuzzyTree:
-    names = _numbered("v", (v.name for v in tree.variables))
-    terms = {v.name: _numbered("t", (t.name for t in v.terms)) for v in tree.variables}
-    sets = {s.variable: _numbered("t", (t.name for t in s.terms)) for s in tree.sets}
-    classes = _numbered("c", tree.classes)
-
-    def branch(one: Branch, variable: str) -> Branch:
-        names_of_terms = tuple(terms[variable][name] for name in one.terms)
-        fitted = tuple(sets[variable][name] for name in one.sets) if sets else ()
-        return replace(one, terms=names_of_terms, sets=fitted)
-
-    return FuzzyTree(
-        name="m",
-        classes=tuple(classes.values()),
-        variables=_variables(tree.variables, names, terms),
-        nodes=tuple(
-            Node(
-                names[node.variable],
-                node.cuts,
-                node.owners,
-                tuple(branch(one, node.variable) for one in node.branches),
+    match part:
+        case tuple():
+            return tuple(map(new, part))
+        case RuleBase() | FuzzyTree():
+            classes = tuple(filter(None, names.classes.values()))
+            keys = ("variables", "semantics", *_OWN[type(part)])
+            parts = {key: new(getattr(part, key)) for key in keys}
+            return type(part)(name="m", classes=classes, **parts)
+        case Semantics(uncovered=uncovered, missing=missing):
+            answers = names.classes[uncovered], names.classes[missing]
+            return Semantics(part.conjunction, *answers)
+        case Variable(name=name, terms=terms, parts=parts):
+            renamed = _terms(terms, names.terms[name])
+            return Variable(names.variables[name], renamed, parts=new(parts))
+        case Sets(variable=name, terms=terms):
+            return Sets(names.variables[name], _terms(terms, names.sets[name]))
+        case Part():
+            return Part(names.variables[part.input], part.weight, part.centre)
+        case Rule():
+            return Rule(new(part.when), names.classes[part.then] or "")
+        case Clause(variable=name):
+            known = names.terms[name]
+            alternatives = tuple(known[term] for term in part.terms)
+            return Clause(names.variables[name], alternatives, part.negated)
+        case Node(variable=name):
+            known, sets = names.terms[name], names.sets.get(name)
+            branches = tuple(
+                replace(
+                    one,
+                    terms=tuple(known[term] for term in one.terms),
+                    sets=tuple(sets[term] for term in one.sets) if sets else (),
+                )
+                for one in part.branches
             )
-            for node in tree.nodes
-        ),
-        leaves=tuple(Leaf(classes[leaf.label]) for leaf in tree.leaves),
-        sets=tuple(
-            Sets(names[one.variable], _terms(one.terms, sets[one.variable]))
-            for one in tree.sets
-        ),
-        semantics=_semantics(tree.semantics, classes),
-    )
+            return Node(names.variables[name], part.cuts, part.owners, branches)
+        case Leaf():
+            return Leaf(names.classes[part.label] or "")
+        case _:
+            return _renamed_system(part, names)
 
 
-def _variables(
-    variables: tuple[Variable, ...], names: Names, terms: Labels
-) -> tuple[Variable, ...]:
-    return tuple(
-        Variable(
-            names[one.name],
-            _terms(one.terms, terms[one.name]),
-            parts=_parts(one.parts, names),
-        )
-        for one in variables
-    )
+_OWN: Mapping[type[Document], tuple[str, ...]] = {
+    RuleBase: ("rules",),
+    FuzzyTree: ("nodes", "leaves", "sets"),
+}
+"""The parts of a model beside variables and semantics."""
 
 
 def _terms(terms: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
@@ -335,124 +347,83 @@ def _terms(terms: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
 
 def _shape(shape: Shape) -> Shape:
     if isinstance(shape, Band):
-        return replace(shape, left=_flank(shape.left), right=_flank(shape.right))
+        left, right = (f and replace(f, error=None) for f in (shape.left, shape.right))
+        return replace(shape, left=left, right=right)
     if isinstance(shape, Points):
         return Points(stepped(shape.values), shape.degrees)
     return shape
 
 
-def _flank(flank: Flank | None) -> Flank | None:
-    return None if flank is None else replace(flank, error=None)
+def _renamed_system(part: Any, names: _NewNames) -> Any:
+    """Return a part of a fuzzy system likewise."""
 
+    def new(one: Any) -> Any:
+        return _renamed(one, names)
 
-def _parts(parts: tuple[Part, ...], names: Names) -> tuple[Part, ...]:
-    return tuple(Part(names[one.input], one.weight, one.centre) for one in parts)
-
-
-def _clauses(
-    when: tuple[Clause, ...], names: Names, terms: Labels
-) -> tuple[Clause, ...]:
-    return tuple(
-        Clause(
-            names[one.variable],
-            tuple(terms[one.variable][name] for name in one.terms),
-            one.negated,
-        )
-        for one in when
-    )
-
-
-def _semantics(semantics: Semantics, classes: Names) -> Semantics:
-    uncovered, missing = semantics.uncovered, semantics.missing
-    return Semantics(
-        semantics.conjunction,
-        None if uncovered is None else classes[uncovered],
-        None if missing is None else classes[missing],
-    )
-
-
-def _system(system: FuzzySystem) -> FuzzySystem:
-    names = _numbered("v", (one.name for one in system.variables))
-    labels = {
-        one.name: _numbered("t", (label.name for label in one.labels))
-        for one in system.variables
-    }
-    return FuzzySystem(
-        name="m",
-        inputs=tuple(_input(one, names, labels) for one in system.inputs),
-        outputs=tuple(_output(one, names, labels) for one in system.outputs),
-        blocks=tuple(_block(one, system, names, labels) for one in system.blocks),
-    )
-
-
-def _input(one: SystemInput, names: Names, labels: Labels) -> SystemInput:
-    return SystemInput(
-        names[one.name],
-        _labels(one.labels, names, labels[one.name], are_numbers=False),
-        low=one.low if one.clips else None,
-        high=one.high if one.clips else None,
-        clips=one.clips,
-        parts=_parts(one.parts, names),
-    )
-
-
-def _output(one: SystemOutput, names: Names, labels: Labels) -> SystemOutput:
-    is_free = one.defuzzifier.is_weighted and not one.clips
-    how = one.defuzzifier
-    if how.is_weighted:
-        how = type(how)(how.method)
-    return replace(
-        one,
-        name=names[one.name],
-        labels=_labels(
-            one.labels, names, labels[one.name], are_numbers=how.is_weighted
-        ),
-        low=None if is_free else one.low,
-        high=None if is_free else one.high,
-        defuzzifier=how,
-        unit="",
-    )
+    match part:
+        case FuzzySystem():
+            blocks = tuple(_block(one, part, names) for one in part.blocks)
+            return FuzzySystem("m", new(part.inputs), new(part.outputs), blocks)
+        case SystemInput():
+            return SystemInput(
+                names.variables[part.name],
+                _labels(part, names, are_numbers=False),
+                low=part.low if part.clips else None,
+                high=part.high if part.clips else None,
+                clips=part.clips,
+                parts=new(part.parts),
+            )
+        case SystemOutput(defuzzifier=how):
+            is_free = how.is_weighted and not part.clips
+            return replace(
+                part,
+                name=names.variables[part.name],
+                labels=_labels(part, names, are_numbers=how.is_weighted),
+                low=None if is_free else part.low,
+                high=None if is_free else part.high,
+                defuzzifier=type(how)(how.method) if how.is_weighted else how,
+                unit="",
+            )
+        case Formula(expression=expression):
+            return Formula(new(expression))
+        case Name(name=name):
+            return Name(name if name == "x" else names.variables.get(name, name))
+        case Call(function=function, arguments=arguments):
+            return Call(function, new(arguments))
+        case Is(variable=variable, label=label):
+            label = None if label is None else names.terms[variable][label]
+            return Is(names.variables[variable], label, _hedges(part.hedges))
+        case And(parts=parts) | Or(parts=parts):
+            return type(part)(new(parts))
+        case Not(part=Is() as inner):
+            return new(replace(inner, hedges=("not", *inner.hedges)))
+        case Not(part=inner):
+            return Not(new(inner))
+        case Conclusion(output=output, label=label):
+            label = names.terms[output][label]
+            return Conclusion(names.variables[output], label, _hedges(part.hedges))
+        case _:
+            return part
 
 
 def _labels(
-    labels: tuple[SystemTerm, ...], variables: Names, names: Names, *, are_numbers: bool
+    variable: SystemInput | SystemOutput, names: _NewNames, *, are_numbers: bool
 ) -> tuple[SystemTerm, ...]:
-    return tuple(
-        replace(
-            one,
-            name=names[one.name],
-            curve=_curve(one.curve, variables, is_number=are_numbers),
-        )
-        for one in labels
-    )
+    terms = names.terms[variable.name]
+    labels: list[SystemTerm] = []
+    for one in variable.labels:
+        curve = _renamed_system(one.curve, names)
+        shape = None if are_numbers or curve is not one.curve else shape_of(curve)
+        curve = curve if shape is None else _shape(shape)
+        labels.append(replace(one, name=terms[one.name], curve=curve))
+    return tuple(labels)
 
 
-def _curve(curve: Curve, names: Names, *, is_number: bool) -> Curve:
-    if isinstance(curve, Formula):
-        return Formula(_expression(curve.expression, names))
-    shape = None if is_number else shape_of(curve)
-    return curve if shape is None else _shape(shape)
-
-
-def _expression(expression: Expression, names: Names) -> Expression:
-    match expression:
-        case Name(name=name):
-            return Name(name if name == "x" else names.get(name, name))
-        case Call(function=function, arguments=arguments):
-            return Call(function, tuple(_expression(one, names) for one in arguments))
-        case _:
-            return expression
-
-
-def _block(
-    block: RuleBlock, system: FuzzySystem, names: Names, labels: Labels
-) -> RuleBlock:
+def _block(block: RuleBlock, system: FuzzySystem, names: _NewNames) -> RuleBlock:
     rules = tuple(
         SystemRule(
-            None
-            if rule.when is None
-            else _ordered(_condition(rule.when, names, labels), block),
-            tuple(_conclusion(one, names, labels) for one in rule.then),
+            rule.when and _ordered(_renamed_system(rule.when, names), block),
+            _renamed(rule.then, names),
             rule.weight,
         )
         for rule in block.rules
@@ -501,28 +472,6 @@ def _ordered(condition: Condition, block: RuleBlock) -> Condition:
             return ordered[0] if len(ordered) == 1 else kind(tuple(ordered))
         case _:
             return condition
-
-
-def _condition(condition: Condition, names: Names, labels: Labels) -> Condition:
-    match condition:
-        case Is(variable=variable, label=label, hedges=hedges):
-            known = labels[variable]
-            name = None if label is None else known[label]
-            return Is(names[variable], name, _hedges(hedges))
-        case And(parts=parts):
-            return And(tuple(_condition(one, names, labels) for one in parts))
-        case Or(parts=parts):
-            return Or(tuple(_condition(one, names, labels) for one in parts))
-        case Not(part=Is() as part):
-            negated = replace(part, hedges=("not", *part.hedges))
-            return _condition(negated, names, labels)
-        case Not(part=part):
-            return Not(_condition(part, names, labels))
-
-
-def _conclusion(one: Conclusion, names: Names, labels: Labels) -> Conclusion:
-    label = labels[one.output][one.label]
-    return Conclusion(names[one.output], label, _hedges(one.hedges))
 
 
 def _hedges(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
