@@ -214,12 +214,14 @@ def _explained(title: str, model: Model, whole: Contents) -> Graph:
     ]
     because: list[Because] = []
     left_out: list[str] = []
-    for what, without in _FEATURES.items():
-        other = without(model)
-        if other is not None:
-            because.append(_because(what, whole, _written(other, "float64", _USUAL)))
-        elif isinstance(model, RuleBase) or what == COMBINATIONS:
+    others: dict[str, Model] = {COMBINATIONS: _without_combinations(model)}
+    if isinstance(model, RuleBase):
+        others |= {what: without(model) for what, without in _FEATURES.items()}
+    for what, other in others.items():
+        if other == model:
             left_out.append(what)
+        else:
+            because.append(_because(what, whole, _written(other, "float64", _USUAL)))
     reasons = (tuple(because), tuple(on_request), tuple(left_out))
     return Graph(title, "float64", whole, *reasons)
 
@@ -236,56 +238,24 @@ def _because(what: str, whole: Contents, without: Contents) -> Because:
     return Because(what, operators, whole.bytes - without.bytes)
 
 
-def _without_combinations(model: Model) -> Model | None:
-    if not any(variable.parts for variable in model.variables):
-        return None
-    return free_axes(model)
+def _without_combinations(model: Model) -> Model:
+    has_any = any(variable.parts for variable in model.variables)
+    return free_axes(model) if has_any else model
 
 
-def _with_rules(model: Model, change: Callable[[Clause], Clause]) -> RuleBase | None:
-    """Return a rule base with other clauses; None for a tree, or if all are alike."""
-    if isinstance(model, FuzzyTree):
-        return None
-    rules = tuple(
-        replace(rule, when=tuple(change(clause) for clause in rule.when))
-        for rule in model.rules
-    )
-    return None if rules == model.rules else replace(model, rules=rules)
+def _with_rules(rules: RuleBase, change: Callable[[Clause], Clause]) -> RuleBase:
+    """Return a rule base with other clauses."""
+    changed = [replace(r, when=tuple(map(change, r.when))) for r in rules.rules]
+    return replace(rules, rules=tuple(changed))
 
 
-def _without_negation(model: Model) -> Model | None:
-    return _with_rules(model, lambda clause: replace(clause, negated=False))
-
-
-def _without_or(model: Model) -> Model | None:
-    return _with_rules(model, lambda clause: replace(clause, terms=clause.terms[:1]))
-
-
-def _without_product(model: Model) -> Model | None:
-    semantics = model.semantics
-    if isinstance(model, FuzzyTree) or semantics.conjunction == "min":
-        return None
-    return replace(model, semantics=replace(semantics, conjunction="min"))
-
-
-def _without_missing_answer(model: Model) -> Model | None:
-    semantics = model.semantics
-    if isinstance(model, FuzzyTree) or semantics.missing == semantics.uncovered:
-        return None
-    return replace(model, semantics=replace(semantics, missing=semantics.uncovered))
-
-
-def _without_curves(model: Model) -> Model | None:
+def _without_curves(rules: RuleBase) -> RuleBase:
     """Return a rule base whose flanks are lines and whose sides have one number."""
-    if isinstance(model, FuzzyTree):
-        return None
     variables = tuple(
         replace(v, terms=tuple(replace(t, shape=_straight(t.shape)) for t in v.terms))
-        for v in model.variables
+        for v in rules.variables
     )
-    if variables == model.variables:
-        return None
-    return replace(model, variables=variables)
+    return replace(rules, variables=variables)
 
 
 def _straight(shape: Shape) -> Shape:
@@ -302,17 +272,24 @@ def _straight(shape: Shape) -> Shape:
 
 COMBINATIONS = "combinations"
 
-_FEATURES: Mapping[str, Callable[[Model], Model | None]] = MappingProxyType(
+_FEATURES: Mapping[str, Callable[[RuleBase], RuleBase]] = MappingProxyType(
     {
-        COMBINATIONS: _without_combinations,
-        "negation": _without_negation,
-        "OR of terms": _without_or,
-        "product as AND": _without_product,
-        "an answer of its own for missing values": _without_missing_answer,
+        "negation": lambda rules: _with_rules(
+            rules, lambda clause: replace(clause, negated=False)
+        ),
+        "OR of terms": lambda rules: _with_rules(
+            rules, lambda clause: replace(clause, terms=clause.terms[:1])
+        ),
+        "product as AND": lambda rules: replace(
+            rules, semantics=replace(rules.semantics, conjunction="min")
+        ),
+        "an answer of its own for missing values": lambda rules: replace(
+            rules, semantics=replace(rules.semantics, missing=rules.semantics.uncovered)
+        ),
         "curves": _without_curves,
     }
 )
-"""What a model may have, and the model without it; None where it has none."""
+"""What rules may have, and the rules without it: the same if they have none."""
 
 
 # --- the proof

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, cast, get_args
 
 from fuzzytree.checking.comparing import strength_gap, unequal
+from fuzzytree.checking.converting import kind_of
 from fuzzytree.checking.equivalence import is_equivalent
 from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import first_line
@@ -43,9 +44,8 @@ def roundtrips(
     """
     trial = Trial("N9", _ADVICE, worst=0.0)
     for representation, form in forms(model).items():
-        kind = "rules" if isinstance(form, RuleBase) else "tree"
         for one in formats:
-            if kind not in one.carries:
+            if kind_of(form) not in one.carries:
                 continue
             try:
                 for count, gap, fault in _tried(
@@ -106,42 +106,30 @@ def _read_again(
     if isinstance(back, FuzzySystem):
         is_same = isinstance(form, RuleBase) and is_equivalent(form, back)
         return 1, 0.0, None if is_same else f"{title}: another model comes back"
-    if back != form and isinstance(form, RuleBase) and is_equivalent(form, back):
-        return _straight(title, back, form, values)
-    if back != form:
-        native = baseline().load
-        if back.inputs != form.inputs or type(back) is not type(form):
-            return 1, 1.0, f"{title}: another model comes back"
-        count, gap, fault = _compared(title, native(back)(values), native(form)(values))
-        said = fault or f"{title}: numbers differ, though all rows agree"
-        return count, gap, f"{said}; the model that comes back is not equal"
-    if one.write(back).content != content:
-        return 1, 0.0, f"{title}: written again it has other bytes"
-    return 2, 0.0, None
-
-
-def _straight(
-    title: str, back: Model, form: RuleBase, values: FloatArray
-) -> tuple[int, float, str | None]:
-    """Compare rules with those whose lines became points, as some formats need.
-
-    Each degree moved by at most 2^-52, so strengths may by as much for each clause.
-    """
-    native = baseline().load
-    actual, expected = native(back)(values), native(form)(values)
-    gap = float(strength_gap(actual, expected).max(initial=0.0))
-    clauses = max((len(rule.when) for rule in form.rules), default=0)
-    if gap <= EXACT * max(clauses, 1) * 2:
-        return values.shape[1], gap, None
-    return values.shape[1], gap, f"{title}: strengths differ by up to {gap:.3g}"
+    if back == form:
+        is_same = one.write(back).content == content
+        other_bytes = f"{title}: written again it has other bytes"
+        return (2, 0.0, None) if is_same else (1, 0.0, other_bytes)
+    is_like = isinstance(form, RuleBase) and is_equivalent(form, back)
+    if not is_like and (back.inputs != form.inputs or type(back) is not type(form)):
+        return 1, 1.0, f"{title}: another model comes back"
+    actual, expected = (baseline().load(model)(values) for model in (back, form))
+    if is_like and isinstance(form, RuleBase):
+        # Its lines became points: each degree moved by at most 2^-52.
+        clauses = max((len(rule.when) for rule in form.rules), default=0)
+        return _compared(title, actual, expected, EXACT * max(clauses, 1) * 2)
+    count, gap, fault = _compared(title, actual, expected)
+    said = fault or f"{title}: numbers differ, though all rows agree"
+    return count, gap, f"{said}; the model that comes back is not equal"
 
 
 def _compared(
-    title: str, actual: Outcome, expected: Outcome
+    title: str, actual: Outcome, expected: Outcome, allowed: float = 0.0
 ) -> tuple[int, float, str | None]:
+    """Return how many rows were compared, the largest gap, and what is wrong."""
     wrong = unequal(actual, expected)
     gap = float(strength_gap(actual, expected).max(initial=0.0))
-    if not wrong.any():
+    if not wrong.any() or 0.0 < gap <= allowed:
         return wrong.size, gap, None
     fault = (
         f"{title}: {int(wrong.sum())} of {wrong.size} rows are answered differently, "
