@@ -366,13 +366,6 @@ def gather(model: Model, values: FloatArray, peers: str | None = None) -> Candid
     return [*measures, *mine, *others, *changed], [*omitted, *absent, *missing, *left]
 
 
-def foreign(model: Model, peers: str | None) -> list[Candidate]:
-    """Return the candidates that a child process tries; see `trial`."""
-    main = next(iter(questions(model)))
-    mine = own(model, _no_bounds, Layouts())[0]
-    return [*floors(main)[0], *mine, *load_peers(peers)(model, _no_bounds)[0]]
-
-
 def load_peers(path: str | None) -> Peers:
     """Run a Python module or package and return its function `peers`.
 
@@ -408,10 +401,6 @@ def load_peers(path: str | None) -> Peers:
     if peers is None:
         raise ValueError(f"peers: {path!r} has no function 'peers'")
     return peers
-
-
-def _no_bounds(rules: RuleBase, dtype: Dtype) -> None:
-    """Certify nothing."""
 
 
 def chosen(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 import numpy as np
@@ -41,7 +41,7 @@ _BATCH = 1 << 15  # rows in which a call's own cost no longer counts
 _MOST_STRENGTHS = 200_000  # for each candidate, in intervals: half a second or so
 
 
-class CandidateJudgement(msgspec.Struct, frozen=True):
+class CandidateJudgement(NamedTuple):
     """What is known of a candidate before it is timed.
 
     Attributes:

@@ -6,7 +6,8 @@ does that declares them all; *as it is* is the model; *pruned* is what is left o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -312,11 +313,7 @@ def _calls(
     for name, run in runs.items():
         for count, what in ((1, "one row"), (BATCH, f"{BATCH:,} rows")):
             values = np.ascontiguousarray(rows[:, :count])
-            yield count, (stage, title, name, what), _bound(run, values)
-
-
-def _bound(run: Callable[[FloatArray], object], values: FloatArray) -> Call:
-    return lambda: run(values)
+            yield count, (stage, title, name, what), partial(run, values)
 
 
 def _reading(table: object, model: Model) -> Call:

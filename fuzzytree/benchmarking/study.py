@@ -290,14 +290,7 @@ class _Run:
             except Exception as error:  # whatever foreign code raises is a finding
                 self.omit(one.name, trial.error_text(error))
                 continue
-            self.drafts[one.name] = _Draft(
-                one,
-                loaded,
-                load_ms,
-                judgement.error,
-                judgement.probes,
-                judgement.row_ns,
-            )
+            self.drafts[one.name] = _Draft(one, loaded, load_ms, *judgement)
 
     def time(self) -> None:
         """Time all candidates, few rows first: what they leave is for more rows."""

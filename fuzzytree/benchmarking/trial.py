@@ -22,7 +22,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO, TYPE_CHECKING, cast
 
-from fuzzytree.benchmarking.candidates import foreign
+from fuzzytree.benchmarking.candidates import gather
 from fuzzytree.benchmarking.records import Candidate
 from fuzzytree.model import Model, Progress
 
@@ -146,7 +146,7 @@ def serve() -> None:
         "tuple[str | None, Model, Sequence[str], FloatArray]",
         pickle.loads(sys.stdin.buffer.read()),  # written by our own parent
     )
-    known = {one.name: one for one in foreign(model, peers)}
+    known = {one.name: one for one in gather(model, values, peers)[0]}
     for name in names:
         out.write(json.dumps(_try(known, name, values)).encode() + b"\n")
         out.flush()
