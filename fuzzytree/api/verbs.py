@@ -14,18 +14,17 @@ from typing import TYPE_CHECKING, Literal, get_args
 import msgspec
 import numpy as np
 
-from fuzzytree import semantics
+from fuzzytree import (
+    auditing,
+    benchmarking,
+    checking,
+    learning,
+    numerics,
+    report,
+    semantics,
+)
 from fuzzytree.api.answering import Carried, opened
 from fuzzytree.api.answering import run as run
-from fuzzytree.checking import (
-    CALLED,
-    as_model,
-    deciding,
-    format_of,
-    kind_of,
-    load_content,
-    refuse_unreadable,
-)
 from fuzzytree.checking import convert as convert
 from fuzzytree.checking import export as export
 from fuzzytree.checking import load as load
@@ -68,24 +67,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from matplotlib.figure import Figure
 
-    from fuzzytree.auditing import (
-        Audit,
-        AuditDomain,
-        AuditRows,
-        AuditSelection,
-        AuditSettings,
-        Code,
-        Difference,
-        Material,
-        ModelFile,
-        SourceFile,
-    )
-    from fuzzytree.auditing import Report as RecheckReport
-    from fuzzytree.benchmarking import BenchSettings, Footprint, Study
-    from fuzzytree.checking import ProgramFile, Stability
-    from fuzzytree.learning import LearningSettings, Learnt
     from fuzzytree.model import FloatArray, Use
-    from fuzzytree.numerics import Certificate
 
 
 def learn(
@@ -95,7 +77,7 @@ def learn(
     ignore: Sequence[str] = (),
     name: str | None = None,
     units: Mapping[str, str] | None = None,
-    settings: LearningSettings | None = None,
+    settings: learning.LearningSettings | None = None,
     progress: Progress | None = None,
 ) -> FuzzyTree:
     """Learn a fuzzy tree from a table with a class for each row.
@@ -127,16 +109,14 @@ def learn(
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
-    from fuzzytree.learning import LearningSettings, remarks
-
     result = read_table(table, target=target, ignore=ignore)
-    for column, text in remarks(result, lambda column: f"ignore=[{column!r}]"):
+    for column, text in learning.remarks(result, lambda column: f"ignore=[{column!r}]"):
         warnings.warn(f"{result.name}: {column} has {text}", stacklevel=2)
     return learn_table(
         result,
         name=name or _name_of(table),
         units=units or {},
-        settings=settings or LearningSettings(),
+        settings=settings or learning.LearningSettings(),
         progress=progress,
     ).tree
 
@@ -146,24 +126,22 @@ def learn_table(
     *,
     name: str,
     units: Mapping[str, str],
-    settings: LearningSettings,
+    settings: learning.LearningSettings,
     progress: Progress | None = None,
-) -> Learnt:
+) -> learning.Learnt:
     """Learn from a table that was read, and return the report beside the tree.
 
     Raises:
         TableError: If a unit is given for a column that is not there.
         LearningError: If nothing can be learnt from the table.
     """
-    from fuzzytree.learning import learn_arrays
-
     absent = [column for column in units if column not in table.columns]
     if absent:
         known = ", ".join(table.columns)
         raise TableError(
             f"a unit for {absent[0]!r}, which is no column; it has {known}"
         )
-    learnt = learn_arrays(
+    learnt = learning.learn_arrays(
         table.values.T,
         table.codes,
         columns=table.columns,
@@ -312,7 +290,7 @@ def check(
         True
     """
     chosen = settings or CheckSettings()
-    first = as_model(model, allow_loss=allow_loss)
+    first = checking.as_model(model, allow_loss=allow_loss)
     names = as_names(names)
     titles = [
         names[k] if k < len(names) else _title(other, k)
@@ -322,7 +300,6 @@ def check(
         _program(other, chosen.run_code) or opened(other, allow_loss=allow_loss)
         for other in others
     ]
-    from fuzzytree import checking
 
     return checking.check(
         first,
@@ -336,16 +313,15 @@ def check(
     )
 
 
-def _program(source: Carried, may_run: bool) -> ProgramFile | None:
+def _program(source: Carried, may_run: bool) -> checking.ProgramFile | None:
     """Return what the path of a file that is run and not read stands for."""
     if not isinstance(source, str | os.PathLike):
         return None
-    form = format_of(source)
+    form = checking.format_of(source)
     if form.read is not None or form.name == "onnx":
         return None
-    from fuzzytree.checking import ProgramFile
 
-    return ProgramFile(form.name, read_bounded(source), may_run)
+    return checking.ProgramFile(form.name, read_bounded(source), may_run)
 
 
 def certify(
@@ -353,7 +329,7 @@ def certify(
     dtype: Dtype = "float64",
     *,
     data: object = None,
-) -> Certificate:
+) -> numerics.Certificate:
     """Return how far a number type can take a model from its exact answers, at most.
 
     Args:
@@ -372,8 +348,6 @@ def certify(
         >>> certify(random_tree(1, combinations=0)).sentence
         'no path can differ: no value is rounded before it meets a cut'
     """
-    from fuzzytree import numerics
-
     if dtype not in get_args(Dtype):
         known = ", ".join(get_args(Dtype))
         raise ValueError(f"there is no number type {dtype!r}; there are {known}")
@@ -387,9 +361,9 @@ def bench(
     data: object = None,
     only: Sequence[str] = (),
     skip: Sequence[str] = (),
-    settings: BenchSettings | None = None,
+    settings: benchmarking.BenchSettings | None = None,
     progress: Progress | None = None,
-) -> Study:
+) -> benchmarking.Study:
     """Measure error against run time for every way of running a model.
 
     Args:
@@ -420,8 +394,6 @@ def bench(
         >>> [point.question for point in study.points]
         ['tree', 'relative rules', 'raw rules']
     """
-    from fuzzytree import benchmarking
-
     first = _model_of(model, "bench")
     return benchmarking.bench(
         first,
@@ -435,13 +407,13 @@ def bench(
 
 
 def _model_of(model: ModelSource, verb: str) -> Model:
-    return deciding(as_model(model), verb)
+    return checking.deciding(checking.as_model(model), verb)
 
 
 def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
-    result = as_model(model)
+    result = checking.as_model(model)
     if not isinstance(result, FuzzyTree):
-        kind = CALLED[kind_of(result)]
+        kind = checking.CALLED[checking.kind_of(result)]
         raise TypeError(f"{verb} takes a tree, and {result.name} is a {kind}")
     return result
 
@@ -452,16 +424,16 @@ def _data_name(data: object) -> str:
 
 
 def audit(
-    model: ModelSource | Material,
+    model: ModelSource | auditing.Material,
     *,
     data: object = None,
     target: str | None = None,
-    domain: AuditDomain | None = None,
-    selection: AuditSelection | None = None,
-    settings: AuditSettings | None = None,
+    domain: auditing.AuditDomain | None = None,
+    selection: auditing.AuditSelection | None = None,
+    settings: auditing.AuditSettings | None = None,
     repeat: str = "",
     progress: Progress | None = None,
-) -> Audit:
+) -> auditing.Audit:
     """Search a rule base for dead rules, gaps, conflicts and other findings.
 
     Ctrl-C ends it early and keeps what is proved; see `Audit.was_interrupted`.
@@ -491,25 +463,14 @@ def audit(
         >>> audit(random_tree(1), selection=wanted).is_complete
         True
     """
-    from fuzzytree import auditing
-    from fuzzytree.auditing import (
-        AuditDomain,
-        AuditSettings,
-        Clock,
-        Material,
-        check_settings,
-        domain_of,
-        limited,
-    )
-
-    chosen = settings or AuditSettings()
-    check_settings(chosen)
-    where = domain or AuditDomain()
-    if not isinstance(model, Material):
+    chosen = settings or auditing.AuditSettings()
+    auditing.check_settings(chosen)
+    where = domain or auditing.AuditDomain()
+    if not isinstance(model, auditing.Material):
         model = material(model, data=data, target=target)
     elif data is not None or target:
         raise ValueError("a material is read already: pass its data to material()")
-    box = domain_of(
+    box = auditing.domain_of(
         model.model,
         within=where.within,
         spreads=where.spreads,
@@ -519,11 +480,11 @@ def audit(
     )
     return auditing.audit(
         model,
-        domain=limited(box, where.limits, model.model),
+        domain=auditing.limited(box, where.limits, model.model),
         row=where.row,
         selection=selection,
         settings=chosen,
-        clock=Clock(chosen.budget_s, report=progress),
+        clock=auditing.Clock(chosen.budget_s, report=progress),
         repeat=repeat,
     )
 
@@ -535,7 +496,7 @@ def material(
     target: str | None = None,
     results: Sequence[str | os.PathLike[str]] = (),
     allow_loss: bool = False,
-) -> Material:
+) -> auditing.Material:
     """Return all that an audit is about, each file read once.
 
     Args:
@@ -551,28 +512,24 @@ def material(
         TableError: If a column is absent or holds text, the table has no row, or it
             changes while it is read.
     """
-    from fuzzytree.auditing import Material, read_results
-
     document, file = _model_and_file(model, allow_loss)
-    known = read_results(results, document)
+    known = auditing.read_results(results, document)
     data, name = _readable_twice(data)
     source = _source_of(data, name)
     rows = audited_rows(data, document, target=target, name=name)
     if _source_of(data, name) != source:
         raise TableError(f"{name}: was changed while it was read")
-    return Material(document, file, rows, source, known)
+    return auditing.Material(document, file, rows, source, known)
 
 
 def _model_and_file(
     model: ModelSource, allow_loss: bool
-) -> tuple[Document, ModelFile | None]:
+) -> tuple[Document, auditing.ModelFile | None]:
     """Return a model, and what is known of its file if it is the path of one."""
-    from fuzzytree.auditing import model_file
-
     if not isinstance(model, str | os.PathLike):
-        return as_model(model), None
-    file = model_file(os.fspath(model), _bytes_of(model))
-    return load_content(file.content, file.name, allow_loss=allow_loss), file
+        return checking.as_model(model), None
+    file = auditing.model_file(os.fspath(model), _bytes_of(model))
+    return checking.load_content(file.content, file.name, allow_loss=allow_loss), file
 
 
 def _readable_twice(data: object) -> tuple[object, str | None]:
@@ -604,17 +561,15 @@ def _bytes_of(path: str | os.PathLike[str]) -> bytes:
     Raises:
         ReadError: If it cannot be read, or is in a format that only others read.
     """
-    refuse_unreadable(format_of(path), os.fspath(path))
+    checking.refuse_unreadable(checking.format_of(path), os.fspath(path))
     return read_bounded(path)
 
 
-def _source_of(data: object, name: str | None = None) -> SourceFile | None:
+def _source_of(data: object, name: str | None = None) -> auditing.SourceFile | None:
     """Return the name and the hash of a table that is a file, None for another."""
-    from fuzzytree.auditing import SourceFile, source_of, writable
-
     table = data.source if isinstance(data, TableSource) else data
     if isinstance(table, io.BytesIO):
-        return source_of(name or "standard input", table.getvalue())
+        return auditing.source_of(name or "standard input", table.getvalue())
     path = path_of(table)
     if path is None:
         return None
@@ -623,7 +578,7 @@ def _source_of(data: object, name: str | None = None) -> SourceFile | None:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise TableError(f"{path}: cannot be read: {reason(error)}") from error
-    return SourceFile(writable(path), digest)
+    return auditing.SourceFile(auditing.writable(path), digest)
 
 
 def audited_rows(
@@ -632,7 +587,7 @@ def audited_rows(
     *,
     target: str | None = None,
     name: str | None = None,
-) -> AuditRows | None:
+) -> auditing.AuditRows | None:
     """Return the rows of a table for an audit, with their classes; None without one.
 
     Args:
@@ -645,8 +600,6 @@ def audited_rows(
         TableError: If a column is absent or holds text, or the table has no row, or
             none of a class of the model.
     """
-    from fuzzytree.auditing import AuditRows
-
     if data is None:
         return None
     values, result = _rows(
@@ -657,7 +610,7 @@ def audited_rows(
     )
     name = result[0].piece.name
     if target is None:
-        return AuditRows(name, values)
+        return auditing.AuditRows(name, values)
     known = result[0].piece.columns
     if target not in known:
         raise TableError(
@@ -673,7 +626,7 @@ def audited_rows(
             f"{name}: no row has in column {target!r} a class of the model; "
             f"{name_choice(str(labels[0]), classes)}"
         )
-    return AuditRows(name, values, codes)
+    return auditing.AuditRows(name, values, codes)
 
 
 def diff(
@@ -683,10 +636,10 @@ def diff(
     data: object = None,
     limits: Mapping[str, tuple[float, float]] | None = None,
     budget_s: float = 60.0,
-    settings: AuditSettings | None = None,
+    settings: auditing.AuditSettings | None = None,
     allow_loss: bool = False,
     progress: Progress | None = None,
-) -> Difference:
+) -> auditing.Difference:
     """Return what has changed from one model to another, and which decisions do.
 
     Args:
@@ -713,23 +666,13 @@ def diff(
         >>> diff(tree, rules_from_tree(tree)).verdict
         'equal'
     """
-    from fuzzytree.auditing import (
-        AuditRows,
-        AuditSettings,
-        Clock,
-        all_inputs,
-        check_common_inputs,
-        difference,
-        joined_domain,
-    )
-
-    clock = Clock(budget_s, report=progress)
+    clock = auditing.Clock(budget_s, report=progress)
     models, files = zip(
         *(_model_and_file(model, allow_loss) for model in (old, new)), strict=True
     )
     first, second = models
     titles = [f.name if f else m.name for f, m in zip(files, models, strict=True)]
-    check_common_inputs(first, second, (titles[0], titles[1]))
+    auditing.check_common_inputs(first, second, (titles[0], titles[1]))
     data, name = _readable_twice(data)
     source = _source_of(data, name)
     rows = None
@@ -737,21 +680,21 @@ def diff(
         result = [
             *batches(
                 data,
-                all_inputs(first, second),
+                auditing.all_inputs(first, second),
                 name=name,
             )
         ]
-        rows = AuditRows(
+        rows = auditing.AuditRows(
             result[0].piece.name, np.hstack([batch.values for batch in result])
         )
         if not rows.values.shape[1]:
             raise TableError(f"{rows.name} has no rows")
-    return difference(
+    return auditing.difference(
         first,
         second,
-        domain=joined_domain(first, second, limits or {}, rows),
+        domain=auditing.joined_domain(first, second, limits or {}, rows),
         rows=rows,
-        settings=settings or AuditSettings(budget_s=budget_s),
+        settings=settings or auditing.AuditSettings(budget_s=budget_s),
         clock=clock,
         files=(files[0], files[1]),
         data=source,
@@ -766,7 +709,7 @@ def needs(
     drop: Collection[Literal["inputs", "rules"]] = (),
     seconds: float = 0.0,
     progress: Progress | None = None,
-) -> Footprint:
+) -> benchmarking.Footprint:
     """Return what a model needs, and what leaving out the rest saves.
 
     Args:
@@ -786,13 +729,12 @@ def needs(
         >>> needs(random_tree(1)).ok
         True
     """
-    from fuzzytree import benchmarking
-    from fuzzytree.semantics import pruned
-
     first = _model_of(model, "needs")
     return benchmarking.report(
         first,
-        pruned(first, uses=uses, inputs="inputs" in drop, rules="rules" in drop),
+        semantics.pruned(
+            first, uses=uses, inputs="inputs" in drop, rules="rules" in drop
+        ),
         uses=uses,
         data=rows_of(data, first),
         table=data if path_of(data) else None,
@@ -801,7 +743,7 @@ def needs(
     )
 
 
-def explain(code: str) -> Code:
+def explain(code: str) -> auditing.Code:
     """Return what a code of an audit means, why it matters, and what to do about it.
 
     Args:
@@ -815,22 +757,20 @@ def explain(code: str) -> Code:
         >>> explain("FT101").title
         'dead rule'
     """
-    from fuzzytree.auditing import CODES
-
     if not isinstance(code, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise TypeError(
             f"explain takes a code such as 'FT101', and not a {type(code).__name__}"
         )
     name = code.upper().partition("-")[0]
-    if name not in CODES:
-        choice = name_choice(name[:40], [*CODES])
+    if name not in auditing.CODES:
+        choice = name_choice(name[:40], [*auditing.CODES])
         raise ValueError(f"no code {code[:40]!r}; {choice}")
-    return CODES[name]
+    return auditing.CODES[name]
 
 
 def recheck(
     audit: str | os.PathLike[str], model: str | os.PathLike[str]
-) -> RecheckReport:
+) -> auditing.Report:
     """Check the JSON file of an audit against the YAML file of its model, on its own.
 
     The report's `wrong` lists what does not hold; `lines()` is what the command prints.
@@ -838,11 +778,9 @@ def recheck(
     Raises:
         ReadError: If one of the files cannot be read.
     """
-    from fuzzytree.auditing import CannotRunError, recheck_files
-
     try:
-        return recheck_files(os.fspath(audit), os.fspath(model))
-    except CannotRunError as error:
+        return auditing.recheck_files(os.fspath(audit), os.fspath(model))
+    except auditing.CannotRunError as error:
         raise ReadError(str(error)) from error
 
 
@@ -861,8 +799,6 @@ def draw(tree: ModelSource, *, title: str | None = None) -> Figure:
         ValueError: If the tree is too large for a picture.
         MissingExtraError: If matplotlib is not installed.
     """
-    from fuzzytree import report
-
     return report.draw_tree(_tree_of(tree, "draw"), title=title)
 
 
@@ -873,7 +809,7 @@ def stability(
     only: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     progress: Progress | None = None,
-) -> Stability:
+) -> checking.Stability:
     """Apply the criteria N1 to N10 to a model: is it numerically stable?
 
     Args:
@@ -893,11 +829,9 @@ def stability(
         >>> stability(random_tree(1), runtimes=["native"], only=["N3", "N7"]).ok
         True
     """
-    from fuzzytree.checking import examine
-
     first = _model_of(model, "stability")
     chosen = chosen_runtimes(runtimes)
-    return examine(
+    return checking.examine(
         first,
         runtimes=chosen,
         formats=all_formats(),

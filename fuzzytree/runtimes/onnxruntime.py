@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
+from fuzzytree import exporters
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
 from fuzzytree.exporters import FORMAT_VERSION, Output, write_onnx
 from fuzzytree.model import (
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import onnx
 
-    from fuzzytree.exporters import Bare, Session
     from fuzzytree.model import FloatArray
 
     Outputs = dict[str, npt.NDArray[np.generic]]
@@ -128,9 +128,8 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
     proto = parsed(content, name)
     facts = _facts(proto, name)
     _check_signature(proto, facts, name)
-    from fuzzytree.exporters import named
 
-    session = named(loaded(content, name))
+    session = exporters.named(loaded(content, name))
     has_labels = "label" in facts.outputs
     is_system = facts.representation == "system"
     return OnnxModel(
@@ -166,7 +165,6 @@ def prepare(
     if plain and not isinstance(model, FuzzyTree):
         raise LossError("onnxruntime plain runs trees, and these are rules")
     _require_packages("running")
-    from fuzzytree.exporters import named, open_bare
 
     outputs: tuple[Output, ...] = ("rule", "status", "strengths")
     if isinstance(model, FuzzyTree):
@@ -180,7 +178,7 @@ def prepare(
         verify=False,
     ).content
     facts = _facts(_decoded(content, model.name), model.name)
-    bare = open_bare(content, threads)
+    bare = exporters.open_bare(content, threads)
     names: list[str] = [*outputs]
     rows = _rows_at_once(facts)
 
@@ -189,7 +187,7 @@ def prepare(
             bare(names, {"inputs": table[start : start + rows]})
 
     return Prepared(
-        functools.partial(_run, named(bare), facts),
+        functools.partial(_run, exporters.named(bare), facts),
         functools.partial(_table, facts),
         call,
         content,
@@ -206,7 +204,7 @@ def _require_packages(doing: str) -> None:
 
 
 def _arrays(
-    session: Session, facts: Facts, values: FloatArray, names: Sequence[str]
+    session: exporters.Session, facts: Facts, values: FloatArray, names: Sequence[str]
 ) -> dict[str, npt.NDArray[Any]]:
     """Return outputs by name, rows last."""
     widths, count = _widths(facts), values.shape[1]
@@ -228,8 +226,7 @@ def _widths(facts: Facts) -> dict[str, int]:
     return {"strengths": rules, "activations": rules, "outputs": len(facts.names)}
 
 
-def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:
-
+def _run(session: exporters.Session, facts: Facts, values: FloatArray) -> Outcome:
     values = checked(values, facts.inputs)
     names = [name for name in facts.outputs if name != "label"]
     arrays = _arrays(session, facts, values, names)
@@ -239,12 +236,13 @@ def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:
     return Outcome(rule, status, arrays.get("strengths"))
 
 
-def _refuse(session: Session, facts: Facts, values: FloatArray) -> Outcome:
+def _refuse(session: exporters.Session, facts: Facts, values: FloatArray) -> Outcome:
     raise ValueError(f"{facts.name} is a fuzzy system: call run_system")
 
 
-def _run_system(session: Session, facts: Facts, values: FloatArray) -> SystemOutcome:
-
+def _run_system(
+    session: exporters.Session, facts: Facts, values: FloatArray
+) -> SystemOutcome:
     values = checked(values, facts.inputs)
     arrays = _arrays(session, facts, values, facts.outputs)
     outputs = arrays["outputs"]
@@ -262,17 +260,15 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
         MissingExtraError: If onnx or onnxruntime is not installed.
     """
     _require_packages("running")
-    from fuzzytree.exporters import open_session
 
     outputs: tuple[Output, ...] = ("outputs", "status", "activations")
     outputs = outputs if activations else outputs[:2]
     content = write_onnx(system, outputs=outputs, verify=False).content
     facts = _facts(_decoded(content, system.name), system.name)
-    return functools.partial(_run_system, open_session(content), facts)
+    return functools.partial(_run_system, exporters.open_session(content), facts)
 
 
-def _labels(session: Session, facts: Facts, values: FloatArray) -> Labels:
-
+def _labels(session: exporters.Session, facts: Facts, values: FloatArray) -> Labels:
     values = checked(values, facts.inputs)
     return tuple(
         label or None
@@ -282,21 +278,19 @@ def _labels(session: Session, facts: Facts, values: FloatArray) -> Labels:
 
 
 def _chunks(
-    session: Session,
+    session: exporters.Session,
     facts: Facts,
     values: FloatArray,
     names: Sequence[str],
 ) -> Iterator[tuple[int, Outputs]]:
     """Yield the outputs, by name, of some rows at a time, with the first row."""
-    from fuzzytree.exporters import RUNTIME_ERRORS, first_line
-
     rows = _rows_at_once(facts)
     for start in range(0, max(values.shape[1], 1), rows):
         table = _table(facts, values[:, start : start + rows])
         try:
             result = session(names, table)
-        except RUNTIME_ERRORS as error:
-            text = f"onnxruntime cannot run {facts.name}: {first_line(error)}"
+        except exporters.RUNTIME_ERRORS as error:
+            text = f"onnxruntime cannot run {facts.name}: {exporters.first_line(error)}"
             raise LossError(text) from error
         if not _is_answer(facts, result, len(table)):
             raise LossError(
@@ -360,18 +354,16 @@ def parsed(content: bytes, name: str) -> onnx.ModelProto:
     return proto
 
 
-def loaded(content: bytes, name: str) -> Bare:
+def loaded(content: bytes, name: str) -> exporters.Bare:
     """Return what runs an ONNX file.
 
     Raises:
         ReadError: If onnxruntime does not load it.
     """
-    from fuzzytree.exporters import RUNTIME_ERRORS, first_line, open_bare
-
     try:
-        return open_bare(content)
-    except RUNTIME_ERRORS as error:
-        text = f"{name}: onnxruntime does not load it: {first_line(error)}"
+        return exporters.open_bare(content)
+    except exporters.RUNTIME_ERRORS as error:
+        text = f"{name}: onnxruntime does not load it: {exporters.first_line(error)}"
         raise ReadError(text) from error
 
 

@@ -75,8 +75,8 @@ def test_a_verb_loads_no_library_that_it_does_not_need(folder: Path) -> None:
 def test_verbs_that_read_a_model_load_neither_learner_nor_check(folder: Path) -> None:
     lines = [("show", "grip.yaml"), ("run", "grip.yaml", "grasps.csv", "--quiet")]
     names = (
-        "fuzzytree.learning",
+        "fuzzytree.learning.learner",
         "fuzzytree.checking.representations",
-        "fuzzytree.benchmarking",
+        "fuzzytree.benchmarking.study",
     )
     assert loaded(folder, lines, names) == [[0]] * 2
