@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack, overload
+from typing import TypedDict, Unpack, overload
 
 import msgspec
 import numpy as np
@@ -16,6 +16,7 @@ from fuzzytree.files import read_bounded
 from fuzzytree.model import (
     Document,
     Fitted,
+    FloatArray,
     FuzzySystem,
     Model,
     ModelSource,
@@ -35,9 +36,6 @@ from fuzzytree.runtimes import (
     predictions_of,
 )
 from fuzzytree.tables import Batch, batches
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 Carried = ModelSource | OnnxModel | bytes
 """A model, an ONNX file opened or as bytes, or the path of a file of either."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -17,7 +17,7 @@ from fuzzytree.benchmarking.records import (
     LoadedCandidate,
     Question,
 )
-from fuzzytree.model import Model, RuleBase
+from fuzzytree.model import FloatArray, Model, RuleBase
 from fuzzytree.numerics import (
     Decisions,
     ErrorMeasure,
@@ -26,9 +26,6 @@ from fuzzytree.numerics import (
     strength_errors,
 )
 from fuzzytree.semantics import landmarks, probe_values
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 MOST_ROWS = 2_000
 """Rows on which errors are observed, of those that are timed."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import msgspec
 
+from fuzzytree.model import FloatArray, IntArray
 from fuzzytree.semantics import Form
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
 
 Question = Form
 """What a candidate computes. Errors are measured against the exact answer to it."""

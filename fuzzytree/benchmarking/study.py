@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -31,11 +30,8 @@ from fuzzytree.benchmarking.records import (
     Study,
     Timing,
 )
-from fuzzytree.model import Model, Progress, as_names, fingerprint, noticed
+from fuzzytree.model import FloatArray, Model, Progress, as_names, fingerprint, noticed
 from fuzzytree.runtimes import baseline
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 ROWS = (1, 1_000, 1_000_000)
 THREADS = (1, 2)

@@ -20,14 +20,11 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from typing import IO, TYPE_CHECKING, cast
+from typing import IO, cast
 
 from fuzzytree.benchmarking.candidates import gather
 from fuzzytree.benchmarking.records import Candidate
-from fuzzytree.model import Model, Progress
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
+from fuzzytree.model import FloatArray, Model, Progress
 
 _START = """
 import json, sys

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -14,7 +14,9 @@ from fuzzytree.model import (
     Certified,
     Comparison,
     Dtype,
+    FloatArray,
     FuzzyTree,
+    IntArray,
     Model,
     Outcome,
     RuleBase,
@@ -29,9 +31,6 @@ from fuzzytree.numerics import (
 )
 from fuzzytree.runtimes import baseline, predictions_of
 from fuzzytree.semantics import Status, probe_values
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
 
 BoolArray = npt.NDArray[np.bool_]
 

@@ -20,14 +20,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.model import LR, Band, Flank, Points, RuleBase, Shape, Side, Term
+from fuzzytree.model import (
+    LR,
+    Band,
+    Flank,
+    FloatArray,
+    IntArray,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Term,
+)
 from fuzzytree.numerics.curves import (
     BELOW_ONE,
     body_coefficients,
@@ -38,9 +48,6 @@ from fuzzytree.numerics.curves import (
     values_at,
 )
 from fuzzytree.numerics.placing import points_of
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
 
 _GRID = 512  # places at which a fit is looked at
 _EXCHANGES = 200  # of places in a fit, at most

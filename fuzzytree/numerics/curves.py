@@ -25,14 +25,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from fuzzytree.model import Flank, Side
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
+from fuzzytree.model import Flank, FloatArray, Side
 
 BELOW_ONE = 1.0 - 2.0**-53
 """The largest double below 1: the highest degree off a plateau."""

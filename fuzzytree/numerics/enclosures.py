@@ -35,7 +35,7 @@ roundings and the rounding of the errors' own arithmetic.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple, assert_never
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
@@ -44,15 +44,13 @@ from fuzzytree.model import (
     Band,
     Clause,
     Flank,
+    FloatArray,
     Points,
     Shape,
     Side,
     Variable,
     checkpoint,
 )
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 U = 2.0**-53
 """The unit roundoff of doubles."""

@@ -14,12 +14,12 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.model import LR, MOST_POINTS, Band, Flank, Points
+from fuzzytree.model import LR, MOST_POINTS, Band, Flank, FloatArray, Points
 from fuzzytree.numerics.curves import (
     BELOW_ONE,
     DegreePiece,
@@ -29,9 +29,6 @@ from fuzzytree.numerics.curves import (
     side_stretches,
     values_at,
 )
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 _GRID = 512  # places on a curve at which its bend is looked at
 _TRIES = 12  # of placing points before the bound counts as out of reach

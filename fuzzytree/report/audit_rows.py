@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from fuzzytree.auditing import AuditRows
-from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase, Variable
+from fuzzytree.model import (
+    FloatArray,
+    FuzzySystem,
+    FuzzyTree,
+    IntArray,
+    RuleBase,
+    Variable,
+)
 from fuzzytree.runtimes import axis_lines, plan_axes
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
 
 Counts = tuple[int, ...]
 """Rows of each class, in the order of the classes; rows of no class come last."""

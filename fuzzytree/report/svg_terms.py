@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from fuzzytree.auditing import Span
-from fuzzytree.model import RuleBase
+from fuzzytree.model import IntArray, RuleBase
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
     LETTER,
@@ -35,9 +35,6 @@ from fuzzytree.report.drawing import (
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import number
 from fuzzytree.runtimes import fire
-
-if TYPE_CHECKING:
-    from fuzzytree.model import IntArray
 
 WIDE = 340.0
 MOST_CURVES = 24

@@ -8,14 +8,11 @@ or a rule means, so that the results have the same bits as those of many rows.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from fuzzytree.model import Model, Outcome, RuleBase, Run
+from fuzzytree.model import FloatArray, Model, Outcome, RuleBase, Run
 from fuzzytree.runtimes import native, reference
 from fuzzytree.semantics import INEXACT, LOGICAL, NUMERIC, Program, still_results
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 _FEW_RULES = 16  # from about twice as many on, numpy is faster on one row too
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from fuzzytree.model import (
+    FloatArray,
     FuzzySystem,
     Model,
     Outcome,
@@ -18,9 +17,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.runtimes.rows import checked, outcome_of
 from fuzzytree.semantics import Answer, descend, evaluate, infer
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 
 def load(model: Model) -> Run:

@@ -14,12 +14,21 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
-from fuzzytree.model import Clause, Model, Outcome, RuleBase, Run, Runtime, Shape
+from fuzzytree.model import (
+    Clause,
+    FloatArray,
+    Model,
+    Outcome,
+    RuleBase,
+    Run,
+    Runtime,
+    Shape,
+)
 from fuzzytree.runtimes.rows import (
     axis_lines,
     checked,
@@ -35,9 +44,6 @@ from fuzzytree.runtimes.sampling import (
     universe,
 )
 from fuzzytree.runtimes.table import rules_only
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 _MOST_POINTS = 128  # on each curved piece of a shape
 _MOST_NUMBERS = 1 << 20  # samples of one variable, over all of its terms

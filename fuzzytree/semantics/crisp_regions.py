@@ -11,15 +11,20 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from msgspec.structs import replace
 
-from fuzzytree.model import Clause, FuzzyTree, Node, RuleBase, Variable, shapes_of
+from fuzzytree.model import (
+    Clause,
+    FloatArray,
+    FuzzyTree,
+    Node,
+    RuleBase,
+    Variable,
+    shapes_of,
+)
 from fuzzytree.semantics.reference import clause_degree
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 _Model = TypeVar("_Model", bound=FuzzyTree | RuleBase)
 

@@ -13,7 +13,6 @@ import math
 import random
 import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from fuzzytree.model import (
     LR,
@@ -25,6 +24,7 @@ from fuzzytree.model import (
     Condition,
     Cosine,
     Curve,
+    FloatArray,
     Formula,
     FuzzySystem,
     FuzzyTree,
@@ -50,9 +50,6 @@ from fuzzytree.model import (
 from fuzzytree.semantics.inference.degrees import curve_degree, hedged
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import axis_values
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 SPECIAL = (
     math.nan,

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -43,12 +42,17 @@ from fuzzytree.auditing.findings.domains import inputs_of
 from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
-from fuzzytree.model import Document, FuzzyTree, Rule, RuleBase, Variable
+from fuzzytree.model import (
+    Document,
+    FloatArray,
+    FuzzyTree,
+    IntArray,
+    Rule,
+    RuleBase,
+    Variable,
+)
 from fuzzytree.numerics import MISSING, TIE, UNCOVERED, Decisions, decide
 from fuzzytree.semantics import probe_values, proof_faults, unguarded
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
 
 _PROBES = 4_000  # of each model
 _SEGMENTS = 64  # between points of different decisions, halved down to doubles

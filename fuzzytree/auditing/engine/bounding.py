@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -38,12 +38,8 @@ from fuzzytree.auditing.engine.states import (
     counted,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.model import RuleBase
+from fuzzytree.model import FloatArray, IntArray, RuleBase
 from fuzzytree.numerics import U, outwards
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
-
 
 TOO_MANY: Final = "too many boxes are left"
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,10 +33,7 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
     values_near,
 )
-from fuzzytree.model import Shape, checkpoint
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
+from fuzzytree.model import FloatArray, Shape, checkpoint
 
 
 class Bounds(NamedTuple):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,12 +38,8 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     point_of,
 )
-from fuzzytree.model import Value, Variable
+from fuzzytree.model import FloatArray, Value, Variable
 from fuzzytree.numerics import U, outwards
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
-
 
 NARROW = Fraction(1, 1000)
 """The two bounds differ by this share of the upper one, unless something stops it."""

@@ -17,7 +17,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple, assert_never
+from typing import NamedTuple, assert_never
 
 import numpy as np
 
@@ -42,6 +42,7 @@ from fuzzytree.model import (
     Band,
     Clause,
     Flank,
+    FloatArray,
     Points,
     Shape,
     Side,
@@ -56,10 +57,6 @@ from fuzzytree.numerics import (
     degree_enclosure,
     outwards,
 )
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
-
 
 ZERO, ONE = Fraction(0), Fraction(1)
 

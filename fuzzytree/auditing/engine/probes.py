@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Collection, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import msgspec
 import numpy as np
@@ -18,16 +18,12 @@ from fuzzytree.auditing.engine.arrangement import Arrangement, strength_above
 from fuzzytree.auditing.engine.domain import Domain, Point
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
 from fuzzytree.auditing.engine.witnesses import is_within, point_with
-from fuzzytree.model import RuleBase, checkpoint, shapes_of
+from fuzzytree.model import FloatArray, IntArray, RuleBase, checkpoint, shapes_of
 from fuzzytree.numerics import (
     axis_value,
     clause_enclosure,
     degree_enclosure,
 )
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
-
 
 _FIRST = 4096  # points drawn in the whole domain
 _NEXT = 512  # points drawn around the best one, in each round

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -31,11 +31,8 @@ from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.auditing.findings.support import sample_points
-from fuzzytree.model import Clause, Rule, RuleBase, clause_text
+from fuzzytree.model import Clause, FloatArray, IntArray, Rule, RuleBase, clause_text
 from fuzzytree.numerics import decide
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
 
 MOST_ROWS: Final = 4096
 """The most rows that are drawn to find an input where a clause matters."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Literal, assert_never
+from typing import Literal, assert_never
 
 import msgspec
 import numpy as np
@@ -22,6 +22,7 @@ from fuzzytree.model import (
     Cosine,
     Curve,
     Document,
+    FloatArray,
     Formula,
     FuzzySystem,
     FuzzyTree,
@@ -40,9 +41,6 @@ from fuzzytree.model import (
     Trapezoid,
     TwoGaussians,
 )
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 Within = Literal["model", "data"]
 

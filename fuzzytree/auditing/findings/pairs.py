@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -29,9 +29,7 @@ from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
+from fuzzytree.model import FloatArray
 
 NEARLY: Final = Fraction(1, 10**6)
 """Two antecedents are nearly the same if no degree differs by more than this."""

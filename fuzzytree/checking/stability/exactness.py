@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,12 +19,9 @@ from fuzzytree.checking.stability.runs import (
 from fuzzytree.checking.stability.sensitivity import InputScale, input_scales
 from fuzzytree.checking.stability.transforms import moved
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model import Dtype, Model, Runtime
+from fuzzytree.model import Dtype, FloatArray, Model, Runtime
 from fuzzytree.numerics import Decisions, decide
 from fuzzytree.semantics import forms, probe_values
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 _ADVICE = (
     "the runtime computes something else, or in another number type than it says; "

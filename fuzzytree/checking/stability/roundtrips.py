@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, cast, get_args
+from typing import cast, get_args
 
 from fuzzytree.checking.comparing import strength_gap, unequal
 from fuzzytree.checking.converting import kind_of
@@ -14,6 +14,7 @@ from fuzzytree.checking.stability.runs import first_line
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.model import (
     Dtype,
+    FloatArray,
     Format,
     FuzzySystem,
     Model,
@@ -24,9 +25,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.runtimes import baseline, load_content, open_onnx
 from fuzzytree.semantics import EXACT, forms
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 _ADVICE = "keep the YAML file as the model, and do not ship the file that failed"
 

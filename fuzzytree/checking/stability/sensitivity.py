@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from fuzzytree.checking.stability.results import Criterion, CurveFault, Stiff, T
 from fuzzytree.model import (
     LR,
     Band,
+    FloatArray,
     FuzzyTree,
     Model,
     Points,
@@ -28,9 +29,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.numerics import UNIT, Conduct, Decisions, conduct, decide, degree_bound
 from fuzzytree.semantics import forms, landmarks
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 SAFE = 1e-4
 """The error of a degree up to which a number type is called safe."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,12 +20,17 @@ from fuzzytree.checking.stability.roundtrips import roundtrips
 from fuzzytree.checking.stability.row_checks import decades, order, scaling, specials
 from fuzzytree.checking.stability.sensitivity import curves, stiffness
 from fuzzytree.checking.stability.term_checks import degenerate, edges
-from fuzzytree.model import Format, Model, Progress, Runtime, as_names, fingerprint
+from fuzzytree.model import (
+    FloatArray,
+    Format,
+    Model,
+    Progress,
+    Runtime,
+    as_names,
+    fingerprint,
+)
 from fuzzytree.runtimes import is_installed
 from fuzzytree.semantics import probe_values
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 _PROBES = 2_000  # for the comparison with the exact answers
 _SOME = 250  # probes for criteria that load a model anew many times

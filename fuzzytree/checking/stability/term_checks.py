@@ -11,7 +11,7 @@ import math
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Literal, assert_never
+from typing import Literal, assert_never
 
 import msgspec
 import numpy as np
@@ -32,6 +32,7 @@ from fuzzytree.model import (
     Clause,
     Dtype,
     Flank,
+    FloatArray,
     Model,
     Points,
     Rule,
@@ -44,9 +45,6 @@ from fuzzytree.model import (
 )
 from fuzzytree.numerics import exact_degree
 from fuzzytree.semantics import forms, landmarks, neighbours
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
 
 Demand = Literal["one", "below one", "zero"]
 

@@ -9,14 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
 from fuzzytree.checking import counted
 from fuzzytree.errors import TableError
-from fuzzytree.model import Agreement, Comparison, Model, RuleBase, fingerprint
+from fuzzytree.model import (
+    Agreement,
+    Comparison,
+    FloatArray,
+    Model,
+    RuleBase,
+    fingerprint,
+)
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
 from fuzzytree.tactile.features.exact import exact_features
@@ -32,10 +38,6 @@ from fuzzytree.tactile.recognition.runners import (
     runners,
 )
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed, saturated
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
-
 
 _ORDERS = ("2", "22", "33", "33", "3333", "332", "44", "44", "4", "444", "42")
 """Of S1 to S11: the orders of the moments that it is a product of."""

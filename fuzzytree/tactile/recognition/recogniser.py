@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fuzzytree.errors import TableError
-from fuzzytree.model import FuzzyTree, Model, RuleBase, Run
+from fuzzytree.model import FloatArray, FuzzyTree, IntArray, Model, RuleBase, Run
 from fuzzytree.runtimes import load
 from fuzzytree.semantics import Status, rules_from_tree
 from fuzzytree.tactile.features.names import feature_of
@@ -16,10 +15,6 @@ from fuzzytree.tactile.features.plain import State as State
 from fuzzytree.tactile.features.plain import check_reject
 from fuzzytree.tactile.runtimes.frames import Features, FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray
-
 
 USUAL_FLOOR = 0.001
 """What is weaker lies beyond all that was learnt, unless one knows better."""
