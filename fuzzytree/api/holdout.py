@@ -15,14 +15,13 @@ import msgspec
 import numpy as np
 
 from fuzzytree.learning import LearningReport, LearningSettings, learn_arrays
-from fuzzytree.model import FuzzyTree
+from fuzzytree.model import FloatArray, FuzzyTree, IntArray
 from fuzzytree.runtimes import baseline
 from fuzzytree.tables import Table
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model import FloatArray, IntArray
 
 FOLDS = 5
 ROWS = 20_000

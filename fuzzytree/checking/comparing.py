@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from fuzzytree.model import (
     Basis,
+    BoolArray,
     Certified,
     Comparison,
     Dtype,
@@ -31,8 +31,6 @@ from fuzzytree.numerics import (
 )
 from fuzzytree.runtimes import baseline, predictions_of
 from fuzzytree.semantics import Status, probe_values
-
-BoolArray = npt.NDArray[np.bool_]
 
 _SHOWN = 5  # differing rows listed for each comparison
 _LISTED = 20  # differences in the content of a file

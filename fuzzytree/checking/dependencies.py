@@ -17,7 +17,6 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.checking.comparing import (
-    BoolArray,
     ModelRun,
     RowSet,
     compare_bits,
@@ -32,15 +31,18 @@ from fuzzytree.model import (
     LR,
     Agreement,
     Band,
+    BoolArray,
     Clause,
     Comparison,
     Dtype,
+    FloatArray,
     FuzzyTree,
     Model,
     ModelKind,
     Outcome,
     Points,
     RuleBase,
+    Runtime,
     Shape,
     Use,
     fingerprint,
@@ -58,7 +60,6 @@ from fuzzytree.semantics import (
 
 if TYPE_CHECKING:
     from fuzzytree.exporters import Output
-    from fuzzytree.model import FloatArray, Runtime
     from fuzzytree.runtimes import Real
     from fuzzytree.semantics import Form
 

@@ -27,6 +27,7 @@ from fuzzytree.model import (
     Comparison,
     Count,
     Document,
+    FloatArray,
     FuzzySystem,
     FuzzyTree,
     Outcome,
@@ -47,8 +48,6 @@ from fuzzytree.runtimes import (
 from fuzzytree.semantics import Status, as_rules, as_system
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
-
     Checked = CheckedModel | CheckedSystem
     Shipped = Document | OnnxModel | ProgramFile
 

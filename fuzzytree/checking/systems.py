@@ -26,9 +26,11 @@ from fuzzytree.checking.comparing import (
 from fuzzytree.checking.equivalence import is_equivalent
 from fuzzytree.checking.models import first_difference
 from fuzzytree.model import (
+    BoolArray,
     Certified,
     Comparison,
     Coverage,
+    FloatArray,
     FuzzySystem,
     Runtime,
     SystemOutcome,
@@ -47,9 +49,6 @@ from fuzzytree.semantics import (
 )
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray
     from fuzzytree.runtimes import OnnxModel
 
 _SLOW_STEPS = 2_000_000  # operations that a slow runtime computes
@@ -262,7 +261,7 @@ class _Gaps:
             where = f"{self.rows.text(row)}: {names[first]}"
             yield f"{where} {one!r} where {two!r} is right{more}"
 
-    def is_edge(self) -> npt.NDArray[np.bool_]:
+    def is_edge(self) -> BoolArray:
         """Return which numbers have a bound above a millionth of their range."""
         spans = np.ones((len(self.allowed), 1))
         for line, output in enumerate(self.subject.model.outputs):
@@ -283,7 +282,7 @@ def _table(outcome: SystemOutcome, other: SystemOutcome) -> FloatArray:
     return np.vstack([*lines, outcome.status.astype(np.float64)])
 
 
-def _largest(numbers: FloatArray, which: npt.NDArray[np.bool_]) -> float:
+def _largest(numbers: FloatArray, which: BoolArray) -> float:
     return float(numbers[which].max(initial=0.0))
 
 
@@ -332,11 +331,11 @@ def _probes(
     return np.concatenate(tables, axis=1), coverage
 
 
-def _fired(run: SystemRun, values: FloatArray) -> npt.NDArray[np.bool_]:
+def _fired(run: SystemRun, values: FloatArray) -> BoolArray:
     """Return which rules fire in which rows, of shape (rules, rows)."""
     degrees = run(values).activations
     assert degrees is not None  # it was prepared with activations
-    fires: npt.NDArray[np.bool_] = degrees > 0.0
+    fires: BoolArray = degrees > 0.0
     return fires
 
 

@@ -9,6 +9,7 @@ from .agreement import Count as Count
 from .agreement import Coverage as Coverage
 from .agreement import Verdict as Verdict
 from .agreement import version as version
+from .contracts import BoolArray as BoolArray
 from .contracts import Document as Document
 from .contracts import Dtype as Dtype
 from .contracts import Fitted as Fitted

@@ -24,8 +24,10 @@ import msgspec
 import numpy as np
 
 from fuzzytree.model import (
+    BoolArray,
     Clause,
     Dtype,
+    FloatArray,
     FuzzyTree,
     Model,
     ModelKind,
@@ -45,12 +47,7 @@ from fuzzytree.numerics.rounding import (
 )
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray
     from fuzzytree.numerics.rounding import Reals
-
-    BoolArray = npt.NDArray[np.bool_]
 
 __all__ = [
     "FLOAT32_MAX",

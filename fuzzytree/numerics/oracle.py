@@ -18,12 +18,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from fuzzytree.model import Clause, FuzzyTree, Model, RuleBase
+from fuzzytree.model import (
+    BoolArray,
+    Clause,
+    FloatArray,
+    FuzzyTree,
+    IntArray,
+    Model,
+    RuleBase,
+)
 from fuzzytree.numerics.enclosures import (
     EnclosedValue,
     Enclosure,
@@ -45,13 +53,6 @@ from fuzzytree.numerics.exact import (
     exact_degree,
     outwards,
 )
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray, IntArray
-
-    BoolArray = npt.NDArray[np.bool_]
 
 __all__ = [
     "CAP",

@@ -40,6 +40,7 @@ from fuzzytree.model import (
     Band,
     Dtype,
     Flank,
+    FloatArray,
     Points,
     Shape,
     Side,
@@ -50,8 +51,6 @@ from fuzzytree.numerics.enclosures import U
 from fuzzytree.numerics.exact import exact_flank, outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
-
     Reals = FloatArray
 
 UNIT = 2.0**-24

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import Points, checkpoint
+from fuzzytree.model import IntArray, Points, checkpoint
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    from fuzzytree.model import IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
     Real = np.dtype[np.floating[Any]]

@@ -24,14 +24,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fuzzytree.model import (
     LR,
     Band,
+    BoolArray,
     Clause,
+    FloatArray,
+    IntArray,
     Outcome,
     Points,
     RuleBase,
@@ -49,11 +51,6 @@ from fuzzytree.runtimes.envelope import (
 )
 from fuzzytree.runtimes.native_rules import fire
 from fuzzytree.runtimes.rows import axis_lines, checked, missing_rows, plan_axes
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray, IntArray
 
 _CHUNK = 1 << 13  # rows: their cells shall stay in the cache
 _PAIRS = 1 << 11  # rows and rules whose strengths are computed together
@@ -543,7 +540,7 @@ def _part_strengths(
     return result
 
 
-def _begins(owner: IntArray) -> npt.NDArray[np.bool_]:
+def _begins(owner: IntArray) -> BoolArray:
     """Return where a new owner begins among sorted ones."""
     result = np.ones(len(owner), np.bool_)
     np.not_equal(owner[1:], owner[:-1], out=result[1:])

@@ -19,6 +19,7 @@ import numpy as np
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import write_c
 from fuzzytree.model import (
+    FloatArray,
     FuzzySystem,
     Model,
     Outcome,
@@ -33,8 +34,6 @@ from fuzzytree.runtimes.table import rules_only
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray
 
     Decide = Callable[..., None]
 

@@ -22,11 +22,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import LR, Dtype, Flank, Points, Shape, Side, checkpoint
+from fuzzytree.model import LR, Dtype, Flank, IntArray, Points, Shape, Side, checkpoint
 from fuzzytree.numerics import segments_of
 
 if TYPE_CHECKING:
-    from fuzzytree.model import IntArray
     from fuzzytree.numerics import Reals, Segments
 
     Real = np.dtype[np.floating[Any]]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import Dtype, FuzzyTree, Outcome, Run
+from fuzzytree.model import Dtype, FloatArray, FuzzyTree, IntArray, Outcome, Run
 from fuzzytree.runtimes.degrees import NUMBERS
 from fuzzytree.runtimes.rows import (
     Axes,
@@ -31,8 +31,6 @@ from fuzzytree.runtimes.rows import (
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray, IntArray
 
     Real = np.dtype[np.floating[Any]]
     Reals = npt.NDArray[np.floating[Any]]

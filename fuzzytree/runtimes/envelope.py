@@ -36,8 +36,11 @@ import numpy as np
 from fuzzytree.model import (
     LR,
     Band,
+    BoolArray,
     Clause,
     Flank,
+    FloatArray,
+    IntArray,
     Points,
     RuleBase,
     Shape,
@@ -50,11 +53,7 @@ from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS, halved, join
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model import FloatArray, IntArray
-
     Singles = npt.NDArray[np.float32]
-    Bools = npt.NDArray[np.bool_]
-
 _ENTRIES, _FEWEST, _MOST = 1 << 21, 32, 1 << 10  # of the table; of cells on an axis
 _CLOSE = 1e-12  # of an axis mapped to (-1, 1): more than rounding moves a cell's end
 _EPS = float(np.finfo(np.float64).eps)
@@ -146,7 +145,7 @@ class Envelope:
 
     grid: AxisCells
     line: IntArray
-    negated: Bools
+    negated: BoolArray
     lower: Singles
     upper: Singles
     start: IntArray

@@ -19,6 +19,7 @@ from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hi
 from fuzzytree.exporters import FORMAT_VERSION, Output, write_onnx
 from fuzzytree.model import (
     Dtype,
+    FloatArray,
     FuzzySystem,
     FuzzyTree,
     Model,
@@ -37,8 +38,6 @@ from fuzzytree.runtimes.rows import checked
 if TYPE_CHECKING:
     import numpy.typing as npt
     import onnx
-
-    from fuzzytree.model import FloatArray
 
     Outputs = dict[str, npt.NDArray[np.generic]]
 

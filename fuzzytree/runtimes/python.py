@@ -10,12 +10,10 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fuzzytree.exporters import write_python
-from fuzzytree.model import Model, Outcome, Run, Runtime
+from fuzzytree.model import FloatArray, Model, Outcome, Run, Runtime
 from fuzzytree.runtimes.rows import checked, outcome_of
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
-
     RowAnswer = tuple[str | None, int, int] | tuple[str | None, int, int, list[float]]
 
 

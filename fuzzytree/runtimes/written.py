@@ -17,19 +17,16 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from fuzzytree.errors import FuzzyTreeError, MissingExtraError
 from fuzzytree.exporters import beginning
-from fuzzytree.model import Model, Outcome, RuleBase
+from fuzzytree.model import FloatArray, Model, Option, Outcome, RuleBase
 from fuzzytree.runtimes import c
 from fuzzytree.runtimes.rows import outcome_of
 from fuzzytree.semantics import Status
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, Option
 
 Options = Mapping[str, "Option"]
 _LONGEST_WAIT = 600.0  # seconds

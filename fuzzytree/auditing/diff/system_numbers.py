@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -35,13 +35,10 @@ from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, AuditSettings, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
-from fuzzytree.model import FuzzySystem
+from fuzzytree.model import FloatArray, FuzzySystem, SystemRun
 from fuzzytree.numerics import outwards
 from fuzzytree.runtimes import run_system
 from fuzzytree.semantics import system_probes
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, SystemRun
 
 _PROBES = 2_000  # of each system
 _DRAWN = 4_000  # at most, for numbers take longer than decisions

@@ -29,15 +29,20 @@ from fuzzytree.auditing.engine.domain import Domain, span, variable_value
 from fuzzytree.auditing.engine.linear import ZERO
 from fuzzytree.auditing.engine.pieces import ALWAYS, ChangePoint, RuleCurve, places
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
-from fuzzytree.model import Clause, Rule, RuleBase, Variable, checkpoint, shapes_of
+from fuzzytree.model import (
+    BoolArray,
+    Clause,
+    IntArray,
+    Rule,
+    RuleBase,
+    Variable,
+    checkpoint,
+    shapes_of,
+)
 from fuzzytree.numerics import exact_degree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    from fuzzytree.model import IntArray
-
-    BoolArray = npt.NDArray[np.bool_]
 
 
 MOST_NUMBERS: Final = 1 << 24

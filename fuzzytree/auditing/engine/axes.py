@@ -49,7 +49,7 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
     values_near,
 )
-from fuzzytree.model import Clause, Shape, checkpoint
+from fuzzytree.model import BoolArray, Clause, FloatArray, IntArray, Shape, checkpoint
 from fuzzytree.numerics import (
     EnclosedValue,
     Enclosure,
@@ -61,9 +61,6 @@ from fuzzytree.numerics import (
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model import FloatArray, IntArray
-
-    BoolArray = npt.NDArray[np.bool_]
     Values = npt.NDArray[np.float64] | npt.NDArray[np.object_]
 
 

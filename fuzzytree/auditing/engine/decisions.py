@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from msgspec.structs import replace
@@ -36,16 +36,16 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.ties import decides_by_order
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.model import Clause, RuleBase, Variable, checkpoint, shapes_of
+from fuzzytree.model import (
+    BoolArray,
+    Clause,
+    FloatArray,
+    RuleBase,
+    Variable,
+    checkpoint,
+    shapes_of,
+)
 from fuzzytree.numerics import Enclosure, U, axis_value, strength_enclosure
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray
-
-    BoolArray = npt.NDArray[np.bool_]
-
 
 _STEPS: Final = 8  # towards the place where another class gets ahead
 _BESIDE: Final = 1e-6  # of a range, to see which way degrees change

@@ -63,15 +63,12 @@ from fuzzytree.auditing.engine.witnesses import (
     stretch,
     widest,
 )
-from fuzzytree.model import checkpoint
+from fuzzytree.model import BoolArray, FloatArray, IntArray, checkpoint
 from fuzzytree.numerics import outwards
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.model import FloatArray, IntArray
-
-    BoolArray = npt.NDArray[np.bool_]
     ByteArray = npt.NDArray[np.int8]
 
 

@@ -28,7 +28,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -70,13 +70,8 @@ from fuzzytree.auditing.engine.witnesses import (
     stretch,
     widest,
 )
-from fuzzytree.model import checkpoint
+from fuzzytree.model import BoolArray, IntArray, checkpoint
 from fuzzytree.numerics import outwards
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import IntArray
 
 
 def maximal(masks: Iterable[int]) -> tuple[int, ...]:
@@ -159,7 +154,7 @@ class AxisOptions(msgspec.Struct, frozen=True, eq=False, dict=True):
     top: IntArray
     floor: IntArray
 
-    def masks(self, is_open: npt.NDArray[np.bool_], band: int) -> tuple[int, ...]:
+    def masks(self, is_open: BoolArray, band: int) -> tuple[int, ...]:
         """Return the largest sets of rivals that open options leave below a band."""
         below = self.floor[is_open] <= band
         if below.shape[1] < _MOST_BITS:

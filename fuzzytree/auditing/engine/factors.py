@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -33,11 +33,7 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
     values_near,
 )
-from fuzzytree.model import Clause, Shape, checkpoint, shapes_of
-
-if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.arrangement import BoolArray
-    from fuzzytree.model import FloatArray
+from fuzzytree.model import BoolArray, Clause, FloatArray, Shape, checkpoint, shapes_of
 
 UNKNOWN: Final = Fraction(1 << 4096)
 """The upper bound of a ratio of which none was found."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,11 +31,7 @@ from fuzzytree.auditing.engine.witnesses import (
     part_of,
     stretch,
 )
-from fuzzytree.model import checkpoint
-
-if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.arrangement import BoolArray
-    from fuzzytree.model import IntArray
+from fuzzytree.model import BoolArray, IntArray, checkpoint
 
 
 class TieQuestion(NamedTuple):

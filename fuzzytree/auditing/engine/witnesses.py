@@ -38,10 +38,11 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
 )
 from fuzzytree.auditing.engine.states import Span
+from fuzzytree.model import BoolArray
 from fuzzytree.numerics import outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.axes import BoolArray, Values
+    from fuzzytree.auditing.engine.axes import Values
 
 
 START = -1  # the number of the option at an axis's lower end itself

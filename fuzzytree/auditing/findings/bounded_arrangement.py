@@ -15,7 +15,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import msgspec
 import numpy as np
@@ -38,7 +38,17 @@ from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model import Clause, Points, Rule, RuleBase, Term, Variable, shapes_of
+from fuzzytree.model import (
+    BoolArray,
+    Clause,
+    FloatArray,
+    Points,
+    Rule,
+    RuleBase,
+    Term,
+    Variable,
+    shapes_of,
+)
 from fuzzytree.numerics import (
     EnclosedValue,
     Enclosure,
@@ -47,11 +57,6 @@ from fuzzytree.numerics import (
     outwards,
     strength_enclosure,
 )
-
-if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.arrangement import BoolArray
-    from fuzzytree.model import FloatArray
-
 
 _BELOW: Final = "from below: "
 _ROUNDING: Final = 1e-9

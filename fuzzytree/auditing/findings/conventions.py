@@ -10,7 +10,7 @@ import contextlib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -28,17 +28,22 @@ from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import rows_outside, sample_points
 from fuzzytree.checking import ModelRun, labels
 from fuzzytree.errors import LossError
-from fuzzytree.model import FuzzySystem, FuzzyTree, Model, RuleBase, SystemOutcome
+from fuzzytree.model import (
+    BoolArray,
+    FloatArray,
+    FuzzySystem,
+    FuzzyTree,
+    IntArray,
+    Model,
+    RuleBase,
+    Run,
+    Runtime,
+    SystemOutcome,
+    SystemRun,
+)
 from fuzzytree.numerics import TIE, decide, exact_answer
 from fuzzytree.runtimes import all_runtimes, is_installed
 from fuzzytree.semantics import Status, few_probes, forms, probe_values
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray, IntArray, Run, Runtime, SystemRun
-
-    BoolArray = npt.NDArray[np.bool_]
 
 MOST: Final = 240
 """The most probes of one question."""

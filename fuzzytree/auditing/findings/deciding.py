@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from fuzzytree.auditing.engine.arrangement import Arrangement
 from fuzzytree.auditing.engine.clock import Clock
@@ -29,9 +29,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
 from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
-
-if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.arrangement import BoolArray
+from fuzzytree.model import BoolArray
 
 MOST_SHOWN: Final = 20
 """The most ties that are listed one by one."""

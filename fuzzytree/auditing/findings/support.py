@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from fractions import Fraction
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import msgspec
 import numpy as np
@@ -20,7 +20,7 @@ from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
-from fuzzytree.model import Clause, RuleBase, shapes_of
+from fuzzytree.model import BoolArray, Clause, FloatArray, IntArray, RuleBase, shapes_of
 from fuzzytree.numerics import (
     MISSING,
     UNCOVERED,
@@ -34,13 +34,6 @@ from fuzzytree.numerics import (
     exact_axis,
     outwards,
 )
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from fuzzytree.model import FloatArray, IntArray
-
-    BoolArray = npt.NDArray[np.bool_]
 
 CONFIDENCE: Final = 0.95
 """Of every interval."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -24,12 +23,8 @@ from fuzzytree.checking.stability.runs import (
 )
 from fuzzytree.checking.stability.transforms import NORMAL, exponent_range, scaled
 from fuzzytree.errors import InvalidModelError, LossError
-from fuzzytree.model import Dtype, Model, Outcome, Runtime
+from fuzzytree.model import BoolArray, Dtype, FloatArray, Model, Outcome, Runtime
 from fuzzytree.semantics import Status
-
-if TYPE_CHECKING:
-    from fuzzytree.checking.stability.runs import BoolArray
-    from fuzzytree.model import FloatArray
 
 BATCHES = (1, 7, 33, 1000)
 """Rows answered at a time."""

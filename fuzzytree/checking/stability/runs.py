@@ -10,23 +10,27 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from fuzzytree.checking.comparing import ModelRun, exact_errors, unequal
 from fuzzytree.errors import LossError
-from fuzzytree.model import Dtype, FuzzyTree, Model, Outcome, RuleBase, Run, Runtime
+from fuzzytree.model import (
+    BoolArray,
+    Dtype,
+    FloatArray,
+    FuzzyTree,
+    Model,
+    Outcome,
+    RuleBase,
+    Run,
+    Runtime,
+)
 from fuzzytree.numerics import Decisions, decide, strength_bounds
 from fuzzytree.runtimes import is_installed, needed_by
 from fuzzytree.semantics import forms
-
-if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
-
-    BoolArray = npt.NDArray[np.bool_]
 
 _SLOW_ROWS = 60  # rows that a slow runtime is given, whatever the others get
 
