@@ -251,8 +251,9 @@ def _is_in_range(
     is_large = kind.ge is None or value >= kind.ge
     is_small = kind.le is None or value <= kind.le
     if not (is_large and is_small):
-        bound = f"least {kind.ge}" if not is_large else f"most {kind.le}"
-        _add(mistakes, node, f"{what} must be at {bound}, not {value}")
+        form = "g" if isinstance(kind, inspect.FloatType) else ""
+        bound = f"most {kind.le:{form}}" if is_large else f"least {kind.ge:{form}}"
+        _add(mistakes, node, f"{what} must be at {bound}, not {value:{form}}")
     return is_large and is_small
 
 
