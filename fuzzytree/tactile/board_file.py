@@ -20,7 +20,7 @@ from fuzzytree.formats import (
     record,
     report,
 )
-from fuzzytree.model import Mistake
+from fuzzytree.model import Mistake, Value
 from fuzzytree.tactile.boards import (
     ABOUT_PREFIX,
     PREFIX,
@@ -304,39 +304,34 @@ def board_text(board: Board) -> str:
         "format": BOARD_FORMAT,
         "name": board.name,
         "sensor": _sensor_entry(board.sensor),
-        family: _changed(kind, board.protocol, always),
+        family: Short(_changed(kind, board.protocol, always)),
         "order": board.order,
     }
     if board.pressure != "rises":
         entries["pressure"] = board.pressure
-    entries["port"] = _changed(PortOfBoard, board.port, "baud")
+    entries["port"] = Short(_changed(PortOfBoard, board.port, "baud"))
     if board.start != Start():
-        entries["start"] = _changed(StartOfBoard, board.start)
+        entries["start"] = Short(_changed(StartOfBoard, board.start))
     if board.banner:
         entries["banner"] = Noted(board.banner, "lines")
     return joined(board.name, _TITLE, entries).decode()
 
 
 def _sensor_entry(sensor: Sensor) -> Entry:
-    entries: dict[str, Entry] = {
-        "rows": sensor.rows,
-        "columns": sensor.columns,
-        "full": sensor.full,
-    }
-    if sensor.threshold:
-        entries["threshold"] = sensor.threshold
+    entries = _changed(SensorOfBoard, sensor, "rows columns full")
+    if not (sensor.baseline or sensor.masked):
+        return Short(entries)
     if sensor.baseline:
         entries["baseline"] = Short([*sensor.baseline], is_run_on=True)
     if sensor.masked:
         cells: list[Entry] = [Short([*cell]) for cell in sensor.masked]
         entries["masked"] = Short(cells, is_run_on=True)
-    is_short = not (sensor.baseline or sensor.masked)
-    return Short(entries) if is_short else entries
+    return entries
 
 
 def _changed(
-    kind: type[FileRecord], value: Protocol | Port | Start, always: str = ""
-) -> Short:
+    kind: type[FileRecord], value: Value, always: str = ""
+) -> dict[str, Entry]:
     """Return the fields that are not as usual, by their keys."""
     entries: dict[str, Entry] = {}
     for one in structs.fields(kind):
@@ -344,4 +339,4 @@ def _changed(
         is_usual = own == one.default or own is False or own == ""
         if not is_usual or one.name in always.split():
             entries[one.encode_name] = "rows and columns" if own is True else own
-    return Short(entries)
+    return entries

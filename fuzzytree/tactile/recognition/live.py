@@ -14,11 +14,7 @@ from fuzzytree.errors import TableError
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
 from fuzzytree.tactile.sensor import Cells, Counters, Frame, pressed
 
-STATES = {
-    State.OBJECT: "object",
-    State.NOTHING: "nothing",
-    State.UNKNOWN: "unknown",
-}
+STATES = {state: state.name.lower() for state in State}
 """The word for each state in lines and JSON."""
 
 SENTENCES = {
