@@ -19,17 +19,12 @@ from fuzzytree.formats import (
 from fuzzytree.model import (
     LR,
     And,
-    Arc,
     Band,
-    Binary,
     Call,
-    Concave,
     Condition,
     Expression,
-    Formula,
     Hedge,
     Is,
-    Linear,
     Loss,
     Name,
     Not,
@@ -37,14 +32,11 @@ from fuzzytree.model import (
     Or,
     Points,
     RuleBlock,
-    SCurve,
-    Sigmoid,
-    Singleton,
     SystemCurve,
     SystemOutput,
     SystemRule,
     SystemTerm,
-    Trapezoid,
+    curves,
     joints,
     questions,
 )
@@ -174,11 +166,11 @@ def hedge_losses(rules: Sequence[SystemRule]) -> Iterator[Loss]:
 def degree_text(label: SystemTerm, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term; None if FLL has no such term."""
     match label.curve:
-        case Formula(expression=expression):
+        case curves.Formula(expression=expression):
             if label.height != 1.0:
                 expression = Call("*", (Number(label.height), expression))
             return f"Function {fuzzylite_text_of(_renamed(expression, names))}"
-        case Linear() | Band() | LR():
+        case curves.Linear() | Band() | LR():
             return None
         case Points():
             parts = _points(label.curve)
@@ -195,19 +187,19 @@ def weighted_type(output: SystemOutput) -> str:
 
     `Tsukamoto` if it inverts each of them at a degree, else `TakagiSugeno`.
     """
-    curves = [label.curve for label in output.labels]
-    is_inverse = [value_at(one, 0.5) is not None for one in curves]
+    functions = [label.curve for label in output.labels]
+    is_inverse = [value_at(one, 0.5) is not None for one in functions]
     return "Tsukamoto" if is_inverse and all(is_inverse) else "TakagiSugeno"
 
 
 def number_text(label: SystemTerm, kind: str, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term of a weighted output, or None."""
     match label.curve:
-        case Singleton(value=value):
+        case curves.Singleton(value=value):
             return f"Constant {_number(value)}"
-        case Linear(weights=weights, offset=offset):
+        case curves.Linear(weights=weights, offset=offset):
             return " ".join(["Linear", *map(_number, (*weights, offset))])
-        case Formula(expression=expression):
+        case curves.Formula(expression=expression):
             return f"Function {fuzzylite_text_of(_renamed(expression, names))}"
         case curve if kind == "TakagiSugeno" and value_at(curve, 0.5) is not None:
             return f"Function {fuzzylite_text_of(_inverse(label))}"
@@ -221,7 +213,7 @@ def _number(value: float) -> str:
 
 def _parts(curve: SystemCurve) -> tuple[str | float, ...]:
     match curve:
-        case Trapezoid(a=a, b=b, c=c, d=d):
+        case curves.Trapezoid(a=a, b=b, c=c, d=d):
             low = -math.inf if a is None else a
             high = math.inf if d is None else d
             if low == b and c == high:
@@ -229,12 +221,12 @@ def _parts(curve: SystemCurve) -> tuple[str | float, ...]:
             return (
                 ("Triangle", low, b, high) if b == c else ("Trapezoid", low, b, c, high)
             )
-        case SCurve(start=start, end=end):
+        case curves.SCurve(start=start, end=end):
             rises = start <= end
             return ("SShape", start, end) if rises else ("ZShape", end, start)
-        case Binary(start=start, is_above=is_above):
+        case curves.Binary(start=start, is_above=is_above):
             return "Binary", start, math.inf if is_above else -math.inf
-        case Singleton(value=value):
+        case curves.Singleton(value=value):
             return "Rectangle", value, value
         case _:
             name, numbers = in_words(curve, FLL_CLASSES) or ("", [])
@@ -286,15 +278,15 @@ def _inverse(label: SystemTerm) -> Expression:
         case Points(values=(first, last), degrees=(low, _)):
             start, end = (first, last) if low == 0.0 else (last, first)
             return parse(f"{start!r} + {end - start!r} * {d}")
-        case Sigmoid(inflection=inflection, slope=slope):
+        case curves.Sigmoid(inflection=inflection, slope=slope):
             return parse(f"{inflection!r} - log(1 / {d} - 1) / {slope!r}")
-        case SCurve(start=start, end=end):
+        case curves.SCurve(start=start, end=end):
             low_part = f"{start!r} + {end - start!r} * sqrt(0.5 * {d})"
             high_part = f"{end!r} - {end - start!r} * sqrt(0.5 * (1 - {d}))"
             return parse(f"le({d}, 0.5) * ({low_part}) + gt({d}, 0.5) * ({high_part})")
-        case Concave(inflection=inflection, end=end):
+        case curves.Concave(inflection=inflection, end=end):
             return parse(f"{end!r} - {end - inflection!r} * (1 / {d} - 1)")
-        case Arc(start=start, end=end):
+        case curves.Arc(start=start, end=end):
             root = f"sqrt((1 - {d}) * (1 + {d}))"
             return parse(f"{end!r} - {end - start!r} * {root}")
         case curve:

@@ -95,6 +95,7 @@ from .system import Grid as Grid
 from .system import SystemInput as SystemInput
 from .system import SystemOutput as SystemOutput
 from .system import SystemTerm as SystemTerm
+from .system import curves as curves
 from .system import is_drawn_by_lines as is_drawn_by_lines
 from .system import sampled_values as sampled_values
 from .system.curves import FUNCTIONS as FUNCTIONS

@@ -12,52 +12,35 @@ from fuzzytree.model import (
     Activation,
     ActivationMethod,
     And,
-    Arc,
     Band,
-    Bell,
-    Binary,
     Call,
-    Concave,
     Conclusion,
     Condition,
-    Cosine,
     Curve,
     Defuzzifier,
     DefuzzifierMethod,
     Expression,
     Flank,
-    Formula,
     FuzzySystem,
-    Gaussian,
     Grid,
     Hedge,
     Is,
-    Linear,
     Name,
     Not,
     Number,
     Or,
     Part,
-    PiCurve,
     Points,
     Relation,
     RuleBlock,
-    SCurve,
-    SemiEllipse,
     Side,
-    Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
-    Singleton,
     SNorm,
-    Spike,
     SystemInput,
     SystemOutput,
     SystemRule,
     SystemTerm,
     TNorm,
-    Trapezoid,
-    TwoGaussians,
+    curves,
 )
 
 Formulas = Literal["none", "tame", "wild"]
@@ -177,25 +160,25 @@ class _Maker:
             names.append(plain if name in (*names, *self.scales, "x") else name)
         return names
 
-    def _labels(self, curves: Sequence[Curve]) -> tuple[SystemTerm, ...]:
+    def _labels(self, functions: Sequence[Curve]) -> tuple[SystemTerm, ...]:
         names: list[str] = []
-        for plain in _PLAIN[: len(curves)]:
+        for plain in _PLAIN[: len(functions)]:
             name = self._name(plain)
             names.append(plain if name in names or name in _PLAIN else name)
         return tuple(
             SystemTerm(name, curve, self.chance.choice((1.0, 1.0, 1.0, 0.75, 0.3)))
-            for name, curve in zip(names, curves, strict=True)
+            for name, curve in zip(names, functions, strict=True)
         )
 
     def _input(self, name: str, columns: Sequence[str]) -> SystemInput:
         chance, scale = self.chance, self.scales[name]
         low, high = (-scale, scale) if chance.random() < 0.9 else (None, None)
-        curves = [
+        functions = [
             self._curve(scale, columns) for _ in range(chance.randint(1, len(_PLAIN)))
         ]
         clips = low is not None and chance.random() < 0.3
         unit = chance.choice(("", "cm"))
-        return SystemInput(name, self._labels(curves), low, high, clips, unit)
+        return SystemInput(name, self._labels(functions), low, high, clips, unit)
 
     def _combination(self, columns: Sequence[str]) -> SystemInput:
         chance = self.chance
@@ -203,8 +186,8 @@ class _Maker:
             Part(name, chance.uniform(0.2, 2.0) / self.scales[name], chance.random())
             for name in chance.sample(columns, chance.randint(2, len(columns)))
         )
-        curves = [self._curve(1.0, columns) for _ in range(3)]
-        return SystemInput("mix", self._labels(curves), parts=parts)
+        functions = [self._curve(1.0, columns) for _ in range(3)]
+        return SystemInput("mix", self._labels(functions), parts=parts)
 
     def _output(
         self, name: str, nameable: Sequence[str], columns: Sequence[str], kind: str
@@ -214,21 +197,23 @@ class _Maker:
         is_weighted = kind == "weighted" or (kind == "any" and chance.random() < 0.5)
         how = self._defuzzifier(is_weighted=is_weighted)
         count = chance.randint(1, len(_PLAIN))
-        curves = [
+        functions = [
             self._number(scale, nameable, columns)
             if is_weighted and chance.random() < 0.7
             else self._curve(scale, nameable)
             for _ in range(count)
         ]
         if not is_weighted:  # formats that sample ranges refuse singletons
-            curves = [
-                Gaussian(one.value, scale) if isinstance(one, Singleton) else one
-                for one in curves
+            functions = [
+                curves.Gaussian(one.value, scale)
+                if isinstance(one, curves.Singleton)
+                else one
+                for one in functions
             ]
         norms: tuple[SNorm | None, ...] = get_args(SNorm)
         return SystemOutput(
             name,
-            self._labels(curves),
+            self._labels(functions),
             -scale,
             scale,
             how,
@@ -323,7 +308,7 @@ class _Maker:
         kinds = 2 if self.formulas == "none" else 3
         match chance.randrange(kinds):
             case 0:
-                return Singleton(chance.uniform(-1.0, 1.0) * scale)
+                return curves.Singleton(chance.uniform(-1.0, 1.0) * scale)
             case 1:
                 weights = [
                     chance.choice(
@@ -331,9 +316,9 @@ class _Maker:
                     )
                     for n in columns
                 ]
-                return Linear(tuple(weights), chance.uniform(-1.0, 1.0) * scale)
+                return curves.Linear(tuple(weights), chance.uniform(-1.0, 1.0) * scale)
             case _:
-                return Formula(self._expression(nameable, 3))
+                return curves.Formula(self._expression(nameable, 3))
 
     def _curve(self, scale: float, nameable: Sequence[str]) -> Curve:
         """Return any curve that has degrees within some scales of 0."""
@@ -341,39 +326,42 @@ class _Maker:
         a, b, c, d = sorted(chance.uniform(-1.0, 1.0) * scale for _ in range(4))
         width = chance.uniform(0.1, 1.0) * scale
         slope = chance.uniform(1.0, 20.0) / scale * chance.choice((-1.0, 1.0))
-        first, second = Sigmoid(b, slope), Sigmoid(c, chance.choice((slope, -slope)))
+        first, second = (
+            curves.Sigmoid(b, slope),
+            curves.Sigmoid(c, chance.choice((slope, -slope))),
+        )
         start, end = chance.choice(((a, d), (d, a)))
         ramp = chance.choice(((0.0, 1.0), (1.0, 0.0)))
         side = Side(width, (0.5,))
         edges: list[Curve] = [
             Points((a, b), ramp),
-            Sigmoid(b, slope),
-            SCurve(start, end),
-            Concave(start, end),
-            Arc(start, end),
+            curves.Sigmoid(b, slope),
+            curves.SCurve(start, end),
+            curves.Concave(start, end),
+            curves.Arc(start, end),
         ]
         others: list[Curve] = [
-            Trapezoid(a, b, c, d),
-            Trapezoid(a, b, b, d),
-            Trapezoid(None, b, c, chance.choice((None, d))),
-            Trapezoid(a, a, d, chance.choice((None, d))),
+            curves.Trapezoid(a, b, c, d),
+            curves.Trapezoid(a, b, b, d),
+            curves.Trapezoid(None, b, c, chance.choice((None, d))),
+            curves.Trapezoid(a, a, d, chance.choice((None, d))),
             Points((a, b, b, c, d), (0.0, chance.random(), 1.0, chance.random(), 0.5)),
             Band(b, c, Flank(b, a), Flank(c, d, (0.5, 0.5))),
             LR(b, side, Side(width, (0.4, 0.1), 3.0)),
-            Gaussian(b, width),
-            TwoGaussians(b, width, chance.choice((a, c)), 0.5 * width),
-            Bell(b, width, chance.uniform(0.5, 4.0)),
-            SigmoidDifference(first, second),
-            SigmoidProduct(first, second),
-            PiCurve(a, b, c, d),
-            Cosine(b, width),
-            Spike(b, width),
-            SemiEllipse(a, d),
-            Binary(b, chance.random() < 0.5),
-            Singleton(b),
+            curves.Gaussian(b, width),
+            curves.TwoGaussians(b, width, chance.choice((a, c)), 0.5 * width),
+            curves.Bell(b, width, chance.uniform(0.5, 4.0)),
+            curves.SigmoidDifference(first, second),
+            curves.SigmoidProduct(first, second),
+            curves.PiCurve(a, b, c, d),
+            curves.Cosine(b, width),
+            curves.Spike(b, width),
+            curves.SemiEllipse(a, d),
+            curves.Binary(b, chance.random() < 0.5),
+            curves.Singleton(b),
         ]
         if self.formulas != "none":
-            others.append(Formula(self._degree_formula(nameable, scale)))
+            others.append(curves.Formula(self._degree_formula(nameable, scale)))
         return chance.choice([*edges, *others])
 
     def _degree_formula(self, nameable: Sequence[str], scale: float) -> Expression:

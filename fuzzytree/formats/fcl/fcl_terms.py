@@ -17,20 +17,11 @@ from fuzzytree.formats.text_files import PartError, Word, number_of
 from fuzzytree.model import (
     LR,
     Band,
-    Bell,
-    Cosine,
     Curve,
-    Gaussian,
-    PiCurve,
     Points,
-    Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
-    Singleton,
     SystemTerm,
-    Trapezoid,
-    TwoGaussians,
     curve_mistakes,
+    curves,
     name_choice,
 )
 
@@ -56,7 +47,7 @@ def read(text: TermStatement, where: TermScope, dialect: Dialect) -> FclTerm:
         kind = Word("Constant", *place(first))
         if dialect == "fuzzylite" or where.is_weighted:
             return FclTerm(read_term(name, kind, _words(text.tokens), where))
-        return FclTerm(_checked(first, name, Singleton(_number(first)), where))
+        return FclTerm(_checked(first, name, curves.Singleton(_number(first)), where))
     if text.kind == "points":
         numbers = [_number(one) for one in text.tokens]
         points = Points(tuple(numbers[::2]), tuple(numbers[1::2]))
@@ -137,7 +128,7 @@ def _shape(text: TermStatement, where: TermScope) -> FclTerm:
     except ValueError as error:
         raise PartError((*place(first), str(error))) from error
     loss = ""
-    if isinstance(curve, SigmoidDifference) and not is_plain(curve):
+    if isinstance(curve, curves.SigmoidDifference) and not is_plain(curve):
         loss = "where the first sigmoid is below the second one, the difference "
         loss += "counts and not 0, as jFuzzyLogic has it"
     return FclTerm(_checked(first, str(text.name), curve, where), loss)
@@ -146,23 +137,23 @@ def _shape(text: TermStatement, where: TermScope) -> FclTerm:
 def _two_gaussians(n: Sequence[float]) -> Curve:
     if n[0] > n[2]:
         raise ValueError(f"the first mean {n[0]!r} must not lie above {n[2]!r}")
-    return TwoGaussians(*n)
+    return curves.TwoGaussians(*n)
 
 
 FCL_SHAPES: Final[Mapping[str, CurveWord]] = {
-    "TRIAN": CurveWord(3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
-    "TRAPE": CurveWord(4, lambda n: Trapezoid(*n)),
-    "GAUSS": fields(Gaussian, 0, 1),
-    "GAUSS2": CurveWord(4, _two_gaussians, TwoGaussians, (0, 1, 2, 3)),
-    "GBELL": fields(Bell, 1, 2, 0),
-    "SIGM": fields(Sigmoid, 1, 0),
-    "DSIGM": fields(SigmoidDifference, 1, 0, 3, 2),
-    "COSINE": CurveWord(2, lambda n: Cosine(n[1], 2.0 * n[0])),
+    "TRIAN": CurveWord(3, lambda n: curves.Trapezoid(n[0], n[1], n[1], n[2])),
+    "TRAPE": CurveWord(4, lambda n: curves.Trapezoid(*n)),
+    "GAUSS": fields(curves.Gaussian, 0, 1),
+    "GAUSS2": CurveWord(4, _two_gaussians, curves.TwoGaussians, (0, 1, 2, 3)),
+    "GBELL": fields(curves.Bell, 1, 2, 0),
+    "SIGM": fields(curves.Sigmoid, 1, 0),
+    "DSIGM": fields(curves.SigmoidDifference, 1, 0, 3, 2),
+    "COSINE": CurveWord(2, lambda n: curves.Cosine(n[1], 2.0 * n[0])),
 }
 """The curves of jFuzzyLogic."""
 
 
-def is_plain(curve: SigmoidDifference) -> bool:
+def is_plain(curve: curves.SigmoidDifference) -> bool:
     """Return whether the first sigmoid is nowhere below the second one."""
     one, two = curve.first, curve.second
     return one.slope == two.slope > 0.0 and one.inflection <= two.inflection
@@ -173,30 +164,30 @@ def extent(curve: Curve) -> tuple[float, float] | None:
     match curve:
         case Points(values=values):
             return values[0], values[-1]
-        case Trapezoid(a=a, d=d):
+        case curves.Trapezoid(a=a, d=d):
             return None if a is None or d is None else (a, d)
-        case Gaussian(mean=mean, deviation=deviation):
+        case curves.Gaussian(mean=mean, deviation=deviation):
             return mean - 4.0 * deviation, mean + 4.0 * deviation
-        case TwoGaussians():
+        case curves.TwoGaussians():
             low = curve.left - 4.0 * curve.left_deviation
             return low, curve.right + 4.0 * curve.right_deviation
-        case Bell(center=center, width=width, slope=slope):
+        case curves.Bell(center=center, width=width, slope=slope):
             reach = abs(width) * 999.0 ** (1.0 / (2.0 * slope)) if slope > 0 else 0.0
             return center - reach, center + reach
-        case Sigmoid(inflection=inflection, slope=slope):
+        case curves.Sigmoid(inflection=inflection, slope=slope):
             reach = 9.0 / abs(slope) if slope else 0.0
             return inflection - reach, inflection + reach
         case (
-            SigmoidDifference(first=first, second=second)
-            | SigmoidProduct(first=first, second=second)
+            curves.SigmoidDifference(first=first, second=second)
+            | curves.SigmoidProduct(first=first, second=second)
         ):
             ends = [one for one in (extent(first), extent(second)) if one is not None]
             return min(low for low, _ in ends), max(high for _, high in ends)
-        case Cosine(center=center, width=width):
+        case curves.Cosine(center=center, width=width):
             return center - width / 2.0, center + width / 2.0
-        case PiCurve(a=a, d=d):
+        case curves.PiCurve(a=a, d=d):
             return a, d
-        case Singleton(value=value):
+        case curves.Singleton(value=value):
             return value, value
         case Band() | LR() | _:
             return None

@@ -13,25 +13,13 @@ from typing import Final, Literal, NamedTuple, get_args
 from fuzzytree.formats.curve_words import CurveWord, fields
 from fuzzytree.model import (
     MOST_POINTS,
-    Bell,
-    Binary,
-    Concave,
-    Cosine,
     Curve,
-    Gaussian,
     Hedge,
-    PiCurve,
     Points,
-    SCurve,
-    Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
     SNorm,
-    Spike,
     TNorm,
-    Trapezoid,
-    TwoGaussians,
     curve_mistakes,
+    curves,
 )
 
 Dialect = Literal["matlab", "octave", "fuzzylite"]
@@ -109,7 +97,7 @@ class CurveKind(NamedTuple):
     is_private: bool = False
 
 
-def trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
+def trapezoid(a: float, b: float, c: float, d: float) -> curves.Trapezoid:
     """Return a trapezoid; two corners beyond `FAR` leave a side open.
 
     A side to the next double is a step: no value lies on it.
@@ -122,12 +110,12 @@ def trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
     a = b if a == math.nextafter(b, -math.inf) else a
     d = c if d == math.nextafter(c, math.inf) else d
     if is_left and is_right:
-        return Trapezoid(None, 0.0, 0.0, None)
+        return curves.Trapezoid(None, 0.0, 0.0, None)
     if is_left:
-        return Trapezoid(None, c, c, d)
+        return curves.Trapezoid(None, c, c, d)
     if is_right:
-        return Trapezoid(a, b, b, None)
-    return Trapezoid(a, b, c, d)
+        return curves.Trapezoid(a, b, b, None)
+    return curves.Trapezoid(a, b, c, d)
 
 
 def _ramp(start: float, end: float) -> Curve:
@@ -140,24 +128,24 @@ def _ramp(start: float, end: float) -> Curve:
 
 def _rising(start: float, end: float) -> Curve:
     if start < end:
-        return SCurve(start, end)
-    return Binary((start + end) / 2)  # as MATLAB's smf
+        return curves.SCurve(start, end)
+    return curves.Binary((start + end) / 2)  # as MATLAB's smf
 
 
 def _falling(start: float, end: float) -> Curve:
     if start < end:
-        return SCurve(end, start)
-    return Binary((start + end) / 2, is_above=False)
+        return curves.SCurve(end, start)
+    return curves.Binary((start + end) / 2, is_above=False)
 
 
 def _rectangle(numbers: Sequence[float]) -> Curve:
     start, end = numbers
-    return Trapezoid(start, start, end, end)
+    return curves.Trapezoid(start, start, end, end)
 
 
 def _binary(numbers: Sequence[float]) -> Curve:
     start, direction = numbers
-    return Binary(start, is_above=direction > start)
+    return curves.Binary(start, is_above=direction > start)
 
 
 _TWO_SIGMOIDS = "slope inflection slope inflection"
@@ -166,23 +154,25 @@ FIS_KINDS: Final[Mapping[str, CurveKind]] = {
     "trapmf": CurveKind("a b c d", CurveWord(4, lambda n: trapezoid(*n))),
     "linzmf": CurveKind("a b", CurveWord(2, lambda n: _ramp(n[1], n[0]))),
     "linsmf": CurveKind("a b", CurveWord(2, lambda n: _ramp(*n))),
-    "gaussmf": CurveKind("deviation mean", fields(Gaussian, 1, 0, by_size=True)),
+    "gaussmf": CurveKind("deviation mean", fields(curves.Gaussian, 1, 0, by_size=True)),
     "gauss2mf": CurveKind(
         "deviation mean deviation mean",
-        fields(TwoGaussians, 1, 0, 3, 2, by_size=True),
+        fields(curves.TwoGaussians, 1, 0, 3, 2, by_size=True),
     ),
-    "gbellmf": CurveKind("width slope center", fields(Bell, 1, 2, 0, by_size=True)),
-    "sigmf": CurveKind("slope inflection", fields(Sigmoid, 1, 0)),
-    "dsigmf": CurveKind(_TWO_SIGMOIDS, fields(SigmoidDifference, 1, 0, 3, 2)),
-    "psigmf": CurveKind(_TWO_SIGMOIDS, fields(SigmoidProduct, 1, 0, 3, 2)),
+    "gbellmf": CurveKind(
+        "width slope center", fields(curves.Bell, 1, 2, 0, by_size=True)
+    ),
+    "sigmf": CurveKind("slope inflection", fields(curves.Sigmoid, 1, 0)),
+    "dsigmf": CurveKind(_TWO_SIGMOIDS, fields(curves.SigmoidDifference, 1, 0, 3, 2)),
+    "psigmf": CurveKind(_TWO_SIGMOIDS, fields(curves.SigmoidProduct, 1, 0, 3, 2)),
     "smf": CurveKind("start end", CurveWord(2, lambda n: _rising(*n))),
     "zmf": CurveKind("start end", CurveWord(2, lambda n: _falling(*n))),
-    "pimf": CurveKind("a b c d", fields(PiCurve, 0, 1, 2, 3)),
+    "pimf": CurveKind("a b c d", fields(curves.PiCurve, 0, 1, 2, 3)),
     "rampmf": CurveKind("start end", CurveWord(2, lambda n: _ramp(*n)), True),
     "rectmf": CurveKind("start end", CurveWord(2, _rectangle), True),
-    "cosinemf": CurveKind("center width", fields(Cosine, 0, 1), True),
-    "spikemf": CurveKind("center width", fields(Spike, 0, 1), True),
-    "concavemf": CurveKind("inflection end", fields(Concave, 0, 1), True),
+    "cosinemf": CurveKind("center width", fields(curves.Cosine, 0, 1), True),
+    "spikemf": CurveKind("center width", fields(curves.Spike, 0, 1), True),
+    "concavemf": CurveKind("inflection end", fields(curves.Concave, 0, 1), True),
     "binarymf": CurveKind("start direction", CurveWord(2, _binary), True),
 }
 """The curves with a fixed number of parameters, by their name in a file."""

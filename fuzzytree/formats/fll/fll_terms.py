@@ -12,32 +12,15 @@ from fuzzytree.formats.curve_words import CurveWord, fields
 from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import FileMistake, PartError, Word, number_of
 from fuzzytree.model import (
-    Arc,
-    Bell,
-    Binary,
     Call,
-    Concave,
-    Cosine,
     Curve,
     Expression,
-    Formula,
-    Gaussian,
-    Linear,
     Name,
     Number,
-    PiCurve,
     Points,
-    SCurve,
-    SemiEllipse,
-    Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
-    Singleton,
-    Spike,
     SystemTerm,
-    Trapezoid,
-    TwoGaussians,
     curve_mistakes,
+    curves,
     name_choice,
 )
 from fuzzytree.semantics import stepped
@@ -100,9 +83,9 @@ def read_term(
     match kind.text:
         case "Constant":
             _check_count(kind, numbers, (1,), "1 number")
-            curve: Curve = Singleton(numbers[0])
+            curve: Curve = curves.Singleton(numbers[0])
             if not place.is_weighted:
-                curve = Formula(Number(numbers[0]))
+                curve = curves.Formula(Number(numbers[0]))
         case "Linear":
             curve = _linear(kind, numbers, place)
         case "Discrete":
@@ -124,7 +107,7 @@ def read_term(
             if place.is_inverse and known in ("SShape", "ZShape"):
                 # Where it has a degree has a formula, though it ends before it starts.
                 start, end = numbers if known == "SShape" else reversed(numbers)
-                curve = SCurve(start, end)
+                curve = curves.SCurve(start, end)
         case _:
             choice = name_choice(kind.text, CLASSES)
             raise _error(kind, f"no term {kind.text!r}; {choice}")
@@ -169,14 +152,14 @@ def _numbers(words: Sequence[Word]) -> list[float]:
 
 def _function(
     kind: Word, rest: Sequence[Word], place: TermScope, formula: str
-) -> Formula:
+) -> curves.Formula:
     if not rest:
         raise _error(kind, "Function takes a formula")
     if "x" in place.names:
         sentence = "'x' in a formula is the value itself; rename the variable 'x'"
         raise _error(rest[0], sentence)
     try:
-        return Formula(parse(formula, place.names))
+        return curves.Formula(parse(formula, place.names))
     except FormulaError as error:
         column = rest[0].column + error.column - 1
         raise PartError((rest[0].line, column, error.sentence)) from error
@@ -188,7 +171,7 @@ def _linear(kind: Word, numbers: Sequence[float], place: TermScope) -> Curve:
     _check_count(kind, numbers, (count, count + 1), wanted)
     offset = numbers[count] if len(numbers) > count else 0.0
     if place.is_weighted:
-        return Linear(tuple(numbers[:count]), offset)
+        return curves.Linear(tuple(numbers[:count]), offset)
     total: Expression = Number(offset)
     parts = [
         Call("*", (Number(weight), Name(name)))
@@ -200,14 +183,14 @@ def _linear(kind: Word, numbers: Sequence[float], place: TermScope) -> Curve:
         for part in others:
             total = Call("+", (total, part))
         total = Call("+", (total, Number(offset)))
-    return Formula(total)
+    return curves.Formula(total)
 
 
 def _binary(numbers: Sequence[float]) -> Curve:
     start, direction = numbers
     if start == direction:
         raise ValueError("the direction of Binary must be above or below its start")
-    return Binary(start, direction > start)
+    return curves.Binary(start, direction > start)
 
 
 def _ramp(numbers: Sequence[float]) -> Curve:
@@ -232,39 +215,41 @@ def _trapezoid(numbers: Sequence[float]) -> Curve:
         b = min(c, d) if math.isfinite(min(c, d)) else 0.0
     if c == math.inf and high is None:
         c = max(a, b) if math.isfinite(max(a, b)) else 0.0
-    return Trapezoid(low, b, c, high)
+    return curves.Trapezoid(low, b, c, high)
 
 
 def _s_shape(numbers: Sequence[float]) -> Curve:
     start, end = numbers
     if start < end:
-        return SCurve(start, end)
+        return curves.SCurve(start, end)
     return Points((start, start), (0.0, 1.0))
 
 
 def _z_shape(numbers: Sequence[float]) -> Curve:
     start, end = numbers
     if start < end:
-        return SCurve(end, start)
+        return curves.SCurve(end, start)
     return Points((start, start), (1.0, 0.0))
 
 
 FLL_CLASSES: Final[Mapping[str, CurveWord]] = {
-    "Arc": fields(Arc, 0, 1),
-    "Bell": fields(Bell, 0, 1, 2, by_size=True),
+    "Arc": fields(curves.Arc, 0, 1),
+    "Bell": fields(curves.Bell, 0, 1, 2, by_size=True),
     "Binary": CurveWord(2, _binary),
-    "Concave": fields(Concave, 0, 1),
-    "Cosine": fields(Cosine, 0, 1),
-    "Gaussian": fields(Gaussian, 0, 1, by_size=True),
-    "GaussianProduct": fields(TwoGaussians, 0, 1, 2, 3, by_size=True),
-    "PiShape": fields(PiCurve, 0, 1, 2, 3),
+    "Concave": fields(curves.Concave, 0, 1),
+    "Cosine": fields(curves.Cosine, 0, 1),
+    "Gaussian": fields(curves.Gaussian, 0, 1, by_size=True),
+    "GaussianProduct": fields(curves.TwoGaussians, 0, 1, 2, 3, by_size=True),
+    "PiShape": fields(curves.PiCurve, 0, 1, 2, 3),
     "Ramp": CurveWord(2, _ramp),
     "Rectangle": CurveWord(2, _rectangle),
-    "SemiEllipse": CurveWord(2, lambda n: SemiEllipse(*sorted(n)), SemiEllipse, (0, 1)),
-    "Sigmoid": fields(Sigmoid, 0, 1),
-    "SigmoidDifference": fields(SigmoidDifference, 0, 1, 3, 2),
-    "SigmoidProduct": fields(SigmoidProduct, 0, 1, 3, 2),
-    "Spike": fields(Spike, 0, 1, by_size=True),
+    "SemiEllipse": CurveWord(
+        2, lambda n: curves.SemiEllipse(*sorted(n)), curves.SemiEllipse, (0, 1)
+    ),
+    "Sigmoid": fields(curves.Sigmoid, 0, 1),
+    "SigmoidDifference": fields(curves.SigmoidDifference, 0, 1, 3, 2),
+    "SigmoidProduct": fields(curves.SigmoidProduct, 0, 1, 3, 2),
+    "Spike": fields(curves.Spike, 0, 1, by_size=True),
     "SShape": CurveWord(2, _s_shape),
     "Trapezoid": CurveWord(4, _trapezoid),
     "Triangle": CurveWord(3, lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
@@ -287,25 +272,25 @@ def as_degree(label: SystemTerm) -> SystemTerm:
             # A second point at the end is a step of no height.
             again = Points((*values, values[-1]), (*degrees, degrees[-1]))
             return msgspec.structs.replace(label, curve=again)
-        case SCurve(start=start, end=end) if start < end:
-            rising = PiCurve(start, end, _FURTHEST, _FURTHEST)
+        case curves.SCurve(start=start, end=end) if start < end:
+            rising = curves.PiCurve(start, end, _FURTHEST, _FURTHEST)
             return msgspec.structs.replace(label, curve=rising)
-        case SCurve(start=start, end=end):
-            falling = PiCurve(-_FURTHEST, -_FURTHEST, end, start)
+        case curves.SCurve(start=start, end=end):
+            falling = curves.PiCurve(-_FURTHEST, -_FURTHEST, end, start)
             return msgspec.structs.replace(label, curve=falling)
-        case Sigmoid(inflection=inflection, slope=slope):
+        case curves.Sigmoid(inflection=inflection, slope=slope):
             text = f"1 / (1 + exp({-slope!r} * (x - {inflection!r})))"
-        case Concave(inflection=inflection, end=end) if inflection <= end:
+        case curves.Concave(inflection=inflection, end=end) if inflection <= end:
             text = (
                 f"{end - inflection!r} / ({end - inflection!r} + max({end!r} - x, 0))"
             )
-        case Concave(inflection=inflection, end=end):
+        case curves.Concave(inflection=inflection, end=end):
             text = (
                 f"{inflection - end!r} / ({inflection - end!r} + max(x - {end!r}, 0))"
             )
-        case Arc(start=start, end=end):
+        case curves.Arc(start=start, end=end):
             part = f"min(max((x - {start!r}) / {end - start!r}, 0), 1)"
             text = f"sqrt({part} * (2 - {part}))"
         case _:
             return label
-    return SystemTerm(label.name, Formula(parse(f"{label.height!r} * ({text})")))
+    return SystemTerm(label.name, curves.Formula(parse(f"{label.height!r} * ({text})")))

@@ -22,20 +22,8 @@ from typing import NamedTuple
 
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
-    Arc,
-    Bell,
-    Concave,
-    Cosine,
     Curve,
-    Gaussian,
-    PiCurve,
-    SCurve,
-    SemiEllipse,
-    Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
-    Spike,
-    TwoGaussians,
+    curves,
 )
 from fuzzytree.semantics.inference.degrees import curve_degree
 from fuzzytree.semantics.programs.operations import divide
@@ -120,31 +108,31 @@ def plan_of(curve: Curve, tolerance: float) -> PointPlan:
     """
     tail = tolerance * _TAIL
     match curve:
-        case Gaussian(mean=mean, deviation=deviation):
+        case curves.Gaussian(mean=mean, deviation=deviation):
             return _two_gaussians(
-                curve, TwoGaussians(mean, deviation, mean, deviation), tail
+                curve, curves.TwoGaussians(mean, deviation, mean, deviation), tail
             )
-        case TwoGaussians():
+        case curves.TwoGaussians():
             return _two_gaussians(curve, curve, tail)
-        case Bell():
+        case curves.Bell():
             return _bell(curve, tail)
-        case Sigmoid():
+        case curves.Sigmoid():
             return _sigmoid(curve, tail)
-        case SigmoidDifference() | SigmoidProduct():
+        case curves.SigmoidDifference() | curves.SigmoidProduct():
             return sigmoid_plan(curve, tolerance)
-        case SCurve():
+        case curves.SCurve():
             return _s(curve)
-        case PiCurve():
+        case curves.PiCurve():
             return _pi(curve)
-        case Cosine():
+        case curves.Cosine():
             return _cosine(curve)
-        case Concave():
+        case curves.Concave():
             return _concave(curve, tail)
-        case Spike():
+        case curves.Spike():
             return _spike(curve, tail)
-        case Arc():
+        case curves.Arc():
             return _arc(curve)
-        case SemiEllipse():
+        case curves.SemiEllipse():
             return _semi_ellipse(curve)
         case _:
             raise LossError("it is a formula, of which nothing is known between points")
@@ -172,7 +160,7 @@ def _slack(scale: float, knots: Iterable[float], power: float = 1.0) -> float:
     return (2.0**-44 + coarse * coarse) * (1.0 + power)
 
 
-def _two_gaussians(curve: Curve, two: TwoGaussians, tail: float) -> PointPlan:
+def _two_gaussians(curve: Curve, two: curves.TwoGaussians, tail: float) -> PointPlan:
     left, right = two.left, two.right
     below, above = two.left_deviation, two.right_deviation
     reach = math.sqrt(-2.0 * math.log(tail))
@@ -211,7 +199,7 @@ def _halves(
     ]
 
 
-def _bell(curve: Bell, tail: float) -> PointPlan:
+def _bell(curve: curves.Bell, tail: float) -> PointPlan:
     power, width = 2.0 * abs(curve.slope), curve.width
     if power == 0.0:
         return PointPlan(((curve.center, 0.5),))
@@ -233,7 +221,7 @@ def _bell(curve: Bell, tail: float) -> PointPlan:
     )
 
 
-def _spike(curve: Spike, tail: float) -> PointPlan:
+def _spike(curve: curves.Spike, tail: float) -> PointPlan:
     rate = 10.0 / curve.width
 
     def steepness(distance: float) -> float:
@@ -247,7 +235,7 @@ def _spike(curve: Spike, tail: float) -> PointPlan:
     )
 
 
-def _cosine(curve: Cosine) -> PointPlan:
+def _cosine(curve: curves.Cosine) -> PointPlan:
     width = curve.width
 
     def steepness(distance: float) -> float:
@@ -259,7 +247,7 @@ def _cosine(curve: Cosine) -> PointPlan:
     return PointPlan(tuple(parts), 0.0, _slack(width / 6.0, ends), 0.0, 0.0)
 
 
-def _sigmoid(curve: Sigmoid, tail: float) -> PointPlan:
+def _sigmoid(curve: curves.Sigmoid, tail: float) -> PointPlan:
     center, rate = curve.inflection, curve.slope
     if rate == 0.0:
         return PointPlan(((center, 0.5),))
@@ -292,14 +280,14 @@ def _s_pieces(curve: Curve, start: float, end: float) -> tuple[list[CurvePiece],
     return _pieces(curve, knots, slope), 2.0**-44 + coarse
 
 
-def _s(curve: SCurve) -> PointPlan:
+def _s(curve: curves.SCurve) -> PointPlan:
     if curve.start == curve.end:
         return PointPlan(((curve.start, 0.0), (curve.start, 1.0)))
     parts, slack = _s_pieces(curve, curve.start, curve.end)
     return PointPlan(tuple(parts), 0.0, slack)
 
 
-def _pi(curve: PiCurve) -> PointPlan:
+def _pi(curve: curves.PiCurve) -> PointPlan:
     a, b, c, d = curve.a, curve.b, curve.c, curve.d
     if a == d:
         return PointPlan(((a, 0.0),))
@@ -314,7 +302,7 @@ def _pi(curve: PiCurve) -> PointPlan:
     return PointPlan((*parts, *falling), 0.0, max(slack, more))
 
 
-def _concave(curve: Concave, tail: float) -> PointPlan:
+def _concave(curve: curves.Concave, tail: float) -> PointPlan:
     end = curve.end
     width = end - curve.inflection
     if width == 0.0:
@@ -330,7 +318,7 @@ def _concave(curve: Concave, tail: float) -> PointPlan:
     return PointPlan(tuple(_pieces(curve, knots, slope)), tail, slack)
 
 
-def _arc(curve: Arc) -> PointPlan:
+def _arc(curve: curves.Arc) -> PointPlan:
     start, end = curve.start, curve.end
     width = end - start
     if width == 0.0:
@@ -346,7 +334,7 @@ def _arc(curve: Arc) -> PointPlan:
     )
 
 
-def _semi_ellipse(curve: SemiEllipse) -> PointPlan:
+def _semi_ellipse(curve: curves.SemiEllipse) -> PointPlan:
     start, end = curve.start, curve.end
     width = end - start
     if not width > 0.0:
@@ -380,7 +368,7 @@ class _Range(NamedTuple):
 
 
 def sigmoid_plan(
-    curve: SigmoidDifference | SigmoidProduct, tolerance: float
+    curve: curves.SigmoidDifference | curves.SigmoidProduct, tolerance: float
 ) -> PointPlan:
     """Return how points can be placed along two sigmoids.
 
@@ -395,7 +383,7 @@ def sigmoid_plan(
     start = min(one.inflection - reach / abs(one.slope) for one in pair)
     end = max(one.inflection + reach / abs(one.slope) for one in pair)
     knots = {start, end, *(one.inflection for one in pair)}
-    if isinstance(curve, SigmoidDifference):
+    if isinstance(curve, curves.SigmoidDifference):
         edge = _crossing(curve.first, curve.second)
         if edge is not None and start < edge < end:
             knots.add(edge)
@@ -407,7 +395,7 @@ def sigmoid_plan(
     return PointPlan(tuple(parts), tolerance / 2.0, slack)
 
 
-def _crossing(first: Sigmoid, second: Sigmoid) -> float | None:
+def _crossing(first: curves.Sigmoid, second: curves.Sigmoid) -> float | None:
     """Return where two sigmoids are equal, rounded once."""
     k, m = Fraction(first.slope), Fraction(second.slope)
     if k == m:
@@ -419,14 +407,14 @@ def _crossing(first: Sigmoid, second: Sigmoid) -> float | None:
         return None
 
 
-def _error(curve: SigmoidDifference | SigmoidProduct) -> Error:
+def _error(curve: curves.SigmoidDifference | curves.SigmoidProduct) -> Error:
     first, second = curve.first, curve.second
     k, m = first.slope, second.slope
 
     def error(a: float, b: float) -> float:
         value_1, slope_1, bend_1 = _ranges(first, a, b)
         value_2, slope_2, bend_2 = _ranges(second, a, b)
-        if isinstance(curve, SigmoidDifference):
+        if isinstance(curve, curves.SigmoidDifference):
             result = bend_1.scaled(k * k).plus(bend_2.scaled(-m * m))
         else:
             result = (
@@ -441,7 +429,7 @@ def _error(curve: SigmoidDifference | SigmoidProduct) -> Error:
     return error
 
 
-def _ranges(one: Sigmoid, a: float, b: float) -> tuple[_Range, _Range, _Range]:
+def _ranges(one: curves.Sigmoid, a: float, b: float) -> tuple[_Range, _Range, _Range]:
     """Return the ranges of s, s' and s'' between two values of x."""
     ends = sorted(one.slope * (x - one.inflection) for x in (a, b))
     low, high = _sigmoids(ends[0]), _sigmoids(ends[1])

@@ -16,32 +16,15 @@ from typing import assert_never
 
 from fuzzytree.model import (
     LR,
-    Arc,
     Band,
-    Bell,
-    Binary,
-    Concave,
-    Cosine,
     Curve,
     Flank,
-    Formula,
-    Gaussian,
-    Linear,
-    PiCurve,
     Points,
-    SCurve,
-    SemiEllipse,
     Shape,
     Side,
-    Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
-    Singleton,
-    Spike,
     SystemCurve,
-    Trapezoid,
-    TwoGaussians,
     Variable,
+    curves,
 )
 from fuzzytree.semantics.programs.formulas import as_number, value_of
 from fuzzytree.semantics.programs.operations import N, Numbers
@@ -52,22 +35,24 @@ from fuzzytree.semantics.reference import BELOW_ONE
 def is_unit(curve: Curve) -> bool:
     """Return whether a curve's degree lies in [0, 1] at every finite value, surely."""
     match curve:
-        case Formula() | Linear() | SemiEllipse():  # a root may be rounded above 1
+        case (
+            curves.Formula() | curves.Linear() | curves.SemiEllipse()
+        ):  # a root may be rounded above 1
             return False
-        case SCurve(start=start, end=end) | Arc(start=start, end=end):
+        case curves.SCurve(start=start, end=end) | curves.Arc(start=start, end=end):
             return math.isfinite(end - start)
-        case PiCurve(a=a, b=b, c=c, d=d):
+        case curves.PiCurve(a=a, b=b, c=c, d=d):
             return math.isfinite(b - a) and math.isfinite(d - c)
-        case Sigmoid(slope=slope):
+        case curves.Sigmoid(slope=slope):
             return slope != 0.0
         case (
-            SigmoidDifference(first=first, second=second)
-            | SigmoidProduct(first=first, second=second)
+            curves.SigmoidDifference(first=first, second=second)
+            | curves.SigmoidProduct(first=first, second=second)
         ):
             return is_unit(first) and is_unit(second)
-        case Bell(slope=slope):
+        case curves.Bell(slope=slope):
             return slope != 0.0
-        case Concave(inflection=inflection, end=end):
+        case curves.Concave(inflection=inflection, end=end):
             return math.isfinite(2.0 * (end - inflection))
         case _:
             return True
@@ -87,55 +72,55 @@ def system_degree(
 ) -> N:
     """Return the degree at a value, without the term's height."""
     match curve:
-        case Trapezoid():
+        case curves.Trapezoid():
             return _trapezoid(make, curve, x)
-        case Gaussian(mean=mean, deviation=deviation):
+        case curves.Gaussian(mean=mean, deviation=deviation):
             return _gaussian(make, x, mean, deviation)
-        case TwoGaussians():
+        case curves.TwoGaussians():
             left, right = curve.left, curve.right
             low = make("minimum", x, make.constant(left))
             high = make("maximum", x, make.constant(right))
             below = _gaussian(make, low, left, curve.left_deviation)
             above = _gaussian(make, high, right, curve.right_deviation)
             return make("multiply", below, above)
-        case Bell(center=center, width=width, slope=slope):
+        case curves.Bell(center=center, width=width, slope=slope):
             size = make("absolute", _scaled(make, x, center, width))
             power = make("power", size, make.constant(2.0 * slope))
             return _one_by_one_plus(make, power)
-        case Sigmoid(inflection=inflection, slope=slope):
+        case curves.Sigmoid(inflection=inflection, slope=slope):
             offset = make("subtract", x, make.constant(inflection))
             steep = make("multiply", make.constant(-slope), offset)
             return _one_by_one_plus(make, make("exponential", steep))
-        case SigmoidDifference(first=first, second=second):
+        case curves.SigmoidDifference(first=first, second=second):
             pair = [system_degree(make, one, x, names) for one in (first, second)]
             return make("absolute", make("subtract", *pair))
-        case SigmoidProduct(first=first, second=second):
+        case curves.SigmoidProduct(first=first, second=second):
             pair = [system_degree(make, one, x, names) for one in (first, second)]
             return make("multiply", *pair)
-        case SCurve(start=start, end=end):
+        case curves.SCurve(start=start, end=end):
             return _s(make, x, start, end)
-        case PiCurve():
+        case curves.PiCurve():
             return _pi(make, curve, x)
-        case Cosine(center=center, width=width):
+        case curves.Cosine(center=center, width=width):
             return _cosine(make, _scaled(make, x, center, width))
-        case Concave(inflection=inflection, end=end):
+        case curves.Concave(inflection=inflection, end=end):
             return _concave(make, x, inflection, end)
-        case Spike(center=center, width=width):
+        case curves.Spike(center=center, width=width):
             t = _scaled(make, x, center, width)
             size = make("absolute", make("multiply", make.constant(10.0), t))
             return make("exponential", make("negate", size))
-        case Arc(start=start, end=end):
+        case curves.Arc(start=start, end=end):
             return _arc(make, _scaled(make, x, start, end - start))
-        case SemiEllipse(start=start, end=end):
+        case curves.SemiEllipse(start=start, end=end):
             return _semi_ellipse(make, x, start, end)
-        case Binary(start=start, is_above=is_above):
+        case curves.Binary(start=start, is_above=is_above):
             ends = (make.constant(start), x) if is_above else (x, make.constant(start))
             return as_number(make, make("at_most", *ends))
-        case Singleton(value=value):
+        case curves.Singleton(value=value):
             return as_number(make, make("equal", x, make.constant(value)))
-        case Linear():
+        case curves.Linear():
             return make.constant(math.nan)
-        case Formula(expression=expression):
+        case curves.Formula(expression=expression):
             return value_of(make, expression, {**names, "x": x})
         case _:
             assert_never(curve)
@@ -151,11 +136,11 @@ def value_at(make: Numbers[N], curve: Curve, degree: N) -> N | None:
         case Points(values=(first, last), degrees=(1.0, 0.0)) if first < last:
             rise = make("multiply", make.constant(first - last), degree)
             return make("add", make.constant(last), rise)
-        case Sigmoid(inflection=inflection, slope=slope):
+        case curves.Sigmoid(inflection=inflection, slope=slope):
             odds = make("logarithm", _odds(make, degree))
             steep = make("divide", odds, make.constant(slope))
             return make("subtract", make.constant(inflection), steep)
-        case SCurve(start=start, end=end):
+        case curves.SCurve(start=start, end=end):
             width, half = make.constant(end - start), make.constant(0.5)
             low = make("square_root", make("multiply", half, degree))
             rest = make("multiply", half, make("subtract", one, degree))
@@ -163,12 +148,12 @@ def value_at(make: Numbers[N], curve: Curve, degree: N) -> N | None:
             low = make("add", make.constant(start), make("multiply", width, low))
             high = make("subtract", make.constant(end), make("multiply", width, high))
             return make("where", make("at_most", degree, half), low, high)
-        case Concave(inflection=inflection, end=end):
+        case curves.Concave(inflection=inflection, end=end):
             back = make(
                 "multiply", make.constant(end - inflection), _odds(make, degree)
             )
             return make("subtract", make.constant(end), back)
-        case Arc(start=start, end=end):
+        case curves.Arc(start=start, end=end):
             below, above = make("subtract", one, degree), make("add", one, degree)
             root = make("square_root", make("multiply", below, above))
             back = make("multiply", make.constant(end - start), root)
@@ -192,7 +177,7 @@ def _one_by_one_plus(make: Numbers[N], a: N) -> N:
     return make("divide", one, make("add", one, a))
 
 
-def _trapezoid(make: Numbers[N], curve: Trapezoid, x: N) -> N:
+def _trapezoid(make: Numbers[N], curve: curves.Trapezoid, x: N) -> N:
     """Return the smaller slope, clamped to [0, 1]; an upright side is cut off last."""
     a, b, c, d = curve.a, curve.b, curve.c, curve.d
     slopes: list[N] = []
@@ -243,7 +228,7 @@ def _s(make: Numbers[N], x: N, start: float, end: float) -> N:
     return make("where", make("at_most", t, zero), zero, result)
 
 
-def _pi(make: Numbers[N], curve: PiCurve, x: N) -> N:
+def _pi(make: Numbers[N], curve: curves.PiCurve, x: N) -> N:
     zero, one = make.constant(0.0), make.constant(1.0)
     falling = _s(make, x, curve.d, curve.c)
     is_behind = make("at_most", make.constant(curve.d), x)
