@@ -393,7 +393,7 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
     if claim.kind == "strength":
         return level is not None and ours[0][0] <= level <= ours[0][1]
     if claim.kind == "covered":
-        return _certain(ZERO, max(every.values()))
+        return _certain((ZERO, ZERO), max(every.values()))
     least = min(low for low, _ in ours), min(high for _, high in ours)
     most = max(low for low, _ in ours), max(high for _, high in ours)
     top = max(rivals, default=(ZERO, ZERO))[0], max([h for _, h in rivals] or [ZERO])
@@ -405,14 +405,12 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
     if level is None:
         raise DoesNotHoldError("a claim without its level")
     if claim.kind == "below":
-        return most[1] == level == 0 or _certain(most, level)
-    return least[0] >= level or not _certain(least, level)
+        return most[1] == level == 0 or _certain(most, (level, level))
+    return least[0] >= level or not _certain(least, (level, level))
 
 
-def _certain(small: Between | Fraction, large: Between | Fraction) -> bool:
+def _certain(one: Between, other: Between) -> bool:
     """Return whether one number is below another one, each between two ends."""
-    one = small if isinstance(small, tuple) else (small, small)
-    other = large if isinstance(large, tuple) else (large, large)
     if one[1] < other[0]:
         return True
     if one[0] < other[1]:

@@ -517,7 +517,7 @@ def shows_gap(case: Case, answer: Answer, state: Witness) -> None:
 
 # --- the check of each code
 
-AGAIN: dict[str, Callable[[Case, Answer], None]] = {
+PROOFS: dict[str, Callable[[Case, Answer], None]] = {
     "FT101": dead,
     "FT103": superfluous,
     "FT104": hidden,
@@ -548,27 +548,4 @@ WHY = {
     "FT601": "nothing is run here but the model itself",
     "FT602": "nothing is run here but the model itself",
 }
-
-
-def decide(case: Case, answer: Answer) -> None:
-    """Decide again what an answer says is proved.
-
-    Raises:
-        DoesNotHoldError: If it is not so.
-        UndecidedError: If that cannot be decided here.
-    """
-    again = AGAIN.get(answer.code)
-    if again is None:
-        why = WHY.get(answer.code, "there is no second way for it here")
-        raise UndecidedError(why)
-    again(case, answer)
-
-
-def shows(case: Case, answer: Answer, state: Witness) -> None:
-    """Check that the claims of a witness are those of its code.
-
-    Raises:
-        DoesNotHoldError: If they are others.
-    """
-    if answer.code in SHOWS:
-        SHOWS[answer.code](case, answer, state)
+"""Why proofs of these codes are not decided again."""

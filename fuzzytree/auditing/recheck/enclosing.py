@@ -76,9 +76,9 @@ def logarithm(x: Fraction) -> Between:
 
 def cosine(turns: Fraction) -> Between:
     """Return between which numbers cos(2 pi t) lies, 0 <= t <= 1/2."""
-    angles = [2 * turns * end for end in PI]
     # It falls up to pi, and the angle may be a hair above: then cos is at least -1.
-    return _cosine(up(angles[1]))[0], _cosine(down(angles[0]))[1]
+    low, high = (_cosine(2 * turns * end) for end in PI[::-1])
+    return low[0], high[1]
 
 
 def _cosine(angle: Fraction) -> Between:
