@@ -9,8 +9,8 @@ can, and says what it could not. Exit 0: all holds; 1: something does not, and a
 that is listed; 2: it could not be run.
 
 Read it in this order: the records (`audit_records`, `model_records`) and how files
-become them (`yaml`, `systems`, `models`); what a model means (`polynomials`,
-`enclosing`, `meaning`, `views`); how a "never" is decided again (`grid`); the checks
+become them (`yaml`, `models`); what a model means (`polynomials`, `enclosing`,
+`meaning`); how a "never" is decided again (`grid`); the checks
 (`cases`, `head`, `forms`, `deciding`, `answers`) and how they end (`outcomes`).
 """
 

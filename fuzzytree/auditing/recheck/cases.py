@@ -22,6 +22,7 @@ from fuzzytree.auditing.recheck.grid import Grid, Line, RuleBits, Ties, height, 
 from fuzzytree.auditing.recheck.meaning import (
     Point,
     Steps,
+    View,
     answer_of,
     paths,
     rules_of,
@@ -37,7 +38,6 @@ from fuzzytree.auditing.recheck.outcomes import (
     require,
 )
 from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
-from fuzzytree.auditing.recheck.views import View
 
 NEAR = Fraction(1, 10**6)
 """How far a highest common level that is one number may be above it."""

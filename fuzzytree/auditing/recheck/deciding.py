@@ -24,7 +24,13 @@ from fuzzytree.auditing.recheck.cases import (
 )
 from fuzzytree.auditing.recheck.forms import clause_text, clauses_of
 from fuzzytree.auditing.recheck.grid import FINE, RuleBits
-from fuzzytree.auditing.recheck.meaning import Point, answer_of, leaf_of, strengths
+from fuzzytree.auditing.recheck.meaning import (
+    Point,
+    View,
+    answer_of,
+    leaf_of,
+    strengths,
+)
 from fuzzytree.auditing.recheck.model_records import Clause, Rules, Tree, Variable
 from fuzzytree.auditing.recheck.outcomes import (
     DoesNotHoldError,
@@ -32,7 +38,6 @@ from fuzzytree.auditing.recheck.outcomes import (
     require,
 )
 from fuzzytree.auditing.recheck.polynomials import ZERO
-from fuzzytree.auditing.recheck.views import View
 
 Interval = tuple[Fraction, Fraction, bool]  # True opens the low end
 

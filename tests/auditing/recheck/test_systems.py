@@ -18,11 +18,10 @@ from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.audit_records import Audit
 from fuzzytree.auditing.recheck.enclosing import NORMS, bounds, hedged
 from fuzzytree.auditing.recheck.head import digest_of, fingerprint
+from fuzzytree.auditing.recheck.meaning import View
 from fuzzytree.auditing.recheck.model_records import System
-from fuzzytree.auditing.recheck.models import built, read_file
+from fuzzytree.auditing.recheck.models import HEDGES, built, read_condition, read_file
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
-from fuzzytree.auditing.recheck.systems import HEDGES, read_condition
-from fuzzytree.auditing.recheck.views import View
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import yaml
 from fuzzytree.model import (
