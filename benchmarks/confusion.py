@@ -119,13 +119,13 @@ def _write_names(
     high = len(names) * _CELL
     for number, name in enumerate(names):
         y = top + (number + 0.5) * _CELL
-        sheet.write(left - _GAP, y, name, colour=WORD, ha="right")
+        sheet.write(left - _GAP, y, name, color=WORD, ha="right")
     for number, head in enumerate(heads):
         x = left + (number + 0.4) * _CELL
         y = top - _GAP
-        sheet.write(x, y, head, colour=WORD, va="baseline", turn_deg=_SLANT_DEG)
+        sheet.write(x, y, head, color=WORD, va="baseline", rotation=_SLANT_DEG)
     middle, below = top + high / 2.0, top + high + _CELL / 2.0
-    sheet.write(MARGIN, middle, _THERE, ha="center", va="top", turn_deg=90.0)
+    sheet.write(MARGIN, middle, _THERE, ha="center", va="top", rotation=90.0)
     sheet.write(left + len(heads) * _CELL, below, _TAKEN, ha="right")
 
 
@@ -153,7 +153,11 @@ def _draw_cells(sheet: Sheet, counts: Counts, left: float, top: float) -> None:
             middle = x + _CELL / 2.0, y + _CELL / 2.0
             is_right = row == column
             sheet.write(
-                *middle, f"{count:,}", colour=colour, bold=is_right, ha="center"
+                *middle,
+                f"{count:,}",
+                color=colour,
+                fontweight="bold" if is_right else "normal",
+                ha="center",
             )
     sheet.axes.add_patch(
         Rectangle(
@@ -176,4 +180,4 @@ def _write_rates(sheet: Sheet, counts: Counts, left: float, top: float) -> None:
         sheet.write(x, y, rate_text(int(good), int(total)), colour=WORD, ha="right")
     whole = rate_text(int(right.sum()), int(totals.sum()))
     y = top + (len(counts) + 0.5) * _CELL
-    sheet.write(x, y, whole, colour="black", bold=True, ha="right")
+    sheet.write(x, y, whole, color="black", fontweight="bold", ha="right")

@@ -12,7 +12,7 @@ import io
 import os
 from collections.abc import Generator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import PathLike, write_atomically
@@ -110,7 +110,12 @@ class Sheet:
     def width(self, text: str, size: float = SIZE, *, bold: bool = False) -> float:
         """Return how wide words are, in inches."""
         drawn = self.figure.text(
-            0, 0, text, fontsize=size, fontweight=_weight(bold), parse_math=False
+            0,
+            0,
+            text,
+            fontsize=size,
+            fontweight="bold" if bold else "normal",
+            parse_math=False,
         )
         wide: float = drawn.get_window_extent(self._renderer).width
         drawn.remove()
@@ -122,44 +127,24 @@ class Sheet:
         self.axes.set_xlim(0.0, width)
         self.axes.set_ylim(height, 0.0)
 
-    def write(
-        self,
-        x: float,
-        y: float,
-        text: str,
-        *,
-        size: float = SIZE,
-        bold: bool = False,
-        colour: str = FAINT,
-        ha: Literal["left", "center", "right"] = "left",
-        va: Literal["center_baseline", "baseline", "top", "center"] = "center_baseline",
-        turn_deg: float = 0.0,
-    ) -> None:
-        """Write words; a name with the signs of a formula is no formula."""
-        self.axes.text(
-            x,
-            y,
-            text,
-            fontsize=size,
-            fontweight=_weight(bold),
-            color=colour,
-            ha=ha,
-            va=va,
-            rotation=turn_deg,
-            rotation_mode="anchor",
-            parse_math=False,
-            zorder=3,
-        )
+    def write(self, x: float, y: float, text: str, **style: Any) -> None:
+        """Write words; a name with the signs of a formula is no formula.
+
+        Args:
+            x: In inches from the left.
+            y: In inches from the top.
+            text: The words.
+            style: What matplotlib's `Text` takes, other than small, faint words whose
+                left end stands at x, and whose middle at y.
+        """
+        usual = {"fontsize": SIZE, "color": FAINT, "va": "center_baseline"}
+        fixed = {"rotation_mode": "anchor", "parse_math": False, "zorder": 3}
+        self.axes.text(x, y, text, **{**usual, **style, **fixed})
 
     def write_title(self, text: str) -> None:
         """Write words at the top."""
-        self.write(
-            MARGIN, MARGIN, text, size=SIZE + 3, bold=True, colour="black", va="top"
-        )
-
-
-def _weight(bold: bool) -> Literal["bold", "normal"]:
-    return "bold" if bold else "normal"
+        style = {"fontsize": SIZE + 3, "fontweight": "bold", "color": "black"}
+        self.write(MARGIN, MARGIN, text, va="top", **style)
 
 
 def short(text: str, longest: int) -> str:

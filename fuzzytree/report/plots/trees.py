@@ -171,6 +171,6 @@ def _draw_box(sheet: Sheet, box: Box, top: float) -> None:
         short(text, _LONGEST) for text in (box.title, box.note, box.branch)
     )
     ink = colour if is_leaf else WORD
-    sheet.write(left + 0.12, begin + 0.24, title, colour=ink, bold=True)
-    sheet.write(left + 0.12, begin + 0.5, note, size=SIZE - 1.0)
-    sheet.write(left + 0.03, begin - 0.09, branch, size=SIZE - 1.0)
+    sheet.write(left + 0.12, begin + 0.24, title, color=ink, fontweight="bold")
+    sheet.write(left + 0.12, begin + 0.5, note, fontsize=SIZE - 1.0)
+    sheet.write(left + 0.03, begin - 0.09, branch, fontsize=SIZE - 1.0)
