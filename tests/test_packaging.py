@@ -30,6 +30,8 @@ assert "site-packages" in fuzzytree.__file__ or EDITABLE, fuzzytree.__file__
 assert (files("fuzzytree") / "py.typed").is_file()
 for name in ("tree.schema.json", "rulebase.schema.json"):
     assert (files("fuzzytree.schemas") / name).is_file(), name
+for name in ("page.html", "parts.html"):
+    assert (files("fuzzytree.report") / "templates" / name).is_file(), name
 import numpy as np
 values = np.array([[1.0], [1.5], [2.0], [2.5], [7.0], [7.5], [8.0], [8.5]])
 table = fuzzytree.table(values, columns=["size"])

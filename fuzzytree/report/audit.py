@@ -436,9 +436,7 @@ def _asked_text(audit: Audit) -> str:
 
 
 def _item(text: str) -> Iterator[str]:
-    first, *rest = wrapped(text, WIDTH - 2)
-    yield f"- {first}"
-    yield from (f"  {line}" for line in rest)
+    yield from wrapped(text, WIDTH, "- ", "  ")
 
 
 def explanation_lines(code: Code) -> Iterator[str]:

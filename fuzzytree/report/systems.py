@@ -24,7 +24,6 @@ from fuzzytree.model import (
     Or,
     Part,
     Points,
-    RuleBase,
     RuleBlock,
     SigmoidDifference,
     SigmoidProduct,
@@ -35,7 +34,7 @@ from fuzzytree.model import (
     SystemTerm,
     Trapezoid,
 )
-from fuzzytree.report.text import aligned, counted, depth, number, shape_text
+from fuzzytree.report.text import aligned, counted, kind_text, number, shape_text
 from fuzzytree.runtimes import Outputs
 from fuzzytree.semantics import Status
 
@@ -48,23 +47,16 @@ def document_text(model: Document) -> str:
         >>> document_text(random_tree(1, leaves=2))
         'tree, 1 node, 2 leaves, depth 1, 1 input, 3 classes'
     """
-    match model:
-        case FuzzyTree():
-            leaves = counted(len(model.leaves), "leaf", "leaves")
-            what = f"tree, {counted(len(model.nodes), 'node')}, {leaves}"
-            what += f", depth {depth(model)}"
-        case RuleBase():
-            kind = f"{model.kind} " if model.kind else ""
-            what = f"{kind}rule base, {counted(len(model.rules), 'rule')}"
-        case FuzzySystem():
-            terms = sum(len(one.labels) for one in model.variables)
-            return (
-                f"fuzzy system, {counted(len(model.columns), 'input')}, "
-                f"{counted(len(model.outputs), 'output')}, "
-                f"{counted(len(model.rules), 'rule')}, {counted(terms, 'term')}"
-            )
+    if isinstance(model, FuzzySystem):
+        terms = sum(len(one.labels) for one in model.variables)
+        return (
+            f"fuzzy system, {counted(len(model.columns), 'input')}, "
+            f"{counted(len(model.outputs), 'output')}, "
+            f"{counted(len(model.rules), 'rule')}, {counted(terms, 'term')}"
+        )
     inputs = counted(len(model.inputs), "input")
-    return f"{what}, {inputs}, {counted(len(model.classes), 'class', 'classes')}"
+    classes = counted(len(model.classes), "class", "classes")
+    return f"{kind_text(model)}, {inputs}, {classes}"
 
 
 def document_facts(model: Document) -> dict[str, object]:

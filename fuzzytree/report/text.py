@@ -158,13 +158,8 @@ def fact_lines(facts: Mapping[str, object]) -> list[str]:
 
 def head_lines(model: FuzzyTree | RuleBase) -> Iterator[str]:
     """Yield what a model is, what it needs, and what it answers."""
-    if isinstance(model, FuzzyTree):
-        sizes = f"{counted(len(model.leaves), 'leaf', 'leaves')}, depth {depth(model)}"
-        what = f"fuzzy tree, {counted(len(model.nodes), 'node')}, {sizes}"
-    else:
-        kind = f"{model.kind} " if model.kind else ""
-        what = f"{kind}rule base, {counted(len(model.rules), 'rule')}"
-    yield f"{model.name}: {what}"
+    fuzzy = "fuzzy " if isinstance(model, FuzzyTree) else ""
+    yield f"{model.name}: {fuzzy}{kind_text(model)}"
     of = f" of {len(model.columns)} columns" if model.columns else ""
     yield f"inputs   {len(model.inputs)}{of}: {', '.join(model.inputs) or 'none'}"
     yield f"classes  {len(model.classes)}: {', '.join(model.classes)}"
@@ -174,6 +169,15 @@ def head_lines(model: FuzzyTree | RuleBase) -> Iterator[str]:
         answers += f"; no rule fires: {semantics.uncovered or 'no class'}"
         answers += f"; AND is {semantics.conjunction}; the first of the strongest wins"
     yield f"answers  {answers}"
+
+
+def kind_text(model: FuzzyTree | RuleBase) -> str:
+    """Return what a model is and how large."""
+    if isinstance(model, FuzzyTree):
+        sizes = f"{counted(len(model.leaves), 'leaf', 'leaves')}, depth {depth(model)}"
+        return f"tree, {counted(len(model.nodes), 'node')}, {sizes}"
+    kind = f"{model.kind} " if model.kind else ""
+    return f"{kind}rule base, {counted(len(model.rules), 'rule')}"
 
 
 def depth(tree: FuzzyTree) -> int:

@@ -9,12 +9,12 @@ from typing import Final, Literal, NamedTuple, TypeVar
 from lark import Token
 
 from fuzzytree.formats.fcl.fcl_syntax import (
-    Declaration,
     FclBlock,
     FclCondition,
     FclJunction,
     FclNegation,
     FclProposition,
+    FclRange,
     FclText,
     Header,
     RuleStatement,
@@ -187,16 +187,11 @@ def _evidence(text: FclText) -> Iterator[DialectEvidence]:
                 yield from _of_rule(one)
             case Setting(keyword=keyword, words=words):
                 yield from _of_setting(keyword, words, block)
-            case Declaration():
-                pass
+            case FclRange(keyword=keyword) if block.startswith("VAR"):
+                what = "RANGE among the variables"
+                yield DialectEvidence("jfuzzylogic", what, keyword.line or 1)
             case _:
-                if block.startswith("VAR") and getattr(one, "low", None) is not None:
-                    line = getattr(one, "keyword", None)
-                    yield DialectEvidence(
-                        "jfuzzylogic",
-                        "RANGE among the variables",
-                        line.line if isinstance(line, Token) and line.line else 1,
-                    )
+                pass
     for sign, dialect in _COMMENTS.items():
         before, result, _ = text.text.partition(sign)
         if result:

@@ -200,10 +200,12 @@ def read_block(block: FclBlock, scope: Scope) -> FclRuleBlock:
         rule = _read(text, len(rules) + 1, scope)
         label = raw(text.label)
         is_portable = scope.dialect == "portable"
-        if is_portable and label == last and _is_same_but_then(rules[-1], rule):
+        if is_portable and label == last:
             # One conclusion per rule: one rule was written as several.
-            rules[-1] = replace(rules[-1], then=(*rules[-1].then, *rule.then))
-            continue
+            whole = replace(rules[-1], then=(*rules[-1].then, *rule.then))
+            if whole == replace(rule, then=whole.then, name=whole.name):
+                rules[-1] = whole
+                continue
         rules.append(rule)
         tokens.append(text.keyword)
         last = label
@@ -217,10 +219,6 @@ def read_block(block: FclBlock, scope: Scope) -> FclRuleBlock:
     )
     accu = norm_of(block, "ACCU", S_WORDS, scope.notes)
     return FclRuleBlock(result, block.head.keyword, tuple(tokens), accu)
-
-
-def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:
-    return one.when == other.when and one.weight == other.weight
 
 
 def _implication(
@@ -243,33 +241,22 @@ def _norms(
     is_jfuzzylogic = scope.dialect == "jfuzzylogic"
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
     if conjunction is None and any(_uses(rule.when, And) for rule in rules):
-        conjunction = _partner(disjunction, pairs)
+        partners = [t_norm for t_norm, one in pairs.items() if one == disjunction]
+        conjunction = partners[0] if partners else "minimum"
         text = f"line {block.line}: AND is missing; {conjunction} is taken"
         scope.notes.remark(text)
     if disjunction is None and any(_uses(rule.when, Or) for rule in rules):
         disjunction = pairs.get(conjunction or "minimum", "maximum")
         text = f"line {block.line}: OR is missing; {disjunction} is taken"
         scope.notes.remark(text)
-    if is_jfuzzylogic and conjunction is not None and disjunction is not None:
-        _check_pair(block, pairs[conjunction], disjunction, scope)
-    return conjunction, disjunction
-
-
-def _partner(disjunction: SNorm | None, pairs: Mapping[TNorm, SNorm]) -> TNorm:
-    """Return the AND that an OR brings with it."""
-    for t_norm, s_norm in pairs.items():
-        if s_norm == disjunction:
-            return t_norm
-    return "minimum"
-
-
-def _check_pair(block: FclBlock, wanted: SNorm, value: SNorm, scope: Scope) -> None:
-    if wanted != value:
+    wanted = disjunction if conjunction is None else pairs[conjunction]
+    if is_jfuzzylogic and disjunction not in (None, wanted):
         what = (
             "AND and OR are taken as they are written; jFuzzyLogic takes the last of "
             "the two lines and the operator that belongs to it"
         )
         scope.notes.loss(f"line {block.line}", what)
+    return conjunction, disjunction
 
 
 def _uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:

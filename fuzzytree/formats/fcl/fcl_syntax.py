@@ -271,14 +271,9 @@ MOST_LEVELS: Final = 50
 
 
 class FclText(msgspec.Struct, frozen=True):
-    """What an FCL file says.
+    """What an FCL file says: statements without mistakes, and mistakes of the others.
 
-    Attributes:
-        text: The text; its lines end with LF.
-        tokens: All of it but blanks and comments.
-        statements: The statements that have no mistake.
-        mistakes: Those of the other statements.
-        remarks: On an encoding other than UTF-8.
+    Lines of the text end with LF; the tokens are all but blanks and comments.
     """
 
     text: str
@@ -308,7 +303,7 @@ def parsed(content: bytes, name: str) -> FclText:
     return FclText(text, tuple(tokens), tuple(statements), tuple(result), remarks)
 
 
-_BLOCKS: Final = {
+ENDINGS: Final = {
     "FUNCTION_BLOCK": "END_FUNCTION_BLOCK",
     "VAR_INPUT": "END_VAR",
     "VAR_OUTPUT": "END_VAR",
@@ -316,10 +311,9 @@ _BLOCKS: Final = {
     "DEFUZZIFY": "END_DEFUZZIFY",
     "RULEBLOCK": "END_RULEBLOCK",
 }
-ENDINGS: Final = dict(_BLOCKS)
 """Which word ends a block that begins with another."""
 
-_EDGES = {*_BLOCKS, *_BLOCKS.values()}
+_EDGES = {*ENDINGS, *ENDINGS.values()}
 _SETTINGS = {"METHOD", "ACCU", "ACT", "AND", "OR", "ENABLED", "LOCK"}
 _ASSIGNED = {"RANGE", "DEFAULT"}
 _LEADERS = {*_EDGES, *_SETTINGS, *_ASSIGNED, "TERM", "RULE"}

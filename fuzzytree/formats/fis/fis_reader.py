@@ -130,15 +130,11 @@ def _signs(page: text.FisFile) -> tuple[Dialect, str]:
     for entry in entries:
         if entry.key.endswith("Method") and "_" in entry.value:
             return "octave", f"{entry.value} in line {entry.line} is no word of MATLAB"
-        if not entry.key and any(
-            number % 1 for number in text.numbers_of(_indices(entry.value), 0, 0, [])
-        ):
+        indices = entry.value.partition("(")[0]
+        numbers = text.numbers_of(indices, 0, 0, [])
+        if not entry.key and any(number % 1 for number in numbers):
             return "octave", f"line {entry.line} has hedges, which MATLAB has not"
     return "matlab", "nothing says otherwise"
-
-
-def _indices(rule: str) -> str:
-    return rule.partition("(")[0]
 
 
 def _system(

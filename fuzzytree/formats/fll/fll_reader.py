@@ -287,7 +287,12 @@ def _variable(
             _default(section.one_of("default"), notes),
             clips,
         )
-        _note_locked(section.one_of("lock-previous"), name, notes)
+        if fll.truth(section.one_of("lock-previous"), False, notes):
+            what = (
+                "lock-previous: where no rule concludes it, the answer to the row "
+                "before; the default answers instead"
+            )
+            notes.loss(f"output {name!r}", what)
     kind = "" if how is None else how[1]
     return ReadVariable(
         section,
@@ -311,7 +316,11 @@ def _terms(
         if term is not None:
             name = term.label.name
             if name in results:
-                _note_second(name, results.pop(name)[1], entry, notes)
+                what = (
+                    f"the term {name!r} stands in line {entry.line} again, which "
+                    "counts as in pyfuzzylite; fuzzylite 6 takes the first"
+                )
+                notes.loss(f"line {results.pop(name)[1].line}", what)
             words = (name, entry.words()[0].text, *_other_names(name))
             results[name] = (term, entry, words)
         if notes.is_full:
@@ -322,16 +331,6 @@ def _terms(
         [one for _, one, _ in results.values()],
         [w for _, _, w in results.values()],
     )
-
-
-def _note_second(
-    name: str, first: FllEntry, second: FllEntry, notes: ReaderNotes
-) -> None:
-    what = (
-        f"the term {name!r} stands in line {second.line} again, which counts as in "
-        "pyfuzzylite; fuzzylite 6 takes the first"
-    )
-    notes.loss(f"line {first.line}", what)
 
 
 def _defuzzifier(
@@ -424,15 +423,6 @@ def _default(entry: FllEntry | None, notes: ReaderNotes) -> float | None:
     if math.isinf(value):
         notes.mistake(entry.position, "a default cannot be infinite")
     return value if math.isfinite(value) else None
-
-
-def _note_locked(entry: FllEntry | None, name: str, notes: ReaderNotes) -> None:
-    if fll.truth(entry, False, notes):
-        notes.loss(
-            f"output {name!r}",
-            "lock-previous: where no rule concludes it, the answer to the row "
-            "before; the default answers instead",
-        )
 
 
 def read_block(
