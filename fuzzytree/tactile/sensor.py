@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Literal
 
@@ -245,7 +245,3 @@ class Counters:
     stalls: int = 0
     reconnects: int = 0
     doubtful: int = 0
-
-    def facts(self) -> dict[str, int]:
-        """Return the counters by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}

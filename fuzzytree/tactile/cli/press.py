@@ -6,6 +6,7 @@ import difflib
 import hashlib
 import shlex
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import click
@@ -86,17 +87,21 @@ def command(options: TactilePressOptions) -> None:
         found = {
             one: press(one, options.count, options.seed, settings) for one in names
         }
-    width = max(map(len, found))
+    width, objects = max(map(len, found)), list[dict[str, object]]()
     for name, made in found.items():
         clipped, outside = int(made.clipped.sum()), float(made.outside.max())
         over = f", up to {100 * outside:.0f} % over the edge" if outside > 1e-9 else ""
         said = f"{len(made.frames)} times, {clipped} cells clipped at full{over}"
         say_rows(("pressed", name, said), width=width, quiet=options.quiet)
+        truth = asdict(made.truth)
+        places = {key: truth[key] for key in ("x", "y", "angle_deg", "force_n")}
+        arrays = {"clipped": made.clipped, "outside": made.outside, **places}
+        objects.append({"name": name, **{k: one.tolist() for k, one in arrays.items()}})
     facts: dict[str, object] = {
         "count": options.count,
         "seed": options.seed,
         "settings": msgspec.structs.asdict(settings),
-        "objects": [_facts(one, made) for one, made in found.items()],
+        "objects": objects,
     }
     content = _content(found)
     if options.output == "-":
@@ -148,13 +153,6 @@ def _value(name: str, text: str, kind: type) -> object:
     except ValueError as error:
         what = "a whole number" if kind is int else "a number"
         raise click.UsageError(f"{name}: must be {what}, not {text!r}") from error
-
-
-def _facts(name: str, found: Simulated) -> dict[str, object]:
-    truth = found.truth
-    places = {key: getattr(truth, key) for key in ("x", "y", "angle_deg", "force_n")}
-    arrays = {"clipped": found.clipped, "outside": found.outside, **places}
-    return {"name": name, **{key: one.tolist() for key, one in arrays.items()}}
 
 
 def _content(found: dict[str, Simulated]) -> bytes:

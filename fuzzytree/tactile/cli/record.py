@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -123,7 +124,7 @@ def command(options: TactileRecordOptions) -> int:
             "frames": coming.count,
             "seconds": coming.seconds,
             "end": end,
-            "counters": line.counters.facts(),
+            "counters": asdict(line.counters),
             "most_at_risk": recorder.most_at_risk,
         }
         answer_json(facts)
@@ -252,7 +253,7 @@ def _tell(
     if coming.seconds:
         rate = f", {(coming.count - 1) / coming.seconds:.1f} a second"
     frames = counted(coming.count, "frame")
-    facts = line.counters.facts().items()
+    facts = asdict(line.counters).items()
     risk = counted(recorder.most_at_risk, "frame")
     after = shlex.join(["fuzzytree", "tactile", "replay", options.output])
     say_rows(

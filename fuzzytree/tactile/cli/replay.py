@@ -128,7 +128,7 @@ def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
     damaged = counted(found.damaged, "record")
     cut = counted(found.cut_bytes, "byte")
     yield f"damaged   {damaged}, and {cut} of one that is cut off at the end"
-    counters = found.counters.facts().items()
+    counters = asdict(found.counters).items()
     yield f"counted   {', '.join(f'{name} {count}' for name, count in counters)}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from itertools import cycle, islice
 from typing import TYPE_CHECKING
 
@@ -108,7 +109,7 @@ def command(options: TactileSimulateOptions) -> None:
             while not stop.wait(_LOOK_S):
                 if device.over.is_set() and not device.is_open:
                     break
-    facts = device.counts.facts()
+    facts = asdict(device.counts)
     counts = ", ".join(f"{what} {count}" for what, count in facts.items() if count)
     say_rows(("counted", counts or "nothing", ""), quiet=options.quiet)
     if options.as_json:

@@ -402,7 +402,9 @@ def differences(
             f"cannot write {model.name} as onnx: onnxruntime "
             f"{onnxruntime.__version__} does not run it: {first_line(error)}"
         ) from error
-    found = {name: np.asarray(one) for name, one in zip(outputs, arrays, strict=True)}
+    found: dict[Output, npt.NDArray[np.generic]] = {
+        name: np.asarray(one) for name, one in zip(outputs, arrays, strict=True)
+    }
     for number, name, text in apart(found, made, model, frames, reject):
         yield (
             f"the onnx file of {model.name} gives other {name} than plain Python for "

@@ -216,7 +216,9 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
                 port went away and is not waited for. The line goes on to be read.
         """
         with self._news:
-            self._news.wait_for(self._has_news, timeout_s)
+            self._news.wait_for(
+                lambda: self._waiting or self._error or self.state == "ended", timeout_s
+            )
             if self._waiting:
                 return self._waiting.popleft()
             if self._error is not None:
@@ -237,9 +239,6 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
     def __exit__(self, *_: object) -> None:
         """Close the port."""
         self.close()
-
-    def _has_news(self) -> bool:
-        return bool(self._waiting) or self._error is not None or self.state == "ended"
 
     def _run(self) -> None:
         """Read until `close`, whatever happens to the port."""

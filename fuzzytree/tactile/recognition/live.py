@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Protocol
 
 import numpy as np
@@ -195,7 +195,7 @@ class Live:
             answer,
             self._rate(),
             self._latency(),
-            self.source.counters.facts(),
+            asdict(self.source.counters),
             self._refused,
             self._trouble(now),
             max(now - (answer.frame.time if answer else self._began), 0.0),

@@ -295,7 +295,14 @@ def press(
         noise = random.standard_normal((_AT_ONCE, SIDE, SIDE))[some]
         done = _truth(thing, settings, places, turns, forces, tilts)
         truth.append(astuple(done))
-        read = _read(thing, done, settings.noise * noise, settings)
+        newtons = forces_of(thing, done, settings.aperture)
+        seen = read_matrix(
+            gains(settings) * fsr(newtons, settings) + settings.rest_us,
+            settings.wiring,
+            drive_ohm=settings.drive_ohm,
+            load_ohm=settings.load_ohm,
+        )
+        read = quantised(seen / settings.full_us, settings.noise * noise)
         found.append((*read, outside(thing, done)))
     frames, clipped, over = map(np.concatenate, zip(*found, strict=True))
     sensor = Sensor(SIDE, SIDE, full=FULL, threshold=settings.threshold)
@@ -325,21 +332,6 @@ def _truth(
     room = settings.roam * np.maximum(high - low, 0.0) / 2
     x, y = ((low + high) / 2 + room * places).T
     return PressTruth(x, y, angle, force, slope[:, 0], slope[:, 1])
-
-
-def _read(
-    thing: Object, truth: PressTruth, noise: FloatArray, settings: PhysicsSettings
-) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.int64]]:
-    """Return what the sensor reads, and how many cells are clipped."""
-    newtons = forces_of(thing, truth, settings.aperture)
-    conductance = gains(settings) * fsr(newtons, settings) + settings.rest_us
-    seen = read_matrix(
-        conductance,
-        settings.wiring,
-        drive_ohm=settings.drive_ohm,
-        load_ohm=settings.load_ohm,
-    )
-    return quantised(seen / settings.full_us, noise)
 
 
 def _outlines(thing: Object, angle_deg: FloatArray) -> list[FloatArray]:

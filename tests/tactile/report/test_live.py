@@ -41,7 +41,7 @@ VIEW = LiveView(
     answer=ANSWER,
     rate=43.96,
     latency=Latency(4e-4, 9e-4, 2e-3),
-    counters=Counters(bytes=900, frames=56, damaged=2).facts(),
+    counters=dataclasses.asdict(Counters(bytes=900, frames=56, damaged=2)),
     refused=0,
     trouble="",
     silent_s=0.01,
