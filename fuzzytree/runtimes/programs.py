@@ -16,7 +16,14 @@ import numpy as np
 
 from fuzzytree.model import FuzzySystem, SystemOutcome, SystemRun, checkpoint
 from fuzzytree.runtimes.rows import checked
-from fuzzytree.semantics import Program, Step, StepValue, from_system, still_results
+from fuzzytree.semantics import (
+    ARRAYS,
+    Program,
+    Step,
+    StepValue,
+    from_system,
+    still_results,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -28,47 +35,6 @@ if TYPE_CHECKING:
 
 _WORKING_SET = 1 << 16  # numbers that all buffers of a chunk may hold together
 _SMALLEST_CHUNK, _LARGEST_CHUNK = 512, 1 << 13
-
-_UFUNCS: Mapping[str, Function] = {
-    "add": np.add,
-    "subtract": np.subtract,
-    "multiply": np.multiply,
-    "divide": np.divide,
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-    "negate": np.negative,
-    "absolute": np.absolute,
-    "floor": np.floor,
-    "ceiling": np.ceil,
-    "round": np.rint,
-    "square_root": np.sqrt,
-    "exponential": np.exp,
-    "logarithm": np.log,
-    "logarithm_10": np.log10,
-    "logarithm_1p": np.log1p,
-    "sine": np.sin,
-    "cosine": np.cos,
-    "tangent": np.tan,
-    "arc_sine": np.arcsin,
-    "arc_cosine": np.arccos,
-    "arc_tangent": np.arctan,
-    "hyperbolic_sine": np.sinh,
-    "hyperbolic_cosine": np.cosh,
-    "hyperbolic_tangent": np.tanh,
-    "area_sine": np.arcsinh,
-    "area_cosine": np.arccosh,
-    "area_tangent": np.arctanh,
-    "power": np.power,
-    "remainder": np.fmod,
-    "arc_tangent_2": np.arctan2,
-    "less": np.less,
-    "at_most": np.less_equal,
-    "equal": np.equal,
-    "is_finite": np.isfinite,
-    "and": np.logical_and,
-    "or": np.logical_or,
-    "not": np.logical_not,
-}
 
 
 def _total(samples: Values, *, out: Values) -> Values:
@@ -136,7 +102,7 @@ def _function(step: Step) -> Function:
         return _below(step.table)
     if step.operation == "pick":
         return _pick(step.table)
-    return _UFUNCS.get(step.operation) or _OTHERS[step.operation]
+    return ARRAYS.get(step.operation) or _OTHERS[step.operation]
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,6 +45,7 @@ from .probing import probe_values as probe_values
 from .probing import probes as probes
 from .probing import range_rows as range_rows
 from .probing import system_probes as system_probes
+from .programs.bounds import ARRAYS as ARRAYS
 from .programs.bounds import ORIGIN as ORIGIN
 from .programs.bounds import error_bounds as error_bounds
 from .programs.evaluate import StepValue as StepValue

@@ -15,7 +15,6 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import msgspec
@@ -32,7 +31,6 @@ from fuzzytree.model import (
     Linear,
     Not,
     Or,
-    Relation,
     RuleBlock,
     Singleton,
     SNorm,
@@ -51,7 +49,8 @@ from fuzzytree.semantics.inference.degrees import (
     value_at,
     value_of,
 )
-from fuzzytree.semantics.programs.operations import divide, maximum, total
+from fuzzytree.semantics.programs.norms import passes
+from fuzzytree.semantics.programs.operations import DOUBLES, divide, maximum, total
 from fuzzytree.semantics.reference import Status
 
 __all__ = [
@@ -394,25 +393,12 @@ def _or(name: SNorm | None) -> Callable[[float, float], float]:
     return functools.partial(s_norm, name or "maximum")
 
 
-_RELATIONS: Mapping[Relation, Callable[[float, float], bool]] = {
-    "<": operator.lt,
-    "<=": operator.le,
-    "==": operator.eq,
-    "!=": operator.ne,
-    ">=": operator.ge,
-    ">": operator.gt,
-}
-
-
 def _passes(how: Activation, degree: float, count: int) -> bool:
     """Return whether a rule is activated when `count` were before it."""
-    match how.method:
-        case "first" | "last":
-            return count < how.count and degree >= how.threshold
-        case "threshold":
-            return _RELATIONS[how.relation](degree, how.threshold)
-        case _:
-            return True
+    if how.method in ("first", "last") and count >= how.count:
+        return False
+    result = passes(DOUBLES, how, degree)
+    return result is None or bool(result)
 
 
 def _chosen(how: Activation, result: Sequence[float]) -> list[float]:

@@ -50,7 +50,15 @@ graphs compute a cosine from a sine."""
 _SURELY_0 = -750.0
 """Below it e to a power is 0 in every library: half the least double is at -745.1."""
 
-_MONOTONE: Mapping[str, Callable[..., Array]] = {
+ARRAYS: Mapping[str, Callable[..., Array]] = {
+    "add": np.add,
+    "subtract": np.subtract,
+    "multiply": np.multiply,
+    "divide": np.divide,
+    "minimum": np.minimum,
+    "maximum": np.maximum,
+    "negate": np.negative,
+    "absolute": np.absolute,
     "floor": np.floor,
     "ceiling": np.ceil,
     "round": np.rint,
@@ -59,30 +67,37 @@ _MONOTONE: Mapping[str, Callable[..., Array]] = {
     "logarithm": np.log,
     "logarithm_10": np.log10,
     "logarithm_1p": np.log1p,
+    "sine": np.sin,
+    "cosine": np.cos,
+    "tangent": np.tan,
     "arc_sine": np.arcsin,
     "arc_cosine": np.arccos,
     "arc_tangent": np.arctan,
     "hyperbolic_sine": np.sinh,
+    "hyperbolic_cosine": np.cosh,
     "hyperbolic_tangent": np.tanh,
     "area_sine": np.arcsinh,
     "area_cosine": np.arccosh,
     "area_tangent": np.arctanh,
-}
-_COMPARISONS: Mapping[str, Callable[[Array, Array], Array]] = {
+    "power": np.power,
+    "remainder": np.fmod,
+    "arc_tangent_2": np.arctan2,
     "less": np.less,
     "at_most": np.less_equal,
     "equal": np.equal,
+    "is_finite": np.isfinite,
+    "and": np.logical_and,
+    "or": np.logical_or,
+    "not": np.logical_not,
 }
-_WAVES: Mapping[str, Callable[..., Array]] = {"sine": np.sin, "cosine": np.cos}
+"""The operations on arrays, but for those over samples, tables and `where`."""
+
+_COMPARISONS = frozenset(("less", "at_most", "equal"))
+_WAVES = frozenset(("sine", "cosine"))
 _UNROUNDED = frozenset(
     ("where", "minimum", "maximum", "negate", "absolute", "floor", "ceiling", "round")
 ) | {"below", "pick", "last", "highest", "lowest"}
-_ROUGH: Mapping[str, Callable[..., Array]] = {
-    "tangent": np.tan,
-    "hyperbolic_cosine": np.cosh,
-    "arc_tangent_2": np.arctan2,
-    "remainder": np.fmod,
-}
+_ROUGH = frozenset(("tangent", "hyperbolic_cosine", "arc_tangent_2", "remainder"))
 """Functions of which nothing is known unless their arguments are the same."""
 
 
@@ -224,18 +239,16 @@ def _compared(operation: str, one: Pair, two: Pair, is_same: Array) -> Pair:
     is_near = (both > 0.0) & ~(np.abs(a - b) > both)
     is_nan = (np.isnan(a) & (error_a == 0.0)) | (np.isnan(b) & (error_b == 0.0))
     unsure = is_near & ~is_nan & (~is_same | np.isinf(both))
-    return _COMPARISONS[operation](a, b), unsure
+    return ARRAYS[operation](a, b), unsure
 
 
 def _number(step: Step, operands: Sequence[Pair]) -> Pair:
     operation = step.operation
-    if operation in _MONOTONE:
-        return _monotone(_MONOTONE[operation], *operands[0])
     if operation in _WAVES:
         a, error = operands[0]
-        return _WAVES[operation](a), np.minimum(error, 2.0)
+        return ARRAYS[operation](a), np.minimum(error, 2.0)
     if operation in _ROUGH:
-        value = _ROUGH[operation](*[one for one, _ in operands])
+        value = ARRAYS[operation](*[one for one, _ in operands])
         unsure = sum(error for _, error in operands)
         return value, np.where(unsure == 0.0, 0.0, np.inf)
     if step.table:
@@ -247,6 +260,8 @@ def _number(step: Step, operands: Sequence[Pair]) -> Pair:
     if operation in ("negate", "absolute"):
         a, error = operands[0]
         return (-a if operation == "negate" else np.abs(a)), error
+    if len(operands) == 1:
+        return _monotone(ARRAYS[operation], *operands[0])
     return _of_two(operation, *operands[0], *operands[1])
 
 

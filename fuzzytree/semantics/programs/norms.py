@@ -190,7 +190,7 @@ def positive(make: Maker, degree: int) -> int:
     return make("where", make("less", zero, degree), degree, zero)
 
 
-def passes(make: Maker, how: Activation, degree: int) -> int | None:
+def passes(make: Numbers[N], how: Activation, degree: N) -> N | None:
     """Return whether a degree stands the block's threshold; None if there is none."""
     limit = make.constant(how.threshold)
     match how.method:

@@ -26,11 +26,16 @@ class Operation(msgspec.Struct, frozen=True):
     takes: tuple[Kind, ...]
     gives: Kind
     says: str
+    is_inexact: bool = False
 
 
 def _numbers(count: int, says: str, gives: Kind = "number") -> Operation:
     kind: Kind = "number"
     return Operation((kind,) * count, gives, says)
+
+
+def _inexact(count: int, says: str) -> Operation:
+    return msgspec.structs.replace(_numbers(count, says), is_inexact=True)
 
 
 def _truths(count: int, says: str) -> Operation:
@@ -54,25 +59,25 @@ OPERATIONS: Mapping[str, Operation] = {
     "ceiling": _numbers(1, "the smallest whole number from a on"),
     "round": _numbers(1, "the nearest whole number, of two equally near ones the even"),
     "square_root": _numbers(1, "the square root of a"),
-    "exponential": _numbers(1, "e to the power a"),
-    "logarithm": _numbers(1, "the natural logarithm of a"),
-    "logarithm_10": _numbers(1, "the logarithm of a to base 10"),
-    "logarithm_1p": _numbers(1, "the natural logarithm of 1 + a"),
-    "sine": _numbers(1, "sin a"),
-    "cosine": _numbers(1, "cos a"),
-    "tangent": _numbers(1, "tan a"),
-    "arc_sine": _numbers(1, "asin a"),
-    "arc_cosine": _numbers(1, "acos a"),
-    "arc_tangent": _numbers(1, "atan a"),
-    "hyperbolic_sine": _numbers(1, "sinh a"),
-    "hyperbolic_cosine": _numbers(1, "cosh a"),
-    "hyperbolic_tangent": _numbers(1, "tanh a"),
-    "area_sine": _numbers(1, "asinh a"),
-    "area_cosine": _numbers(1, "acosh a"),
-    "area_tangent": _numbers(1, "atanh a"),
-    "power": _numbers(2, "a to the power b"),
+    "exponential": _inexact(1, "e to the power a"),
+    "logarithm": _inexact(1, "the natural logarithm of a"),
+    "logarithm_10": _inexact(1, "the logarithm of a to base 10"),
+    "logarithm_1p": _inexact(1, "the natural logarithm of 1 + a"),
+    "sine": _inexact(1, "sin a"),
+    "cosine": _inexact(1, "cos a"),
+    "tangent": _inexact(1, "tan a"),
+    "arc_sine": _inexact(1, "asin a"),
+    "arc_cosine": _inexact(1, "acos a"),
+    "arc_tangent": _inexact(1, "atan a"),
+    "hyperbolic_sine": _inexact(1, "sinh a"),
+    "hyperbolic_cosine": _inexact(1, "cosh a"),
+    "hyperbolic_tangent": _inexact(1, "tanh a"),
+    "area_sine": _inexact(1, "asinh a"),
+    "area_cosine": _inexact(1, "acosh a"),
+    "area_tangent": _inexact(1, "atanh a"),
+    "power": _inexact(2, "a to the power b"),
     "remainder": _numbers(2, "a - b trunc(a / b), exact; of the sign of a"),
-    "arc_tangent_2": _numbers(2, "the angle of the point (b, a)"),
+    "arc_tangent_2": _inexact(2, "the angle of the point (b, a)"),
     "below": _numbers(1, "how many numbers of the step's rising table are below a"),
     "pick": _numbers(1, "the number of the step's table at place a, from 0"),
     "less": _numbers(2, "a < b", "truth"),
@@ -95,28 +100,7 @@ and adds the second half to the first until one number is left."""
 OVER_SAMPLES = frozenset(("total", "last", "highest", "lowest"))
 """Operations that make one number of all samples."""
 
-INEXACT = frozenset(
-    (
-        "exponential",
-        "logarithm",
-        "logarithm_10",
-        "logarithm_1p",
-        "sine",
-        "cosine",
-        "tangent",
-        "arc_sine",
-        "arc_cosine",
-        "arc_tangent",
-        "hyperbolic_sine",
-        "hyperbolic_cosine",
-        "hyperbolic_tangent",
-        "area_sine",
-        "area_cosine",
-        "area_tangent",
-        "power",
-        "arc_tangent_2",
-    )
-)
+INEXACT = frozenset(name for name, one in OPERATIONS.items() if one.is_inexact)
 """Operations whose last digits are the library's own; all others have one result."""
 
 
