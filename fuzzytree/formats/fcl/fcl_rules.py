@@ -241,7 +241,7 @@ def _norms(
     is_jfuzzylogic = scope.dialect == "jfuzzylogic"
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
     if conjunction is None and any(_uses(rule.when, And) for rule in rules):
-        partners = [t_norm for t_norm, one in pairs.items() if one == disjunction]
+        partners: list[TNorm] = [t for t, one in pairs.items() if one == disjunction]
         conjunction = partners[0] if partners else "minimum"
         text = f"line {block.line}: AND is missing; {conjunction} is taken"
         scope.notes.remark(text)

@@ -139,7 +139,8 @@ class Sheet:
         """
         usual = {"fontsize": SIZE, "color": FAINT, "va": "center_baseline"}
         fixed = {"rotation_mode": "anchor", "parse_math": False, "zorder": 3}
-        self.axes.text(x, y, text, **{**usual, **style, **fixed})
+        whole: dict[str, Any] = {**usual, **style, **fixed}
+        self.axes.text(x, y, text, **whole)
 
     def write_title(self, text: str) -> None:
         """Write words at the top."""
