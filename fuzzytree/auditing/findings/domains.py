@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Literal, assert_never
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -28,14 +28,11 @@ from fuzzytree.model import (
     FuzzyTree,
     Gaussian,
     Linear,
-    PiCurve,
     Points,
     SCurve,
-    SemiEllipse,
     Sigmoid,
     SigmoidDifference,
     SigmoidProduct,
-    Singleton,
     Spike,
     SystemInput,
     Trapezoid,
@@ -257,11 +254,8 @@ def _ends(curve: Curve) -> Iterator[float]:
             yield mean + right_side.spread * right_side.reach
         case Points(values=values):
             yield from (values[0], values[-1])
-        case Trapezoid() | PiCurve():
-            corners = (curve.a, curve.b, curve.c, curve.d)
-            yield from (one for one in corners if one is not None)
-        case Gaussian(mean=mean, deviation=deviation):
-            yield from _about(mean, 3 * deviation)
+        case Gaussian(mean=middle, deviation=width) | Bell(center=middle, width=width):
+            yield from _about(middle, 3 * width)
         case TwoGaussians(left=low, right=high):
             yield low - 3 * curve.left_deviation
             yield high + 3 * curve.right_deviation
@@ -272,20 +266,15 @@ def _ends(curve: Curve) -> Iterator[float]:
             | SigmoidProduct(first=one, second=other)
         ):
             yield from (*_ends(one), *_ends(other))
-        case Bell(center=middle, width=width):
-            yield from _about(middle, 3 * width)
         case Cosine(center=middle, width=width) | Spike(center=middle, width=width):
             yield from _about(middle, width / 2)
-        case SCurve(start=start, end=end) | Arc(start=start, end=end):
-            yield from (start, end)
-        case SemiEllipse(start=start, end=end) | Concave(inflection=start, end=end):
-            yield from (start, end)
-        case Binary(start=value) | Singleton(value=value):
+        case Binary(start=value):
             yield value
         case Linear() | Formula():
             return
-        case _:
-            assert_never(curve)
+        case _:  # its fields are values of the input
+            fields = [getattr(curve, name) for name in curve.__struct_fields__]
+            yield from (one for one in fields if one is not None)
 
 
 def _about(middle: float, reach: float) -> tuple[float, float]:
