@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import PurePath
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 from msgspec.structs import replace
@@ -148,8 +148,8 @@ def _positions(
 ) -> Positions:
     """Return where the parts of the system stand."""
     return positions_of(
-        (_group(one.section, one.lines) for one in inputs),
-        (_group(one.section, one.lines) for one in outputs),
+        (_group(one.section, [term.entry for term in one.terms]) for one in inputs),
+        (_group(one.section, [term.entry for term in one.terms]) for one in outputs),
         (_group(one.section, one.lines) for one in blocks),
     )
 
@@ -163,14 +163,20 @@ MOST_VARIABLES: Final = 2000
 _DROPPED = re.compile(r"[^\w.]")
 
 
+class ReadTerm(NamedTuple):
+    """A term as it was read: where it stands, and which words stand for it."""
+
+    term: FllTerm
+    entry: FllEntry
+    words: tuple[str, ...]
+
+
 class ReadVariable(msgspec.Struct, frozen=True):
     """A variable as it was read."""
 
     section: FllSection
     name: str
-    terms: tuple[FllTerm, ...]
-    lines: tuple[FllEntry, ...]
-    said: tuple[tuple[str, ...], ...]
+    terms: tuple[ReadTerm, ...]
     variable: SystemInput | SystemOutput
     kind: str = ""
     is_enabled: bool = True
@@ -222,8 +228,8 @@ def vocabulary_of(variables: Sequence[ReadVariable]) -> Vocabulary:
     results: dict[str, FllVariable] = {}
     for one in variables:
         terms: dict[str, str] = {}
-        for term, said in zip(one.terms, one.said, strict=True):
-            for word in said:
+        for term, _, words in one.terms:
+            for word in words:
                 terms.setdefault(word, term.label.name)
         entry = FllVariable(one.name, terms, one.is_output)
         for word in (one.name, one.section.head.value, *_other_names(one.name)):
@@ -270,10 +276,10 @@ def _variable(
             is_weighted=is_weighted,
             is_inverse=is_weighted and how[1] != "TakagiSugeno",
         )
-    terms, kept, content = _terms(section, place, notes)
+    terms = _terms(section, place, notes)
     low, high = _range(section.one_of("range"), notes)
     clips = fll.truth(section.one_of("lock-range"), False, notes)
-    labels = tuple(term.label for term in terms)
+    labels = tuple(one.term.label for one in terms)
     clips = clips and not (low is None and high is None)
     variable: SystemInput | SystemOutput = SystemInput(name, labels, low, high, clips)
     if how is not None:
@@ -294,23 +300,14 @@ def _variable(
             )
             notes.loss(f"output {name!r}", what)
     kind = "" if how is None else how[1]
-    return ReadVariable(
-        section,
-        name,
-        tuple(terms),
-        tuple(kept),
-        tuple(content),
-        variable,
-        kind,
-        is_enabled,
-    )
+    return ReadVariable(section, name, terms, variable, kind, is_enabled)
 
 
 def _terms(
     section: FllSection, place: TermScope, notes: ReaderNotes
-) -> tuple[list[FllTerm], list[FllEntry], list[tuple[str, ...]]]:
-    """Return the terms of a variable, where they stand, and what stands for each."""
-    results: dict[str, tuple[FllTerm, FllEntry, tuple[str, ...]]] = {}
+) -> tuple[ReadTerm, ...]:
+    """Return the terms of a variable."""
+    results: dict[str, ReadTerm] = {}
     for entry in section.all_of("term"):
         term = _term(entry, place, notes)
         if term is not None:
@@ -320,17 +317,12 @@ def _terms(
                     f"the term {name!r} stands in line {entry.line} again, which "
                     "counts as in pyfuzzylite; fuzzylite 6 takes the first"
                 )
-                notes.loss(f"line {results.pop(name)[1].line}", what)
+                notes.loss(f"line {results.pop(name).entry.line}", what)
             words = (name, entry.words()[0].text, *_other_names(name))
-            results[name] = (term, entry, words)
+            results[name] = ReadTerm(term, entry, words)
         if notes.is_full:
             break
-    terms = [term for term, _, _ in results.values()]
-    return (
-        terms,
-        [one for _, one, _ in results.values()],
-        [w for _, _, w in results.values()],
-    )
+    return (*results.values(),)
 
 
 def _defuzzifier(
@@ -526,8 +518,9 @@ def _as_meant(output: ReadVariable, notes: ReaderNotes) -> SystemOutput:
     assert isinstance(variable, SystemOutput)  # the caller selects outputs
     if not variable.defuzzifier.is_weighted:
         return variable
-    has_numbers = any(term.is_number for term in output.terms)
-    has_monotone = any(term.is_monotone for term in output.terms)
+    terms = [one.term for one in output.terms]
+    has_numbers = any(term.is_number for term in terms)
+    has_monotone = any(term.is_monotone for term in terms)
     if output.kind == "Automatic" and has_numbers and has_monotone:
         what = (
             "numbers and monotone terms are mixed, which fuzzylite 6 takes by the "
@@ -537,6 +530,6 @@ def _as_meant(output: ReadVariable, notes: ReaderNotes) -> SystemOutput:
     is_sugeno = output.kind == "TakagiSugeno"
     labels = tuple(
         as_degree(term.label) if is_sugeno or not term.is_monotone else term.label
-        for term in output.terms
+        for term in terms
     )
     return replace(variable, labels=labels)
