@@ -10,11 +10,11 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.fcl_checklist import check_list
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect, FclWords
 from fuzzytree.exporters.fcl_rules import (
     accu_of,
     block_lines,
+    check_list,
     has_accu,
     losses_of,
     norm_losses,
