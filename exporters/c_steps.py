@@ -9,7 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from fuzzytree.exporters.c_text import DOUBLE, bits_of, real_lines
 from fuzzytree.exporters.program_text import StepText, SystemExample, system_examples
 from fuzzytree.model import FuzzySystem
-from fuzzytree.semantics import Program, Step, from_system, system_probes
+from fuzzytree.semantics import (
+    OVER_SAMPLES,
+    Program,
+    Step,
+    from_system,
+    system_probes,
+)
 
 LIBRARY: Mapping[str, str] = {
     "absolute": "fabs",
@@ -154,8 +160,7 @@ class CSteps(StepText):
     def __init__(self, program: Program, library: Mapping[str, str] = LIBRARY) -> None:
         super().__init__(program)
         self.library = library
-        self.tables: list[tuple[str, Sequence[float]]] = []
-        self._table_names: dict[tuple[float, ...], str] = {}
+        self.tables: dict[tuple[float, ...], str] = {}
         self.round = self._rounds()
         self.kept = self._kept()
         self.body = list(self._body())
@@ -163,10 +168,8 @@ class CSteps(StepText):
     @property
     def needs_library(self) -> bool:
         """Whether math.h is needed, for functions or for infinite numbers in tables."""
-        numbers = (number for _, table in self.tables for number in table)
-        return not (
-            self.needs.isdisjoint(self.library) and all(map(math.isfinite, numbers))
-        )
+        is_finite = all(math.isfinite(one) for table in self.tables for one in table)
+        return not (is_finite and self.needs.isdisjoint(self.library))
 
     def helper_text(self) -> Iterator[str]:
         """Yield the helpers that the steps call, but for functions of the library."""
@@ -176,8 +179,8 @@ class CSteps(StepText):
 
     def table_text(self) -> Iterator[str]:
         """Yield the tables."""
-        for name, values in self.tables:
-            yield f"static const double name_{name}[{len(values)}] = {{\n"
+        for values, name in self.tables.items():
+            yield f"static const double {name}[{len(values)}] = {{\n"
             yield from real_lines(values, DOUBLE)
             yield "};\n"
 
@@ -185,49 +188,39 @@ class CSteps(StepText):
         """Return a step's result as an expression, within a loop if it has samples."""
         result = self.still[place]
         if result is None:
-            step = self.program.steps[place]
-            if place in self.kept and step.samples:
-                return f"s{place}[i]"
-            return f"v{place}"
+            is_kept = place in self.kept and self.steps[place].samples
+            return f"s{place}[i]" if is_kept else f"v{place}"
         if isinstance(result, list):
             return f"{self._table(tuple(map(float, result)))}[i]"
         if isinstance(result, bool):
             return str(int(result))
-        return self._number(result)
-
-    def _number(self, value: float) -> str:
-        if not math.isfinite(value):
+        if not math.isfinite(result):
             self.needs.add("bits")
-        return number_text(value)
+        return number_text(result)
 
     def _table(self, values: tuple[float, ...]) -> str:
         """Return the name of a table."""
-        if values not in self._table_names:
-            self._table_names[values] = f"name_t{len(self.tables)}"
-            self.tables.append((f"t{len(self.tables)}", values))
-        return self._table_names[values]
+        return self.tables.setdefault(values, f"name_t{len(self.tables)}")
 
     def _rounds(self) -> list[int]:
         """Return after how many loops each step can be computed."""
         result: list[int] = []
-        for place, step in enumerate(self.program.steps):
+        for place, step in enumerate(self.steps):
             moving = [a for a in step.arguments if self.still[a] is None]
             after = max((result[a] for a in moving), default=0)
-            is_reduced = not step.samples and any(
-                self.program.steps[a].samples for a in moving
-            )
+            is_reduced = not step.samples and any(self.steps[a].samples for a in moving)
             result.append(0 if self.still[place] is not None else after + is_reduced)
         return result
 
     def _kept(self) -> set[int]:
         """Return the steps with samples that a later loop needs, or a sum by halves."""
         kept: set[int] = set()
-        for place, step in enumerate(self.program.steps):
+        for place, step in enumerate(self.steps):
             if step.operation in _CARRIED:
                 continue
             for argument in step.arguments:
                 is_moving = self.still[argument] is None
-                if is_moving and self.program.steps[argument].samples:
+                if is_moving and self.steps[argument].samples:
                     is_later = self.round[place] > self.round[argument]
                     if is_later or step.operation == "total":
                         kept.add(argument)
@@ -237,44 +230,35 @@ class CSteps(StepText):
         moving = [p for p, result in enumerate(self.still) if result is None]
         for turn in range(max((self.round[p] for p in moving), default=0) + 1):
             now = [p for p in moving if self.round[p] == turn]
-            single = [p for p in now if not self.program.steps[p].samples]
-            reduced = [p for p in single if self._is_reduced(p)]
-            for place in reduced:
-                if self._is(place, "total"):
+            for place in now:
+                if self.steps[place].operation == "total":
                     yield from self._total(place)
-            for place in single:
-                if place not in reduced:
+            for place in now:
+                step = self.steps[place]
+                if not (step.samples or step.operation in OVER_SAMPLES):
                     yield f"    {self._declared(place)};\n"
-            counts = dict.fromkeys(self.program.steps[p].samples for p in now)
-            for count in counts:
+            for count in dict.fromkeys(self.steps[p].samples for p in now):
                 if count:
-                    own = [p for p in now if self.program.steps[p].samples == count]
+                    own = [p for p in now if self.steps[p].samples == count]
                     yield from self._loop(own, count)
 
-    def _is(self, place: int, operation: str) -> bool:
-        return self.program.steps[place].operation == operation
-
-    def _is_reduced(self, place: int) -> bool:
-        step = self.program.steps[place]
-        return any(self.program.steps[a].samples for a in step.arguments)
-
     def _declared(self, place: int) -> str:
-        step = self.program.steps[place]
-        return f"const {self._type(place)} v{place} = {self.expression(step)}"
+        text = self.expression(self.steps[place])
+        return f"const {self._type(place)} v{place} = {text}"
 
     def _type(self, place: int) -> str:
-        return "int" if self.program.steps[place].kind == "truth" else "name_real"
+        return "int" if self.steps[place].kind == "truth" else "name_real"
 
     def _loop(self, places: Sequence[int], count: int) -> Iterator[str]:
         """Yield a loop over samples, and what it carries along."""
         carried = [
             place
-            for place, step in enumerate(self.program.steps)
+            for place, step in enumerate(self.steps)
             if step.operation in _CARRIED
             and self.still[place] is None
             and step.arguments[0] in places
         ]
-        running = [p for p in places if self._is(p, "running")]
+        running = [p for p in places if self.steps[p].operation == "running"]
         for place in places:
             if place in self.kept:
                 yield f"    {self._type(place)} s{place}[{count}];\n"
@@ -285,11 +269,11 @@ class CSteps(StepText):
         yield f"    for (i = 0; i < {count}; i++) {{\n"
         for place in places:
             if place in running:
-                (argument,) = self.program.steps[place].arguments
+                (argument,) = self.steps[place].arguments
                 term = self.value(argument)
                 yield f"        r{place} = i == 0 ? {term} : r{place} + {term};\n"
             if place in self.kept:
-                step = self.program.steps[place]
+                step = self.steps[place]
                 text = f"r{place}" if place in running else self.expression(step)
                 yield f"        s{place}[i] = {text};\n"
             elif place in running:
@@ -301,7 +285,7 @@ class CSteps(StepText):
         yield "    }\n"
 
     def _carried(self, place: int) -> str:
-        step = self.program.steps[place]
+        step = self.steps[place]
         operands = self.value(step.arguments[0])
         if step.operation == "last":
             return f"v{place} = {operands}"
@@ -311,8 +295,8 @@ class CSteps(StepText):
 
     def _total(self, place: int) -> Iterator[str]:
         """Yield statements that sum an array by halves."""
-        (source,) = self.program.steps[place].arguments
-        count = self.program.steps[source].samples
+        (source,) = self.steps[place].arguments
+        count = self.steps[source].samples
         half = max(1 << (count - 1).bit_length() >> 1, 1)
         self.needs.add("total")
         yield f"    name_real h{place}[{half}];\n"

@@ -227,7 +227,7 @@ class JsSteps(StepText):
 
     def body(self) -> Iterator[str]:
         """Yield a statement for each step that an input enters."""
-        for place, step in enumerate(self.program.steps):
+        for place, step in enumerate(self.steps):
             if self.still[place] is None:
                 yield f"  const v{place} = {self._step_text(step)};\n"
 
@@ -243,7 +243,7 @@ class JsSteps(StepText):
         else:
             text = number_text(result)
             return f"({text})" if text.startswith("-") else text
-        return f"{name}[i]" if self.program.steps[place].samples else name
+        return f"{name}[i]" if self.steps[place].samples else name
 
     def helpers(self) -> Iterator[str]:
         """Yield the functions that the body needs."""

@@ -86,6 +86,7 @@ class StepText:
 
     Attributes:
         program: The program.
+        steps: Its steps.
         still: The results of steps that no input enters, None for the others.
         needs: The operations that the steps call as functions.
     """
@@ -103,7 +104,7 @@ class StepText:
     }
 
     def __init__(self, program: Program) -> None:
-        self.program = program
+        self.program, self.steps = program, program.steps
         self.still: tuple[StepValue | None, ...] = still_results(program)
         self.needs: set[str] = set()
 
