@@ -279,36 +279,22 @@ GUESS
 
 
 def rules_code(
-    tables: Tables,
-    numbers: CNumbers,
-    axes: str,
-    *,
-    is_product: bool,
+    tables: Tables, numbers: CNumbers, axes: str, *, is_product: bool
 ) -> Iterator[str]:
     """Yield the tables of a rule base and the functions that fire it."""
     yield from _data(tables, numbers)
+    longest = (tables.number, tables.clause_term, tables.places.clause, tables.label)
+    kind = place_type(max(map(len, longest)))
     for template in _functions(tables, numbers):
         text = template.replace("JOIN", "a * b" if is_product else "b < a ? b : a")
-        text = text.replace("TAKE_AXES\n", axes)
-        text = text.replace("AT ", f"{_place_type(tables)} ")
-        yield text
-
-
-def _place_type(tables: Tables) -> str:
-    tallest = max(len(tables.number), len(tables.clause_term))
-    return place_type(max(tallest, len(tables.places.clause), len(tables.label)))
+        yield text.replace("TAKE_AXES\n", axes).replace("AT ", f"{kind} ")
 
 
 def _data(tables: Tables, numbers: CNumbers) -> Iterator[str]:
     places = tables.places
-    for name, size in (
-        ("RULES", len(tables.label)),
-        ("PLACES", len(places.clause)),
-        ("DEPTH", max(places.depth)),
-        ("CLAUSES", len(tables.negated)),
-    ):
-        if name != "RULES":  # declared already
-            yield f"#define NAME_{name} {size}u\n"
+    yield f"#define NAME_PLACES {len(places.clause)}u\n"
+    yield f"#define NAME_DEPTH {max(places.depth)}u\n"
+    yield f"#define NAME_CLAUSES {len(tables.negated)}u\n"
     about = "The numbers of ends of plateaus, of sides of sets, and of points."
     yield "\n"
     if tables.kind:

@@ -97,7 +97,11 @@ def write(
     remarks: list[str] = []
     facts = ""
     if isinstance(model, RuleBase):
-        _check_scores(scores)
+        if scores == "winner":
+            raise LossError(
+                "FCL activates all rules, and not the strongest alone; "
+                "pass scores=rule or scores=class"
+            )
         always: Always = "any" if words.has_hedges else "term"
         rules, lost = pointed(model, tolerance)
         losses += [*cast_losses(model, scores), *lost]
@@ -135,14 +139,6 @@ def write(
     remarks += _remarks(system, names, words)
     text = "\n".join(lines) + "\n"
     return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
-
-
-def _check_scores(scores: Scores) -> None:
-    if scores == "winner":
-        raise LossError(
-            "FCL activates all rules, and not the strongest alone; "
-            "pass scores=rule or scores=class"
-        )
 
 
 def _comment(text: str, words: FclWords) -> str:

@@ -214,7 +214,7 @@ def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
     groups: dict[str, list[Condition]] = {}
     parts = [_simple(one) for one in operands(condition, terms.system.blocks[0])]
     if terms.dialect != "fuzzylite":
-        plain = [part for part in parts if not _is_always_true(part)]
+        plain = [p for p in parts if not (isinstance(p, Is) and p.hedges == ("any",))]
         if not plain or (is_or and len(plain) < len(parts)):
             return _codes(None, terms)
         parts = plain
@@ -236,10 +236,6 @@ def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
                 raise LossError(f"{terms.dialect} has no way to say {hedges!r}")
         codes[name] = code or terms.joined(parts, is_or=is_or)
     return {name: code for name, code in codes.items() if code != "0"}
-
-
-def _is_always_true(part: Condition) -> bool:
-    return isinstance(part, Is) and part.hedges == ("any",)
 
 
 def _simple(condition: Condition) -> Condition:

@@ -240,7 +240,9 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
         yield f"OutputVariable: {names.variables[output.name]}"
         yield from _common(output)
         yield f"  aggregation: {_S_WORDS[output.aggregation]}"
-        yield f"  defuzzifier: {_defuzzifier(output)}"
+        how = output.defuzzifier
+        rest = weighted_type(output) if how.is_weighted else str(how.samples)
+        yield f"  defuzzifier: {_METHOD_WORDS[how.method]} {rest}"
         default = math.nan if output.default is None else output.default
         yield f"  default: {float(default)!r}"
         yield "  lock-previous: false"
@@ -271,12 +273,6 @@ def _terms(variable: SystemInput | SystemOutput, names: FileNames) -> Iterator[s
     for label in variable.labels:
         name = names.labels[variable.name][label.name]
         yield f"  term: {name} {_term_text(variable, label, names.variables.accepted)}"
-
-
-def _defuzzifier(output: SystemOutput) -> str:
-    how = output.defuzzifier
-    rest = weighted_type(output) if how.is_weighted else str(how.samples)
-    return f"{_METHOD_WORDS[how.method]} {rest}"
 
 
 def _activation(activation: Activation) -> str:

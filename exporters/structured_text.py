@@ -299,6 +299,11 @@ def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Writt
             f"it needs {', '.join(lacking)}"
         )
     body = [*steps.statements(), *_results(system, steps, names)]
+    nothing = [
+        f"    {names[output.name]} := {numbers.literal(0.0)};\n"
+        f"    is_number[{number}] := FALSE;\n"
+        for number, output in enumerate(system.outputs, 1)
+    ]
     local = ["    is_known : BOOL;\n    k : DINT;\n"]
     local += [f"    {one} : {kind};\n" for one, kind in steps.declared.items()]
     lines = [
@@ -308,7 +313,7 @@ def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Writt
         "\n",
         *known_inputs(inputs, numbers),
         "IF NOT is_known THEN\n    status := 3;\n",
-        *_nothing(system, names, numbers),
+        *nothing,
         "ELSE\n",
         *body,
     ]
@@ -347,12 +352,6 @@ def _declared(
     for one in variables:
         about = f"{one.name} ({one.unit})" if one.unit else one.name
         yield f"    {names[one.name]} : {numbers.name}; (* {remark(about)} *)\n"
-
-
-def _nothing(system: FuzzySystem, names: NameMap, numbers: StNumbers) -> Iterator[str]:
-    for number, output in enumerate(system.outputs, 1):
-        yield f"    {names[output.name]} := {numbers.literal(0.0)};\n"
-        yield f"    is_number[{number}] := FALSE;\n"
 
 
 def _results(system: FuzzySystem, steps: SystemSteps, names: NameMap) -> Iterator[str]:
