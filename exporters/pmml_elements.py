@@ -110,7 +110,8 @@ class Functions:
                 result = constant(1.0)
                 if high is not None:
                     beyond = self._flank(right, x)
-                    result = apply("if", _above(x, high), beyond, result)
+                    is_above = apply("greaterThan", x, constant(high))
+                    result = apply("if", is_above, beyond, result)
                 if low is not None:
                     below = self._flank(left, x)
                     result = apply("if", _up_to(x, low), below, result)
@@ -272,7 +273,3 @@ def _horner(names: Sequence[str], x: XmlElement) -> XmlElement:
 
 def _up_to(x: XmlElement, value: float) -> XmlElement:
     return apply("lessOrEqual", x, constant(value))
-
-
-def _above(x: XmlElement, value: float) -> XmlElement:
-    return apply("greaterThan", x, constant(value))

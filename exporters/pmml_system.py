@@ -137,17 +137,16 @@ class SystemFields:
             case "total":
                 return [self._total(place, operands[0])]
             case "running":
-                return self._running(place, operands[0])
+                return self._running(place, "add", operands[0])
             case "last":
                 return operands[0][-1:]
             case "highest" | "lowest":
                 operation = "maximum" if step.operation == "highest" else "minimum"
-                return [self._carried(place, operation, operands[0])]
+                return self._running(place, operation, operands[0])[-1:]
             case "below" | "pick":
-                one = operands[0]
                 return [
                     self._field(f"{place} {k}", _table(step, value), "number")
-                    for k, value in enumerate(one)
+                    for k, value in enumerate(operands[0])
                 ]
             case _:
                 return [
@@ -195,16 +194,11 @@ class SystemFields:
             level = added
         return level[0]
 
-    def _running(self, place: int, samples: list[Value]) -> list[Value]:
+    def _running(self, place: int, operation: str, samples: list[Value]) -> list[Value]:
+        """Return an operation on the samples up to each."""
         result = samples[:1]
         for k, one in enumerate(samples[1:]):
-            result.append(self._one(f"{place} {k}", "add", [result[-1], one]))
-        return result
-
-    def _carried(self, place: int, operation: str, samples: list[Value]) -> Value:
-        result = samples[0]
-        for k, one in enumerate(samples[1:]):
-            result = self._one(f"{place} {k}", operation, [result, one])
+            result.append(self._one(f"{place} {k}", operation, [result[-1], one]))
         return result
 
     def _define(self, operation: str) -> None:

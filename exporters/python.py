@@ -331,17 +331,15 @@ def parameters(names: Sequence[str]) -> tuple[str, ...]:
 
 def _doors(inputs: Sequence[Variable], *, has_strengths: bool) -> Iterator[str]:
     names = parameters([variable.name for variable in inputs])
-    yield from _door("decide", "class, number of the rule and status", "[:3]", names)
-    if has_strengths:
-        yield from _door("strengths", "the strength of every rule", "[3]", names)
-
-
-def _door(name: str, what: str, part: str, names: Sequence[str]) -> Iterator[str]:
     takes = ", ".join(["*", *names]) if names else ""
-    prediction = "".join(f"{n}, " for n in names).strip()
-    yield f"\n\ndef {name}({takes}):\n"
-    yield f'    """Return {what}; each input is given by name."""\n'
-    yield f"    return answer(({prediction})){part}\n"
+    values = "".join(f"{n}, " for n in names).strip()
+    doors = [("decide", "class, number of the rule and status", "[:3]")]
+    if has_strengths:
+        doors.append(("strengths", "the strength of every rule", "[3]"))
+    for name, what, part in doors:
+        yield f"\n\ndef {name}({takes}):\n"
+        yield f'    """Return {what}; each input is given by name."""\n'
+        yield f"    return answer(({values})){part}\n"
 
 
 def _examples(model: Model) -> Iterator[str]:
