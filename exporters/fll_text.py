@@ -59,7 +59,8 @@ def speakable(block: RuleBlock) -> RuleBlock:
     Raises:
         LossError: If a rule has a NOT that other norms keep where it is.
     """
-    if not any(_has_joined_not(rule.when) for rule in block.rules):
+    joined = (And, Or, Not)
+    if not any(has_not(rule.when, of=joined) for rule in block.rules):
         return block
     kinds = {kind for rule in block.rules for kind in joints(rule.when)}
     conjunction = block.conjunction if And in kinds else "minimum"
@@ -67,7 +68,7 @@ def speakable(block: RuleBlock) -> RuleBlock:
     is_exact = (conjunction, disjunction) == ("minimum", "maximum")
     rules: list[SystemRule] = []
     for number, rule in enumerate(block.rules, 1):
-        if _has_joined_not(rule.when) and rule.when is not None:
+        if rule.when is not None and has_not(rule.when, of=joined):
             if not is_exact:
                 raise LossError(
                     f"rule {number} has a NOT of several conditions, which FLL can "
@@ -80,7 +81,9 @@ def speakable(block: RuleBlock) -> RuleBlock:
     )
 
 
-def has_not(condition: Condition | None, *, of: type = object) -> bool:
+def has_not(
+    condition: Condition | None, *, of: type | tuple[type, ...] = object
+) -> bool:
     """Return whether a condition has a NOT that is no hedge, of a kind of condition."""
     match condition:
         case And(parts=parts) | Or(parts=parts):
@@ -89,10 +92,6 @@ def has_not(condition: Condition | None, *, of: type = object) -> bool:
             return isinstance(part, of) or has_not(part, of=of)
         case _:
             return False
-
-
-def _has_joined_not(condition: Condition | None) -> bool:
-    return any(has_not(condition, of=kind) for kind in (And, Or, Not))
 
 
 def _pushed(condition: Condition, nots: int) -> Condition:

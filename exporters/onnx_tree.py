@@ -36,8 +36,7 @@ class OnnxTreeTest(msgspec.Struct, frozen=True):
 
     variable: str
     cut: float
-    left: int
-    right: int
+    ways: tuple[int, int]
 
 
 def tree_graph(
@@ -122,8 +121,7 @@ def cut_tests(tree: FuzzyTree) -> list[OnnxTreeTest]:
             )
             todo += [span for span in (left, right) if span[0] < span[1]]
         tests += [
-            OnnxTreeTest(node.variable, cut, *ways[i])
-            for i, cut in enumerate(node.cuts)
+            OnnxTreeTest(node.variable, cut, ways[i]) for i, cut in enumerate(node.cuts)
         ]
     return tests
 
@@ -151,10 +149,10 @@ def _ensemble(
         targets[parent, is_left] = (len(order), 0)
         number = len(order)
         order.append(way)
-        todo.append((tests[way].left, number, True))
-        todo.append((tests[way].right, number, False))
-    left = [targets[number, True] for number in range(len(order))]
-    right = [targets[number, False] for number in range(len(order))]
+        left, right = tests[way].ways
+        todo += [(left, number, True), (right, number, False)]
+    yes = [targets[number, True] for number in range(len(order))]
+    no = [targets[number, False] for number in range(len(order))]
     ordered = [tests[position] for position in order]
     cuts = rounded([test.cut for test in ordered], numbers.axis)
     leaf = graph.node(
@@ -169,10 +167,10 @@ def _ensemble(
         nodes_featureids=[place[test.variable] for test in ordered],
         nodes_modes=_tensor(np.zeros(len(ordered), np.uint8)),
         nodes_splits=_tensor(cuts),
-        nodes_truenodeids=[node for node, _ in left],
-        nodes_trueleafs=[is_leaf for _, is_leaf in left],
-        nodes_falsenodeids=[node for node, _ in right],
-        nodes_falseleafs=[is_leaf for _, is_leaf in right],
+        nodes_truenodeids=[node for node, _ in yes],
+        nodes_trueleafs=[is_leaf for _, is_leaf in yes],
+        nodes_falsenodeids=[node for node, _ in no],
+        nodes_falseleafs=[is_leaf for _, is_leaf in no],
         leaf_targetids=[0] * len(leaves),
         leaf_weights=_tensor(np.array(leaves, numbers.axis)),
     )
@@ -193,7 +191,7 @@ def _walk(
 ) -> str:
     """Add one step for each level; a row that has reached its leaf stays there."""
     count = len(tests)
-    leaves = 1 + max(-way for q in tests for way in (q.left, q.right))
+    leaves = 1 + max(-way for q in tests for way in q.ways)
 
     def state(way: int) -> int:
         return way if way >= 0 else count - way
@@ -203,11 +201,13 @@ def _walk(
     cuts = rounded([q.cut for q in tests] + [0.0] * leaves, graph.types.axis)
     place = graph.numbers(places, "variables")
     cut = graph.constant(cuts, "cuts")
-    left = graph.numbers([*(state(q.left) for q in tests), *own], "left")
-    right = graph.numbers([*(state(q.right) for q in tests), *own], "right")
+    left, right = (
+        graph.numbers([*(state(q.ways[k]) for q in tests), *own], name)
+        for k, name in enumerate(("left", "right"))
+    )
     value = graph.take(frame.block, [places[start]])
     here = graph.node("Less", graph.constant(cuts[[start]], "cut"), value)
-    there = [graph.numbers([state(w)], "way") for w in _ways(tests[start])]
+    there = [graph.numbers([state(w)], "way") for w in tests[start].ways]
     here = graph.node("Where", here, there[1], there[0])
     for _ in range(_depth(tests, start) - 1):
         column = graph.node("Gather", place, here, axis=0)
@@ -219,14 +219,10 @@ def _walk(
     return graph.node("Sub", flat, graph.constant(np.array(count), "questions"))
 
 
-def _ways(test: OnnxTreeTest) -> tuple[int, int]:
-    return test.left, test.right
-
-
 def _depth(tests: Sequence[OnnxTreeTest], start: int) -> int:
     """Return how many tests the longest path has."""
     level, depth = {start}, 0
     while level:
         depth += 1
-        level = {w for p in level for w in _ways(tests[p]) if w >= 0}
+        level = {w for p in level for w in tests[p].ways if w >= 0}
     return depth
