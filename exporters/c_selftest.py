@@ -33,7 +33,7 @@ def _examples(file: CModel) -> Iterator[tuple[list[float], list[str]]]:
         else:
             with np.errstate(over="ignore"):
                 values = {k: float(np.float32(value)) for k, value in row.items()}
-            answer = computed(file, values)
+            answer = answer_of_tables(file, values)
         label = number_of(answer.label, model)
         ends = [str(label), str(answer.rule), str(int(answer.status))]
         if file.tables:
@@ -154,7 +154,7 @@ Real = np.float64 | np.float32
 
 
 @np.errstate(all="ignore")
-def computed(file: CModel, row: Row) -> Answer:
+def answer_of_tables(file: CModel, row: Row) -> Answer:
     """Return the prediction of the tables of a file in their number type."""
     model, tables = file.model, file.tables
     values = _axis_values(file, row)
@@ -249,14 +249,14 @@ def _atom(tables: Tables, atom: int, x: Real, numbers: CNumbers) -> Real:
             return one
         if count == 0:
             return zero
-        q = _held((x - n[1]) / n[2], zero, one)
-        return _held(_curve(n[3:], q) * q, zero, numbers.kind(numbers.below_one))
+        q = _clamped((x - n[1]) / n[2], zero, one)
+        return _clamped(_curve(n[3:], q) * q, zero, numbers.kind(numbers.below_one))
     if kind == POINTS:
         return _line(n[:count], n[count:], x, numbers)
-    u = _held((x - n[0]) / n[1], zero, n[2])
+    u = _clamped((x - n[0]) / n[1], zero, n[2])
     t = min(u, one)
-    body = _held(one - t * _curve(n[4:], numbers.kind(2) * t - one), zero, one)
-    w = _held((n[2] - u) / n[3], zero, one)
+    body = _clamped(one - t * _curve(n[4:], numbers.kind(2) * t - one), zero, one)
+    w = _clamped((n[2] - u) / n[3], zero, one)
     square = w * w
     return body * (square * square)
 
@@ -271,9 +271,9 @@ def _line(
     if degrees[near] == degrees[far]:
         return degrees[near]
     largest = numbers.kind(numbers.largest)
-    width = _held(values[far] - values[near], -largest, largest)
+    width = _clamped(values[far] - values[near], -largest, largest)
     result = degrees[near] + (x - values[near]) / width * (degrees[far] - degrees[near])
-    return _held(result, *sorted((degrees[near], degrees[far])))
+    return _clamped(result, *sorted((degrees[near], degrees[far])))
 
 
 def _curve(coefficients: Sequence[Real], x: Real) -> Real:
@@ -283,5 +283,5 @@ def _curve(coefficients: Sequence[Real], x: Real) -> Real:
     return total
 
 
-def _held(value: Real, low: Real, high: Real) -> Real:
+def _clamped(value: Real, low: Real, high: Real) -> Real:
     return min(max(value, low), high)

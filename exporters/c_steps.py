@@ -303,7 +303,7 @@ class CSteps(StepText):
         yield f"    const name_real v{place} = name_total("
         yield f"s{source}, {count}u, h{place}, {half}u);\n"
 
-    def called(self, step: Step, operands: Sequence[str]) -> str:
+    def call(self, step: Step, operands: Sequence[str]) -> str:
         """Return a step as the call of a function of math.h, or of a helper."""
         self.needs.add(step.operation)
         if step.operation in self.library:

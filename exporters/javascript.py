@@ -15,7 +15,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
-from fuzzytree.exporters.js_system import named, system_parts
+from fuzzytree.exporters.js_system import entry_of, system_parts
 from fuzzytree.exporters.js_text import (
     AS_MODULE,
     AS_SCRIPT,
@@ -122,7 +122,7 @@ def _body(model: Document) -> Iterator[str]:
         for v in model.variables
         if v.parts
     )
-    yield from table("INPUTS", map(named, inputs))
+    yield from table("INPUTS", map(entry_of, inputs))
     yield from table("CLASSES", (f"{text_of(label)}," for label in model.classes))
     yield f"const WHEN_MISSING = {literal(model.semantics.missing)};\n"
     yield "\n/* Place of an input, weight and centre of each part. */"

@@ -46,8 +46,8 @@ def system_parts(system: FuzzySystem, rows: str) -> Iterator[str]:
     activations = ", ".join(map(steps.value, program.of("activation")))
     (status,) = program.of("status")
     columns = [one for one in system.inputs if not one.parts]
-    yield from table("INPUTS", map(named, columns))
-    yield from table("OUTPUTS", map(named, system.outputs))
+    yield from table("INPUTS", map(entry_of, columns))
+    yield from table("OUTPUTS", map(entry_of, system.outputs))
     for numbers, name in steps.tables.items():
         yield f"\nconst {name} = {numbers};\n"
     yield rows
@@ -67,7 +67,7 @@ def system_parts(system: FuzzySystem, rows: str) -> Iterator[str]:
     yield _TEST
 
 
-def named(one: Variable | SystemInput | SystemOutput) -> str:
+def entry_of(one: Variable | SystemInput | SystemOutput) -> str:
     """Return the entry of a variable in a table of names."""
     unit = f" // {text_of(one.unit)}" if one.unit else ""
     return f"{text_of(one.name)},{unit}"
@@ -264,7 +264,7 @@ class JsSteps(StepText):
         self.needs.add("samples")
         return f"samples({step.samples}, (i) => {text})"
 
-    def called(self, step: Step, operands: Sequence[str]) -> str:
+    def call(self, step: Step, operands: Sequence[str]) -> str:
         """Return a step as the call of a function of Math, or of a helper."""
         operation = step.operation
         if operation in _LIBRARY:

@@ -40,7 +40,7 @@ def derived(name: str, expression: XmlElement) -> XmlElement:
     return element("DerivedField", expression, name=name, **NUMBER)
 
 
-def defined(
+def definition(
     name: str,
     parameters: Mapping[str, Mapping[str, str]],
     body: XmlElement,
@@ -61,7 +61,7 @@ def schema(inputs: Iterable[str], target: str) -> XmlElement:
     return element("MiningSchema", *fields, target_field)
 
 
-def halved(
+def bisection(
     x: XmlElement,
     last: int,
     limit: Callable[[int], float],
@@ -149,7 +149,9 @@ class Functions:
 
     def _define(self, name: str, parameters: Sequence[str], body: XmlElement) -> str:
         if name not in self.defined:
-            self.defined[name] = defined(name, dict.fromkeys(parameters, NUMBER), body)
+            self.defined[name] = definition(
+                name, dict.fromkeys(parameters, NUMBER), body
+            )
         return name
 
     def _clipped(self, value: XmlElement, high: XmlElement) -> XmlElement:
@@ -204,7 +206,7 @@ class Functions:
         if count == 1:
             return constant(points.degrees[0])
         # Of places 0 (up to the first point), 1, ..., count (behind the last one).
-        return halved(
+        return bisection(
             x, count, values.__getitem__, lambda place: self._line(points, place, x)
         )
 

@@ -19,9 +19,9 @@ from fuzzytree.exporters.pmml_elements import (
     NUMBER,
     TRUTH,
     apply,
+    bisection,
     constant,
-    defined,
-    halved,
+    definition,
     joined,
     ref,
 )
@@ -208,7 +208,7 @@ class SystemFields:
         known = OPERATIONS[operation]
         kinds = {"number": NUMBER, "truth": TRUTH}
         takes = dict(zip("abc", (kinds[one] for one in known.takes), strict=False))
-        self.functions[operation] = defined(
+        self.functions[operation] = definition(
             _own(operation), takes, _body(operation, takes), kinds[known.gives]
         )
 
@@ -283,10 +283,12 @@ def _table(step: Step, value: Value) -> XmlElement:
     table, x = step.table, _expression(value)
     if step.operation == "pick":
         numbers: Sequence[float] = table
-        whole = halved(
+        whole = bisection(
             x, len(table) - 1, lambda k: k + 0.5, lambda k: constant(table[k])
         )
     else:
         numbers = (0.0,)
-        whole = halved(x, len(table), table.__getitem__, lambda k: constant(float(k)))
+        whole = bisection(
+            x, len(table), table.__getitem__, lambda k: constant(float(k))
+        )
     return apply("if", apply("isMissing", x), constant(numbers[0]), whole)

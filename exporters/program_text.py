@@ -112,7 +112,7 @@ class StepText:
         """Return a step's result as an expression; of samples, the i-th."""
         raise NotImplementedError
 
-    def called(self, step: Step, operands: Sequence[str]) -> str:
+    def call(self, step: Step, operands: Sequence[str]) -> str:
         """Return a step as the call of a function."""
         raise NotImplementedError
 
@@ -129,7 +129,7 @@ class StepText:
             case operation if operation in self.signs:
                 return f"{operands[0]} {self.signs[operation]} {operands[1]}"
             case _:
-                return self.called(step, operands)
+                return self.call(step, operands)
 
 
 def answer_of(model: Model, row: Row) -> Answer:

@@ -78,7 +78,7 @@ class StSteps:
         """Return a constant in the type of the file; 0 where it is NaN."""
         return 0.0 if math.isnan(value) else self.numbers.nearest(value)
 
-    def computed(
+    def assignment(
         self, name: str, operation: str, operands: Sequence[str]
     ) -> Iterator[str]:
         """Yield what sets a variable to the result of an operation without samples."""
@@ -235,20 +235,20 @@ class SystemSteps(StSteps):
         operands = [self.value(argument) for argument in step.arguments]
         odd = self.is_odd(place)
         if operation == "where":
-            yield from self.computed(name, operation, operands)
+            yield from self.assignment(name, operation, operands)
             if place in self.odd:
                 odds = [operands[0], *map(self.is_odd, step.arguments[1:])]
-                yield from self.computed(odd, operation, odds)
+                yield from self.assignment(odd, operation, odds)
             return
         flags = [self.is_odd(a) for a in step.arguments if a in self.odd]
         odds = list(dict.fromkeys(flags))
         if step.kind == "truth":
-            yield from self.computed(name, operation, operands)
+            yield from self.assignment(name, operation, operands)
             for one in odds:  # NaN is neither less than a number nor equal to one
                 yield f"IF {one} THEN {name} := FALSE; END_IF;"
             return
         if place not in self.odd:
-            yield from self.computed(name, operation, operands)
+            yield from self.assignment(name, operation, operands)
             return
         tests = list(odds)
         if operation == "divide" and not self._is_safe(step.arguments[1]):
@@ -259,7 +259,7 @@ class SystemSteps(StSteps):
         yield f"IF {odd} THEN"
         yield f"    {name} := {self.numbers.literal(0.0)};"
         yield "ELSE"
-        for line in self.computed(name, operation, operands):
+        for line in self.assignment(name, operation, operands):
             yield f"    {line}"
         yield "END_IF;"
 
@@ -394,9 +394,9 @@ class RuleSteps(StSteps):
             yield f"{name} := {self.table(step.table)}[{operands[0]}];"
         elif step.operation in _COMPARED:
             # The first one if they are equal, as in the reference: -0 or 0.
-            yield from self.computed(name, step.operation, operands[::-1])
+            yield from self.assignment(name, step.operation, operands[::-1])
         else:
-            yield from self.computed(name, step.operation, operands)
+            yield from self.assignment(name, step.operation, operands)
 
 
 def decision(rules: RuleBase, numbers: StNumbers) -> Iterator[str]:

@@ -9,7 +9,7 @@ import pytest
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c import FORMAT, write_c
-from fuzzytree.exporters.c_selftest import computed, words_of
+from fuzzytree.exporters.c_selftest import answer_of_tables, words_of
 from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import CModel, tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
@@ -117,7 +117,7 @@ def test_the_tables_of_a_tree_say_what_the_reference_says(seed: int) -> None:
     file = CModel(tree, DOUBLE)
     assert len(file.tests) == sum(len(node.cuts) for node in tree.nodes)
     for row in probes(tree, limit=300):
-        assert computed(file, row) == descend(tree, row)
+        assert answer_of_tables(file, row) == descend(tree, row)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -135,7 +135,7 @@ def test_the_tables_of_rules_say_what_the_reference_says(
     rules = with_points(rules, seed)
     file = CModel(rules, DOUBLE)
     for row in probes(rules, limit=200):
-        answer, right = computed(file, row), evaluate(rules, row)
+        answer, right = answer_of_tables(file, row), evaluate(rules, row)
         assert (answer.rule, answer.status) == (right.rule, right.status)
         if right.status is not Status.MISSING:
             assert answer.strengths == right.strengths
