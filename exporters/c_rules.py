@@ -283,8 +283,8 @@ def rules_code(
 ) -> Iterator[str]:
     """Yield the tables of a rule base and the functions that fire it."""
     yield from _data(tables, numbers)
-    longest = (tables.number, tables.clause_term, tables.places.clause, tables.label)
-    kind = place_type(max(map(len, longest)))
+    tallest = max(len(tables.number), len(tables.clause_term), len(tables.label))
+    kind = place_type(max(tallest, len(tables.places.clause)))
     for template in _functions(tables, numbers):
         text = template.replace("JOIN", "a * b" if is_product else "b < a ? b : a")
         yield text.replace("TAKE_AXES\n", axes).replace("AT ", f"{kind} ")
