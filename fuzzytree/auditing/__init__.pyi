@@ -38,8 +38,8 @@ from .findings.domains import domain_of as domain_of
 from .findings.locations import ModelFile as ModelFile
 from .findings.locations import model_file as model_file
 from .findings.locations import writable as writable
-from .findings.records import Answer as Answer
 from .findings.records import Audit as Audit
+from .findings.records import AuditAnswer as AuditAnswer
 from .findings.records import AuditSelection as AuditSelection
 from .findings.records import AuditSettings as AuditSettings
 from .findings.records import FileLocation as FileLocation

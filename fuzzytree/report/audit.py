@@ -9,8 +9,8 @@ from typing import Final
 
 from fuzzytree.auditing import (
     CODES,
-    Answer,
     Audit,
+    AuditAnswer,
     Bracket,
     Code,
     Declined,
@@ -123,7 +123,9 @@ def audit_lines(
     yield from (line for text in audit.limits for line in _item(text))
 
 
-def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[str]:
+def _short(
+    audit: Audit, findings: Sequence[AuditAnswer], paint: _Paint
+) -> Iterator[str]:
     """Yield the gravest findings, the first with their evidence, and counts."""
     yield _title(audit)
     for result in audit.results:
@@ -226,7 +228,7 @@ def _name(text: str) -> str:
 
 
 def _finding(
-    answer: Answer, audit: Audit, source: Sequence[str], paint: _Paint
+    answer: AuditAnswer, audit: Audit, source: Sequence[str], paint: _Paint
 ) -> Iterator[str]:
     yield from _sentence(answer, audit, paint)
     if answer.places:
@@ -234,7 +236,7 @@ def _finding(
     yield from _evidence(answer, paint)
 
 
-def _sentence(answer: Answer, audit: Audit, paint: _Paint) -> Iterator[str]:
+def _sentence(answer: AuditAnswer, audit: Audit, paint: _Paint) -> Iterator[str]:
     """Yield where a finding is, and what it says."""
     file = audit.file.name if audit.file else ""
     where = str(answer.places[0]) if answer.places else file
@@ -246,7 +248,7 @@ def _sentence(answer: Answer, audit: Audit, paint: _Paint) -> Iterator[str]:
 
 
 def _evidence(
-    answer: Answer, paint: _Paint, *, only: int | None = None
+    answer: AuditAnswer, paint: _Paint, *, only: int | None = None
 ) -> Iterator[str]:
     """Yield how a finding is known: all facts, or only the first few."""
     for title, text in [*_facts(answer)][:only]:
@@ -264,7 +266,7 @@ def _plain(text: str, _: str) -> str:
     return text
 
 
-def _facts(answer: Answer) -> Iterator[tuple[str, str]]:
+def _facts(answer: AuditAnswer) -> Iterator[tuple[str, str]]:
     """Yield how an answer is known, where, and how to find it again."""
     yield state_word(answer.state), state_text(answer.state)
     match answer.state:
@@ -310,7 +312,7 @@ def _quoted(place: FileLocation, source: Sequence[str]) -> Iterator[str]:
     yield f"  {margin} | {' ' * (place.column - 1 - begin)}^"
 
 
-def _counts(answers: Sequence[Answer]) -> Iterator[str]:
+def _counts(answers: Sequence[AuditAnswer]) -> Iterator[str]:
     words = [state_word(answer.state) for answer in answers]
     findings = sum(answer.is_finding for answer in answers)
     counts = [len(answers), findings]
@@ -318,11 +320,11 @@ def _counts(answers: Sequence[Answer]) -> Iterator[str]:
     yield from (str(count) if count else "-" for count in counts)
 
 
-def _gravity(answer: Answer) -> int:
+def _gravity(answer: AuditAnswer) -> int:
     return [*SEVERITIES].index(answer.severity)
 
 
-def _by_severity(findings: Sequence[Answer]) -> str:
+def _by_severity(findings: Sequence[AuditAnswer]) -> str:
     counts = [
         counted(sum(one.severity == severity for one in findings), SEVERITIES[severity])
         for severity in SEVERITIES
@@ -356,7 +358,7 @@ def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
 
 
 def _brief(
-    title: str, answers: Sequence[Answer], paint: _Paint, more: int = 0
+    title: str, answers: Sequence[AuditAnswer], paint: _Paint, more: int = 0
 ) -> Iterator[str]:
     """Yield answers by their sentences, below a title, and how many more there are."""
     if not answers:
@@ -372,7 +374,7 @@ def _brief(
     yield ""
 
 
-def _first(answers: Sequence[Answer]) -> Iterator[Answer]:
+def _first(answers: Sequence[AuditAnswer]) -> Iterator[AuditAnswer]:
     """Yield the first few answers of each code."""
     counts: Counter[str] = Counter()
     for answer in answers:

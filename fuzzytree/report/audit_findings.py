@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 from fuzzytree.auditing import (
     CODES,
-    Answer,
+    AuditAnswer,
     AuditView,
     Bracket,
     Severity,
@@ -42,7 +42,7 @@ MOST_FACTS = 8
 _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
 
 
-def anchors(findings: Sequence[Answer]) -> list[str]:
+def anchors(findings: Sequence[AuditAnswer]) -> list[str]:
     """Return a name for each finding by which links find it: its id if it has one."""
     names: dict[str, None] = {}
     for place, answer in enumerate(findings, 1):
@@ -51,14 +51,14 @@ def anchors(findings: Sequence[Answer]) -> list[str]:
     return [*names]
 
 
-def gravest_first(findings: Sequence[Answer]) -> list[Answer]:
+def gravest_first(findings: Sequence[AuditAnswer]) -> list[AuditAnswer]:
     """Return findings by severity, then by code, else in their order."""
     order = {severity: place for place, severity in enumerate(SEVERITIES)}
     return sorted(findings, key=lambda one: (order[one.severity], one.code))
 
 
 def findings_section(
-    findings: Sequence[Answer], scene: Scene, accepted: Collection[str] = ()
+    findings: Sequence[AuditAnswer], scene: Scene, accepted: Collection[str] = ()
 ) -> Markup:
     """Return all findings, the gravest first, those of one code together."""
     names = anchors(findings)
@@ -96,7 +96,7 @@ def findings_section(
 class ShownFinding(NamedTuple):
     """A finding as the page shows it; links find it by its name."""
 
-    answer: Answer
+    answer: AuditAnswer
     name: str
     is_accepted: bool
     is_whole: bool
@@ -119,12 +119,12 @@ def _explanations(code: str) -> list[tuple[str, str]]:
     return [(title, words) for title, words in texts if words]
 
 
-def facts_section(answers: Sequence[Answer]) -> Markup | None:
+def facts_section(answers: Sequence[AuditAnswer]) -> Markup | None:
     """Return what else is known: answers that are no findings and have numbers.
 
     What rows say of single rules is not among them: it stands in the table of rules.
     """
-    groups: dict[str, list[Answer]] = {}
+    groups: dict[str, list[AuditAnswer]] = {}
     for answer in answers:
         has_numbers = bool(answer.measures or answer.region)
         is_of_rule = answer.code == "FT701" and answer.rules
@@ -145,7 +145,7 @@ def _region_text(region: Sequence[Span], scene: Scene) -> str:
     )
 
 
-def _concerned(answer: Answer, scene: Scene) -> list[str]:
+def _concerned(answer: AuditAnswer, scene: Scene) -> list[str]:
     """Return the rules and terms that a finding is about, in words."""
     viewed = scene.viewed
     rules = viewed.rules.rules if viewed.rules else ()
@@ -184,7 +184,7 @@ class Scene(NamedTuple):
         return self.viewed.rules if is_strongest else None
 
 
-def pictures(answer: Answer, name: str, scene: Scene, drawn: Drawn) -> Markup:
+def pictures(answer: AuditAnswer, name: str, scene: Scene, drawn: Drawn) -> Markup:
     """Return the region as pictures: a bar for each variable, a map of two."""
     point: dict[str, Fraction] = {}
     if isinstance(answer.state, (Witness, Bracket)):
@@ -254,7 +254,7 @@ def _near(values: Mapping[str, Fraction], axis: Axis) -> float | None:
 
 
 def _concerning(
-    answer: Answer,
+    answer: AuditAnswer,
     region: Mapping[str, Span],
     values: Mapping[str, Fraction],
     scene: Scene,
@@ -271,7 +271,7 @@ def _concerning(
     return [scene.axes[one] for one in names if one in scene.axes]
 
 
-def _deciding(answer: Answer, scene: Scene) -> list[tuple[str, RuleBase]]:
+def _deciding(answer: AuditAnswer, scene: Scene) -> list[tuple[str, RuleBase]]:
     """Return whose decisions maps show: those of the tree and of its raw rules."""
     if scene.deciding is None:
         return []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.auditing import Answer, AuditView, Sampled
+from fuzzytree.auditing import AuditAnswer, AuditView, Sampled
 from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
@@ -107,7 +107,7 @@ def _in_words(model: Audited, name: str) -> list[str]:
 
 
 def rules_section(
-    viewed: AuditView, answers: Sequence[Answer], links: Mapping[int, Markup]
+    viewed: AuditView, answers: Sequence[AuditAnswer], links: Mapping[int, Markup]
 ) -> Markup:
     """Return the rules as a table, with what the rows say of each."""
     rules = viewed.rules.rules if viewed.rules else ()
@@ -172,18 +172,18 @@ def _notes(viewed: AuditView) -> Iterator[tuple[str, str]]:
         yield "caption", said + ", ".join(weights[:MOST_RULES])
 
 
-def _of_rows(answer: Answer) -> Iterator[int]:
+def _of_rows(answer: AuditAnswer) -> Iterator[int]:
     """Yield the rule that an answer about rows is about."""
     if answer.code == "FT701" and len(answer.rules) == 1:
         yield answer.rules[0]
 
 
-def _measured(answer: Answer | None, names: Sequence[str]) -> list[str]:
+def _measured(answer: AuditAnswer | None, names: Sequence[str]) -> list[str]:
     known = {one.name: one.value for one in answer.measures} if answer else {}
     return [number(known[name]) if name in known else "-" for name in names]
 
 
-def _confidence(answer: Answer | None) -> str:
+def _confidence(answer: AuditAnswer | None) -> str:
     state = answer.state if answer else None
     if not isinstance(state, Sampled) or "its class" not in state.of:
         return "-"  # a share of something else, such as of the rows that it wins

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.auditing import CODES, Answer, Audit, AuditRows, Declined, view
+from fuzzytree.auditing import CODES, Audit, AuditAnswer, AuditRows, Declined, view
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import ORIGINS, gathered
 from fuzzytree.report.audit_findings import (
@@ -151,7 +151,7 @@ def _policy_text(audit: Audit) -> str:
     return f"AND is {policy.conjunction}; {'; '.join([who, *none])}"
 
 
-def _links(findings: Sequence[Answer]) -> dict[int, Markup]:
+def _links(findings: Sequence[AuditAnswer]) -> dict[int, Markup]:
     """Return links to the findings about each rule, by its number: one for a code."""
     about: dict[int, dict[str, list[str]]] = {}
     for answer, name in zip(findings, anchors(findings), strict=True):
@@ -161,7 +161,7 @@ def _links(findings: Sequence[Answer]) -> dict[int, Markup]:
 
 
 def _questions(audit: Audit) -> Markup:
-    groups: dict[str, list[Answer]] = {}
+    groups: dict[str, list[AuditAnswer]] = {}
     for answer in audit.answers:
         groups.setdefault(answer.code, []).append(answer)
     summary: list[Sequence[str]] = []
@@ -219,7 +219,7 @@ def _repeat(audit: Audit) -> Markup:
     return part("repeat", audit, _command(audit.answers), sources, settings, sides)
 
 
-def _command(answers: Sequence[Answer]) -> str:
+def _command(answers: Sequence[AuditAnswer]) -> str:
     """Return the command of the audit: what the commands of all answers share.
 
     The command of an answer is that of the audit with `--select` and its code.
@@ -251,7 +251,7 @@ def verdict(audit: Audit) -> Markup:
 
 
 def _result(
-    findings: Sequence[Answer], states: Mapping[str, int], *, is_complete: bool
+    findings: Sequence[AuditAnswer], states: Mapping[str, int], *, is_complete: bool
 ) -> tuple[str, str]:
     """Return a sign and a sentence: what was found, and what that is worth."""
     counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
@@ -273,18 +273,18 @@ def _result(
 
 
 def _urgent(
-    findings: Sequence[Answer], named: Sequence[Answer]
-) -> tuple[list[tuple[Answer, str, int]], int]:
+    findings: Sequence[AuditAnswer], named: Sequence[AuditAnswer]
+) -> tuple[list[tuple[AuditAnswer, str, int]], int]:
     """Return errors and warnings, each with its link and how often it stands.
 
     Those that say the same are one. Behind them stands how many more there are.
     """
     listing = {id(one) for one in findings if one.severity != "info"}
-    urgent: dict[tuple[str, str], list[tuple[Answer, str]]] = {}
+    urgent: dict[tuple[str, str], list[tuple[AuditAnswer, str]]] = {}
     for one, name in zip(named, anchors(named), strict=True):
         if id(one) in listing:
             urgent.setdefault((one.code, one.sentence), []).append((one, name))
-    shown: list[tuple[Answer, str, int]] = []
+    shown: list[tuple[AuditAnswer, str, int]] = []
     kinds: Counter[tuple[str, str]] = Counter()
     for alike in urgent.values():
         one, name = alike[0]

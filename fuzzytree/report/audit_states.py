@@ -8,8 +8,8 @@ import msgspec
 
 from fuzzytree.auditing import (
     CODES,
-    Answer,
     Audit,
+    AuditAnswer,
     Bracket,
     Claim,
     Declined,
@@ -149,7 +149,7 @@ def _level(level: str | None) -> str:
         return level
 
 
-def known_as(answers: Sequence[Answer]) -> dict[str, int]:
+def known_as(answers: Sequence[AuditAnswer]) -> dict[str, int]:
     """Return how many answers have each state, in the order of `STATES`."""
     counts = dict.fromkeys(STATES, 0)
     for answer in answers:

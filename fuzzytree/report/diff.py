@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from fuzzytree.auditing import (
-    Answer,
+    AuditAnswer,
     Change,
     ComparedModel,
     Difference,
@@ -99,7 +99,7 @@ def _model_text(title: str, model: ComparedModel) -> str:
     return printable(f"{title:8} {of}{model.form} {model.name!r}")
 
 
-def _answer_lines(answer: Answer, *, has_point: bool) -> Iterator[str]:
+def _answer_lines(answer: AuditAnswer, *, has_point: bool) -> Iterator[str]:
     word = state_word(answer.state)
     yield from wrapped(answer.sentence, WIDTH, f"  {word:8} ", _INDENT)
     if not has_point:

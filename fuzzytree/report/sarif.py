@@ -11,8 +11,8 @@ import msgspec
 
 from fuzzytree.auditing import (
     CODES,
-    Answer,
     Audit,
+    AuditAnswer,
     Code,
     Declined,
     FileLocation,
@@ -80,7 +80,7 @@ def _words(title: str) -> list[str]:
 
 
 def _result(
-    answer: Answer,
+    answer: AuditAnswer,
     audit: Audit,
     baseline: Mapping[str, str] | None,
     codes: list[str],
@@ -191,7 +191,7 @@ def annotation_lines(audit: Audit) -> Iterator[str]:
         yield f"::notice title=audit declined::nothing is known: first, {said}"
 
 
-def _annotation(answer: Answer, audit: Audit) -> str:
+def _annotation(answer: AuditAnswer, audit: Audit) -> str:
     properties: dict[str, object] = {}
     if answer.places:
         place = answer.places[0]

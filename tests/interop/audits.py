@@ -16,8 +16,8 @@ from fuzzytree.api.verbs import audited_rows
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import (
-    Answer,
     Audit,
+    AuditAnswer,
     AuditSelection,
     AuditSettings,
 )
@@ -216,7 +216,7 @@ def by_hand(found: Sequence[Case]) -> Iterator[str]:
         yield f"  {one.words}"
 
 
-def _state(answer: Answer) -> str:
+def _state(answer: AuditAnswer) -> str:
     return str(answer.state.__struct_config__.tag)
 
 

@@ -19,8 +19,8 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.records import (
     LIMITS,
-    Answer,
     Audit,
+    AuditAnswer,
     AuditSettings,
     FileLocation,
     Measure,
@@ -46,7 +46,7 @@ AGAIN = "fuzzytree audit grip.yaml --select "
 def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Audit:
     """Return an audit with all five states, of a file of any name."""
     answers = (
-        Answer(
+        AuditAnswer(
             "FT101",
             "rule 2",
             said,
@@ -58,7 +58,7 @@ def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Aud
             repeat=f"{AGAIN}FT101",
             id="FT101-00000001",
         ),
-        Answer(
+        AuditAnswer(
             "FT202",
             "rules 1 and 2",
             "rules 1 and 2 are equally strong on a part of the domain",
@@ -70,7 +70,7 @@ def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Aud
             measures=(Measure("width", 0.25, "1/4", "N"),),
             id="FT202-00000002",
         ),
-        Answer(
+        AuditAnswer(
             "FT301",
             "coverage",
             "how weak the weakest cover is was not settled",
@@ -79,7 +79,7 @@ def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Aud
             "info",
             id="FT301-00000003",
         ),
-        Answer(
+        AuditAnswer(
             "FT401",
             "term 'low' of 'force'",
             "the term 'low' of 'force' is not decided",
@@ -88,7 +88,7 @@ def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Aud
             terms=(TermName("force", "low"),),
             id="FT401-00000004",
         ),
-        Answer(
+        AuditAnswer(
             "FT701",
             "rule 1",
             "rule 1 wins 3 of 4 rows",

@@ -21,8 +21,8 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.records import (
     LIMITS,
-    Answer,
     Audit,
+    AuditAnswer,
     AuditSettings,
     FileLocation,
     Measure,
@@ -67,12 +67,12 @@ def rule_base(pressure: str = "pressure", firm: str = "firm") -> RuleBase:
     return RuleBase("grip", ("loose", firm, "hard"), inputs, rules, Semantics())
 
 
-def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
+def answers(pressure: str = "pressure") -> tuple[AuditAnswer, ...]:
     """Return one answer of each state, five of them findings, and rows of each rule."""
     half = coordinates({pressure: Fraction(5), "area": Fraction(50)})
     third = coordinates({pressure: Fraction(26, 3), "area": Fraction(90)})
     return (
-        Answer(
+        AuditAnswer(
             "FT101",
             "rule 4",
             "rule 4 never wins: wherever it fires rule 2 is at least as strong",
@@ -85,7 +85,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             repeat="fuzzytree audit grip.yaml --select FT101",
             id="FT101-9f2c11ab",
         ),
-        Answer(
+        AuditAnswer(
             "FT101",
             "rule 3",
             "rule 3 wins somewhere",
@@ -94,7 +94,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             rules=(3,),
             repeat="fuzzytree audit grip.yaml --select FT101",
         ),
-        Answer(
+        AuditAnswer(
             "FT201",
             "rules 2 and 3",
             "rules 2 and 3 both reach about a third",
@@ -104,7 +104,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             repeat="fuzzytree audit grip.yaml --select FT201",
             id="FT201-00000001",
         ),
-        Answer(
+        AuditAnswer(
             "FT301",
             "the domain",
             f"no rule reaches 0.1 where {pressure!r} is high",
@@ -115,7 +115,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             repeat="fuzzytree audit grip.yaml --select FT301",
             id="FT301-00000002",
         ),
-        Answer(
+        AuditAnswer(
             "FT403",
             pressure,
             f"'low' and 'medium' of {pressure!r} are hard to distinguish",
@@ -125,7 +125,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             repeat="fuzzytree audit grip.yaml --select FT403",
             id="FT403-00000003",
         ),
-        Answer(
+        AuditAnswer(
             "FT601",
             "the ONNX graph",
             "the rules were not held against their graph",
@@ -134,7 +134,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             repeat="fuzzytree audit grip.yaml --select FT601",
         ),
         *(
-            Answer(
+            AuditAnswer(
                 "FT701",
                 f"rule {k}",
                 f"rule {k} won {7 * k} rows",
@@ -150,7 +150,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
 
 
 def audit_of(
-    model: RuleBase, found: tuple[Answer, ...] | None = None, **fields: Any
+    model: RuleBase, found: tuple[AuditAnswer, ...] | None = None, **fields: Any
 ) -> Audit:
     """Return an audit with the given answers, or with those of `answers`.
 

@@ -15,7 +15,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.states import Declined, Proved
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking.stability.results import Stability, Trial
 from fuzzytree.model.agreement import Agreement, Comparison
@@ -200,7 +200,7 @@ def test_the_rules_say_how_often_they_fired_and_link_to_their_findings() -> None
 
 
 def test_what_else_is_known_is_reported_with_its_numbers() -> None:
-    size = Answer(
+    size = AuditAnswer(
         "FT501",
         "the rule base",
         "4 rules with 7 clauses",
@@ -239,7 +239,7 @@ def test_no_name_becomes_markup() -> None:
 
 
 def test_sentences_places_and_ids_of_a_hostile_audit_do_not_become_markup() -> None:
-    evil = Answer(
+    evil = AuditAnswer(
         EVIL,
         EVIL,
         EVIL,

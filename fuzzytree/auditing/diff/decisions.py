@@ -39,7 +39,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.domains import inputs_of
-from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.model import (
@@ -109,13 +109,13 @@ def decisions(
     rows: AuditRows | None,
     settings: AuditSettings,
     clock: Clock,
-) -> tuple[list[Answer], DecisionEvidence]:
+) -> tuple[list[AuditAnswer], DecisionEvidence]:
     """Return what is known of decisions, and how those that differ come about."""
     whole = _same_everywhere(pair)
     if whole is not None:
         return [whole], DecisionEvidence(is_equal=True)
     differences = _Differences(pair, clock.share(_POINTS))
-    answers: list[Answer] = []
+    answers: list[AuditAnswer] = []
     if rows is not None:
         answers.append(_on_rows(rows, differences))
     values = sample_points(
@@ -161,7 +161,7 @@ def _alike(pair: RulePair, clock: Clock) -> State:
     return state
 
 
-def _same_everywhere(pair: RulePair) -> Answer | None:
+def _same_everywhere(pair: RulePair) -> AuditAnswer | None:
     """Return that both perform the same operations on the same numbers, if they do."""
     old, new = pair.old, pair.new
     faults = [*proof_faults(old, new), *unguarded(old, new), *unguarded(new, old)]
@@ -174,7 +174,7 @@ def _same_everywhere(pair: RulePair) -> Answer | None:
 _EQUAL = "both models decide alike"
 
 
-def _equal_answer(pair: RulePair, state: State) -> Answer:
+def _equal_answer(pair: RulePair, state: State) -> AuditAnswer:
     sentence = f"{_EQUAL} everywhere on the domain"
     old, new = pair.old, pair.new
     if old.semantics.missing != new.semantics.missing or unguarded(old, new):
@@ -187,7 +187,7 @@ def _equal_answer(pair: RulePair, state: State) -> Answer:
     return note("FT801", "decisions", sentence, state)
 
 
-def _on_rows(rows: AuditRows, differences: _Differences) -> Answer:
+def _on_rows(rows: AuditRows, differences: _Differences) -> AuditAnswer:
     hits, count = differences.add(rows.values, name="row")
     of = f"{count} rows"
     if count < rows.values.shape[1]:
@@ -196,23 +196,25 @@ def _on_rows(rows: AuditRows, differences: _Differences) -> Answer:
     state = sampled_share(
         "rows that are classified differently", hits, count, rows.name
     )
-    return Answer("FT801", "rows", sentence, state, hits > 0, severity="error")
+    return AuditAnswer("FT801", "rows", sentence, state, hits > 0, severity="error")
 
 
-def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
+def _drawn_answer(hits: int, rows: int, seed: int) -> AuditAnswer:
     how = f"{rows} points drawn evenly from the domain, seed {seed}"
     state = sampled_share("the domain that is classified differently", hits, rows, how)
     text = f"{hits} of {rows} points drawn from the domain are classified differently"
-    return Answer("FT801", "domain", text, state, hits > 0)
+    return AuditAnswer("FT801", "domain", text, state, hits > 0)
 
 
-def left_out(points: str, reason: str = "the budget was spent") -> Answer:
+def left_out(points: str, reason: str = "the budget was spent") -> AuditAnswer:
     """Return that some points were not compared."""
     text = f"{points} were not looked at: {reason}"
     return note("FT801", "points", text, Declined("FTD03", reason))
 
 
-def _witness_answers(pair: RulePair, differences: _Differences) -> Iterator[Answer]:
+def _witness_answers(
+    pair: RulePair, differences: _Differences
+) -> Iterator[AuditAnswer]:
     """Yield a witness for each pair of classes, the clearest one that is known."""
     known = sorted(differences.witnesses.items(), key=lambda item: str(item[0]))
     for number, (labels, (_, name, found_at)) in enumerate(known[:_MOST_LISTED]):
@@ -235,7 +237,7 @@ def _witness_answers(pair: RulePair, differences: _Differences) -> Iterator[Answ
         point = known[_MOST_LISTED][1][2]
         state = difference_at(pair.old, pair.new, point)
         assert state is not None
-        yield Answer("FT801", "more", sentence, state, True)
+        yield AuditAnswer("FT801", "more", sentence, state, True)
 
 
 def _simple(

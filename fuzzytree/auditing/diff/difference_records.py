@@ -10,7 +10,7 @@ import msgspec
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
 from fuzzytree.auditing.findings.records import (
-    Answer,
+    AuditAnswer,
     AuditSettings,
     FileLocation,
     Measure,
@@ -97,7 +97,7 @@ class Difference(Value, frozen=True):
     domain: Domain
     settings: AuditSettings
     changes: tuple[Change, ...]
-    answers: tuple[Answer, ...]
+    answers: tuple[AuditAnswer, ...]
     format: Literal["fuzzytree-diff/1"] = FORMAT
 
     def __repr__(self) -> str:

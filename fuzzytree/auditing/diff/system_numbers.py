@@ -32,7 +32,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, AuditSettings, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, Measure
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.model import FloatArray, FuzzySystem, SystemRun
@@ -64,7 +64,7 @@ class SystemPair(NamedTuple):
 
 def number_answers(
     pair: SystemPair, rows: AuditRows | None, settings: AuditSettings, clock: Clock
-) -> list[Answer]:
+) -> list[AuditAnswer]:
     """Return what is known of the numbers that two systems have in common."""
     try:
         with enforced(clock):
@@ -128,7 +128,7 @@ def _hows(pair: SystemPair) -> dict[str, _Alike | None]:
     }
 
 
-def _proved(pair: SystemPair, sentence: str, how: str) -> Answer:
+def _proved(pair: SystemPair, sentence: str, how: str) -> AuditAnswer:
     if {*pair.old.columns} != {*pair.new.columns}:
         sentence += ", where no value is missing"
     return note("FT801", "decisions", sentence, Proved(how))
@@ -139,7 +139,7 @@ def _sampled(
     rows: AuditRows | None,
     settings: AuditSettings,
     clock: Clock,
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield how often outputs differ, and what the budget left out."""
     pair = differences.pair
     low, high = ends_of(pair.domain, pair.columns)
@@ -171,7 +171,7 @@ def _sampled(
 
 def _counted(
     differences: _Differences, subject: str, hits: int, rows: int, how: str
-) -> Answer:
+) -> AuditAnswer:
     state = sampled_share(
         "rows in which an output differs", hits, rows, f"{rows} {how}"
     )
@@ -266,7 +266,7 @@ class _Differences:
             numbers.append(run(rows).outputs[[known.index(n) for n in self.outputs]])
         return numbers
 
-    def witness(self, name: str) -> Answer:
+    def witness(self, name: str) -> AuditAnswer:
         """Return where an output differs most, of what was seen."""
         largest = self.largest[name]
         point = {key: Fraction(value) for key, value in largest.row.items()}
@@ -310,7 +310,7 @@ class _Differences:
             return 0.0 if was is now else math.inf
         return float(abs(now - was))
 
-    def bound(self, name: str) -> Answer:
+    def bound(self, name: str) -> AuditAnswer:
         """Return between which numbers the largest difference of an output lies."""
         of = f"the largest difference of {name!r} where both answer a number"
         known = most(self.pair.old, self.pair.new, name, self.pair.domain)

@@ -26,8 +26,8 @@ from fuzzytree.auditing.findings.locations import (
 from fuzzytree.auditing.findings.records import (
     INTERRUPTED,
     LIMITS,
-    Answer,
     Audit,
+    AuditAnswer,
     AuditSelection,
     AuditSettings,
     Policy,
@@ -45,7 +45,7 @@ from fuzzytree.model import (
     version,
 )
 
-FamilyFunction = Callable[[Subject], Iterator[Answer]]
+FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
 
 
 _OF_A_ROW = "FT204"
@@ -152,7 +152,7 @@ def source_of(name: str, content: bytes) -> SourceFile:
 class _Progress(NamedTuple):
     """The answers so far, and by code why it was cut short or not begun."""
 
-    answers: list[Answer]
+    answers: list[AuditAnswer]
     cut: dict[str, str]
 
 
@@ -175,7 +175,7 @@ def _tasks(wanted: set[str], row: Mapping[str, float] | None) -> Iterator[_Task]
             yield _Task(codes, run, family.part)
 
 
-def _answers(place: str, subject: Subject) -> Iterator[Answer]:
+def _answers(place: str, subject: Subject) -> Iterator[AuditAnswer]:
     """Return what a function of a family yields; its module is imported here."""
     module, _, name = place.partition(":")
     family = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
@@ -183,7 +183,7 @@ def _answers(place: str, subject: Subject) -> Iterator[Answer]:
     return cast("FamilyFunction", getattr(family, name))(subject)
 
 
-def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[Answer]:
+def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[AuditAnswer]:
     from fuzzytree.auditing.findings.robustness import row_answers
 
     return row_answers(subject, row)
@@ -215,7 +215,7 @@ def _run_all(
             return
 
 
-def _is_late(answer: Answer) -> bool:
+def _is_late(answer: AuditAnswer) -> bool:
     return isinstance(answer.state, Declined) and answer.state.code == _LATE
 
 
@@ -247,12 +247,12 @@ def _unasked(policy: Policy, wanted: set[str], progress: _Progress) -> Iterator[
 
 
 def _located(
-    answers: Iterable[Answer],
+    answers: Iterable[AuditAnswer],
     wanted: Collection[str],
     viewed: AuditView,
     material: Material,
     repeat: str,
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield the wanted answers with ids, places and the commands that repeat them."""
     kept = sorted((a for a in answers if a.code in wanted), key=lambda a: a.code)
     bounds = viewed.bounds

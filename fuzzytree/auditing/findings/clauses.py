@@ -28,7 +28,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure, TermName
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.auditing.findings.support import sample_points
 from fuzzytree.model import Clause, FloatArray, IntArray, Rule, RuleBase, clause_text
@@ -58,7 +58,7 @@ class _Dropped(NamedTuple):
         return replace(rules, rules=tuple(every))
 
 
-def clause_answers(subject: Subject) -> Iterator[Answer]:
+def clause_answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer for each clause whether some decision changes without it."""
     every = [*_dropped(subject.rules)]
     if not every:
@@ -225,7 +225,7 @@ class _Sample:
         return None
 
 
-def _answer(subject: Subject, one: _Dropped, state: State) -> Answer:
+def _answer(subject: Subject, one: _Dropped, state: State) -> AuditAnswer:
     name = subject.rule_name(one.rule)
     text = f"{clause_text(one.clause)!r}"
     sentence = f"{name} decides the same without {text}"

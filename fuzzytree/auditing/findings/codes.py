@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Final, Literal, TypedDict, Unpack
 
 from fuzzytree.auditing.engine.states import Span, State
-from fuzzytree.auditing.findings.records import Answer, Measure, Severity, TermName
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity, TermName
 from fuzzytree.model import Value
 
 
@@ -394,7 +394,7 @@ CODES: Final = MappingProxyType({code.code: code for code in _CODES})
 
 
 class Details(TypedDict, total=False):
-    """What an answer is about, and its numbers; see `Answer`."""
+    """What an answer is about, and its numbers; see `AuditAnswer`."""
 
     rules: tuple[int, ...]
     terms: tuple[TermName, ...]
@@ -404,17 +404,17 @@ class Details(TypedDict, total=False):
 
 def finding(
     code: str, subject: str, sentence: str, state: State, **details: Unpack[Details]
-) -> Answer:
+) -> AuditAnswer:
     """Return a finding, of the severity of its code."""
     severity = CODES[code].severity
-    return Answer(code, subject, sentence, state, True, severity, **details)
+    return AuditAnswer(code, subject, sentence, state, True, severity, **details)
 
 
 def note(
     code: str, subject: str, sentence: str, state: State, **details: Unpack[Details]
-) -> Answer:
+) -> AuditAnswer:
     """Return what was checked or declined, and is no finding."""
-    return Answer(code, subject, sentence, state, False, **details)
+    return AuditAnswer(code, subject, sentence, state, False, **details)
 
 
 class Family(Value, frozen=True):

@@ -22,13 +22,13 @@ from fuzzytree.auditing.engine.polynomials import (
 )
 from fuzzytree.auditing.engine.states import Proved, counted, short
 from fuzzytree.auditing.findings.codes import note
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges
 from fuzzytree.model import FuzzyTree, RuleBase
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Count rules, clauses and terms, and compute the index of Nauck."""
     rules = subject.rules
     clauses = [len(rule.when) for rule in rules.rules]

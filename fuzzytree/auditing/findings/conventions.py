@@ -23,7 +23,7 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
 )
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import rows_outside, sample_points
 from fuzzytree.checking import ModelRun, labels
@@ -65,7 +65,7 @@ class Convention(NamedTuple):
     left_out: int = 0
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Compare all forms and runtimes where these usually differ.
 
     Raises:
@@ -165,7 +165,7 @@ def _outside(subject: Subject) -> Iterator[tuple[str, float]]:
 
 def convention_answers(
     subject: Subject, question: Convention, results: Sequence[ModelRun]
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield each representation that differs in a question, or that none does.
 
     The first of a form is compared with the first of all, the others with the first of
@@ -186,7 +186,7 @@ def convention_answers(
         yield _alike(question, [one.title for one in results])
 
 
-def _alike(question: Convention, titles: Sequence[str]) -> Answer:
+def _alike(question: Convention, titles: Sequence[str]) -> AuditAnswer:
     name, count = question.name, question.values.shape[1]
     text = f"{name}: {len(titles)} representations answer {count} probes alike"
     if not count:
@@ -218,7 +218,7 @@ def _broken(
     one: ModelRun,
     base: ModelRun,
     rows: IntArray,
-) -> Answer:
+) -> AuditAnswer:
     row = int(rows[0])
     text = f"answers {_said(one, row)} where {base.title} answers {_said(base, row)}"
     answer = _differing(subject, question, one.title, text, rows)
@@ -228,7 +228,7 @@ def _broken(
 
 def _differing(
     subject: Subject, question: Convention, title: str, text: str, rows: IntArray
-) -> Answer:
+) -> AuditAnswer:
     """Return that a representation differs in some probes, and the first of them."""
     values = zip(
         subject.rules.inputs, question.values[:, rows[0]].tolist(), strict=True
@@ -251,7 +251,7 @@ def _said(answers: ModelRun, row: int) -> str:
 # --- systems
 
 
-def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
+def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[AuditAnswer]:
     """Compare a system's runtimes where values are missing, infinite or far away.
 
     How an answer came about must be alike, and which outputs have a number. Numbers
@@ -272,7 +272,7 @@ def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
 
 def system_answers(
     subject: Subject, question: Convention, results: Sequence[tuple[str, SystemOutcome]]
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield what runtimes of a system answer: each that differs, or that none does."""
     first, base = results[0]
     is_alike = True

@@ -27,7 +27,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     bounded_arrangement,
 )
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure, Severity
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.model import BoolArray
 
@@ -38,7 +38,7 @@ _PART = 0.25  # of the time that is left, for one question
 _APART = Proved("they share no curve, and no constant")
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether rules win, lead, are needed, and tie.
 
     Where every rule that fires takes part in the answer: whether it fires.
@@ -59,7 +59,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield from ties.answers()
 
 
-def _firing(subject: Subject, sides: BoundedArrangement) -> Iterator[Answer]:
+def _firing(subject: Subject, sides: BoundedArrangement) -> Iterator[AuditAnswer]:
     """Answer whether each rule fires; a rule of several ways, whether one of them."""
     ways: dict[str, list[int]] = {}
     for number in range(1, len(subject.rules.rules) + 1):
@@ -80,7 +80,7 @@ def _firing(subject: Subject, sides: BoundedArrangement) -> Iterator[Answer]:
         elif isinstance(state, Witness):
             sentence = f"{name} fires"
         rules = (numbers[0],)
-        yield Answer("FT101", name, sentence, state, is_dead, "error", rules)
+        yield AuditAnswer("FT101", name, sentence, state, is_dead, "error", rules)
 
 
 def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
@@ -93,7 +93,7 @@ def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
 
 def _winning(
     subject: Subject, probes: RandomProbes, won: dict[int, Witness]
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Answer whether each rule wins strictly; those that were not seen to win first."""
     arrangement = probes.base
     count = len(subject.rules.rules)
@@ -124,7 +124,7 @@ def _winning(
 
 def _leading(
     subject: Subject, probes: RandomProbes, won: dict[int, Witness]
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Answer whether each rule that wins leads by enough."""
     slices = TimeSlices(subject.clock, 0.5)
     for place, (number, state) in enumerate(sorted(won.items())):
@@ -145,7 +145,7 @@ def _leading(
 
 def _won(
     subject: Subject, arrangement: Arrangement, number: int, state: State
-) -> Answer:
+) -> AuditAnswer:
     name = subject.rule_name(number)
     if isinstance(state, Witness):
         sentence = f"{name} wins somewhere"
@@ -168,7 +168,7 @@ def _won(
             f"{name} decides by its place in the list alone: where it is strongest, a "
             "rule of another class further down is exactly as strong"
         )
-        return Answer(
+        return AuditAnswer(
             "FT101", name, sentence, order, True, severity="warning", rules=(number,)
         )
     fires = wins(arrangement, number, (), subject.clock.share(_PART))
@@ -183,7 +183,7 @@ def _won(
     if not isinstance(order, Proved):
         sentence += "; whether it decides by its place in the list is open"
         severity = "warning"
-    return Answer(
+    return AuditAnswer(
         "FT101", name, sentence, state, True, severity=severity, rules=(number,)
     )
 
@@ -195,7 +195,7 @@ def _led(
     rivals: tuple[int, ...],
     known: tuple[Witness, Witness],
     clock: Clock,
-) -> Answer:
+) -> AuditAnswer:
     """Return the answer for a rule of which two points are known at which it wins."""
     name = subject.rule_name(number)
     won, start = known
@@ -220,7 +220,7 @@ def _led(
         sentence += f"{bracket.high:.3g} is excluded"
     facts = "FT102", name, sentence, bracket
     rules, region = (number,), won.region
-    return Answer(*facts, is_marginal, "warning", rules, (), region, measures)
+    return AuditAnswer(*facts, is_marginal, "warning", rules, (), region, measures)
 
 
 class _Ties:
@@ -246,7 +246,7 @@ class _Ties:
             self.known[pair] = state
         return state
 
-    def answers(self) -> Iterator[Answer]:
+    def answers(self) -> Iterator[AuditAnswer]:
         """Answer for pairs that tie one by one, for all others together."""
         rules = self.subject.rules.rules
         tie_count = 0
@@ -286,7 +286,7 @@ class _Ties:
             state = Declined("FTD03", "the budget was spent")
         yield note("FT202", "pairs of rules", sentence, state, measures=measures)
 
-    def _tied(self, one: int, other: int, state: Witness) -> Answer:
+    def _tied(self, one: int, other: int, state: Witness) -> AuditAnswer:
         first, second = self.subject.rule_name(one), self.subject.rule_name(other)
         sentence = (
             f"{first} and {second} are equally strong, and the strongest, on more than "
@@ -297,7 +297,9 @@ class _Ties:
         )
 
 
-def _needed(subject: Subject, probes: RandomProbes, ties: _Ties) -> Iterator[Answer]:
+def _needed(
+    subject: Subject, probes: RandomProbes, ties: _Ties
+) -> Iterator[AuditAnswer]:
     """Answer whether leaving out a rule changes a decision."""
     count = len(subject.rules.rules)
     if count == 1:

@@ -38,7 +38,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.leaves import NOT_LOOKED_AT, too_many_boxes
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.robustness import CrispDecider
 from fuzzytree.auditing.findings.rows import (
     OF_RANGES,
@@ -140,7 +140,7 @@ def nearest_difference(
     *,
     known: Sequence[Mapping[str, Fraction]] = (),
     is_alike: bool = False,
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield how near to a row a tree and its raw rules differ.
 
     Rows at which they differ already are counted, and then left aside.
@@ -321,7 +321,7 @@ class _Search:
 
 def _nearest_answer(
     points: DomainRows, search: _Search, differ: int, alike: int
-) -> Answer:
+) -> AuditAnswer:
     measures = [Measure("rows that differ already", differ)]
     measures.append(Measure("rows evaluated", len(search.settled)))
     before = f"of {points.text} {differ} differ already"
@@ -357,7 +357,7 @@ def _no_nearest(search: _Search, low: Fraction) -> State:
     return Proved("both were compared on the whole domain")
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Yield where a tree and its raw rules differ, leaf by leaf, and near which rows.
 
     Only trees with fitted sets have raw rules.
@@ -370,7 +370,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if declined is not None:
         yield note("FT203", "leaves", NOT_LOOKED_AT, declined)
         return
-    known: list[Answer] = []
+    known: list[AuditAnswer] = []
     for answer in leaf_differences(subject, raw, tree, leaf_regions):
         known.append(answer)
         yield answer
@@ -389,7 +389,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
 def leaf_differences(
     subject: Subject, raw: RuleBase, tree: FuzzyTree, leaf_regions: Sequence[Region]
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield the leaves in whose regions the raw rules decide differently."""
     arrangement = arrange(raw, subject.domain)
     alike = count = 0
@@ -412,7 +412,7 @@ def leaf_differences(
     yield note("FT203", "leaves", text, Proved(how))
 
 
-def _difference(arrangement: Arrangement, region: Region, state: State) -> Answer:
+def _difference(arrangement: Arrangement, region: Region, state: State) -> AuditAnswer:
     name = f"leaf {region.leaf}"
     rules: tuple[int, ...] = (region.leaf,)
     if not isinstance(state, Witness):

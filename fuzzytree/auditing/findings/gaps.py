@@ -20,7 +20,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     bounded_arrangement,
 )
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure, Severity
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity
 from fuzzytree.auditing.findings.rows import rank_by_distance
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics import outwards
@@ -33,7 +33,7 @@ _MOST_SIDES = 3  # of a gap in a sentence
 _PART = 0.3  # of the time that is left, for one question
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether some input is covered by no rule, or by less than epsilon."""
     if not subject.is_whole:
         reason = "rules that are left out of the view may cover what the others do not"
@@ -54,7 +54,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield _weak(subject, sides)
 
 
-def _weak(subject: Subject, sides: BoundedArrangement) -> Answer:
+def _weak(subject: Subject, sides: BoundedArrangement) -> AuditAnswer:
     """Answer whether some rule reaches epsilon everywhere, and how little is least."""
     epsilon = subject.settings.epsilon
     state = sides.below(Fraction(epsilon), subject.clock.share(_PART))
@@ -81,7 +81,7 @@ def _weak(subject: Subject, sides: BoundedArrangement) -> Answer:
 
 def _gaps(
     subject: Subject, arrangement: Arrangement, first: Witness
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Answer with the gaps that were found, the nearest to a row first."""
     witnesses, is_all = _separate(subject, arrangement, first)
     gaps = [_gap(subject, state) for state in witnesses]
@@ -101,14 +101,14 @@ def _gaps(
         yield note("FT301", "more gaps", sentence, state)
 
 
-def _gap(subject: Subject, state: Witness) -> Answer:
+def _gap(subject: Subject, state: Witness) -> AuditAnswer:
     answer = subject.policy.uncovered
     what = "no class" if answer is None else f"{answer!r}"
     if subject.policy.decision == "all":
         what = "what the outputs have by default"
     sentence = f"no rule fires {_place(state.region)}: the answer is {what}"
     severity: Severity = "warning" if answer is None else "info"
-    return Answer(
+    return AuditAnswer(
         "FT301", "gap", sentence, state, True, severity=severity, region=state.region
     )
 

@@ -27,7 +27,7 @@ from fuzzytree.auditing.engine.states import (
     number_text,
 )
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import FuzzyTree
 
@@ -40,7 +40,7 @@ MOST_LISTED = 1000
 NOT_LOOKED_AT = "the regions of the leaves are not looked at"
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Yield the region of each leaf, and the leaves that are never reached.
 
     Models other than trees have no leaves.
@@ -68,7 +68,7 @@ def too_many_boxes(tree_regions: Sequence[Region]) -> Declined | None:
 
 def leaf_regions(
     subject: Subject, tree: FuzzyTree, tree_regions: Sequence[Region]
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield where each leaf decides, or that it never does."""
     live, count = 0, sum(map(box_count, tree_regions))
     if count > MOST_LISTED:
@@ -101,7 +101,7 @@ def _region(
     name: str,
     box: Domain,
     point: dict[str, Fraction],
-) -> Answer:
+) -> AuditAnswer:
     assert leaf_at(tree, point) == region.leaf  # a point of its box
     unions = dict(region.sides)
     cut_sides = [side for side in box.sides if side.variable in unions]
@@ -153,7 +153,9 @@ def share_of(box: Domain, tree: FuzzyTree, domain: Domain) -> float | None:
     return float(share)
 
 
-def _unreached(subject: Subject, tree: FuzzyTree, region: Region, count: int) -> Answer:
+def _unreached(
+    subject: Subject, tree: FuzzyTree, region: Region, count: int
+) -> AuditAnswer:
     name = f"leaf {region.leaf}"
     how = "the intervals on its path have nothing in common with the domain"
     if count:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
-from fuzzytree.auditing.findings.records import Answer, FileLocation, TermName
+from fuzzytree.auditing.findings.records import AuditAnswer, FileLocation, TermName
 from fuzzytree.checking import format_of
 from fuzzytree.errors import ReadError
 from fuzzytree.model import (
@@ -108,7 +108,7 @@ def _label_path(system: FuzzySystem, label: TermName) -> Path:
 
 
 def locations_of(
-    answer: Answer, model: Document, file: ModelFile | None, numbers: Iterable[int]
+    answer: AuditAnswer, model: Document, file: ModelFile | None, numbers: Iterable[int]
 ) -> tuple[FileLocation, ...]:
     """Return where the rules and terms of an answer stand, in that order."""
     if file is None:
@@ -123,10 +123,10 @@ def locations_of(
 
 
 def with_ids(
-    answers: Iterable[Answer],
+    answers: Iterable[AuditAnswer],
     representations: Sequence[RuleBase],
     curves: Mapping[tuple[str, str], object] | None = None,
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield answers with ids: the code and a hash of what it is about.
 
     The hash is taken over the sentences and curves of the rules and the terms

@@ -26,7 +26,7 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
 )
 from fuzzytree.auditing.findings.clauses import clause_answers
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure, Severity
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
 from fuzzytree.model import FloatArray
@@ -40,7 +40,7 @@ MOST_SHOWN: Final = 20
 Pair = tuple[int, int]
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer what is to be said of pairs of rules, and of single clauses."""
     compared = bounded_arrangement(subject)
     if compared.lower.is_empty:
@@ -84,7 +84,7 @@ def _noun(subject: Subject) -> str:
 
 def _hidden(
     subject: Subject, compared: BoundedArrangement, *, is_alike: bool
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Answer which rules another one hides, of their class (FT104) or not (FT105)."""
     tested = undecided = 0
     hiding: dict[int, list[int]] = {}
@@ -138,7 +138,7 @@ def _rest_of_strengths(
     counts: tuple[int, int, int],
     *,
     is_alike: bool,
-) -> Answer:
+) -> AuditAnswer:
     """Return what is known of all pairs of which nothing is found."""
     tested, hidden, undecided = counts
     silent = len(compared.fires) - int(compared.fires.sum())
@@ -167,7 +167,7 @@ def _rest_of_strengths(
 # --- FT106: do two rules have the same antecedent?
 
 
-def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
+def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[AuditAnswer]:
     count = len(subject.rules.rules)
     copies: list[tuple[Pair, RuleDistance]] = []
     pairs = near = 0
@@ -233,7 +233,7 @@ def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
 # --- FT201: do rules of different classes reach a level together?
 
 
-def _conflicts(subject: Subject, compared: BoundedArrangement) -> Iterator[Answer]:
+def _conflicts(subject: Subject, compared: BoundedArrangement) -> Iterator[AuditAnswer]:
     level = subject.settings.level
     near: list[tuple[float, Pair]] = []
     clean = touching = 0
@@ -287,7 +287,7 @@ def _may_conflict(subject: Subject, one: int, other: int) -> bool:
     return any(name in shared for name, _ in parts[0] ^ parts[1])
 
 
-def _conflict(subject: Subject, pair: Pair, joint: JointMaximum) -> Answer:
+def _conflict(subject: Subject, pair: Pair, joint: JointMaximum) -> AuditAnswer:
     first, second = (subject.rule_name(number) for number in pair)
     one, other = (_then(subject, number) for number in pair)
     low, high = joint.level
@@ -323,7 +323,7 @@ def level_reached(joint: JointMaximum) -> str:
 
 def _rest_of_conflicts(
     subject: Subject, compared: BoundedArrangement, counts: tuple[int, int], hidden: int
-) -> Answer:
+) -> AuditAnswer:
     clean, touching = counts
     level, noun = short(subject.settings.level), _noun(subject)
     kind = "classes" if noun == "class" else "conclusions"

@@ -56,7 +56,7 @@ class Measure(Value, frozen=True):
     unit: str = ""
 
 
-class Answer(Value, frozen=True):
+class AuditAnswer(Value, frozen=True):
     """One question about a model, and what is known.
 
     Attributes:
@@ -208,7 +208,7 @@ class Audit(Value, frozen=True):
     policy: Policy
     domain: Domain
     settings: AuditSettings
-    answers: tuple[Answer, ...]
+    answers: tuple[AuditAnswer, ...]
     unasked: tuple[str, ...]
     limits: tuple[str, ...]
     is_complete: bool
@@ -219,12 +219,12 @@ class Audit(Value, frozen=True):
     format: Literal["fuzzytree-audit/1"] = FORMAT
 
     @property
-    def findings(self) -> tuple[Answer, ...]:
+    def findings(self) -> tuple[AuditAnswer, ...]:
         """The answers that a reader should see."""
         return tuple(answer for answer in self.answers if answer.is_finding)
 
     @property
-    def open_findings(self) -> tuple[Answer, ...]:
+    def open_findings(self) -> tuple[AuditAnswer, ...]:
         """The findings that no baseline accepts."""
         known = set(self.accepted)
         return tuple(answer for answer in self.findings if answer.id not in known)

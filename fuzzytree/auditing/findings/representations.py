@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State
 from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.checking import check, probed
@@ -41,7 +41,7 @@ _DTYPES: Final[Mapping[str, Dtype]] = MappingProxyType(
 _MOST_ROWS = 2_000  # rows or points that stand behind the probes
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Compare all representations of a model with it.
 
     Raises:
@@ -94,7 +94,7 @@ def agreement(
 
 def agreement_answers(
     subject: Subject, result: Agreement, values: FloatArray
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield an answer for each disagreement of a check, and a summary of the rest."""
     clean: dict[Basis, list[Comparison]] = {}
     for one in result.comparisons:
@@ -113,7 +113,7 @@ def agreement_answers(
         yield note("FT601", name, sentence, Declined("FTD08", text))
 
 
-def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answer:
+def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> AuditAnswer:
     noun = "probes and rows" if one.basis == "rows" else "ways"
     facts = "; ".join(one.detail[:2])
     sentence = (
@@ -142,7 +142,7 @@ def _form(one: Comparison) -> str:
     return one.representation.rpartition(": ")[2]
 
 
-def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> Answer:
+def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> AuditAnswer:
     """Return the answer that sums up comparisons in which nothing differs."""
     ones = [*ones]
     how = "; ".join(
@@ -167,7 +167,7 @@ def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> Answer:
 
 def _certified(
     subject: Subject, one: Certified, form: Model, how: str
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield the bound of a number type's error, and where it leaves a class open."""
     name = one.representation
     if one.verdict == "DISAGREES":

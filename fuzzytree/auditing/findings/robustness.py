@@ -44,7 +44,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.leaves import too_many_boxes
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.rows import (
     OF_RANGES,
     DomainRows,
@@ -216,7 +216,7 @@ _MOST_NAMED = 4  # inputs in a sentence
 # --- a row
 
 
-def radius(subject: Subject, row: Mapping[str, float]) -> Answer:
+def radius(subject: Subject, row: Mapping[str, float]) -> AuditAnswer:
     """Return how far the nearest point is that is decided otherwise than a row.
 
     Raises:
@@ -228,7 +228,7 @@ def radius(subject: Subject, row: Mapping[str, float]) -> Answer:
     return _answer(decider, "the row", point, result)
 
 
-def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[Answer]:
+def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[AuditAnswer]:
     """Yield how a row is decided, and how far the nearest other decision is.
 
     Raises:
@@ -279,7 +279,7 @@ def _point(subject: Subject, row: Mapping[str, float]) -> dict[str, Fraction]:
 
 def _answer(
     decider: Decider, name: str, point: Mapping[str, Fraction], result: Nearest
-) -> Answer:
+) -> AuditAnswer:
     own, _ = decider.decided(point)
     aside = ASIDE if decider.leaves_out(own) else ""
     what = f"the distance from {name} to another decision"
@@ -336,7 +336,7 @@ def _moved(value: Fraction, own: Fraction) -> str:
 # --- all rows
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Yield how far rows are from another decision: the nearest of them, and in all.
 
     Systems in which more than one rule answers have no such rows.
@@ -376,11 +376,11 @@ def answers(subject: Subject) -> Iterator[Answer]:
 class _RowRadius(NamedTuple):
     number: int
     low: Fraction
-    answer: Answer
+    answer: AuditAnswer
     is_aside: bool
 
 
-def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> Answer:
+def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> AuditAnswer:
     """Return an answer about all rows together; `radii` is in order of their radius."""
     count = Measure("rows evaluated", len(radii))
     if not radii:

@@ -23,7 +23,7 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.findings.codes import note
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import Variable
 from fuzzytree.numerics import decide, outwards
@@ -95,12 +95,12 @@ def distance_measure(name: str, value: Fraction) -> Measure:
 
 
 def rank_by_distance(
-    gaps: Sequence[Answer],
+    gaps: Sequence[AuditAnswer],
     rows: AuditRows,
     domain: Domain,
     inputs: Sequence[str],
     variables: Sequence[Variable] = (),
-) -> tuple[Answer, ...]:
+) -> tuple[AuditAnswer, ...]:
     """Return answers in order of how near they are to a row, with the distance.
 
     A gap far from all that was ever seen matters less than one among the rows. Answers
@@ -114,8 +114,8 @@ def rank_by_distance(
         variables: The combinations that regions may name; where one of another name
             is met, the point of the witness counts.
     """
-    known: list[tuple[Fraction, int, Answer]] = []
-    unknown: list[Answer] = []
+    known: list[tuple[Fraction, int, AuditAnswer]] = []
+    unknown: list[AuditAnswer] = []
     for place, gap in enumerate(gaps):
         part = _part(gap, domain, inputs, variables)
         if part is None:
@@ -137,7 +137,7 @@ def rank_by_distance(
 
 
 def _part(
-    gap: Answer,
+    gap: AuditAnswer,
     domain: Domain,
     inputs: Sequence[str],
     variables: Sequence[Variable],
@@ -180,7 +180,7 @@ def _nearest_to_part(
     return best
 
 
-def _spans(gap: Answer, inputs: Sequence[str]) -> tuple[Span, ...]:
+def _spans(gap: AuditAnswer, inputs: Sequence[str]) -> tuple[Span, ...]:
     """Return where a gap is: its region, or the point where that needs more."""
     if gap.region and all(span.variable in inputs for span in gap.region):
         return gap.region
@@ -232,7 +232,7 @@ def box_distance(
     return away
 
 
-def rows_left_out(code: str, count: int) -> Answer:
+def rows_left_out(code: str, count: int) -> AuditAnswer:
     """Return an answer that says how many rows the budget left out."""
     declined = Declined("FTD03", "the budget was spent")
     text = f"{count} more rows are not evaluated"

@@ -12,7 +12,7 @@ from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, counted
 from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.records import (
-    Answer,
+    AuditAnswer,
     AuditSettings,
     Policy,
     SourceFile,
@@ -90,7 +90,7 @@ class AuditView(msgspec.Struct, frozen=True, eq=False):
     system: FuzzySystem | None = None
     rule_names: tuple[str, ...] = ()
     numbers: tuple[int, ...] = ()
-    declined: tuple[Answer, ...] = ()
+    declined: tuple[AuditAnswer, ...] = ()
     is_whole: bool = True
     bounds: BoundedRules | None = None
     left_out: Mapping[str, int] = {}
@@ -144,7 +144,7 @@ class TimeSlices:
         except OutOfTimeError:
             return None
 
-    def rest(self, code: str, noun: str, what: str) -> Iterator[Answer]:
+    def rest(self, code: str, noun: str, what: str) -> Iterator[AuditAnswer]:
         """Yield that some questions are open, if there are any."""
         if self.left_out:
             reason = "the budget was spent"

@@ -18,7 +18,7 @@ import numpy as np
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import BoolArray, Clause, FloatArray, IntArray, RuleBase, shapes_of
 from fuzzytree.numerics import (
@@ -254,7 +254,7 @@ def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
     return fires, may_fire
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Count what the rows show about each rule, and estimate shares of the domain."""
     if subject.rows is None:
         reason = "rows are needed (--data TABLE)"
@@ -265,7 +265,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield from _of_domain(subject)
 
 
-def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[Answer]:
+def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
     """Yield what the user's rows say, of all rules together and of each."""
     codes = None if subject.system else rows.codes  # a view has classes of its own
     lower, most = _both(subject, rows.values, codes)
@@ -277,7 +277,7 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[Answer]:
     ):
         state = sampled_share(name, hits, total, how)
         sentence = f"on {hits} of {total} rows {text}"
-        yield Answer("FT701", name, sentence, state, hits > 0)
+        yield AuditAnswer("FT701", name, sentence, state, hits > 0)
     if not lower.known:
         return
     if lower.missing:
@@ -293,7 +293,7 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[Answer]:
         yield _of_rule(subject, lower, number, how)
 
 
-def _of_domain(subject: Subject) -> Iterator[Answer]:
+def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
     """Yield which shares of the domain's volume are uncovered, weak, tied, close."""
     settings = subject.settings
     clauses = sum(len(rule.when) for rule in subject.rules.rules)
@@ -326,7 +326,7 @@ def _both(
 
 def _nearly_fired(
     subject: Subject, lower: RuleCounts, number: int, most: int
-) -> Answer:
+) -> AuditAnswer:
     """Return on how many rows a rule fires, as far as its curves are known."""
     name, least = subject.rule_name(number), int(lower.fired[number - 1])
     reason = f"it fires on {least} of {lower.known} at least, and on {most} at most"
@@ -336,7 +336,7 @@ def _nearly_fired(
 
 def _shares(
     subject: Subject, counts: tuple[RuleCounts, RuleCounts], noun: str, how: str
-) -> Iterator[Answer]:
+) -> Iterator[AuditAnswer]:
     """Yield in which share of some rows or points the rules are weak or undecided."""
     lower, most = counts
     settings, total = subject.settings, lower.known
@@ -370,7 +370,9 @@ def _shares(
         yield note("FT701", f"{name} {noun}", sentence, state)
 
 
-def _of_rule(subject: Subject, counts: RuleCounts, number: int, how: str) -> Answer:
+def _of_rule(
+    subject: Subject, counts: RuleCounts, number: int, how: str
+) -> AuditAnswer:
     """Return on how many rows a rule fires, how many it wins, and how many rightly."""
     name, total = subject.rule_name(number), counts.known
     fired, won = int(counts.fired[number - 1]), int(counts.won[number - 1])

@@ -27,7 +27,7 @@ from fuzzytree.auditing.findings.curve_bounds import (
     hedged_bounds,
     scale,
 )
-from fuzzytree.auditing.findings.records import Answer, TermName
+from fuzzytree.auditing.findings.records import AuditAnswer, TermName
 from fuzzytree.model import (
     And,
     Clause,
@@ -120,11 +120,11 @@ def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Interval | None]
 
 def terms_of(
     system: FuzzySystem, ranges: Mapping[str, Interval | None]
-) -> tuple[SystemTerms, tuple[Answer, ...]]:
+) -> tuple[SystemTerms, tuple[AuditAnswer, ...]]:
     """Return the terms of a system's inputs, and what is to be said of some."""
     plain: dict[str, dict[str, Shape]] = {}
     bounds: dict[Name, CurveBounds] = {}
-    answers: list[Answer] = []
+    answers: list[AuditAnswer] = []
     uses = Counter(
         key
         for rule in system.rules
@@ -189,7 +189,7 @@ def _outcome(
 
 def _answer(
     one: SystemInput, label: SystemLabel, outcome: tuple[str, str], users: str
-) -> Answer:
+) -> AuditAnswer:
     name, (what, reason) = f"term {label.name!r} of {one.name!r}", outcome
     text, state = f"{name} {what}: {reason}; {users}", f"{reason}; {users}"
     terms = (TermName(one.name, label.name),)

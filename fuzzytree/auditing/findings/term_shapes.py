@@ -31,7 +31,7 @@ from fuzzytree.auditing.engine.states import (
     short,
 )
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import (
     VariableRange,
@@ -46,7 +46,7 @@ SHALLOW: Final = Fraction(1, 100)
 """Excesses and dips of degrees below this are counted and not listed."""
 
 
-def shape_answers(subject: Subject) -> Iterator[Answer]:
+def shape_answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether terms are well shaped."""
     sound = shallow = 0
     for of in ranges(subject):
@@ -66,7 +66,7 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
     yield note("FT402", "terms", text, Proved(how), measures=measures)
 
 
-def _defects(of: VariableRange, term: Term) -> Iterator[Answer | None]:
+def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
     """Yield the defects of a term's shape, None for each too small one."""
     for excess in excesses(term.shape, of.low, of.high):
         yield _excess(of, term, excess) if excess.depth >= SHALLOW else None
@@ -85,13 +85,13 @@ def _defect(
     how: str,
     measures: tuple[Measure, ...],
     region: tuple[Span, ...] = (),
-) -> Answer:
+) -> AuditAnswer:
     name, terms = term_name(of.variable, term), labels_of(of, term)
     facts = "FT402", name, f"{name} {text}", Proved(how)
     return finding(*facts, terms=terms, region=region, measures=measures)
 
 
-def _excess(of: VariableRange, term: Term, excess: Excess) -> Answer:
+def _excess(of: VariableRange, term: Term, excess: Excess) -> AuditAnswer:
     end = "above 1" if excess.is_above else "below 0"
     return _defect(
         of,
@@ -107,7 +107,7 @@ def _excess(of: VariableRange, term: Term, excess: Excess) -> Answer:
     )
 
 
-def _dips(of: VariableRange, term: Term) -> Iterator[Answer | None]:
+def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
     axis = of.line(term)
     walked = [*walk(axis, 0)]
     deep = [*dips(walked, SHALLOW)]
@@ -134,7 +134,7 @@ def _dips(of: VariableRange, term: Term) -> Iterator[Answer | None]:
     )
 
 
-def _subnormal(of: VariableRange, term: Term, most: float) -> Answer:
+def _subnormal(of: VariableRange, term: Term, most: float) -> AuditAnswer:
     return _defect(
         of,
         term,
@@ -144,7 +144,7 @@ def _subnormal(of: VariableRange, term: Term, most: float) -> Answer:
     )
 
 
-def _outlying(of: VariableRange, term: Term, share: Bounds) -> Answer:
+def _outlying(of: VariableRange, term: Term, share: Bounds) -> AuditAnswer:
     return _defect(
         of,
         term,
@@ -195,10 +195,10 @@ MOST_SHOWN: Final = 20
 _MOST_PIECES = 4_000  # of two curves whose overlap is computed
 
 
-def overlap_answers(subject: Subject) -> Iterator[Answer]:
+def overlap_answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer which terms share so much area that they are hard to distinguish."""
     limit = Fraction(subject.settings.overlap)
-    overlaps: list[tuple[Fraction, Answer]] = []
+    overlaps: list[tuple[Fraction, AuditAnswer]] = []
     apart = points = 0
     for of in ranges(subject):
         terms = of.variable.terms
@@ -237,7 +237,7 @@ def _overlapping(
     shared: Overlap,
     jaccard: Bounds,
     limit: Fraction,
-) -> Answer:
+) -> AuditAnswer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
     relation = ""
     if shared.is_within and shared.is_around:
@@ -275,14 +275,14 @@ def _share(jaccard: Bounds) -> str:
     return "more than 0.9999" if text == "1" and jaccard.low < 1 else text
 
 
-def _too_large(of: VariableRange, one: Term, other: Term) -> Answer:
+def _too_large(of: VariableRange, one: Term, other: Term) -> AuditAnswer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
     reason = f"their curves have more than {_MOST_PIECES} pieces"
     text, terms = f"{name} were not compared: {reason}", labels_of(of, one, other)
     return note("FT403", name, text, Declined("FTD05", reason), terms=terms)
 
 
-def _other_pairs(count: int, apart: int, points: int, limit: float) -> Answer:
+def _other_pairs(count: int, apart: int, points: int, limit: float) -> AuditAnswer:
     fewer, more = (counted(n, "pair") for n in (apart, count - MOST_SHOWN))
     parts = [f"{fewer} of terms share less than {short(limit)} of their area"]
     if count > MOST_SHOWN:

@@ -13,7 +13,7 @@ from fuzzytree.auditing.engine.measures import Bounds, CurveAxis, curve_axis, he
 from fuzzytree.auditing.engine.pieces import RuleCurve, pieces
 from fuzzytree.auditing.engine.states import Bracket, Proved, counted, short
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Measure, TermName
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import Term, Variable, questions
 from fuzzytree.numerics import outwards
@@ -91,7 +91,7 @@ def labels_of(of: VariableRange, *terms: Term) -> tuple[TermName, ...]:
     return tuple(TermName(of.variable.name, term.name) for term in terms)
 
 
-def answers(subject: Subject) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether terms are reached, and used."""
     yield from _unused(subject)
     yield from _heights(subject, whole_ranges(subject))
@@ -100,7 +100,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
 # --- FT401: is the term reached?
 
 
-def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answer]:
+def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[AuditAnswer]:
     level = Fraction(subject.settings.level)
     bounds = subject.bounds.terms if subject.bounds else {}
     clean, lowest = 0, Fraction(1)
@@ -145,7 +145,7 @@ def _is_full(of: VariableRange, term: Term) -> bool:
 
 def _low_term(
     of: VariableRange, term: Term, height: Bounds, at: Fraction, cells: int
-) -> Answer:
+) -> AuditAnswer:
     name = term_name(of.variable, term)
     where = f"from {short(of.low)} to {short(of.high)}"
     text = f"its largest degree {where} is {short(height.nearest)}, at {short(at)}"
@@ -161,7 +161,7 @@ def _low_term(
 
 def _low_curve(
     of: VariableRange, term: Term, height: Bounds, *, is_low: bool
-) -> Answer:
+) -> AuditAnswer:
     """Return that a curve between bounds is hardly reached, or may be."""
     name = term_name(of.variable, term)
     low, high = outwards(height.low)[0], outwards(height.high)[1]
@@ -174,13 +174,13 @@ def _low_curve(
     measures = Measure("height at least", low), Measure("height at most", high)
     facts = "FT401", name, text, state
     terms = labels_of(of, term)
-    return Answer(*facts, is_low, "warning", terms=terms, measures=measures)
+    return AuditAnswer(*facts, is_low, "warning", terms=terms, measures=measures)
 
 
 # --- FT404: is it used?
 
 
-def _unused(subject: Subject) -> Iterator[Answer]:
+def _unused(subject: Subject) -> Iterator[AuditAnswer]:
     terms, variables, clauses = _inventory(subject)
     used = set(clauses)
     needed = {variable for variable, _ in used}

@@ -22,7 +22,7 @@ import msgspec
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved
 from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import Answer, Policy
+from fuzzytree.auditing.findings.records import AuditAnswer, Policy
 from fuzzytree.auditing.findings.rule_bounds import bounded_rules
 from fuzzytree.auditing.findings.subject import AuditView
 from fuzzytree.auditing.findings.system_conditions import (
@@ -143,11 +143,11 @@ def _conjunction(system: FuzzySystem) -> Conjunction:
     return "product" if counts["product"] > counts["min"] else "min"
 
 
-def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[Answer]]:
+def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[AuditAnswer]]:
     """Return the domain within the ranges that inputs are moved into."""
     clipped = {one.name: one for one in system.inputs if one.clips and not one.parts}
     sides: list[DomainSide] = []
-    answers: list[Answer] = []
+    answers: list[AuditAnswer] = []
     for side in domain.sides:
         one = clipped.get(side.variable)
         low, high = side.low, side.high
@@ -172,7 +172,7 @@ def _moved(one: SystemInput, value: float) -> float:
     return value if one.high is None else min(value, one.high)
 
 
-def _declined(code: str, subject: str, reason: str) -> Answer:
+def _declined(code: str, subject: str, reason: str) -> AuditAnswer:
     sentence = f"{subject} is left out: {reason}"
     return note(code, subject, sentence, Declined(code, reason))
 
@@ -181,7 +181,7 @@ class _Taken:
     """The rules that were taken over so far, and what was left out."""
 
     def __init__(
-        self, conjunction: Conjunction, terms: SystemTerms, answers: list[Answer]
+        self, conjunction: Conjunction, terms: SystemTerms, answers: list[AuditAnswer]
     ) -> None:
         self.conjunction: Conjunction = conjunction
         self.terms = terms

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
-from fuzzytree.auditing.findings.records import Answer, Audit
+from fuzzytree.auditing.findings.records import Audit, AuditAnswer
 from fuzzytree.auditing.findings.subject import AuditView
 from fuzzytree.model import FuzzySystem
 from fuzzytree.semantics.inference import infer
@@ -60,7 +60,7 @@ def check_on_grid(
     return checked
 
 
-def _claimed(system: FuzzySystem, seen: AuditView, answer: Answer) -> int:
+def _claimed(system: FuzzySystem, seen: AuditView, answer: AuditAnswer) -> int:
     """Hold the claims at a point against the system's own degrees there."""
     state = answer.state
     assert isinstance(state, Witness | Bracket)

@@ -17,7 +17,11 @@ from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.bounded_arrangement import BoundedArrangement
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.records import Answer, AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    AuditSelection,
+    AuditSettings,
+)
 from fuzzytree.auditing.findings.rule_bounds import bounded_rules
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.findings.views import view
@@ -94,7 +98,7 @@ def system_of(
     return FuzzySystem("pump", inputs, (output,), (block,))
 
 
-def results(system: FuzzySystem, code: str, **settings: float) -> list[Answer]:
+def results(system: FuzzySystem, code: str, **settings: float) -> list[AuditAnswer]:
     made = replace(AuditSettings(), **settings)
     answers = audit(
         Material(system), settings=made, selection=AuditSelection(select=[code])

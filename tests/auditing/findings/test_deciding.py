@@ -10,7 +10,7 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import _won as won
 from fuzzytree.auditing.findings.deciding import answers
-from fuzzytree.auditing.findings.records import Answer, AuditSettings, Policy
+from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, Policy
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import (
     Clause,
@@ -46,7 +46,7 @@ def _base(*rules: tuple[str, str], conjunction: str = "min") -> RuleBase:
 
 def _asked(
     *rules: tuple[str, str], conjunction: str = "min", decision: str = "strongest"
-) -> list[Answer]:
+) -> list[AuditAnswer]:
     base = _base(*rules, conjunction=conjunction)
     box = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
     policy = Policy(conjunction, decision)  # type: ignore[arg-type]
@@ -63,7 +63,7 @@ def _asked(
     ]
 
 
-def _found(given: list[Answer], code: str) -> dict[tuple[int, ...], Answer]:
+def _found(given: list[AuditAnswer], code: str) -> dict[tuple[int, ...], AuditAnswer]:
     return {one.rules: one for one in given if one.code == code and one.is_finding}
 
 

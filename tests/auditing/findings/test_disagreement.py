@@ -23,7 +23,7 @@ from fuzzytree.auditing.findings.disagreement import (
     answers,
     nearest_difference,
 )
-from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.rows import points_of
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import Conjunction
@@ -32,11 +32,11 @@ from fuzzytree.testing import random_tree
 from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
 
 
-def _findings(subject: Subject) -> list[Answer]:
+def _findings(subject: Subject) -> list[AuditAnswer]:
     return [answer for answer in answers(subject) if answer.is_finding]
 
 
-def _number(answer: Answer, name: str) -> float:
+def _number(answer: AuditAnswer, name: str) -> float:
     return next(one.value for one in answer.measures if one.name == name)
 
 

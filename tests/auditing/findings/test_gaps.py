@@ -8,7 +8,7 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings.gaps import answers
-from fuzzytree.auditing.findings.records import Answer, AuditSettings, Policy
+from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, Policy
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model.rulebase import (
     Clause,
@@ -27,7 +27,7 @@ def _asked(
     uncovered: str | None = None,
     rows: AuditRows | None = None,
     is_whole: bool = True,
-) -> list[Answer]:
+) -> list[AuditAnswer]:
     terms = tuple(
         Term(f"t{n}", Points((p - width, p, p + width), (0.0, 1.0, 0.0)))
         for n, p in enumerate(peaks)

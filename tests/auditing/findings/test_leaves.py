@@ -8,14 +8,14 @@ from fuzzytree.auditing.engine.regions import Region
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings import leaves
 from fuzzytree.auditing.findings.leaves import answers, too_many_boxes, values_text
-from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.testing import random_tree
 from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
 
 
-def _findings(subject: Subject) -> list[Answer]:
+def _findings(subject: Subject) -> list[AuditAnswer]:
     return [answer for answer in answers(subject) if answer.is_finding]
 
 

@@ -18,7 +18,7 @@ from fuzzytree.auditing.findings.locations import (
     with_ids,
 )
 from fuzzytree.auditing.findings.records import (
-    Answer,
+    AuditAnswer,
     AuditSelection,
     FileLocation,
     TermName,
@@ -142,10 +142,10 @@ def found(
     rules: tuple[int, ...] = (),
     terms: tuple[TermName, ...] = (),
     region: tuple[Span, ...] = (),
-) -> Answer:
+) -> AuditAnswer:
     """Return an answer about some rules and terms."""
     state = Proved("read off")
-    return Answer(code, subject, "so", state, True, "info", rules, terms, region)
+    return AuditAnswer(code, subject, "so", state, True, "info", rules, terms, region)
 
 
 def base(**changed: float) -> RuleBase:
@@ -160,7 +160,7 @@ def base(**changed: float) -> RuleBase:
     )
 
 
-def ids(rules: RuleBase, *answers: Answer) -> list[str]:
+def ids(rules: RuleBase, *answers: AuditAnswer) -> list[str]:
     """Return the ids of answers about rules."""
     return [one.id for one in with_ids(answers, [rules])]
 

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree.auditing.engine.states import Bracket, Proved, Sampled, State, Witness
 from fuzzytree.auditing.findings.codes import AUDITED
-from fuzzytree.auditing.findings.records import Answer, Severity
+from fuzzytree.auditing.findings.records import AuditAnswer, Severity
 from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
@@ -240,7 +240,7 @@ OF_FORMS = {"FT601", "FT602"}
 
 
 @functools.cache
-def answers(model: Document) -> tuple[Answer, ...]:
+def answers(model: Document) -> tuple[AuditAnswer, ...]:
     """Return what a whole audit, without representations, answers."""
     data, columns, limits = None, None, {}
     match model:
@@ -260,7 +260,7 @@ def answers(model: Document) -> tuple[Answer, ...]:
     return found.answers
 
 
-def answers_for(model: Document, code: str) -> list[Answer]:
+def answers_for(model: Document, code: str) -> list[AuditAnswer]:
     """Return what a whole audit answers to one kind of question."""
     return [one for one in answers(model) if one.code == code]
 

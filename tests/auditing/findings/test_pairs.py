@@ -20,7 +20,11 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.pairs import level_reached
-from fuzzytree.auditing.findings.records import Answer, AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    AuditSelection,
+    AuditSettings,
+)
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model import Conclusion, Is, Or, RuleBlock, SystemRule
 from fuzzytree.model.rulebase import (
@@ -77,7 +81,7 @@ def base(
 
 def answers_for(
     rules: RuleBase, code: str, settings: AuditSettings | None = None
-) -> list[Answer]:
+) -> list[AuditAnswer]:
     settings = settings or AuditSettings(budget_s=5.0)
     return [
         *audit(

@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.conventions import Convention, questions
-from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.representations import (
     agreement,
     agreement_answers,
@@ -49,7 +49,7 @@ def shipped(model: Model) -> OnnxModel:
     return open_onnx(write_onnx(model).content, "m.onnx")
 
 
-def findings(subject: Subject, *others: Model | OnnxModel) -> list[Answer]:
+def findings(subject: Subject, *others: Model | OnnxModel) -> list[AuditAnswer]:
     points = sample_points(subject.rules, subject.domain, 200, 0)
     found = agreement(subject, points, *others)
     return [one for one in agreement_answers(subject, found, points) if one.is_finding]
@@ -192,7 +192,7 @@ def queries(subject: Subject, name: str) -> Convention:
 
 def answered(
     subject: Subject, question: Convention, representation: OnnxModel | None
-) -> list[Answer]:
+) -> list[AuditAnswer]:
     """Return what the native runtime and a graph answer to a question."""
     native = find_runtime("native").load(subject.rules)(question.values)
     found = [ModelRun("native: rules", subject.rules, native)]

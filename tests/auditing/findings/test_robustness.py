@@ -13,7 +13,7 @@ import fuzzytree as ft
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.nearest import distance
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness, point_of
-from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.robustness import (
     answers,
     decider_of,
@@ -28,7 +28,7 @@ from tests.auditing.engine.bases import random_base
 from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
 
 
-def _number(answer: Answer, name: str) -> float:
+def _number(answer: AuditAnswer, name: str) -> float:
     return next(one.value for one in answer.measures if one.name == name)
 
 

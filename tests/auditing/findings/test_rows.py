@@ -8,7 +8,7 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Claim, Proved, Span, Witness, coordinates
-from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.rows import (
     box_distance,
     distance_measure,
@@ -24,8 +24,8 @@ BOX = Domain((DomainSide("x", 0.0, 4.0), DomainSide("y", 0.0, 1.0)))
 ROWS = AuditRows("rows", np.array([[0.0, 1.0, np.nan], [0.0, 0.5, 0.0]]))
 
 
-def _gap(name: str, *spans: Span) -> Answer:
-    return Answer("FT301", name, "", Proved(""), is_finding=True, region=spans)
+def _gap(name: str, *spans: Span) -> AuditAnswer:
+    return AuditAnswer("FT301", name, "", Proved(""), is_finding=True, region=spans)
 
 
 def test_gaps_are_ranked_by_their_distance_to_the_nearest_row() -> None:
@@ -63,7 +63,7 @@ def test_a_gap_of_a_combination_is_as_far_as_its_inputs_must_move() -> None:
 def test_a_gap_of_an_unknown_combination_is_measured_at_its_point() -> None:
     point = coordinates({"x": Fraction(3), "y": Fraction(1, 2)})
     state = Witness(point, (Claim("below", rules=(1,), level="0"),))
-    gap = Answer("FT301", "sum", "", state, True, region=(Span("sum", 3.0, 4.0),))
+    gap = AuditAnswer("FT301", "sum", "", state, True, region=(Span("sum", 3.0, 4.0),))
     [results] = rank_by_distance([gap], ROWS, BOX, ["x", "y"])
     assert results.measures[0].exact == "1/2"
 

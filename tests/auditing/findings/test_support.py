@@ -13,7 +13,7 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings import support
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.auditing.findings.support import (
     answers,
@@ -65,13 +65,13 @@ def subject_of(
     return Subject(**facts, settings=settings, clock=Clock(), rows=rows)
 
 
-def queries(subject: Subject) -> dict[str, Answer]:
+def queries(subject: Subject) -> dict[str, AuditAnswer]:
     found = {one.subject: one for one in answers(subject)}
     assert {one.code for one in found.values()} == {"FT701"}
     return found
 
 
-def sentences(found: dict[str, Answer], *names: str) -> list[str]:
+def sentences(found: dict[str, AuditAnswer], *names: str) -> list[str]:
     return [found[name].sentence for name in names]
 
 

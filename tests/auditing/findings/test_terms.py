@@ -10,7 +10,11 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, short
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.records import Answer, AuditSelection, AuditSettings
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    AuditSelection,
+    AuditSettings,
+)
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import (
     LR,
@@ -48,7 +52,7 @@ def base(*terms: Term, high: float = 4.0) -> RuleBase:
 
 def found(
     rules: RuleBase, code: str, settings: AuditSettings | None = None
-) -> list[Answer]:
+) -> list[AuditAnswer]:
     return [
         *audit(
             Material(rules), settings=settings, selection=AuditSelection(select=[code])

@@ -11,7 +11,7 @@ import pytest
 from fuzzytree.api.verbs import learn
 from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import LIMITS, Answer, Audit
+from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditAnswer
 from fuzzytree.auditing.recheck import (
     CannotRunError,
     audit_records,
@@ -68,7 +68,7 @@ def test_the_panel_and_the_codes_are_ours() -> None:
 def test_the_records_of_an_audit_are_ours() -> None:
     pairs = [
         (audit_records.Audit, Audit),
-        (audit_records.Answer, Answer),
+        (audit_records.Answer, AuditAnswer),
         (audit_records.Claim, states.Claim),
         (audit_records.Coordinate, states.Coordinate),
         *((getattr(audit_records, k.__name__), k) for k in states.State.__args__),

@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.states import Proved
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.codes import AUDITED
 from fuzzytree.auditing.findings.locations import model_file
-from fuzzytree.auditing.findings.records import Answer, Audit, AuditSelection
+from fuzzytree.auditing.findings.records import Audit, AuditAnswer, AuditSelection
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import recheck
 from fuzzytree.exporters import yaml
@@ -221,7 +221,7 @@ def disproved(grid: Grid, found: Audit) -> list[str]:
     ]
 
 
-def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
+def _is_so(grid: Grid, found: Audit, answer: AuditAnswer) -> bool:
     strengths, rules = grid.strengths, grid.rules.rules
     numbers = [number - 1 for number in answer.rules]
     reported = [one.rules for one in found.answers if one.rules]
