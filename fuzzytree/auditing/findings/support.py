@@ -103,9 +103,8 @@ def sample_points(rules: RuleBase, domain: Domain, rows: int, seed: int) -> Floa
         if side is None:
             raise ValueError(f"input {name!r} has no side in the domain")
         u = chance.random(rows)
-        table[position] = np.clip(
-            side.low * (1.0 - u) + side.high * u, side.low, side.high
-        )
+        x = side.low * (1.0 - u) + side.high * u
+        table[position] = np.clip(x, side.low, side.high)
     return table[:, ~rows_outside(rules, domain, table)]
 
 
@@ -286,11 +285,16 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
         is_finding = isinstance(answer.state, Sampled) and answer.state.hits > 0
         yield msgspec.structs.replace(answer, is_finding=is_finding)
     for number in range(1, len(subject.rules.rules) + 1):
-        fired = int(most.fired[number - 1])
-        if fired > lower.fired[number - 1]:
-            yield _nearly_fired(subject, lower, number, fired)
+        least, fired = (int(one.fired[number - 1]) for one in (lower, most))
+        if fired == least:
+            yield _of_rule(subject, lower, number, how)
             continue
-        yield _of_rule(subject, lower, number, how)
+        name = subject.rule_name(number)
+        reason = (
+            f"it fires on {least} of {lower.known} at least, and on {fired} at most"
+        )
+        text = f"on how many rows {name} fires is not decided: {reason}"
+        yield note("FT701", name, text, Declined("FTD02", reason))
 
 
 def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
@@ -324,46 +328,32 @@ def _both(
     return count_rows(lower, values, codes), count_rows(upper, values, codes)
 
 
-def _nearly_fired(
-    subject: Subject, lower: RuleCounts, number: int, most: int
-) -> AuditAnswer:
-    """Return on how many rows a rule fires, as far as its curves are known."""
-    name, least = subject.rule_name(number), int(lower.fired[number - 1])
-    reason = f"it fires on {least} of {lower.known} at least, and on {most} at most"
-    sentence = f"on how many rows {name} fires is not decided: {reason}"
-    return note("FT701", name, sentence, Declined("FTD02", reason))
-
-
 def _shares(
     subject: Subject, counts: tuple[RuleCounts, RuleCounts], noun: str, how: str
 ) -> Iterator[AuditAnswer]:
     """Yield in which share of some rows or points the rules are weak or undecided."""
     lower, most = counts
     settings, total = subject.settings, lower.known
-    questions = [
-        ("uncovered", lower.uncovered, "no rule fires"),
-        ("weak", lower.weak, f"no rule reaches {settings.epsilon!r}"),
-    ]
-    for name, fewest in (("uncovered", most.uncovered), ("weak", most.weak)):
-        hits = next(h for n, h, _ in questions if n == name)
-        if fewest < hits and subject.is_whole:
+    questions: list[tuple[str, int, str]] = []
+    weak = f"no rule reaches {settings.epsilon!r}"
+    for name, hits, fewest, text in (
+        ("uncovered", lower.uncovered, most.uncovered, "no rule fires"),
+        ("weak", lower.weak, most.weak, weak),
+    ):
+        if fewest >= hits and subject.is_whole:
+            questions.append((name, hits, text))
+        elif subject.is_whole:
             reason = f"there are {fewest} at least, and {hits} at most"
             text = f"how many {noun} are {name} is not decided: {reason}"
-            unknown = Declined("FTD02", reason)
-            yield note("FT701", f"{name} {noun}", text, unknown)
-            questions = [one for one in questions if one[0] != name]
+            yield note("FT701", f"{name} {noun}", text, Declined("FTD02", reason))
     if not subject.is_whole:
         reason = "rules are left out, and they may cover what the others do not"
         text = f"how many {noun} are covered is not known: {reason}"
-        name = f"covered {noun}"
-        yield note("FT701", name, text, Declined("FTD07", reason))
-        questions.clear()
+        yield note("FT701", f"covered {noun}", text, Declined("FTD07", reason))
     if subject.policy.decision == "strongest":
         margin = f"the two strongest classes are at most {settings.margin!r} apart"
-        questions += [
-            ("tied", lower.tied, "rules of two classes tie"),
-            ("close", lower.close, margin),
-        ]
+        questions.append(("tied", lower.tied, "rules of two classes tie"))
+        questions.append(("close", lower.close, margin))
     for name, hits, text in questions:
         state = sampled_share(f"{name} {noun}", hits, total, how)
         sentence = f"on {hits} of {total} {noun} {text}"
