@@ -20,8 +20,7 @@ Families
     - `gaps`: inputs that no rule covers, or none covers well
     - `pairs`, `clauses`: two rules that hide, copy or contradict each other; clauses
       without effect
-    - `terms`, `term_shapes`: terms that are not reached or not used, ill shaped, hard
-      to distinguish
+    - `terms`: terms that are not reached or not used, ill shaped, hard to distinguish
     - `complexity`: counts, and the index of Nauck
     - `leaves`: where each leaf of a tree decides
     - `robustness`, `rows`: how far a row is from another decision
