@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 
@@ -24,21 +23,21 @@ from fuzzytree.auditing.engine.states import Proved, counted, short
 from fuzzytree.auditing.findings.codes import note
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges
-from fuzzytree.model import FuzzyTree, RuleBase
+from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges, used_terms
+from fuzzytree.model import FuzzyTree
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Count rules, clauses and terms, and compute the index of Nauck."""
     rules = subject.rules
-    clauses = [len(rule.when) for rule in rules.rules]
+    clauses, used = [len(rule.when) for rule in rules.rules], set(used_terms(rules))
     measures = [
         Measure("rules", len(clauses)),
         Measure("clauses", sum(clauses)),
         Measure("most clauses of a rule", max(clauses)),
         Measure("clauses per rule", sum(clauses) / len(clauses)),
-        Measure("distinct terms in use", len(_terms(rules))),
-        Measure("variables in use", len({variable for variable, _ in _terms(rules)})),
+        Measure("distinct terms in use", len(used)),
+        Measure("variables in use", len({variable for variable, _ in used})),
     ]
     if subject.tree is not None:
         measures.append(Measure("depth of the tree", depth(subject.tree)))
@@ -93,10 +92,10 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
         None if no rule uses a variable, a range is a point, or a term has no exact
         shape.
     """
-    used_terms = _terms(subject.rules)
-    if subject.bounds and not used_terms.isdisjoint(subject.bounds.terms):
+    terms = set(used_terms(subject.rules))
+    if subject.bounds and not terms.isdisjoint(subject.bounds.terms):
         return None
-    names = {variable for variable, _ in used_terms}
+    names = {variable for variable, _ in terms}
     used = [of for of in ranges(subject) if of.variable.name in names]
     lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]
     if not used or any(of.low == of.high for of in used):
@@ -158,13 +157,3 @@ def _sum(axis: CurveAxis, at: Fraction) -> Polynomial:
         negative = tuple(-c for c in local_polynomial(element, at))
         total = difference(total, negative)
     return total
-
-
-def _terms(rules: RuleBase) -> set[tuple[str, str]]:
-    return set(
-        itertools.chain.from_iterable(
-            ((clause.variable, term) for term in clause.terms)
-            for rule in rules.rules
-            for clause in rule.when
-        )
-    )

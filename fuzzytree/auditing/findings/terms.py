@@ -41,7 +41,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.model import Points, Shape, Term, Variable, questions
+from fuzzytree.model import Points, RuleBase, Shape, Term, Variable, questions
 from fuzzytree.numerics import outwards
 
 
@@ -253,13 +253,15 @@ def _inventory(
     return (
         [(v.name, term.name) for v in subject.rules.variables for term in v.terms],
         [v.name for v in subject.rules.variables],
-        [
-            (clause.variable, term)
-            for rule in subject.rules.rules
-            for clause in rule.when
-            for term in clause.terms
-        ],
+        [*used_terms(subject.rules)],
     )
+
+
+def used_terms(rules: RuleBase) -> Iterator[tuple[str, str]]:
+    """Yield the variables and terms that rules use, as often as they do."""
+    for clause in (clause for rule in rules.rules for clause in rule.when):
+        for term in clause.terms:
+            yield clause.variable, term
 
 
 # --- FT402: is it well shaped?
@@ -301,32 +303,22 @@ def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
 
 
 def _defect(
-    of: VariableRange,
-    term: Term,
-    text: str,
-    how: str,
-    measures: tuple[Measure, ...],
-    region: tuple[Span, ...] = (),
+    of: VariableRange, term: Term, text: str, how: str, *measures: Measure
 ) -> AuditAnswer:
     name, terms = term_name(of.variable, term), labels_of(of, term)
-    facts = "FT402", name, f"{name} {text}", Proved(how)
-    return finding(*facts, terms=terms, region=region, measures=measures)
+    text = f"{name} {text}"
+    return finding("FT402", name, text, Proved(how), terms=terms, measures=measures)
 
 
 def _excess(of: VariableRange, term: Term, excess: Excess) -> AuditAnswer:
     end = "above 1" if excess.is_above else "below 0"
-    return _defect(
-        of,
-        term,
-        f"is clipped: its polynomial goes {short(excess.depth)} {end} "
-        f"between {short(excess.low)} and {short(excess.high)}",
-        "the polynomial's turning points and crossings were isolated",
-        (
-            Measure("excess", float(excess.depth)),
-            Measure("place of the excess", float(excess.at), unit=of.variable.unit),
-        ),
-        (Span(of.variable.name, float(excess.low), float(excess.high)),),
-    )
+    text = f"is clipped: its polynomial goes {short(excess.depth)} {end} "
+    text += f"between {short(excess.low)} and {short(excess.high)}"
+    how = "the polynomial's turning points and crossings were isolated"
+    depth = Measure("excess", float(excess.depth))
+    at = Measure("place of the excess", float(excess.at), unit=of.variable.unit)
+    span = Span(of.variable.name, float(excess.low), float(excess.high))
+    return replace(_defect(of, term, text, how, depth, at), region=(span,))
 
 
 def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
@@ -340,41 +332,31 @@ def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
     depths = [min(a.low, c.low) - b.high for (a, _), (b, _), (c, _) in deep]
     depth = max(depths)
     (_, left), (bottom, valley), (_, right) = deep[depths.index(depth)]
-    yield _defect(
-        of,
-        term,
-        f"has {len(deep) + 1} peaks: between {short(left)} and {short(right)} "
-        f"its degree falls to {short(bottom.nearest)}, at {short(valley)}",
-        f"its curve was visited in {len(axis.cells.rank)} stretches, in each of which "
-        "it is monotone",
-        (
-            Measure("peaks", len(deep) + 1),
-            Measure("depth of the deepest dip", float(depth)),
-            Measure("place of the deepest dip", float(valley), unit=of.variable.unit),
-        ),
-        (Span(of.variable.name, float(left), float(right)),),
+    text = f"has {len(deep) + 1} peaks: between {short(left)} and {short(right)} "
+    text += f"its degree falls to {short(bottom.nearest)}, at {short(valley)}"
+    how = f"its curve was visited in {len(axis.cells.rank)} stretches, in each of "
+    how += "which it is monotone"
+    measures = (
+        Measure("peaks", len(deep) + 1),
+        Measure("depth of the deepest dip", float(depth)),
+        Measure("place of the deepest dip", float(valley), unit=of.variable.unit),
     )
+    span = Span(of.variable.name, float(left), float(right))
+    yield replace(_defect(of, term, text, how, *measures), region=(span,))
 
 
 def _subnormal(of: VariableRange, term: Term, most: float) -> AuditAnswer:
-    return _defect(
-        of,
-        term,
-        f"has no point of degree 1: its largest degree anywhere is {short(most)}",
-        "the largest degree of its points",
-        (Measure("largest degree", most, str(Fraction(most))),),
-    )
+    text = f"has no point of degree 1: its largest degree anywhere is {short(most)}"
+    largest = Measure("largest degree", most, str(Fraction(most)))
+    return _defect(of, term, text, "the largest degree of its points", largest)
 
 
 def _outlying(of: VariableRange, term: Term, share: Bounds) -> AuditAnswer:
-    return _defect(
-        of,
-        term,
-        f"lies outside of the domain for the most part: {short(share.nearest)} of its "
-        f"area is from {short(of.low)} to {short(of.high)}",
-        "its area was integrated in fractions, on the domain and in all",
-        (measure("share of its area on the domain", share),),
-    )
+    text = f"lies outside of the domain for the most part: {short(share.nearest)} of "
+    text += f"its area is from {short(of.low)} to {short(of.high)}"
+    how = "its area was integrated in fractions, on the domain and in all"
+    inside = measure("share of its area on the domain", share)
+    return _defect(of, term, text, how, inside)
 
 
 def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
