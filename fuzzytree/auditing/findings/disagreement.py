@@ -200,11 +200,7 @@ class _Search:
         return self.rows[self.place].number
 
     def run(self, seeds: Sequence[Mapping[str, Fraction]]) -> None:
-        """Seek it, first near what may lead to it.
-
-        Args:
-            seeds: Points at which both differ.
-        """
+        """Seek it, first near points at which both differ."""
         try:
             if self.rows:
                 self._run(seeds)
@@ -239,23 +235,20 @@ class _Search:
                 self.settled, self.low = set(range(len(self.rows))), None
                 return
             before = self.best
-            self._add(place, result)
+            self._lower(result.low)
+            self.settled.add(place)
+            self._keep(place, result)
             if result.why and not result.is_narrow:
                 self.why = self.why or f"around row {row.number}: {result.why}"
             left = left[1:] if self.best is before else self._left(left[1:])
         if left:
             self.why = self.why or "the budget was spent"
 
-    def _add(self, place: int, result: Nearest) -> None:
-        self._lower(result.low)
-        self.settled.add(place)
-        if result.high is not None and result.point is not None:
-            best = None if self.best is None else self.best.high
-            if best is None or result.high < best:
-                self._keep(place, result)
-
     def _keep(self, place: int, result: Nearest) -> None:
-        assert result.point is not None  # checked by the caller
+        """Keep a result that is nearer than the best one."""
+        high, best = result.high, None if self.best is None else self.best.high
+        if result.point is None or high is None or (best is not None and high >= best):
+            return
         self.claims = self.both.claims(result.point)
         self.best, self.place = result, place
 
@@ -273,9 +266,7 @@ class _Search:
             result = self.both.crisp.nearest_other(row.point, self.end)
             if not result.why:
                 self.exact[place] = result.low
-            if result.point is None or result.high is None:
-                continue
-            if self.both.differ(result.point) and (best is None or result.high < best):
+            if result.point is not None and self.both.differ(result.point):
                 self._keep(place, result)
 
     def _hints(

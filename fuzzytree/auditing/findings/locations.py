@@ -71,40 +71,35 @@ def rule_path(model: Document, number: int) -> Path:
         case FuzzyTree():
             return ("leaves", number - 1)
         case FuzzySystem():
-            return _system_rule_path(model, number)
-
-
-def _system_rule_path(system: FuzzySystem, number: int) -> Path:
-    for position, block in enumerate(system.blocks):
-        if number <= len(block.rules):
-            return ("blocks", position, "rules", number - 1)
-        number -= len(block.rules)
-    return ("blocks",)
+            for position, block in enumerate(model.blocks):
+                if number <= len(block.rules):
+                    return ("blocks", position, "rules", number - 1)
+                number -= len(block.rules)
+            return ("blocks",)
 
 
 def term_path(model: Document, label: TermName) -> Path:
-    """Return where a model holds a term; `variables` if it has none of that name."""
+    """Return where a model has a term; where its variables are if it has none."""
+    for path, variable, terms in _terms_in(model):
+        if variable == label.variable and label.term in terms:
+            return (*path, terms.index(label.term))
+    return ("inputs",) if isinstance(model, FuzzySystem) else ("variables",)
+
+
+def _terms_in(model: Document) -> Iterator[tuple[Path, str, list[str]]]:
+    """Yield where a model has terms, the variable, and their names."""
     if isinstance(model, FuzzySystem):
-        return _label_path(model, label)
+        for position, one in enumerate(model.variables):
+            k, labels = position - len(model.inputs), [term.name for term in one.labels]
+            field: Path = ("inputs", position) if k < 0 else ("outputs", k)
+            yield (*field, "labels"), one.name, labels
+        return
     for k, variable in enumerate(model.variables):
         terms = [term.name for term in variable.terms]
-        if variable.name == label.variable and label.term in terms:
-            return ("variables", k, "terms", terms.index(label.term))
+        yield ("variables", k, "terms"), variable.name, terms
     for k, fitted in enumerate(model.sets if isinstance(model, FuzzyTree) else ()):
         terms = [term.name for term in fitted.terms]
-        if fitted.variable == label.variable and label.term in terms:
-            return ("sets", k, "terms", terms.index(label.term))
-    return ("variables",)
-
-
-def _label_path(system: FuzzySystem, label: TermName) -> Path:
-    for position, one in enumerate(system.variables):
-        names = [term.name for term in one.labels]
-        if one.name == label.variable and label.term in names:
-            k = position - len(system.inputs)
-            field = ("inputs", position) if k < 0 else ("outputs", k)
-            return (*field, "labels", names.index(label.term))
-    return ("inputs",)
+        yield ("sets", k, "terms"), fitted.variable, terms
 
 
 def locations_of(

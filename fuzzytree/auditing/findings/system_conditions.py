@@ -144,8 +144,7 @@ def terms_of(
             count = uses[one.name, label.name]
             few = {0: "no rule uses it", 1: "1 rule uses it"}
             users = few.get(count, f"{count} rules use it")
-            outcome = _outcome(one, label, lines, ranges[one.name])
-            answers.append(_answer(one, label, outcome, users))
+            answers.append(_answer(one, label, lines, ranges[one.name], users))
     return SystemTerms(plain, bounds, ranges), tuple(answers)
 
 
@@ -168,32 +167,28 @@ def _between(label: SystemLabel, of: Interval | None) -> CurveBounds | None:
     return lines and (lines if label.height == 1.0 else scale(lines, label.height))
 
 
-def _outcome(
-    one: SystemInput, label: SystemLabel, lines: CurveBounds | None, of: Interval | None
-) -> tuple[str, str]:
+def _answer(
+    one: SystemInput,
+    label: SystemLabel,
+    lines: CurveBounds | None,
+    of: Interval | None,
+    users: str,
+) -> AuditAnswer:
     """Return what becomes of a term, and why."""
+    name, what = f"term {label.name!r} of {one.name!r}", "is left out"
     kind = str(label.curve.__struct_config__.tag)
     reason = f"its curve ({kind}) has no exact method"
     if one.parts and one.clips:
         reason = "a combination that is moved into a range has no exact method"
-    if lines is None:
-        return "is left out", reason
-    if of is None and isinstance(lines.lower, Points):
-        of = Fraction(lines.lower.values[0]), Fraction(lines.lower.values[-1])
-    apart = f" {float(gap(lines, of)):.2g} apart" if of else ""
-    return (
-        f"is bounded by two lines{apart} at most",
-        f"{reason}; its shape and its overlaps are not checked",
-    )
-
-
-def _answer(
-    one: SystemInput, label: SystemLabel, outcome: tuple[str, str], users: str
-) -> AuditAnswer:
-    name, (what, reason) = f"term {label.name!r} of {one.name!r}", outcome
-    text, state = f"{name} {what}: {reason}; {users}", f"{reason}; {users}"
+    if lines is not None:
+        if of is None and isinstance(lines.lower, Points):
+            of = Fraction(lines.lower.values[0]), Fraction(lines.lower.values[-1])
+        apart = f" {float(gap(lines, of)):.2g} apart" if of else ""
+        what = f"is bounded by two lines{apart} at most"
+        reason += "; its shape and its overlaps are not checked"
+    state = Declined("FTD02", f"{reason}; {users}")
     terms = (TermName(one.name, label.name),)
-    return note("FTD02", name, text, Declined("FTD02", state), terms=terms)
+    return note("FTD02", name, f"{name} {what}: {state.reason}", state, terms=terms)
 
 
 MOST_WAYS: Final = 64
