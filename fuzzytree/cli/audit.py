@@ -225,7 +225,7 @@ def command(options: AuditOptions) -> int:
             domain=AuditDomain(
                 within=options.within,
                 spreads=options.spreads,
-                limits={n: (a, b) for n, a, b in known.limits}
+                limits={one.variable: (one.from_, one.to) for one in known.limits}
                 | limits_of(options.limits),
                 row=row_of(options.row),
             ),

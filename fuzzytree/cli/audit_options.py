@@ -86,7 +86,7 @@ def settings_of(
     """
     from fuzzytree.auditing import check_settings, settings_with
 
-    found = settings_with(known.settings, dict(map(setting, texts)))
+    found = settings_with(known.audit_settings, dict(map(setting, texts)))
     if budget is not None:
         found = msgspec.structs.replace(found, budget_s=budget)
         check_settings(found)

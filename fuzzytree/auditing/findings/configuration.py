@@ -27,7 +27,6 @@ from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.formats import (
-    FileMistake,
     FileRecord,
     MappingNode,
     Name,
@@ -36,7 +35,7 @@ from fuzzytree.formats import (
     find,
     report,
 )
-from fuzzytree.model import as_names, name_choice
+from fuzzytree.model import Path, as_names, name_choice
 
 _SHARES = ("epsilon", "margin", "lead", "level", "overlap")
 _RANGES: Mapping[str, tuple[float, str]] = {
@@ -161,11 +160,22 @@ class SettingsOfFile(FileRecord, frozen=True, kw_only=True):
     overlap: float | None = None
     rows: int | None = None
     seed: int | None = None
-    budget: float | None = None
+    budget_s: float | None = field(name="budget", default=None)
+
+    def __iter__(self) -> Iterator[tuple[str, float]]:
+        """Yield the settings of the file by name."""
+        for name, value in msgspec.structs.asdict(self).items():
+            if value is not None:
+                yield name, value
 
 
-class ConfigurationFile(FileRecord, frozen=True, kw_only=True):
-    """A configuration of `fuzzytree audit`; what is left out is as without a file."""
+class Configuration(FileRecord, frozen=True, kw_only=True):
+    """A configuration of `fuzzytree audit`; what is left out is as without a file.
+
+    Attributes:
+        baseline: The path of a baseline, from the folder of the file.
+        fail_on: The least severity of a finding that fails.
+    """
 
     noun: ClassVar[str] = "a configuration"
     select: _Codes = ()
@@ -175,25 +185,10 @@ class ConfigurationFile(FileRecord, frozen=True, kw_only=True):
     baseline: Name | None = None
     fail_on: FailOn | None = field(name="fail-on", default=None)
 
-
-class Configuration(msgspec.Struct, frozen=True):
-    """What a file of configuration says.
-
-    Attributes:
-        select: Prefixes of codes to answer.
-        ignore: Prefixes of codes to leave out.
-        limits: The ends of variables, by name.
-        settings: The thresholds.
-        baseline: The path of a baseline; in a file, from the folder of that file.
-        fail_on: The least severity of a finding that fails.
-    """
-
-    select: tuple[str, ...] = ()
-    ignore: tuple[str, ...] = ()
-    limits: tuple[tuple[str, float, float], ...] = ()
-    settings: AuditSettings = AuditSettings()
-    baseline: str | None = None
-    fail_on: FailOn | None = None
+    @property
+    def audit_settings(self) -> AuditSettings:
+        """The settings, the defaults where one is left out."""
+        return msgspec.structs.replace(AuditSettings(), **dict(self.settings or ()))
 
 
 def read_configuration(path: PathLike) -> Configuration:
@@ -216,31 +211,33 @@ def configuration(content: bytes, name: str) -> Configuration:
         ReadError: As `read_configuration`.
     """
     root, mistakes = compose(content, name)
-    bound = bind(root, ConfigurationFile, mistakes)
+    bound = bind(root, Configuration, mistakes)
     if bound is None or mistakes:
         raise report(name, mistakes)
     assert isinstance(root, MappingNode)  # or it would not have been bound
-    settings = _settings(bound.settings or SettingsOfFile(), root, mistakes)
-    for position, fault in _wrong_limits(bound.limits):
-        node = find(root, ("limits", position))
+    for place, fault in _wrong(bound):
+        node = find(root, place)
         mistakes.append((node.line, node.column, fault))
+    if mistakes:
+        raise report(name, mistakes)
+    return bound
+
+
+def _wrong(bound: Configuration) -> Iterator[tuple[Path, str]]:
+    """Yield the places of values that are none, and why."""
+    for name, value in bound.settings or ():
+        try:
+            check_settings(msgspec.structs.replace(AuditSettings(), **{name: value}))
+        except ValueError as error:
+            yield ("settings", "budget" if name == "budget_s" else name), str(error)
+    for position, fault in _wrong_limits(bound.limits):
+        yield ("limits", position), fault
     for key in ("select", "ignore"):
         for position, text in enumerate(getattr(bound, key)):
             try:
                 chosen_codes([text])
             except ValueError as error:
-                node = find(root, (key, position))
-                mistakes.append((node.line, node.column, str(error)))
-    if mistakes:
-        raise report(name, mistakes)
-    return Configuration(
-        bound.select,
-        bound.ignore,
-        tuple((one.variable, one.from_, one.to) for one in bound.limits),
-        settings,
-        bound.baseline,
-        bound.fail_on,
-    )
+                yield (key, position), str(error)
 
 
 def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
@@ -255,23 +252,3 @@ def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
         elif one.from_ > one.to:
             swapped = f"limits are swapped: {one.from_!r} to {one.to!r}"
             yield position, f"{swapped}; the smaller one stands first"
-
-
-def _settings(
-    values: SettingsOfFile, root: MappingNode, mistakes: list[FileMistake]
-) -> AuditSettings:
-    """Return settings, the defaults where a value is left out or wrong."""
-    settings = AuditSettings()
-    for key, value in msgspec.structs.asdict(values).items():
-        if value is None:
-            continue
-        name = "budget_s" if key == "budget" else key
-        try:
-            changed = msgspec.structs.replace(settings, **{name: value})
-            check_settings(changed)
-        except ValueError as error:
-            node = find(root, ("settings", key))
-            mistakes.append((node.line, node.column, str(error)))
-        else:
-            settings = changed
-    return settings

@@ -16,6 +16,8 @@ from fuzzytree.auditing.findings.baselines import (
 )
 from fuzzytree.auditing.findings.configuration import (
     Configuration,
+    LimitsOfFile,
+    SettingsOfFile,
     configuration,
     read_configuration,
 )
@@ -36,14 +38,17 @@ fail-on: error
 
 
 def test_a_whole_configuration_is_read() -> None:
-    assert configuration(WHOLE, "x.yaml") == Configuration(
-        ("FT1", "FT301"),
-        ("FT103",),
-        (("force", 1.0, 5.5),),
-        AuditSettings(epsilon=0.2, budget_s=120.0, rows=10),
-        "accepted.json",
-        "error",
+    whole = configuration(WHOLE, "x.yaml")
+    assert whole == Configuration(
+        select=("FT1", "FT301"),
+        ignore=("FT103",),
+        limits=(LimitsOfFile(variable="force", from_=1.0, to=5.5),),
+        settings=SettingsOfFile(epsilon=0.2, budget_s=120.0, rows=10),
+        baseline="accepted.json",
+        fail_on="error",
     )
+    settings = AuditSettings(epsilon=0.2, budget_s=120.0, rows=10)
+    assert whole.audit_settings == settings
 
 
 def test_an_empty_mapping_changes_nothing() -> None:
