@@ -56,23 +56,6 @@ def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) ->
         )
 
 
-def deciding_model(model: Document, name: str) -> FuzzyTree | RuleBase:
-    """Return a model that decides: a system only if it stands for rules.
-
-    Raises:
-        ReadError: If its outputs are numbers.
-    """
-    if not isinstance(model, FuzzySystem):
-        return model
-    rules = as_rules(model, None)
-    if rules is None:
-        raise ReadError(
-            f"{name}: is a fuzzy system whose outputs are numbers, and is not "
-            "compared with rules or a tree"
-        )
-    return rules
-
-
 def joined_domain(
     old: Document,
     new: Document,
@@ -153,23 +136,18 @@ def difference(
     settings = settings or AuditSettings()
     clock = clock or Clock()
     both = old, new
-    if _give_numbers(old) and _give_numbers(new):
-        assert isinstance(old, FuzzySystem)  # no other model gives numbers
-        assert isinstance(new, FuzzySystem)
-        drafts = [*draft_system_changes(old, new)]
-        columns = tuple(dict.fromkeys((*old.columns, *new.columns)))
-        systems = SystemPair(old, new, columns, domain)
-        answers = number_answers(systems, rows, settings, clock)
+    systems = [one for one in both if isinstance(one, FuzzySystem)]
+    systems = [one for one in systems if as_rules(one, None) is None]
+    if len(systems) == 2:
+        first, second = systems
+        drafts = [*draft_system_changes(first, second)]
+        numbers = SystemPair(first, second, all_inputs(old, new), domain)
+        answers = number_answers(numbers, rows, settings, clock)
         is_equal = any(one.subject == "decisions" for one in answers)  # proved
         has_number = any(one.is_finding for one in answers)
         evidence = DecisionEvidence(is_equal=is_equal, has_number=has_number)
     else:
-        titles = [
-            file.name if file else model.name
-            for file, model in zip(files, both, strict=True)
-        ]
-        models = deciding_model(old, titles[0]), deciding_model(new, titles[1])
-        pair = _pair(*models, domain)
+        pair = _rule_pair(both, files, domain)
         clock.report("comparing rules", 0.0)
         drafts = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
         clock.report("comparing decisions", 0.1)
@@ -198,20 +176,30 @@ def difference(
     )
 
 
-def _pair(
-    old: FuzzyTree | RuleBase, new: FuzzyTree | RuleBase, domain: Domain
+def _rule_pair(
+    models: Sequence[Document], files: Sequence[ModelFile | None], domain: Domain
 ) -> RulePair:
-    one, other = (
-        rules_from_tree(m) if isinstance(m, FuzzyTree) else m for m in (old, new)
-    )
-    trees = None
-    if isinstance(old, FuzzyTree) and isinstance(new, FuzzyTree):
-        trees = (old, new)
-    return RulePair(one, other, all_inputs(one, other), domain, trees)
+    """Return two models as rules.
 
-
-def _give_numbers(model: Document) -> bool:
-    return isinstance(model, FuzzySystem) and as_rules(model, None) is None
+    Raises:
+        ReadError: If the outputs of one are numbers.
+    """
+    rules: list[RuleBase] = []
+    for model, file in zip(models, files, strict=True):
+        known: RuleBase | FuzzySystem | None
+        known = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
+        if isinstance(known, FuzzySystem):
+            known = as_rules(known, None)
+        if known is None:
+            raise ReadError(
+                f"{file.name if file else model.name}: is a fuzzy system whose outputs "
+                "are numbers, and is not compared with rules or a tree"
+            )
+        rules.append(known)
+    old, new = rules
+    trees = [model for model in models if isinstance(model, FuzzyTree)]
+    both = (trees[0], trees[1]) if len(trees) == 2 else None
+    return RulePair(old, new, all_inputs(old, new), domain, both)
 
 
 def _placed(
