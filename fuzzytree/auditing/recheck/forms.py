@@ -246,6 +246,11 @@ def forms() -> tuple[Form, ...]:
 
 
 _ANY = {"_": r"[-+0-9.e,]+", "...": r".*"}
+_SOME = {
+    "have": "(are shown to )?have ",
+    "shown to be": "(shown to be )?",
+    "why": "(: .+)?",
+}
 _SIGNS = {"[": "(?:", "]": ")?", "<": "(?:", ">": ")", "|": "|"}
 Facts = Mapping[str, float | str]
 
@@ -269,7 +274,7 @@ def _matches(text: str, form: str, facts: Facts | None) -> bool:
     for literal, name, spec, _ in string.Formatter().parse(form):
         result += "".join(_SIGNS.get(sign, re.escape(sign)) for sign in literal)
         if name is not None and (name in _ANY or facts is None):
-            result += _ANY.get(name, r".*")
+            result += (_ANY | _SOME).get(name, ".+")
         elif name is not None and facts is not None:  # without it, it must be missing
             known = name in facts
             result += re.escape(_shown(facts[name], spec or "")) if known else "(?!)"

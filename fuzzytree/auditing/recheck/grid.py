@@ -75,11 +75,10 @@ class Levels:
 
     def add(self, poly: Poly, end: End) -> int:
         """Return the number of the level that a polynomial has at an end."""
-        if isinstance(end, Root) and end.low == end.high:
+        if isinstance(end, Root) and (end.low == end.high or len(poly) < 2):
             end = end.low
-        if isinstance(end, Fraction) or len(poly) < 2:
-            value = at(poly, end if isinstance(end, Fraction) else ZERO)
-            poly, end = (value,), ZERO
+        if isinstance(end, Fraction):
+            poly, end = (at(poly, end),), ZERO
         number = self.numbers.setdefault((poly, end), len(self.known))
         if number == len(self.known):
             self.known.append((poly, end))
@@ -116,7 +115,7 @@ def cells(functions: Sequence[Function], line: Line, levels: Levels) -> list[Cel
     result: list[Cell] = []
     is_wide = line.low < line.high
     for left, right, polys in stretches(functions, line) if is_wide else ():
-        inside = between(left, right)
+        inside = (left.high + right.low) / 2
         ends = [[levels.add(poly, end) for poly in polys] for end in (left, right)]
         result.append(Cell(_ranks([at(poly, inside) for poly in polys]), *ends))
     here = {s: piece_at(s, line.low) for group, *_ in functions for s in group}
@@ -133,7 +132,7 @@ def _ranks(values: Sequence[Fraction]) -> list[int]:
 
 def stretches(
     functions: Sequence[Function], line: Line
-) -> Iterator[tuple[End, End, list[Poly]]]:
+) -> Iterator[tuple[Root, Root, list[Poly]]]:
     """Yield the parts of an axis, from left to right, and what functions are there."""
     shapes = dict.fromkeys(shape for group, *_ in functions for shape in group)
     ends = {e for s in shapes for p in pieces(s) for e in p[:2] if e is not None}
@@ -141,16 +140,11 @@ def stretches(
     cuts = [line.low, *inner, line.high]
     for a, b in itertools.pairwise(cuts):
         here = {shape: piece_at(shape, (a + b) / 2) for shape in shapes}
-        met: list[End] = [a, *crossings(_curves(functions, here), a, b), b]
+        low, high = (Root((-end, ONE), end, end) for end in (a, b))
+        met = [low, *crossings(_curves(functions, here), a, b), high]
         for left, right in itertools.pairwise(met):
-            inside = between(left, right)
+            inside = (left.high + right.low) / 2
             yield left, right, [_chosen(one, here, inside) for one in functions]
-
-
-def between(left: End, right: End) -> Fraction:
-    """Return a fraction between two ends."""
-    low = left.high if isinstance(left, Root) else left
-    return (low + (right.low if isinstance(right, Root) else right)) / 2
 
 
 def _chosen(function: Function, here: Mapping[Shape, Piece], x: Fraction) -> Poly:
@@ -182,9 +176,8 @@ def crossings(curves: Sequence[Poly], a: Fraction, b: Fraction) -> list[Root]:
     pairs = itertools.combinations(curves, 2)
     polynomials |= dict.fromkeys(plus(one, other, -1) for one, other in pairs)
     if len(polynomials) > MOST_ROOTS:
-        raise UndecidedError(
-            f"more than {MOST_ROOTS} crossings to look for in one place"
-        )
+        text = f"more than {MOST_ROOTS} crossings to look for in one place"
+        raise UndecidedError(text)
     met: list[Root] = []
     for poly in polynomials:
         for root in roots(poly, a, b):
@@ -218,12 +211,11 @@ def shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] | 
         return None
     both = [((one,), False, ONE), ((other,), False, ONE)]
     for left, right, curves in stretches(both, line):
-        inside = between(left, right)
-        for root in (end for end in (left, right) if isinstance(end, Root)):
+        for root in (left, right):
             root.narrow(FINE * (line.high - line.low))
             slack += root.high - root.low
-        a = left.high if isinstance(left, Root) else left
-        b = right.low if isinstance(right, Root) else right
+        a, b = left.high, right.low
+        inside = (a + b) / 2
         order = sorted(curves, key=lambda poly: at(poly, inside))
         wholes = [(ZERO, *(c / n for n, c in enumerate(p, 1))) for p in order]
         areas = [at(whole, b) - at(whole, a) for whole in wholes]
