@@ -57,17 +57,13 @@ class TooManyCellsError(MemoryError):
 
 
 class RuleAxis(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """What the rules ask of one variable.
-
-    Attributes:
-        variable: The variable.
-        elements: The distinct curves; the first is 1 everywhere: no clause.
-        clauses: For each rule its clauses here, each as the elements of which it takes
-            the largest; the rule takes the least of its clauses.
-    """
+    """What the rules ask of one variable."""
 
     variable: Variable
+    # the distinct curves; the first is 1 everywhere: no clause
     elements: tuple[RuleCurve, ...]
+    # for each rule its clauses here, each as the elements of which it takes the
+    # largest; the rule takes the least of its clauses
     clauses: tuple[tuple[tuple[int, ...], ...], ...]
 
     @functools.cached_property
@@ -82,33 +78,20 @@ class RuleAxis(msgspec.Struct, frozen=True, eq=False, dict=True):
 
 
 class AxisGrid(NamedTuple):
-    """An axis on the box.
-
-    Attributes:
-        axis: The axis.
-        cells: Its cells.
-        of: Shape (rules, cells): the element that is a rule's degree in each cell.
-        of_start: Shape (rules,): the same at the lower end itself.
-        least: Shape (elements, cells): the band of the least value.
-        most: Shape (elements, cells): the band of the largest value.
-        at: Shape (elements, zones): the band of the value at each zone.
-        after: The same, of the limit from above.
-        is_zero: Shape (elements, cells): whether an element is 0 throughout.
-        is_zero_at: Shape (elements, zones): whether it is 0 there, for sure.
-        may_be_zero_at: Shape (elements, zones): whether it may be 0 there.
-    """
+    """An axis on the box."""
 
     axis: RuleAxis
     cells: Cells
+    # shape (rules, cells): the element that is a rule's degree in each cell
     of: IntArray
-    of_start: IntArray
-    least: IntArray
-    most: IntArray
-    at: IntArray
-    after: IntArray
-    is_zero: BoolArray
-    is_zero_at: BoolArray
-    may_be_zero_at: BoolArray
+    of_start: IntArray  # shape (rules,): the same at the lower end itself
+    least: IntArray  # shape (elements, cells): the band of the least value
+    most: IntArray  # shape (elements, cells): the band of the largest value
+    at: IntArray  # shape (elements, zones): the band of the value at each zone
+    after: IntArray  # the same, of the limit from above
+    is_zero: BoolArray  # shape (elements, cells): whether an element is 0 throughout
+    is_zero_at: BoolArray  # shape (elements, zones): whether it is 0 there, for sure
+    may_be_zero_at: BoolArray  # shape (elements, zones): whether it may be 0 there
 
 
 class Bands(NamedTuple):
@@ -124,22 +107,15 @@ class Bands(NamedTuple):
 
 
 class Arrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """A rule base on a box.
-
-    Attributes:
-        rules: The rules.
-        domain: The box.
-        axes: What the rules ask, variable by variable.
-        ends: The two ends of each axis on the box, of combinations too; None where
-            no point of the box is within the sides of a combination.
-        is_fine: Whether levels are known as fractions, narrow without limit.
-    """
+    """A rule base on a box."""
 
     rules: RuleBase
-    domain: Domain
-    axes: tuple[RuleAxis, ...]
+    domain: Domain  # the box
+    axes: tuple[RuleAxis, ...]  # what the rules ask, variable by variable
+    # the two ends of each axis on the box, of combinations too; None where no point of
+    # the box is within the sides of a combination
     ends: tuple[tuple[Fraction, Fraction], ...] | None
-    is_fine: bool = False
+    is_fine: bool = False  # whether levels are known as fractions, narrow without limit
 
     @functools.cached_property
     def _grids(self) -> tuple[tuple[AxisGrid, ...], Bands]:
@@ -471,19 +447,13 @@ def _strength_at(
 
 
 class ExactPrediction(NamedTuple):
-    """What a rule base says at a point, exactly.
+    """What a rule base says at a point, exactly."""
 
-    Attributes:
-        label: The class, or None for no class.
-        rule: The number of the winning rule, 0 if none fires.
-        is_tie: Whether another rule is as strong.
-        margin: How far the strongest class is ahead of the next; not firing counts as
-            a class of strength 0.
-    """
-
-    label: str | None
-    rule: int
-    is_tie: bool
+    label: str | None  # the class, or None for no class
+    rule: int  # the number of the winning rule, 0 if none fires
+    is_tie: bool  # whether another rule is as strong
+    # how far the strongest class is ahead of the next; not firing counts as a class of
+    # strength 0
     margin: Fraction
 
 

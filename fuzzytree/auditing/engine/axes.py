@@ -68,21 +68,14 @@ _BITS: Final = (0, 512, 1024, 4096)  # to which places are known, one after anot
 
 
 class AlgebraicLevel(NamedTuple):
-    """A value of a curve at an irrational place.
+    """A value of a curve at an irrational place."""
 
-    Attributes:
-        polynomial: The curve there.
-        of: What is 0 at the place, and nowhere else in the interval of the root.
-        root: The place.
-        least: The curve is at least this.
-        most: The curve is at most this.
-    """
-
-    polynomial: Polynomial
+    polynomial: Polynomial  # the curve there
+    # what is 0 at the place, and nowhere else in the interval of the root
     of: Polynomial
-    root: Root
-    least: Fraction = ZERO
-    most: Fraction = ONE
+    root: Root  # the place
+    least: Fraction = ZERO  # the curve is at least this
+    most: Fraction = ONE  # the curve is at most this
 
     def between(self, bits: int) -> tuple[Fraction, Fraction]:
         """Return bounds of the value, from so many bits of the place; 0: as it is."""
@@ -282,33 +275,26 @@ _FINE_BITS = 256  # to which irrational places are known where floats do not suf
 
 
 class Cells(NamedTuple):
-    """An axis within two ends, cut.
+    """An axis within two ends, cut."""
 
-    Attributes:
-        zones: The places within the ends, apart from each other and in order, the
-            ends first and last; irrational ones as narrow intervals.
-        rank: Shape (cells, elements): the order of the elements in the cell between
-            two neighbouring zones; equal elements have equal ranks.
-        left: Shape (2, elements, zones): bounds of each element's value at a zone,
-            seen from below; at a rational place the value itself.
-        right: The same, seen from above; it differs at a step.
-        start_rank: Shape (elements,): the order at the lower end itself.
-        between: The open cells between neighbouring zones.
-        is_vague: Shape (zones,): whether more than one place may be in a zone, so
-            that a cell is hidden in it.
-        is_zero: Shape (elements, cells): whether an element is 0 throughout.
-        is_zero_at: Shape (elements, zones): whether it is 0 there, for sure.
-    """
-
+    # the places within the ends, apart from each other and in order, the ends first and
+    # last; irrational ones as narrow intervals
     zones: tuple[tuple[Fraction, Fraction], ...]
+    # shape (cells, elements): the order of the elements in the cell between two
+    # neighbouring zones; equal elements have equal ranks
     rank: IntArray
+    # shape (2, elements, zones): bounds of each element's value at a zone, seen from
+    # below; at a rational place the value itself
     left: Values
-    right: Values
-    start_rank: IntArray
+    right: Values  # the same, seen from above; it differs at a step
+    start_rank: IntArray  # shape (elements,): the order at the lower end itself
+    # the open cells between neighbouring zones
     between: tuple[tuple[Fraction, Fraction], ...]
+    # shape (zones,): whether more than one place may be in a zone, so that a cell is
+    # hidden in it
     is_vague: BoolArray
-    is_zero: BoolArray
-    is_zero_at: BoolArray
+    is_zero: BoolArray  # shape (elements, cells): whether an element is 0 throughout
+    is_zero_at: BoolArray  # shape (elements, zones): whether it is 0 there, for sure
 
 
 def cut(

@@ -333,28 +333,19 @@ _MOST_PAIRED = 12  # rules that may win, of which each two are compared
 
 
 class Contender(NamedTuple):
-    """A rule on a box.
+    """A rule on a box."""
 
-    Attributes:
-        then: Its class.
-        form: The forms of its clauses that say something; rules of equal forms are
-            equally strong at every point of the box.
-        clauses: These clauses.
-        bounds: The least and the largest degree of each.
-        low: At most its strength.
-        high: At least its strength.
-        is_below: Whether its strength is below `high` at every point.
-        place: Where it stands among the rules.
-    """
-
-    then: str
+    then: str  # its class
+    # the forms of its clauses that say something; rules of equal forms are equally
+    # strong at every point of the box
     form: tuple[ClauseNumber, ...]
-    clauses: tuple[ClauseNumber, ...]
+    clauses: tuple[ClauseNumber, ...]  # these clauses
+    # the least and the largest degree of each
     bounds: Mapping[ClauseNumber, tuple[float, float]]
-    low: float
-    high: float
-    is_below: bool
-    place: int
+    low: float  # at most its strength
+    high: float  # at least its strength
+    is_below: bool  # whether its strength is below `high` at every point
+    place: int  # where it stands among the rules
 
 
 class Remainder(NamedTuple):

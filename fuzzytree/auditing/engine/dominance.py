@@ -288,18 +288,13 @@ _NEARLY = Fraction(1, 2**30)  # of a level, by which a point may fall short of i
 
 
 class JointMaximum(NamedTuple):
-    """Where two rules meet.
+    """Where two rules meet."""
 
-    Attributes:
-        level: The highest level that both reach.
-        state: A witness, or a bracket of the level; `Proved` where no fractions are a
-            point at which both reach the wanted level.
-        is_touch: Whether both reach that level at irrational values alone.
-    """
-
-    level: Bounds
+    level: Bounds  # the highest level that both reach
+    # A witness, or a bracket of the level; `Proved` where no fractions are a point at
+    # which both reach the wanted level
     state: State
-    is_touch: bool = False
+    is_touch: bool = False  # whether both reach that level at irrational values alone
 
 
 def joint_bounds(compared: RulePairs, one: int) -> FloatArray:

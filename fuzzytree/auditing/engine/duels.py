@@ -140,18 +140,14 @@ _MOST_BITS = 63
 
 
 class AxisOptions(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """The options on one axis.
+    """The options on one axis."""
 
-    Attributes:
-        where: Of each option its cell; `START` for the axis's lower end; `-2 - zone`
-            for a zone that may hold several places, which counts within bands only.
-        top: The band of the rule's largest value.
-        floor: Shape (options, rivals): the band of each rival's least value; `NEVER`
-            where it is not below the rule.
-    """
-
+    # of each option its cell; `START` for the axis's lower end; `-2 - zone` for a zone
+    # that may hold several places, which counts within bands only
     where: IntArray
-    top: IntArray
+    top: IntArray  # the band of the rule's largest value
+    # shape (options, rivals): the band of each rival's least value; `NEVER` where it is
+    # not below the rule
     floor: IntArray
 
     def masks(self, is_open: BoolArray, band: int) -> tuple[int, ...]:
@@ -194,19 +190,14 @@ class AxisOptions(msgspec.Struct, frozen=True, eq=False, dict=True):
 
 
 class Duel(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """Some rules, taken together as their minimum, against rivals.
+    """Some rules, taken together as their minimum, against rivals."""
 
-    Attributes:
-        base: Where.
-        ours: The positions of the rules; without any, a rule without clauses.
-        rivals: The positions of the rivals.
-        is_inner: Whether lower ends are left out: these are surfaces, but where an axis
-            is one value.
-    """
-
-    base: Arrangement
+    base: Arrangement  # where
+    # the positions of the rules; without any, a rule without clauses
     ours: tuple[int, ...]
-    rivals: tuple[int, ...]
+    rivals: tuple[int, ...]  # the positions of the rivals
+    # whether lower ends are left out: these are surfaces, but where an axis is one
+    # value
     is_inner: bool = False
 
     @property
@@ -554,20 +545,14 @@ _DEEPEST = 4  # halvings of levels for axes that share inputs
 
 
 class LevelQuestion(NamedTuple):
-    """Is there a point at which some level separates rules from rivals?
+    """Is there a point at which some level separates rules from rivals?"""
 
-    Attributes:
-        ours: The numbers of the rules that must reach the level; without any, nothing
-            need reach it.
-        rivals: The numbers of the rules that must stay below it.
-        ceiling: The level is at most this; None if any will do.
-        of: What a bracket is about.
-    """
-
+    # the numbers of the rules that must reach the level; without any, nothing need
+    # reach it
     ours: tuple[int, ...]
-    rivals: tuple[int, ...]
-    ceiling: Fraction | None
-    of: str
+    rivals: tuple[int, ...]  # the numbers of the rules that must stay below it
+    ceiling: Fraction | None  # the level is at most this; None if any will do
+    of: str  # what a bracket is about
 
 
 def search_level(base: Arrangement, question: LevelQuestion, clock: Clock) -> State:

@@ -160,18 +160,12 @@ def equivalence(
 
 
 class _OpenBox(NamedTuple):
-    """A box that is open.
+    """A box that is open."""
 
-    Attributes:
-        margin: At least the largest margin on it.
-        box: The box.
-        depth: How often it was halved.
-        rules: Of each model the places of the rules that may win on it; all if None.
-    """
-
-    margin: float
+    margin: float  # at least the largest margin on it
     box: Box
-    depth: int
+    depth: int  # how often it was halved
+    # of each model the places of the rules that may win on it; all if None
     rules: tuple[tuple[int, ...] | None, ...] = (None, None)
 
 

@@ -61,7 +61,7 @@ class CurveAxis(NamedTuple):
     """Curves on an axis between two ends, cut into cells."""
 
     elements: tuple[RuleCurve, ...]  # the curves
-    cells: Cells  # the cells
+    cells: Cells
     is_open: bool = False  # whether the lower end itself is left out
 
     @property
@@ -227,25 +227,16 @@ _CELLS = 256  # on which degrees are enclosed before areas are exact
 
 
 class Overlap(NamedTuple):
-    """How much two curves share on a line.
+    """How much two curves share on a line."""
 
-    Attributes:
-        shared: The area under both, the integral of their minimum.
-        joined: The area under either, the integral of their maximum.
-        possibility: The supremum of their minimum.
-        at: A point near where it is reached.
-        crossings: Points at which they cross, each with the degree there.
-        is_within: Whether the first is nowhere above the second.
-        is_around: Whether the first is nowhere below the second.
-    """
-
-    shared: Bounds
-    joined: Bounds
-    possibility: Bounds
-    at: Fraction
+    shared: Bounds  # the area under both, the integral of their minimum
+    joined: Bounds  # the area under either, the integral of their maximum
+    possibility: Bounds  # the supremum of their minimum
+    at: Fraction  # A point near where it is reached
+    # points at which they cross, each with the degree there
     crossings: tuple[tuple[Fraction, Bounds], ...]
-    is_within: bool
-    is_around: bool
+    is_within: bool  # whether the first is nowhere above the second
+    is_around: bool  # whether the first is nowhere below the second
 
     @property
     def jaccard(self) -> Bounds | None:

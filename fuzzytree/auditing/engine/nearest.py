@@ -51,20 +51,14 @@ _HALVINGS = 10  # of the way from the point to a witness
 
 
 class Nearest(Value, frozen=True):
-    """Bounds of a distance.
+    """Bounds of a distance."""
 
-    Attributes:
-        low: No point of the kind is nearer than this.
-        high: The distance of `point`; None if no such point is known.
-        point: A point of the kind.
-        why: Why the bounds are not narrow, or why there is no point.
-        is_none: Whether there proved to be no such point in all of the domain.
-    """
-
-    low: Fraction
+    low: Fraction  # no point of the kind is nearer than this
+    # the distance of `point`; None if no such point is known
     high: Fraction | None = None
-    point: Point | None = None
-    why: str = ""
+    point: Point | None = None  # A point of the kind
+    why: str = ""  # why the bounds are not narrow, or why there is no point
+    # whether there proved to be no such point in all of the domain
     is_none: bool = False
 
     @property

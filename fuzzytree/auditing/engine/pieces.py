@@ -235,16 +235,11 @@ class RuleCurve(NamedTuple):
 
 
 class ChangePoint(NamedTuple):
-    """Where something can change on an axis: between `low` and `high`.
+    """Where something can change on an axis: between `low` and `high`."""
 
-    Attributes:
-        low: At most the place; the place itself if `low == high`.
-        high: At least the place.
-        of: What is zero there, and the root; None where the place is rational.
-    """
-
-    low: Fraction
-    high: Fraction
+    low: Fraction  # at most the place; the place itself if `low == high`
+    high: Fraction  # at least the place
+    # what is zero there, and the root; None where the place is rational
     of: tuple[Polynomial, Root] | None = None
 
 

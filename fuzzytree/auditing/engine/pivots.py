@@ -35,17 +35,12 @@ from fuzzytree.model import BoolArray, IntArray, checkpoint
 
 
 class TieQuestion(NamedTuple):
-    """Is there a set with an interior on which rules are the strongest?
+    """Is there a set with an interior on which rules are the strongest?"""
 
-    Attributes:
-        ours: The numbers of the rules that shall tie, from 1; or of a single one.
-        strict: The numbers of the rivals that must be weaker.
-        weak: The numbers of the rivals that may be equally strong.
-    """
-
+    # the numbers of the rules that shall tie, from 1; or of a single one
     ours: tuple[int, ...]
-    strict: tuple[int, ...]
-    weak: tuple[int, ...]
+    strict: tuple[int, ...]  # the numbers of the rivals that must be weaker
+    weak: tuple[int, ...]  # the numbers of the rivals that may be equally strong
 
     @property
     def rivals(self) -> tuple[int, ...]:
@@ -182,20 +177,13 @@ def _constants(
 
 
 class Pivot(NamedTuple):
-    """Where a rule, or all of ours, are as strong as one curve.
-
-    Attributes:
-        axis: The axis.
-        cell: The cell.
-        element: The curve.
-        mask: The rivals that do not exceed it.
-        beside: Where the rest of ours are as strong as theirs, of the same level.
-    """
+    """Where a rule, or all of ours, are as strong as one curve."""
 
     axis: int
     cell: int
-    element: int
-    mask: int
+    element: int  # the curve
+    mask: int  # the rivals that do not exceed it
+    # where the rest of ours are as strong as theirs, of the same level
     beside: Pivot | None = None
 
     @property
@@ -207,7 +195,7 @@ class Pivot(NamedTuple):
 class _CellDegrees(NamedTuple):
     """The rules' degrees in the cells of an axis, or at its only value."""
 
-    cells: list[int]  # the cells
+    cells: list[int]
     of: IntArray  # shape (rules, cells): the element that is a rule's degree
     height: IntArray  # the same shape: its rank
     is_zero: BoolArray  # the same shape: whether it is 0 throughout

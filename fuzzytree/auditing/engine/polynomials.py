@@ -22,17 +22,12 @@ _FINE = 48  # bits of the place of a root within its interval
 
 
 class Root(Value, frozen=True):
-    """A place where a polynomial is zero, or nearly is: from `low` to `high`.
+    """A place where a polynomial is zero, or nearly is: from `low` to `high`."""
 
-    Attributes:
-        low: At most the root; the root itself if `low == high`.
-        high: At least the root.
-        is_sure: Whether there is exactly one root; otherwise there are none or several
-            within less than 2**-96 of the interval that was searched.
-    """
-
-    low: Fraction
-    high: Fraction
+    low: Fraction  # at most the root; the root itself if `low == high`
+    high: Fraction  # at least the root
+    # whether there is exactly one root; otherwise there are none or several within less
+    # than 2**-96 of the interval that was searched
     is_sure: bool = True
 
 

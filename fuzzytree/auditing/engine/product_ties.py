@@ -59,12 +59,9 @@ _Form = tuple[Fraction, Polynomial]
 
 
 class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
-    """The rules of a ground, to be compared as functions on boxes of cells.
+    """The rules of a ground, to be compared as functions on boxes of cells."""
 
-    Attributes:
-        base: The rules, joined by the product, and the box, which is not empty.
-    """
-
+    # the rules, joined by the product, and the box, which is not empty
     base: Arrangement
 
     @functools.cached_property

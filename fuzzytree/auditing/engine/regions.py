@@ -33,17 +33,12 @@ EVERYWHERE: Union = ((None, None),)
 
 
 class Region(Value, frozen=True):
-    """What a leaf decides.
+    """What a leaf decides."""
 
-    Attributes:
-        leaf: The leaf's number, from 1.
-        label: Its class.
-        sides: The variables of its path, in that order, each with the values
-            that lead on; none if no value does.
-    """
-
-    leaf: int
-    label: str
+    leaf: int  # the leaf's number, from 1
+    label: str  # its class
+    # the variables of its path, in that order, each with the values that lead on; none
+    # if no value does
     sides: tuple[tuple[str, Union], ...]
 
 

@@ -45,27 +45,19 @@ class RivalPair(NamedTuple):
 
 
 class BoundTable(NamedTuple):
-    """What is known on each of some intervals.
+    """What is known on each of some intervals."""
 
-    Attributes:
-        low: Shape (intervals, rules): at least this is the degree of a rule's clauses.
-        high: At most this.
-        at: About this at the interval's middle.
-        most: Shape (intervals, pairs). Under the product, at most this many times is
-            `one` as large as `other`, clauses of both left out. Under the minimum, at
-            least this is `other` where it is below `one`; infinite if it never is.
-        least: At least this many times under the product; 0 under the minimum.
-        spread: How far apart both are, for choosing which line to part.
-        width: Shape (intervals, rules): the same for a rule alone.
-    """
-
+    # shape (intervals, rules): at least this is the degree of a rule's clauses
     low: FloatArray
-    high: FloatArray
-    at: FloatArray
+    high: FloatArray  # at most this
+    at: FloatArray  # about this at the interval's middle
+    # shape (intervals, pairs). Under the product, at most this many times is `one` as
+    # large as `other`, clauses of both left out. Under the minimum, at least this is
+    # `other` where it is below `one`; infinite if it never is
     most: FloatArray
-    least: FloatArray
-    spread: FloatArray
-    width: FloatArray
+    least: FloatArray  # at least this many times under the product; 0 under the minimum
+    spread: FloatArray  # how far apart both are, for choosing which line to part
+    width: FloatArray  # shape (intervals, rules): the same for a rule alone
 
 
 class Intervals(NamedTuple):
@@ -359,35 +351,23 @@ _MIX_CELLS = 4  # of a combination's values on one box
 
 
 class Combination(NamedTuple):
-    """A combination of inputs.
+    """A combination of inputs."""
 
-    Attributes:
-        use: The clauses of rules on it.
-        weights: The summands' weights, each with the position of its line.
-        constant: Bounds of what is added to them.
-        side: Its limits in the domain, if it has any.
-    """
-
-    use: VariableUse
+    use: VariableUse  # the clauses of rules on it
+    # the summands' weights, each with the position of its line
     weights: tuple[tuple[int, float], ...]
-    constant: tuple[float, float]
-    side: DomainSide | None
+    constant: tuple[float, float]  # bounds of what is added to them
+    side: DomainSide | None  # its limits in the domain, if it has any
 
 
 class BoxReach(NamedTuple):
-    """What is known of each of some boxes.
+    """What is known of each of some boxes."""
 
-    Attributes:
-        table: As of `lines.Table`, of all clauses together.
-        is_empty: Whether a box has no point of the domain.
-        spreads: For each line how far pairs are apart, shape (boxes, pairs).
-        widths: For each line how far rules vary, shape (boxes, rules).
-    """
-
-    table: BoundTable
-    is_empty: npt.NDArray[np.bool_]
+    table: BoundTable  # as of `lines.Table`, of all clauses together
+    is_empty: npt.NDArray[np.bool_]  # whether a box has no point of the domain
+    # for each line how far pairs are apart, shape (boxes, pairs)
     spreads: list[FloatArray]
-    widths: list[FloatArray]
+    widths: list[FloatArray]  # for each line how far rules vary, shape (boxes, rules)
 
 
 class Space:

@@ -321,20 +321,14 @@ def simplified(
 
 
 class LevelSides(NamedTuple):
-    """What must hold along an axis.
+    """What must hold along an axis."""
 
-    Attributes:
-        level: A level.
-        bound: What values must reach to reach it: the level, or the least double that
-            does, where values are doubles.
-        above: The positions of the rules that must reach it.
-        below: The positions of the rules that must stay below it.
-    """
-
-    level: Fraction
+    level: Fraction  # A level
+    # what values must reach to reach it: the level, or the least double that does,
+    # where values are doubles
     bound: Fraction | float
-    above: Sequence[int]
-    below: Sequence[int]
+    above: Sequence[int]  # the positions of the rules that must reach it
+    below: Sequence[int]  # the positions of the rules that must stay below it
 
 
 def region_around(
