@@ -88,7 +88,6 @@ class AxisGrid(NamedTuple):
     least: IntArray  # shape (elements, cells): the band of the least value
     most: IntArray  # shape (elements, cells): the band of the largest value
     at: IntArray  # shape (elements, zones): the band of the value at each zone
-    after: IntArray  # the same, of the limit from above
     is_zero: BoolArray  # shape (elements, cells): whether an element is 0 throughout
     is_zero_at: BoolArray  # shape (elements, zones): whether it is 0 there, for sure
     may_be_zero_at: BoolArray  # shape (elements, zones): whether it may be 0 there
@@ -301,7 +300,6 @@ def _grids_of(
                 np.minimum(*ends_of_cells),
                 np.maximum(*ends_of_cells),
                 left,
-                right,
                 of.is_zero,
                 of.is_zero_at,
                 of.left[0] == 0,

@@ -183,8 +183,8 @@ def simplified(
 def plainer(
     base: Arrangement, point: Point, ours: Collection[int], rivals: Collection[int]
 ) -> Point:
-    """Return a point of fewer digits at which rules still lead by half as much."""
-    goal = lead_at(base, point, ours, rivals) / 2
+    """Return a point of fewer digits at which rules still lead by nearly as much."""
+    goal = lead_at(base, point, ours, rivals) * 15 / 16
     return simplified(
         base, point, lambda near: lead_at(base, near, ours, rivals) > max(goal, ZERO)
     )

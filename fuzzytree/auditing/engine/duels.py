@@ -512,6 +512,42 @@ def parts_of(
         yield from nested(grid, cell, levels, mine, theirs, is_outer=is_outer)
 
 
+def stays(duel: Duel, grid: AxisGrid, cell: int, rival: int, band: int) -> bool:
+    """Return whether a rival's curve is constant in a cell, in a band."""
+    if cell == START:
+        return bool(grid.at[grid.of_start[duel.rivals[rival]], 0] == band)
+    element = grid.of[duel.rivals[rival], cell]
+    return bool(grid.least[element, cell] == band == grid.most[element, cell])
+
+
+def part_at(
+    duel: Duel, band: int, level: Fraction, is_flat: bool, axis: int, mask: int
+) -> AxisStretch | None:
+    """Return where on an axis ours reach a level and some rivals stay below it.
+
+    `band`: the one below the level; or, if `is_flat`, its own, in which rivals may also
+    stay.
+    """
+    options, grid = duel.all_options[axis], duel.base.grids[axis]
+    every = [n for n in range(len(duel.rivals)) if mask >> n & 1]
+    fits = options.where >= START
+    if not is_flat:
+        fits &= (options.top > band) & (options.floor[:, every] <= band).all(axis=1)
+    for number in sorted(fits.nonzero()[0], key=lambda n: -int(options.top[n])):
+        cell = int(options.where[number])
+        rivals = [
+            n for n in every if not (is_flat and stays(duel, grid, cell, n, band))
+        ]
+        if (options.floor[number, rivals] > options.top[number]).any():
+            continue
+        below = {weakest(grid, [duel.rivals[n]], cell) for n in rivals}
+        mine = weakest(grid, duel.ours, cell)
+        result = stretch(grid, cell, level, [mine], below)
+        if result is not None:
+            return result
+    return None
+
+
 def nested(
     grid: AxisGrid,
     cell: int,
@@ -734,7 +770,7 @@ class _Search:
             duel.full,
             self._tell,
             self.clock,
-            None if is_outer else partial(self._part, duel, band, levels[0]),
+            None if is_outer else partial(part_at, duel, band, levels[0], False),
         )
 
     def _tell(self) -> None:
@@ -743,30 +779,6 @@ class _Search:
         self.choices += 1
         if self.choices > _MOST_CHOICES:
             raise OutOfTimeError
-
-    def _part(
-        self, duel: Duel, band: int, level: Fraction, axis: int, mask: int
-    ) -> AxisStretch | None:
-        """Return values of an axis that leave some rivals below a level."""
-        options, grid = duel.options[axis], duel.base.grids[axis]
-        bits = [n for n in range(len(duel.rivals)) if mask >> n & 1]
-        fits = (options.top > band) & (options.where >= START)
-        fits &= (options.floor[:, bits] <= band).all(axis=1)
-        # Of the options that fit, the one where the rule is strongest.
-        order = sorted(fits.nonzero()[0], key=lambda n: -int(options.top[n]))
-        for number in order[:4]:
-            cell = int(options.where[number])
-            rivals = [duel.rivals[n] for n in bits]
-            part = stretch(
-                grid,
-                cell,
-                level,
-                [weakest(grid, duel.ours, cell)],
-                {weakest(grid, [rival], cell) for rival in rivals},
-            )
-            if part is not None:
-                return part
-        return None
 
     def _checked(self, base: Arrangement, point: Point) -> Witness | None:
         """Return a point as a witness, if it is one in fractions."""

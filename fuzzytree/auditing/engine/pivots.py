@@ -19,7 +19,7 @@ import numpy as np
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid, strengths_at
 from fuzzytree.auditing.engine.domain import Point
-from fuzzytree.auditing.engine.duels import Duel, maximal, weakest
+from fuzzytree.auditing.engine.duels import Duel, maximal, stays, weakest
 from fuzzytree.auditing.engine.linear import simple
 from fuzzytree.auditing.engine.measures import local_polynomial
 from fuzzytree.auditing.engine.states import Bracket, Claim, Witness, coordinates
@@ -29,7 +29,6 @@ from fuzzytree.auditing.engine.witnesses import (
     have_one_direction,
     is_within,
     part_of,
-    stretch,
 )
 from fuzzytree.model import BoolArray, IntArray, checkpoint
 
@@ -348,39 +347,3 @@ def flat_family(
 def _least(duel: Duel, grid: AxisGrid, cell: int) -> int:
     """Return the band of the least value of our weakest rule in a cell."""
     return ends_of(grid, weakest(grid, duel.ours, cell), cell)[0]
-
-
-def stays(duel: Duel, grid: AxisGrid, cell: int, rival: int, band: int) -> bool:
-    """Return whether a rival's curve is constant in a cell, in a band."""
-    if cell == START:
-        return bool(grid.at[grid.of_start[duel.rivals[rival]], 0] == band)
-    element = grid.of[duel.rivals[rival], cell]
-    return bool(grid.least[element, cell] == band == grid.most[element, cell])
-
-
-def part_at(
-    duel: Duel, level: Fraction, flat: int | None, axis: int, mask: int
-) -> AxisStretch | None:
-    """Return where on an axis ours reach a level and some rivals stay below it.
-
-    Where the level is a band, `flat`, rivals may also stay in it.
-    """
-    options, grid = duel.all_options[axis], duel.base.grids[axis]
-    every = [n for n in range(len(duel.rivals)) if mask >> n & 1]
-    order = np.argsort(-options.top, kind="stable")
-    for number in order[options.where[order] >= START].tolist():
-        rivals = [
-            n
-            for n in every
-            if flat is None
-            or not stays(duel, grid, int(options.where[number]), n, flat)
-        ]
-        if (options.floor[number, rivals] > options.top[number]).any():
-            continue
-        cell = int(options.where[number])
-        mine = weakest(grid, duel.ours, cell)
-        below = {weakest(grid, [duel.rivals[n]], cell) for n in rivals}
-        result = stretch(grid, cell, level, [mine], below)
-        if result is not None:
-            return result
-    return None

@@ -25,8 +25,10 @@ from fuzzytree.auditing.engine.duels import (
     at_most,
     cover,
     nested,
+    part_at,
     parts_of,
     selections,
+    stays,
     union,
     weakest,
     witness_between,
@@ -38,9 +40,7 @@ from fuzzytree.auditing.engine.pivots import (
     ends_of,
     flat_family,
     levels_of,
-    part_at,
     pivots,
-    stays,
     tie_witness,
     value_of,
     whole,
@@ -240,9 +240,7 @@ class _Search:
             self.duel.full & ~union(part.mask for part in pivot.all),
             self.count,
             self.clock,
-            None
-            if is_outer
-            else partial(part_at, self.duel, levels[0], band if is_flat else None),
+            None if is_outer else partial(part_at, self.duel, band, levels[0], is_flat),
             fixed,
         )
 

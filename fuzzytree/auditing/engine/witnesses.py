@@ -29,7 +29,7 @@ from fuzzytree.auditing.engine.linear import (
     row_of,
     simple,
 )
-from fuzzytree.auditing.engine.pieces import ONE, RuleCurve, piece_at, pieces
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, RuleCurve, piece_at, pieces
 from fuzzytree.auditing.engine.polynomials import (
     difference,
     magnitude,
@@ -71,21 +71,58 @@ def stretch(
         A part of the cell, shorter than the true one by next to nothing; None if there
         is none.
     """
-    limits = [*((one, True) for one in high_ones), *((one, False) for one in low_ones)]
-    elements = grid.axis.elements
+    limits = _limits(grid, (level, level), high_ones, low_ones)
     if cell == START:
-        at = grid.cells.zones[0][0]
-        fits = all((elements[e].degree(at) >= level) is up for e, up in limits)
-        return AxisStretch(at, at, is_open=False) if fits else None
-    ends = grid.cells.between[cell]
+        return _start(grid, limits)
     for bits in (64, 256, 1024):
-        low, high = ends
-        for one, is_high in limits:
-            result = part_of(elements[one], ends, level, is_high=is_high, bits=bits)
-            low, high = max(low, result.low), min(high, result.high)
+        low, high = _common(limits, grid.cells.between[cell], bits)
         if low < high:
             return AxisStretch(low, high)
     return None
+
+
+class _Limit(NamedTuple):
+    """A curve that must reach a level, or stay below it."""
+
+    curve: RuleCurve
+    level: Fraction
+    is_high: bool
+
+
+def _limits(
+    grid: AxisGrid,
+    levels: tuple[Fraction, Fraction],
+    high_ones: Iterable[int],
+    low_ones: Iterable[int],
+) -> list[_Limit]:
+    curves = grid.axis.elements
+    return [
+        *(_Limit(curves[one], levels[0], True) for one in high_ones),
+        *(_Limit(curves[one], levels[1], False) for one in low_ones),
+    ]
+
+
+def _start(grid: AxisGrid, limits: Iterable[_Limit]) -> AxisStretch | None:
+    """Return the lower end of an axis, if limits hold there."""
+    at = grid.cells.zones[0][0]
+    fits = all((curve.degree(at) >= level) is up for curve, level, up in limits)
+    return AxisStretch(at, at, is_open=False) if fits else None
+
+
+def _common(
+    limits: Iterable[_Limit],
+    ends: tuple[Fraction, Fraction],
+    bits: int,
+    margin: Fraction = ZERO,
+) -> tuple[Fraction, Fraction]:
+    """Return where in a cell limits hold: parts that are inner ones, or wider."""
+    low, high = ends
+    for curve, level, is_high in limits:
+        part = part_of(curve, ends, level, is_high=is_high, bits=bits)
+        if part.low <= part.high:
+            part = AxisStretch(part.low - margin, part.high + margin)
+        low, high = max(low, part.low), min(high, part.high)
+    return low, high
 
 
 def part_of(
@@ -129,42 +166,18 @@ def widest(
     Nothing is left out: the elements of `high_ones` must reach the lower level and
     those of `low_ones` be below the upper one, and the zones at the cell's ends count.
     """
-    elements = grid.axis.elements
-    zones = grid.cells.zones
+    limits = _limits(grid, levels, high_ones, low_ones)
     if cell == START:
-        at = zones[0][0]
-        fits = all(elements[one].degree(at) >= levels[0] for one in high_ones) and all(
-            elements[one].degree(at) < levels[1] for one in low_ones
-        )
-        return AxisStretch(at, at, is_open=False) if fits else None
-    low, high = grid.cells.between[cell]
-    ends = low, high
-    first, last = zones[cell][0], zones[cell + 1][1]
-    for one in high_ones:
-        part = _outer(
-            part_of(elements[one], ends, levels[0], is_high=True, bits=64), ends
-        )
-        low, high = max(low, part.low), min(high, part.high)
-    for one in low_ones:
-        part = _outer(
-            part_of(elements[one], ends, levels[1], is_high=False, bits=64), ends
-        )
-        low, high = max(low, part.low), min(high, part.high)
+        return _start(grid, limits)
+    zones, ends = grid.cells.zones, grid.cells.between[cell]
+    low, high = _common(limits, ends, 64, (ends[1] - ends[0]) / 2**60)
     if low > high:
         return None
     return AxisStretch(
-        first if low <= ends[0] else low,
-        last if high >= ends[1] else high,
+        zones[cell][0] if low <= ends[0] else low,
+        zones[cell + 1][1] if high >= ends[1] else high,
         is_open=False,
     )
-
-
-def _outer(part: AxisStretch, ends: tuple[Fraction, Fraction]) -> AxisStretch:
-    """Return bounds of a part that its own ends, inner ones, fall short of."""
-    if part.low > part.high:
-        return part
-    margin = (ends[1] - ends[0]) / 2**60
-    return AxisStretch(part.low - margin, part.high + margin)
 
 
 # --- points of the inputs
