@@ -19,7 +19,7 @@ import heapq
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 from fuzzytree.auditing.engine.arrangement import difference_at
 from fuzzytree.auditing.engine.clock import Clock
@@ -424,27 +424,25 @@ def difference_region(
         if search.answers(wide) == wanted:
             box = wide
             continue
-        for field in ("low", "high"):
-            box = _stretched(search, box, place, field, wanted)
+        for is_low in (True, False):
+            box = _stretched(search, box, place, wanted, is_low=is_low)
         low, high, _ = box[place]
         spans.append(Span(str(axis.key), float(low), float(high)))
     return tuple(spans)
 
 
 def _stretched(
-    search: _Search, box: Box, place: int, field: Literal["low", "high"], wanted: object
+    search: _Search, box: Box, place: int, wanted: object, *, is_low: bool
 ) -> Box:
     """Return a box with one end moved outwards as far as the answers stay."""
+    low, high, _ = box[place]
+    whole = search.axes[place].whole
 
     def moved(end: Fraction) -> Box:
-        low, high, _ = box[place]
-        ends = (end, high) if field == "low" else (low, end)
-        part = AxisPart(*ends, True)
+        part = AxisPart(end, high, True) if is_low else AxisPart(low, end, True)
         return (*box[:place], part, *box[place + 1 :])
 
-    best, beyond = (
-        getattr(one, field) for one in (box[place], search.axes[place].whole)
-    )
+    best, beyond = (low, whole.low) if is_low else (high, whole.high)
     if search.answers(moved(beyond)) == wanted:
         return moved(beyond)
     for _ in range(_HALVINGS):

@@ -26,7 +26,7 @@ from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     derivative,
     difference,
-    divided,
+    division,
     monic,
     multiplied,
     roots,
@@ -342,7 +342,7 @@ def quotient(
         while value_at(bottom, end) == 0:
             if value_at(top, end) != 0:
                 return None
-            top, bottom = divided(top, end), divided(bottom, end)
+            top, bottom = (division(one, (-end, ONE))[0] for one in (top, bottom))
     if len(top) == len(bottom) == 1:
         ratio = top[0] / bottom[0]
         return Bounds(ratio, ratio)

@@ -146,8 +146,7 @@ def nearest(
         near: Points that may be of the kind, and near.
     """
     search = _Search(domain, centre, ask, is_one, clock or Clock())
-    if clear is not None:
-        search.low = clear
+    search.low = clear or ZERO
     return search.run(within, near)
 
 

@@ -28,9 +28,7 @@ from fuzzytree.auditing.engine.polynomials import (
     composed,
     derivative,
     difference,
-    divided,
-    integer_roots,
-    integers,
+    division,
     magnitude,
     refined,
     roots,
@@ -269,12 +267,12 @@ def places(
             result.update(end for end in (piece.low, piece.high) if end is not None)
             if len(polynomial) > 1:
                 ends = piece.low, piece.high
-                turning = integers(derivative(polynomial))[0]
+                turning = derivative(polynomial)
                 if len(turning) > 1:
                     _solve(turning, *ends, result, irrational)
                 for level in levels:
                     if not is_kept or ZERO < level < ONE:
-                        met = _crossing(polynomial, (level,))
+                        met = difference(polynomial, (level,))
                         _solve(met, *ends, result, irrational)
     for one, other in itertools.combinations(parts, 2):
         checkpoint()
@@ -283,7 +281,7 @@ def places(
         for low, high, p, q in _overlaps(one, other):
             is_asked = p in _ENDS or q in _ENDS  # where one meets 0 or 1 is known
             if (len(p) > 1 or len(q) > 1) and not is_asked:
-                _solve(_crossing(p, q), low, high, result, irrational)
+                _solve(difference(p, q), low, high, result, irrational)
     return tuple(_apart([*(ChangePoint(x, x) for x in result), *irrational]))
 
 
@@ -337,7 +335,7 @@ def _is_only_root(of: Polynomial, at: Fraction, place: ChangePoint) -> bool:
     if value_at(of, at) != 0:
         return False
     while len(of) > 1 and value_at(of, at) == 0:
-        of = divided(of, at)
+        of, _ = division(of, (-at, ONE))
     ends = place.low, place.high
     return all(value_at(of, end) for end in ends) and not roots(of, *ends)
 
@@ -359,17 +357,8 @@ def _narrowed(place: ChangePoint, bits: int) -> ChangePoint:
     return ChangePoint(root.low, root.high, (place.of[0], root))
 
 
-def _crossing(one: Polynomial, other: Polynomial) -> list[int]:
-    """Return a positive multiple of a difference, in whole numbers."""
-    a, of_a = integers(one)
-    b, of_b = integers(other)
-    common = math.gcd(of_a, of_b)
-    of_a, of_b = of_a // common, of_b // common
-    return [x * of_b - y * of_a for x, y in itertools.zip_longest(a, b, fillvalue=0)]
-
-
 def _solve(
-    numbers: Sequence[int],
+    polynomial: Polynomial,
     low: Fraction | None,
     high: Fraction | None,
     result: set[Fraction],
@@ -377,16 +366,16 @@ def _solve(
 ) -> None:
     if low is None or high is None:
         return
-    met = integer_roots(numbers, low, high)
+    met = roots(polynomial, low, high)
     if not all(root.is_sure for root in met):  # it may be a double one
-        numbers = integers(squarefree(tuple(map(Fraction, numbers))))[0]
-        met = integer_roots(numbers, low, high)
+        polynomial = squarefree(polynomial)
+        met = roots(polynomial, low, high)
     for root in met:
         if root.low == root.high:
             result.add(root.low)
         else:
-            of = tuple(map(Fraction, numbers))
-            irrational.append(ChangePoint(root.low, root.high, (of, root)))
+            place = ChangePoint(root.low, root.high, (polynomial, root))
+            irrational.append(place)
 
 
 def _overlaps(

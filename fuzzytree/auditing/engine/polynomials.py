@@ -102,22 +102,6 @@ def multiplied(one: Polynomial, other: Polynomial) -> Polynomial:
     return tuple(result)
 
 
-def divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
-    """Return p / (x - at), where p is 0 at `at` (Horner's scheme).
-
-    Example:
-        >>> square = (Fraction(-1), Fraction(0), Fraction(1))
-        >>> [int(one) for one in divided(square, Fraction(1))]
-        [1, 1]
-    """
-    result: list[Fraction] = []
-    carried = Fraction(0)
-    for one in reversed(polynomial[1:]):
-        carried = one + carried * at
-        result.append(carried)
-    return tuple(reversed(result))
-
-
 def monic(polynomial: Polynomial) -> Polynomial:
     """Return the multiple of a polynomial whose last coefficient is 1; 0 stays 0.
 
@@ -184,14 +168,8 @@ def roots(polynomial: Polynomial, low: Fraction, high: Fraction) -> tuple[Root, 
     """  # noqa: E501
     if not low < high:
         raise ValueError(f"no interval from {low} to {high}")
-    return integer_roots(integers(polynomial)[0], low, high)
-
-
-def integer_roots(
-    numbers: Sequence[int], low: Fraction, high: Fraction
-) -> tuple[Root, ...]:
-    """Return what `roots` does, of a polynomial with whole coefficients."""
     checkpoint()
+    numbers, _ = integers(polynomial)
     while len(numbers) > 1 and not numbers[-1]:
         numbers = numbers[:-1]
     if len(numbers) == 1:
