@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -196,15 +196,12 @@ class RulePairs(msgspec.Struct, frozen=True, eq=False, dict=True):
         return "not" if surely[strong - 1] else "open"
 
     @functools.cached_property
-    def _known(self) -> dict[tuple[str, int], ByteArray]:
-        return {}
+    def _weaker(self) -> Callable[[int], ByteArray]:
+        return functools.cache(self._weaker_than)
 
-    def _weaker(self, weak: int) -> ByteArray:
+    def _weaker_than(self, weak: int) -> ByteArray:
         """For each rule: 1 if it is somewhere weaker than one, 2 if unknown, else 0."""
         checkpoint()
-        key = "weaker", weak
-        if key in self._known:
-            return self._known[key]
         result = np.zeros(len(self.base.rules.rules), dtype=np.int64)
         for side, rest in zip(self.sides, self.tops[1], strict=True):
             below = side.rank < side.rank[weak]
@@ -214,8 +211,7 @@ class RulePairs(msgspec.Struct, frozen=True, eq=False, dict=True):
                 least = np.minimum(least, np.where(start, side.at[:, 0], FAR))
             near = (least == rest[weak]) & ~self._is_sharp(least) & (result == 0)
             result = np.where(least < rest[weak], 1, np.where(near, 2, result))
-        self._known[key] = result.astype(np.int8)
-        return self._known[key]
+        return result.astype(np.int8)
 
     def _not_above(self, weak: int) -> tuple[BoolArray, BoolArray]:
         """For each rule: whether it may be, and is, no stronger where one fires."""

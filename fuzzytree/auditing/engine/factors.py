@@ -8,7 +8,7 @@ are then questions about quotients and differences of polynomials, decided in fr
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Final, NamedTuple
 
@@ -74,15 +74,9 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
         )
 
     @functools.cached_property
-    def _known(self) -> dict[tuple[int, int, int], Polynomial]:
-        return {}
-
-    def polynomial(self, axis: int, rule: int, cell: int) -> Polynomial:
-        """Return a rule's degree on an axis in a cell; all are numbered from 0."""
-        key = axis, rule, cell
-        if key not in self._known:
-            self._known[key] = self._polynomial(axis, rule, cell)
-        return self._known[key]
+    def polynomial(self) -> Callable[[int, int, int], Polynomial]:
+        """A rule's degree on an axis in a cell; all are numbered from 0."""
+        return functools.cache(self._polynomial)
 
     def _polynomial(self, axis: int, rule: int, cell: int) -> Polynomial:
         grid = self.grids[axis]
@@ -112,21 +106,19 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
         rank = self.grids[axis].cells.rank[cell]  # element 0 is 1 everywhere
         return bool(rank[low[0] if low else 0] <= rank[high[0] if high else 0])
 
-    def near(self, one: int, most: Fraction) -> BoolArray:
-        """Return which rules may be near one, by their degrees between cells."""
-        if (one, most) not in self._near:
-            checkpoint()
-            limit = float(most)
-            result: BoolArray = np.ones(len(self.base.rules.rules), dtype=bool)
-            for low, high in self.at_zones:
-                is_far = (low[one] - high > limit) | (low - high[one] > limit)
-                result &= ~is_far.any(axis=1)
-            self._near[one, most] = result
-        return self._near[one, most]
-
     @functools.cached_property
-    def _near(self) -> dict[tuple[int, Fraction], BoolArray]:
-        return {}
+    def near(self) -> Callable[[int, Fraction], BoolArray]:
+        """Which rules may be near one, by their degrees between cells."""
+        return functools.cache(self._near)
+
+    def _near(self, one: int, most: Fraction) -> BoolArray:
+        checkpoint()
+        limit = float(most)
+        result: BoolArray = np.ones(len(self.base.rules.rules), dtype=bool)
+        for low, high in self.at_zones:
+            is_far = (low[one] - high > limit) | (low - high[one] > limit)
+            result &= ~is_far.any(axis=1)
+        return result
 
     def at_start(self, axis: int, rule: int) -> Fraction:
         """Return a rule's degree at the lower end of an axis."""

@@ -196,16 +196,27 @@ def walk(of: CurveAxis, one: int) -> Iterator[CurveValue]:
     At a step both its values are yielded, each with a point where it is reached or
     approached.
     """
-    zones = of.cells.zones
-    for number, (a, b) in enumerate(zones):
-        at = (a + b) / 2
-        has_here = number > 0 or not of.is_open or len(zones) == 1
-        if has_here:
-            yield value_at_place(of, one, number), at
-        if number + 1 < len(zones):
-            after = value_at_place(of, one, number, is_after=True)
-            if not has_here or after != value_at_place(of, one, number):
-                yield after, at
+    before: tuple[int, Bounds] | None = None
+    for zone, is_after in _sides(of):
+        value = value_at_place(of, one, zone, is_after=is_after)
+        if (zone, value) != before:
+            yield value, _middle(of, zone)
+        before = zone, value
+
+
+def _sides(of: CurveAxis) -> Iterator[tuple[int, bool]]:
+    """Yield the places of a line, by number, each seen from below and from above."""
+    count = len(of.cells.zones)
+    for zone in range(count):
+        if zone > 0 or not of.is_open or count == 1:
+            yield zone, False
+        if zone + 1 < count:
+            yield zone, True
+
+
+def _middle(of: CurveAxis, zone: int) -> Fraction:
+    low, high = of.cells.zones[zone]
+    return (low + high) / 2
 
 
 def value_at_place(
@@ -269,10 +280,11 @@ def overlap(of: CurveAxis) -> Overlap:
     joined = area(
         of, lambda cell, at: local_polynomial(of.elements[1 - lower[cell]], at)
     )
-    met = [
-        (Bounds(min(a.low, b.low), min(a.high, b.high)), at)
-        for (a, at), (b, _) in _both(of)
-    ]
+    met: list[CurveValue] = []
+    for zone, is_after in _sides(of):
+        a, b = (value_at_place(of, n, zone, is_after=is_after) for n in (0, 1))
+        least = Bounds(min(a.low, b.low), min(a.high, b.high))
+        met.append((least, _middle(of, zone)))
     low = max(bounds.low for bounds, _ in met)
     high = max(bounds.high for bounds, _ in met)
     start = of.cells.start_rank
@@ -312,25 +324,6 @@ def most_shared(shapes: Sequence[Shape], low: float, high: float) -> FloatArray:
         # Edges and sums are off by roundings, which are far below this.
         result[place] = (shared + 1e-6) / np.maximum(joined - 1e-6, 1e-12)
     return np.minimum(result, 1.0)
-
-
-def _both(
-    of: CurveAxis,
-) -> Iterator[tuple[tuple[Bounds, Fraction], tuple[Bounds, Fraction]]]:
-    """Yield the values of two curves at the same places, seen from both sides."""
-    zones = of.cells.zones
-    for number, (a, b) in enumerate(zones):
-        at = (a + b) / 2
-        for is_after, is_asked in (
-            (False, number > 0 or not of.is_open or len(zones) == 1),
-            (True, number + 1 < len(zones)),
-        ):
-            if is_asked:
-                one, other = (
-                    value_at_place(of, which, number, is_after=is_after)
-                    for which in (0, 1)
-                )
-                yield (one, at), (other, at)
 
 
 def _crossings(of: CurveAxis) -> Iterator[tuple[Fraction, Bounds]]:

@@ -12,7 +12,7 @@ whether the rules are the strongest somewhere in such a box.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
 
@@ -140,16 +140,13 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
         return result[max(run.first, 0) : run.last + 2]
 
     @functools.cached_property
-    def _shared(self) -> dict[tuple[int, int, int], bool]:
-        return {}
+    def is_shared(self) -> Callable[[int, int, int], bool]:
+        """Whether two rules ask the same of an axis, in whatever order."""
+        return functools.cache(self._is_shared)
 
-    def is_shared(self, axis: int, one: int, other: int) -> bool:
-        """Return whether two rules ask the same of an axis, in whatever order."""
-        key = axis, one, other
-        if key not in self._shared:
-            question = self.factored.clauses[axis]
-            self._shared[key] = sorted(question[one]) == sorted(question[other])
-        return self._shared[key]
+    def _is_shared(self, axis: int, one: int, other: int) -> bool:
+        question = self.factored.clauses[axis]
+        return sorted(question[one]) == sorted(question[other])
 
     def are_free(self, one: int, other: int) -> bool:
         """Return whether no two axes on which rules differ have one direction."""
@@ -167,20 +164,17 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
         return True
 
     @functools.cached_property
-    def _forms(self) -> dict[tuple[int, int, int], _Form]:
-        return {}
+    def _form(self) -> Callable[[int, int, int], _Form]:
+        return functools.cache(self._form_in)
 
-    def _form(self, axis: int, rule: int, cell: int) -> _Form:
+    def _form_in(self, axis: int, rule: int, cell: int) -> _Form:
         """Return a rule's polynomial in a cell: the last number, and the rest by it."""
-        key = axis, rule, cell
-        if key not in self._forms:
-            if cell == START:
-                polynomial: Polynomial = (self.factored.at_start(axis, rule),)
-            else:
-                polynomial = self.factored.polynomial(axis, rule, cell)
-            polynomial = difference(polynomial, (ZERO,))
-            self._forms[key] = polynomial[-1], monic(polynomial)
-        return self._forms[key]
+        if cell == START:
+            polynomial: Polynomial = (self.factored.at_start(axis, rule),)
+        else:
+            polynomial = self.factored.polynomial(axis, rule, cell)
+        polynomial = difference(polynomial, (ZERO,))
+        return polynomial[-1], monic(polynomial)
 
     def _is_zero(self, axis: int, rule: int, cell: int) -> bool:
         return not self._form(axis, rule, cell)[0]

@@ -347,6 +347,7 @@ def _edges(start: FloatArray, end: FloatArray) -> FloatArray:
 
 # --- boxes
 
+_ROUNDED = (-1, 1, 0, 1, -1)  # each bound of a table: down, up or not
 _MIX_CELLS = 4  # of a combination's values on one box
 
 
@@ -514,27 +515,14 @@ class Space:
         return BoxReach(self._together(tables), is_empty, spreads, widths)
 
     def _together(self, tables: Sequence[BoundTable]) -> BoundTable:
-        low, high, at, most, least, _, _ = zip(*tables, strict=True)
-        nothing = np.empty((len(low[0]), 0))
-        if self.is_product:
-            return BoundTable(
-                product_of(low, -1),
-                product_of(high, 1),
-                product_of(at, 0),
-                product_of(most, 1),
-                product_of(least, -1),
-                nothing,
-                nothing,
-            )
-        return BoundTable(
-            np.minimum.reduce(low),
-            np.minimum.reduce(high),
-            np.minimum.reduce(at),
-            np.minimum.reduce(most),
-            np.minimum.reduce(least),
-            nothing,
-            nothing,
+        fields = [*zip(*tables, strict=True)][:5]
+        nothing = np.empty((len(fields[0][0]), 0))
+        joined = (
+            [product_of(of, side) for of, side in zip(fields, _ROUNDED, strict=True)]
+            if self.is_product
+            else [np.minimum.reduce(of) for of in fields]
         )
+        return BoundTable(*joined, *[nothing] * 2)
 
 
 def _ordered(
