@@ -25,13 +25,13 @@ from fuzzytree.auditing.engine.pieces import (
     RuleCurve,
     piece_at,
     pieces,
-    places,
 )
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     bernstein,
     composed,
     difference,
+    roots,
 )
 from fuzzytree.model import Conjunction, Part, RuleBase, Shape, checkpoint, shapes_of
 from fuzzytree.numerics import outwards
@@ -51,7 +51,7 @@ Bounds = tuple[Fraction, Fraction]
 NEVER, ALWAYS = 0, 1
 """The numbers of the forms that are 0 and 1 throughout."""
 
-_MOST_MARKS = 4_000  # places of an axis at which stretches are cut
+_MOST_CROSSED = 400  # pairs of pieces, of which crossings are looked for
 
 
 class AxisPart(NamedTuple):
@@ -144,13 +144,13 @@ class SharedAxis:
 
     @functools.cached_property
     def marks(self) -> tuple[Fraction, ...]:
-        """Where a curve changes its direction or crosses another, within the whole."""
-        shapes = dict.fromkeys(s for _, curves in self.clauses for s in curves)
-        every = places([RuleCurve(shape) for shape in shapes], _MOST_MARKS)
-        return self._inside(
-            one.low if one.low == one.high else Fraction(float(one.low))
-            for one in every
-        )
+        """Where a curve changes its formula or crosses another, within the whole."""
+        shapes = list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
+        result = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
+        for one, other in itertools.combinations(shapes, 2):
+            if len(pieces(one)) * len(pieces(other)) <= _MOST_CROSSED:
+                result.update(_crossings(one, other, self.whole))
+        return self._inside(result)
 
     def _inside(self, marks: Iterable[Fraction]) -> tuple[Fraction, ...]:
         low, high = self.whole.low, self.whole.high
@@ -175,7 +175,7 @@ def common_axes(
         The axes; and for each model the clauses of each of its rules.
     """
     axes = [SharedAxis(key, whole) for key, whole in ends]
-    numbers = {axis.key: place for place, axis in enumerate(axes)}
+    places = {axis.key: place for place, axis in enumerate(axes)}
     rules: list[list[tuple[ClauseNumber, ...]]] = []
     for model in models:
         keys = {v.name: v.parts or v.name for v in model.variables}
@@ -184,7 +184,7 @@ def common_axes(
         for rule in model.rules:
             when: list[ClauseNumber] = []
             for clause in rule.when:
-                place = numbers[keys[clause.variable]]
+                place = places[keys[clause.variable]]
                 curves = {shapes[clause.variable, t] for t in clause.terms}
                 curves_of = (clause.negated, tuple(sorted(curves, key=repr)))
                 when.append((place, axes[place].number(curves_of)))
@@ -301,12 +301,27 @@ def _curve_is_above(upper: Shape, lower: Shape, stretch: AxisPart) -> bool:
     at = stretch.low
     if stretch.is_closed and RuleCurve(upper).degree(at) < RuleCurve(lower).degree(at):
         return False
-    return all(
-        _piece_is_above(above, below, low, high)
-        for above in _clipped(upper, stretch)
-        for below in _clipped(lower, stretch)
-        if (low := max(above.low, below.low)) < (high := min(above.high, below.high))
-    )
+    return all(_piece_is_above(*both) for both in _overlaps(upper, lower, stretch))
+
+
+def _overlaps(
+    one: Shape, other: Shape, stretch: AxisPart
+) -> Iterator[tuple[ClippedPiece, ClippedPiece, Fraction, Fraction]]:
+    """Yield the pieces of two curves that meet on a stretch, with where they do."""
+    parts = _clipped(one, stretch), _clipped(other, stretch)
+    for first, second in itertools.product(*parts):
+        low, high = max(first.low, second.low), min(first.high, second.high)
+        if low < high:
+            yield first, second, low, high
+
+
+def _crossings(one: Shape, other: Shape, stretch: AxisPart) -> Iterator[Fraction]:
+    """Yield a point at, or beside, each crossing of two curves within a stretch."""
+    for first, second, low, high in _overlaps(one, other, stretch):
+        gap = difference(first.polynomial, second.polynomial)
+        for root in roots(gap, low, high) if len(gap) > 1 else ():
+            is_exact = root.low == root.high
+            yield root.low if is_exact else Fraction(float(root.low))
 
 
 def _piece_is_above(
