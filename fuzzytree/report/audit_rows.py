@@ -22,12 +22,9 @@ Counts = tuple[int, ...]
 
 
 class Data(NamedTuple):
-    """The rows, on every axis of a model.
+    """The rows on every axis of a model, and the number of each row's class.
 
-    Attributes:
-        axes: The value of each variable in every row, by name.
-        codes: The number of each row's class; the number of classes for no class.
-        classes: The classes; none if they are not known of any row.
+    No class has the number of the classes; there are none if no row's is known.
     """
 
     axes: dict[str, FloatArray]

@@ -158,11 +158,7 @@ def known_as(answers: Sequence[AuditAnswer]) -> dict[str, int]:
 
 
 def as_in_file(audit: Audit) -> Audit:
-    """Return an audit whose claims call rules by their numbers in the file.
-
-    Args:
-        audit: An audit; only that of a fuzzy system may number its rules otherwise.
-    """
+    """Return an audit whose claims call rules by their numbers in the file."""
     if not audit.numbers:
         return audit
     answers = [
@@ -192,11 +188,7 @@ def _claim_in_file(claim: Claim, numbers: Sequence[int]) -> Claim:
 
 
 def state_text(state: State, *, has_title: bool = False) -> str:
-    """Return how an answer is known, in words.
-
-    Args:
-        state: How it is known.
-        has_title: Whether the code of a declined question has its title, too.
+    """Return how an answer is known, in words; with a title, that of its code, too.
 
     Example:
         >>> state_text(Bracket("the largest lead", 0.1, 0.2, "the budget is spent"))

@@ -69,13 +69,10 @@ def joined(parts: Iterable[Content], between: str = "") -> Markup:
 
 
 def tag(name: str, *children: Content, **attributes: Attribute) -> Markup:
-    """Return an element.
+    """Return an element; texts in it are escaped.
 
-    Args:
-        name: Its name.
-        children: What stands in it; texts are escaped.
-        attributes: By name, `_` for `-`, a last `_` left out. None and False leave an
-            attribute out, True gives it no value.
+    In the names of attributes `_` stands for `-`, and a last `_` is left out. None and
+    False leave an attribute out, True gives it no value.
 
     Example:
         >>> print(tag("a", "R & D", href="#one", class_="link"))

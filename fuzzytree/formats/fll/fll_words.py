@@ -330,11 +330,7 @@ def _count(word: Word, least: int, notes: ReaderNotes) -> int:
 def defuzzifier(
     entry: FllEntry | None, notes: ReaderNotes
 ) -> tuple[Defuzzifier, str] | None:
-    """Return the defuzzifier that an entry names, and the type of a weighted one.
-
-    Returns:
-        None, and a mistake, where there is none.
-    """
+    """Return the defuzzifier of an entry and the type of a weighted one, if any."""
     if entry is None or entry.value in ("", "none"):
         return None
     name, *rest = entry.words()

@@ -43,13 +43,10 @@ _MOST_DEFINITIONS: Final = 50_000
 class FmlVariables(msgspec.Struct, frozen=True):
     """What rules can reference and conclude.
 
-    Attributes:
-        labels: For each variable the names of its terms: in rules, and in the system.
-        circular: Terms that are an and or an or of others.
-        outputs: The outputs by name.
-        negated: Terms that are the complement of their shape.
-        spent: One entry for each definition that was followed: terms which are made of
-            others many times over come to an end.
+    `labels` has, for each variable, the names of its terms in rules and in the system,
+    `circular` the terms that are made of others, `negated` those that are the
+    complement of their shape. `spent` grows with each definition that is followed, so
+    that terms which are made of others many times over come to an end.
     """
 
     labels: dict[str, dict[str, str]]

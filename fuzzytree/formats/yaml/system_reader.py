@@ -57,11 +57,9 @@ from fuzzytree.model import (
 def read_system(
     root: MappingNode, file_mistakes: list[FileMistake]
 ) -> FuzzySystem | None:
-    """Return the system of a file of `kind: system`.
+    """Return the system of a file of `kind: system`, None after adding why not.
 
-    Returns:
-        The system, or None after adding why there is none. With mistakes added it may
-        be one with placeholders.
+    With mistakes added it may be one with placeholders.
     """
     kept = entries(root, layout.SystemFile, file_mistakes)
     head = record(kept, layout.SystemHead, file_mistakes)

@@ -198,11 +198,7 @@ def _interval(timing: Timing) -> tuple[float, float]:
 def _draw_panel(
     axes: Axes, measure: Measure, marks: Sequence[Mark]
 ) -> dict[str, float]:
-    """Draw markers by kind, colours by form, bars, and the front filled and joined.
-
-    Returns:
-        The height of each marker, by the candidate's name.
-    """
+    """Draw markers, bars and the front; return the height of each marker by name."""
     title, nothing = _TITLES[measure]
     low, high = _decades(marks)
     has_zero = any(mark.error == 0.0 for mark in marks)

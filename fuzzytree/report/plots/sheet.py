@@ -90,12 +90,7 @@ TITLE = 0.36
 
 
 class Sheet:
-    """A figure whose axes count inches, x to the right and y down.
-
-    Attributes:
-        figure: As large as `resize` said.
-        axes: All of it, without lines.
-    """
+    """A figure whose axes count inches, x to the right and y down, without lines."""
 
     def __init__(self) -> None:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
