@@ -177,7 +177,7 @@ def _write_rates(sheet: Sheet, counts: Counts, left: float, top: float) -> None:
     x = left + _RATES
     for row, (good, total) in enumerate(zip(right, totals, strict=True)):
         y = top + (row + 0.5) * _CELL
-        sheet.write(x, y, rate_text(int(good), int(total)), colour=WORD, ha="right")
+        sheet.write(x, y, rate_text(int(good), int(total)), color=WORD, ha="right")
     whole = rate_text(int(right.sum()), int(totals.sum()))
     y = top + (len(counts) + 0.5) * _CELL
     sheet.write(x, y, whole, color="black", fontweight="bold", ha="right")
