@@ -191,7 +191,7 @@ def mistakes(content: bytes) -> list[str]:
                 "4:27: 'bits' must be '8' or '16', not an integer",
                 "4:37: 'tail' cannot be 'xx'; it is 1 to 64 bytes in hexadecimal, such "
                 "as 'AA 55'",
-                "6:14: 'hot' must be at most 1.0, not 2.0",
+                "6:14: 'hot' must be at most 1, not 2",
             ],
         ),
         (
