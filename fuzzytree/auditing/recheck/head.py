@@ -293,7 +293,8 @@ def _complete(case: Case, report: Report) -> None:
 def _wins(case: Case, number: int) -> bool:
     """Return whether a rule is known to beat those of other classes somewhere."""
     try:
-        return case.is_free and case.beats(number, case.rivals(number))
+        mine = case.bits_of(number)
+        return case.is_free and case.beats(mine, case.rivals(number))
     except UndecidedError:
         return False
 
