@@ -168,6 +168,7 @@ def test_an_error_beyond_the_certified_one_is_a_fault() -> None:
     assert [*faults(studied(candidate(bound=1e-4)).points)] == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("calls", [1, 2, 3, 5])
 def test_what_fails_is_an_omission_and_the_others_are_measured(calls: int) -> None:
     broken = candidate("broken", before=counting(calls, RuntimeError("no.\nmore")))
@@ -221,6 +222,7 @@ def test_a_study_that_is_interrupted_before_it_times_has_no_points() -> None:
     assert json.loads(study.to_json())["points"] == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("at", [1, 2, 4, 9])
 def test_an_interruption_that_a_library_swallows_is_noticed(at: int) -> None:
     calls = [0]

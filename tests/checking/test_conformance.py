@@ -42,6 +42,7 @@ SLOW = ("c", "fcl", "fis", "onnx")
 """Formats that take seconds: a compiler, sessions, many curves of points."""
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", [name for name in TABLE if name not in SLOW])
 def test_every_format_of_the_table_keeps_its_promises(name: str) -> None:
     check_exporter(name, rounds=0)

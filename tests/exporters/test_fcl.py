@@ -411,6 +411,7 @@ def test_every_dialect_has_its_words() -> None:
     assert all(words.name == name for name, words in WORDS.items())
 
 
+@pytest.mark.heavy
 def test_a_system_with_terms_that_no_points_stand_for_is_refused_with_each() -> None:
     with pytest.raises(LossError, match="term 'medium' of 'y2': it is a formula"):
         write(random_system(0), allow_loss=True)

@@ -236,6 +236,7 @@ def test_an_ambiguous_clause_is_written_with_its_parts() -> None:
     )
 
 
+@pytest.mark.heavy
 def test_no_line_is_long_where_it_can_be_broken() -> None:
     tree = random_tree(4, leaves=40, inputs=60)
     many = tuple(f"a somewhat long name {n}" for n in range(30))

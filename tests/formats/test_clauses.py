@@ -59,6 +59,7 @@ NAMES = st.lists(
 ).map(" ".join)
 
 
+@pytest.mark.heavy
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(
     st.dictionaries(

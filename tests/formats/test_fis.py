@@ -423,6 +423,7 @@ def test_a_system_without_inputs_and_with_a_singleton_is_read() -> None:
     assert infer(system, {}).outputs == (1.0,)
 
 
+@pytest.mark.heavy
 def test_thousands_of_terms_of_one_name_are_read_quickly() -> None:
     many = "".join(f"MF{k}='a':'trimf',[0 1 2]\n" for k in range(1, 20_001))
     start, _, rest = SUGENO.partition("MF1='slow'")

@@ -372,6 +372,7 @@ def test_all_mistakes_are_reported_at_once_with_their_places_and_nearest_names()
     ]
 
 
+@pytest.mark.heavy
 def test_at_most_a_hundred_mistakes_are_reported() -> None:
     with pytest.raises(ReadError) as error:
         read_fll(

@@ -185,6 +185,7 @@ def test_thousands_of_mistakes_are_listed_in_part_and_at_once() -> None:
     assert message[-1] == "x.yaml: and at least 4100 more mistakes"
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("longest", [8, 200])
 def test_sentences_of_traps_are_read_in_bounded_time(longest: int) -> None:
     names = [" or ".join(["a"] * n) for n in range(1, longest)]

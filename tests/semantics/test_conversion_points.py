@@ -134,6 +134,7 @@ def test_a_tolerance_below_rounding_is_refused() -> None:
         points_for(Gaussian(0.0, 1.0), 1e-15)
 
 
+@pytest.mark.heavy
 def test_too_many_points_are_refused() -> None:
     with pytest.raises(LossError, match="more than 4096 points"):
         points_for(Gaussian(0.0, 1.0), 1e-9)

@@ -71,6 +71,7 @@ def test_every_module_of_the_core_can_be_imported_without_tactile(core: Path) ->
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.heavy
 def test_the_command_line_works_without_tactile(core: Path) -> None:
     table = core / "examples" / "wine" / "wine.csv"
     for words in (
