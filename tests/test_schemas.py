@@ -67,7 +67,7 @@ def test_schemas_are_written_to_a_folder(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == set(FILES)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize(
     "model", models(), ids=lambda m: f"{type(m).__name__} {m.name}"
 )

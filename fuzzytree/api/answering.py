@@ -68,7 +68,7 @@ def opened(source: Carried, *, allow_loss: bool = False) -> Document | OnnxModel
             return as_model(source)
 
 
-class RunOptions(TypedDict, total=False):
+class RunArguments(TypedDict, total=False):
     """The keywords of `run`."""
 
     runtime: str | None
@@ -79,19 +79,19 @@ class RunOptions(TypedDict, total=False):
 
 @overload
 def run(
-    model: FuzzySystem, table: object, **options: Unpack[RunOptions]
+    model: FuzzySystem, table: object, **options: Unpack[RunArguments]
 ) -> Outputs: ...
 
 
 @overload
 def run(
-    model: Model | Fitted, table: object, **options: Unpack[RunOptions]
+    model: Model | Fitted, table: object, **options: Unpack[RunArguments]
 ) -> Predictions: ...
 
 
 @overload
 def run(
-    model: Carried, table: object, **options: Unpack[RunOptions]
+    model: Carried, table: object, **options: Unpack[RunArguments]
 ) -> Predictions | Outputs: ...
 
 

@@ -197,6 +197,7 @@ def quiet() -> Machine:
     return msgspec.structs.replace(machine(), cores=2, load_before=(0.3, 0.2, 0.1))
 
 
+@pytest.mark.heavy
 def test_a_quiet_machine_gives_no_doubt() -> None:
     one = point("native", 1000.0, error(0.0))
     result = after(quiet(), one.timings)
@@ -204,6 +205,7 @@ def test_a_quiet_machine_gives_no_doubt() -> None:
     assert [*noise(result, [one])] == []
 
 
+@pytest.mark.heavy
 def test_a_noisy_machine_is_reported_in_three_ways() -> None:
     wide = msgspec.structs.replace(timing(1000.0, spread=0.5), stolen=0.25)
     one = msgspec.structs.replace(point("native", 1.0, error(0.0)), timings=(wide,))
@@ -217,6 +219,7 @@ def test_a_noisy_machine_is_reported_in_three_ways() -> None:
     ]
 
 
+@pytest.mark.heavy
 def test_stolen_time_is_weighed_by_what_was_measured() -> None:
     short = msgspec.structs.replace(timing(100.0), stolen=1.0)
     long = msgspec.structs.replace(timing(900.0), stolen=0.0)
@@ -225,6 +228,7 @@ def test_stolen_time_is_weighed_by_what_was_measured() -> None:
     assert after(quiet(), [unknown]).stolen is None
 
 
+@pytest.mark.heavy
 def test_packages_that_are_not_installed_have_no_version() -> None:
     result = machine(["numpy", "no such package"]).versions
     assert "numpy" in result

@@ -157,6 +157,7 @@ def test_a_candidate_is_timed_and_judged() -> None:
     )
 
 
+@pytest.mark.heavy
 def test_an_error_beyond_the_certified_one_is_a_fault() -> None:
     study = studied(candidate(error=1e-3, bound=1e-4))
     (fault,) = faults(study.points)
@@ -168,7 +169,7 @@ def test_an_error_beyond_the_certified_one_is_a_fault() -> None:
     assert [*faults(studied(candidate(bound=1e-4)).points)] == []
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("calls", [1, 2, 3, 5])
 def test_what_fails_is_an_omission_and_the_others_are_measured(calls: int) -> None:
     broken = candidate("broken", before=counting(calls, RuntimeError("no.\nmore")))
@@ -186,6 +187,7 @@ def test_what_cannot_be_loaded_is_an_omission() -> None:
     assert omitted(study) == {"broken: rules": "no such library"}
 
 
+@pytest.mark.heavy
 def test_what_ends_its_process_is_an_omission() -> None:
     # A child process cannot make it again, as it cannot make what crashes.
     peer = msgspec.structs.replace(candidate("a peer"), modules=("a_library",))
@@ -195,6 +197,7 @@ def test_what_ends_its_process_is_an_omission() -> None:
     }
 
 
+@pytest.mark.heavy
 def test_an_interrupted_study_keeps_what_was_measured() -> None:
     time = FakeTime()
     plan = BenchSettings(rows=(1, 50), threads=(1,), rounds=6, budget_s=60.0)
@@ -222,7 +225,7 @@ def test_a_study_that_is_interrupted_before_it_times_has_no_points() -> None:
     assert json.loads(study.to_json())["points"] == []
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("at", [1, 2, 4, 9])
 def test_an_interruption_that_a_library_swallows_is_noticed(at: int) -> None:
     calls = [0]
@@ -240,6 +243,7 @@ def test_an_interruption_that_a_library_swallows_is_noticed(at: int) -> None:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.heavy
 def test_the_budget_is_kept_and_slow_ones_are_left_out() -> None:
     time = FakeTime()
     plan = BenchSettings(rows=(1, 1000), threads=(1,), rounds=15, budget_s=4.0)
@@ -258,6 +262,7 @@ def test_the_budget_is_kept_and_slow_ones_are_left_out() -> None:
     assert [len(timing.samples_ns) for timing in fast.timings] == [15, 15]
 
 
+@pytest.mark.heavy
 def test_half_of_the_budget_is_for_timing() -> None:
     time = FakeTime()
     plan = BenchSettings(rows=(1,), threads=(1,), rounds=6, budget_s=2.0)
@@ -330,6 +335,7 @@ def test_nobody_waits_for_a_second_thread_that_nobody_uses() -> None:
     assert [timing.threads for timing in study.points[0].timings] == [1]
 
 
+@pytest.mark.heavy
 def test_rows_that_memory_does_not_hold_are_an_omission() -> None:
     plan = BenchSettings(rows=(2, 10**9), threads=(1,), rounds=6, budget_s=5.0)
     (why,) = omitted(studied(candidate(), plan=plan)).values()

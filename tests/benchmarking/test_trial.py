@@ -67,6 +67,7 @@ def test_what_works_is_not_named(planted: str) -> None:
     assert tried(model(), [], rows(), peers=planted) == {}
 
 
+@pytest.mark.heavy
 def test_crashes_and_errors_are_reported_and_the_others_go_on(planted: str) -> None:
     names = ["crash", "well", "leave", "fail", "late", "unheard of"]
     assert tried(model(), names, rows(), peers=planted) == {
@@ -84,6 +85,7 @@ def test_what_hangs_is_ended(planted: str) -> None:
     assert result == {"hang": "it did not answer within 4 s"}
 
 
+@pytest.mark.heavy
 def test_what_the_budget_leaves_no_time_for_is_reported(planted: str) -> None:
     late = "a third of the budget was over before it was tried; a larger one helps"
     names = ["hang", "well"]
@@ -94,6 +96,7 @@ def test_what_the_budget_leaves_no_time_for_is_reported(planted: str) -> None:
     assert result == dict.fromkeys(names, late)
 
 
+@pytest.mark.heavy
 def test_peers_that_are_missing_are_the_fault_of_every_candidate() -> None:
     result = tried(model(), ["a"], rows(), peers="no_such_module.py")
     assert result == {

@@ -95,6 +95,7 @@ def test_the_schema_is_the_one_that_the_code_generates() -> None:
     assert SCHEMA.read_bytes() == of_result(Study)
 
 
+@pytest.mark.heavy
 def test_the_facts_fit_their_schema(bars: Path, call: Call) -> None:
     code, out, _ = call("bars.npz", "--json", "--features", "axis, area")
     assert code == 0

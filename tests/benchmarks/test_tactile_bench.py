@@ -40,6 +40,7 @@ def test_the_schema_is_the_one_that_the_code_generates() -> None:
     assert SCHEMA.read_bytes() == of_result(FramesStudy)
 
 
+@pytest.mark.heavy
 def test_a_bench_reports_time_error_and_floors(capsys: Said) -> None:
     words = ["tree.yaml", *SIZE, "--data", "f.npz", "--quiet"]
     few = ["--rows", "1", "--rows", "2000", "--rounds", "3"]

@@ -57,7 +57,7 @@ WRITTEN: Sequence[Any] = (
 )
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("model", [TREE, RULES, ENDS], ids=["tree", "rules", "ends"])
 @pytest.mark.parametrize(("path", "options"), WRITTEN)
 def test_a_program_of_ours_is_run_and_agrees(
@@ -74,6 +74,7 @@ def test_a_program_of_ours_is_run_and_agrees(
     assert agreement.ok
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("path", ["m.c", "m.py", "m.mjs", "m.sql"])
 def test_a_changed_program_is_not_run(
     path: str, monkeypatch: pytest.MonkeyPatch
@@ -166,7 +167,7 @@ def test_a_program_that_fails_is_a_disagreement(
     assert fault in rows.detail[0]
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("model", "path", "options", "why"),
     [

@@ -42,7 +42,7 @@ SLOW = ("c", "fcl", "fis", "onnx")
 """Formats that take seconds: a compiler, sessions, many curves of points."""
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", [name for name in TABLE if name not in SLOW])
 def test_every_format_of_the_table_keeps_its_promises(name: str) -> None:
     check_exporter(name, rounds=0)
@@ -179,7 +179,7 @@ def _with_unnamed_option() -> Format:
     return replace(YAML, write=write)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize(
     ("broken", "sentence"),
     [
@@ -235,6 +235,7 @@ def test_a_broken_promise_is_a_sentence(broken: Format, sentence: str) -> None:
     assert re.match(rf"\S+ fails in {count} points:\n", str(caught.value))
 
 
+@pytest.mark.heavy
 def test_a_format_that_cannot_carry_something_may_refuse_it() -> None:
     def write(model: Document, /, *, allow_loss: bool = False) -> Written:
         if isinstance(model, RuleBase) and model.semantics.conjunction == "product":

@@ -133,6 +133,7 @@ def test_the_carriers_of_a_tree_are_those_it_can_serve() -> None:
 SEEDS = st.integers(0, 10_000)
 
 
+@pytest.mark.heavy
 @given(SEEDS)
 @settings(max_examples=12, deadline=None)
 def test_a_pruned_model_answers_with_the_same_bits(seed: int) -> None:
@@ -252,6 +253,7 @@ def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
     assert names == {(stage, *what) for stage in models for what in whats}
 
 
+@pytest.mark.heavy
 def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
     tree = random_tree(1, leaves=1)
     footprint = report(tree, pruned(tree), seconds=5.0)

@@ -85,6 +85,7 @@ def test_a_study_goes_to_stdout_with_its_advice_first(call: Call) -> None:
     assert "tree" in full.splitlines()
 
 
+@pytest.mark.heavy
 def test_without_data_rows_are_made_and_that_is_said(call: Call) -> None:
     _, out, _ = call("bench", "rules.yaml", "--seed", "5", *FAST)
     assert (
@@ -93,6 +94,7 @@ def test_without_data_rows_are_made_and_that_is_said(call: Call) -> None:
     ).partition(": ")[2] in " ".join(out.split())
 
 
+@pytest.mark.heavy
 def test_json_goes_to_stdout_and_to_a_file(call: Call) -> None:
     code, out, err = call("bench", "grip.yaml", "--json", "-o", "study.json", *FAST)
     assert code == 0
@@ -105,6 +107,7 @@ def test_json_goes_to_stdout_and_to_a_file(call: Call) -> None:
     assert "wrote    study.json" in err.splitlines()
 
 
+@pytest.mark.heavy
 def test_a_named_module_adds_candidates_and_omissions(call: Call) -> None:
     Path("my_peers.py").write_text(
         "from fuzzytree.benchmarking.records import Omission\n"
@@ -119,6 +122,7 @@ def test_a_named_module_adds_candidates_and_omissions(call: Call) -> None:
     assert omission in json.loads(out)["omissions"]
 
 
+@pytest.mark.heavy
 def test_quiet_says_nothing_but_the_study(call: Call) -> None:
     code, out, err = call("bench", "grip.yaml", "--quiet", *FAST)
     assert (code, err) == (0, "")
@@ -203,6 +207,7 @@ def test_an_unknown_candidate_is_one_sentence(call: Call) -> None:
     assert err.splitlines()[0].endswith(" (did you mean 'native'?)")
 
 
+@pytest.mark.heavy
 def test_what_a_model_does_not_have_can_be_skipped(call: Call) -> None:
     assert call("bench", "grip.yaml", "--skip", "rules", *FAST)[0] == 0
     code, _, err = call("bench", "grip.yaml", "--only", "rules", "--budget", "1")

@@ -122,6 +122,7 @@ def _shell(command: str, folder: Path, **more: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.heavy
 def test_a_reader_who_leaves_early_sees_no_traceback(folder: Path) -> None:
     with (folder / "long.csv").open("w") as file:
         file.write("force,slip\n" + "1,0\n" * 50_000)

@@ -92,6 +92,7 @@ def test_json_reports_the_same_facts(call: Call) -> None:
     }
 
 
+@pytest.mark.heavy
 def test_json_has_every_changed_name_and_the_text_every_changed_input(
     call: Call,
 ) -> None:
@@ -228,6 +229,7 @@ def test_what_cannot_be_had_is_one_sentence(
     assert not Path("a").exists()
 
 
+@pytest.mark.heavy
 def test_a_refusal_names_options_of_the_command_line(call: Call) -> None:
     Path("fan.fll").write_bytes(
         TIPPER.read_bytes()

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import pytest
+
 HEAVY = (
     *("onnx", "onnxruntime", "sklearn", "skfuzzy", "scipy", "pandas", "polars"),
     *("pyarrow", "matplotlib", "rich", "narwhals", "serial"),
@@ -72,6 +74,7 @@ def test_a_verb_loads_no_library_that_it_does_not_need(folder: Path) -> None:
     }
 
 
+@pytest.mark.heavy
 def test_verbs_that_read_a_model_load_neither_learner_nor_check(folder: Path) -> None:
     lines = [("show", "grip.yaml"), ("run", "grip.yaml", "grasps.csv", "--quiet")]
     names = (

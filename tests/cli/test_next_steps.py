@@ -47,7 +47,7 @@ def taken(call: Call, printed: str) -> list[list[str]]:
 LEARN = ("learn", "few.csv", "--target", "grip", "--no-test")
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_what_follows_learning_works_with_every_format(call: Call, suffix: str) -> None:
     code, _, err = call(*LEARN, "-o", f"m{suffix}")
@@ -89,6 +89,7 @@ def test_a_folder_where_the_model_goes_is_refused_before_learning(call: Call) ->
     assert call(*LEARN, "-o", "m.sql") == (2, "", err)
 
 
+@pytest.mark.heavy
 def test_what_follows_learning_names_the_delimiter(call: Call) -> None:
     words = ("learn", "odd @.csv", "--delimiter", "@", "--target", "grip", "--no-test")
     (after,) = steps(call, *words, "-o", "m m.yaml")
@@ -96,7 +97,7 @@ def test_what_follows_learning_names_the_delimiter(call: Call) -> None:
     assert after == ["check", "m m.yaml", *rest]
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize(
     "begin", ["convert grip.yaml", "convert tipper.fll", "needs grip.yaml -o"]

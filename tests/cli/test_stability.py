@@ -20,6 +20,7 @@ def _here(folder: Path) -> None:
     pass
 
 
+@pytest.mark.heavy
 def test_a_sound_model_holds(call: Call) -> None:
     words = ("stability", "grip.yaml", "--data", "grasps.csv", "--verbose")
     code, out, err = call(*words, *NATIVE)

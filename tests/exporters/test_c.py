@@ -94,6 +94,7 @@ def test_a_prefix_is_made_of_the_model_s_name(name: str, expected: str) -> None:
     assert prefix_of(name) == expected
 
 
+@pytest.mark.heavy
 def test_writing_twice_gives_the_same_bytes() -> None:
     for model in (random_tree(4), rules_from_tree(random_tree(4)), random_system(4)):
         assert write_c(model).content == write_c(model).content

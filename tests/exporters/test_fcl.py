@@ -100,6 +100,7 @@ END_FUNCTION_BLOCK
     )
 
 
+@pytest.mark.heavy
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10_000), st.sampled_from(DIALECTS))
 def test_reading_gives_the_equal_rule_base(seed: int, dialect: Dialect) -> None:
@@ -109,7 +110,7 @@ def test_reading_gives_the_equal_rule_base(seed: int, dialect: Dialect) -> None:
     assert read_fcl(written.content, "x.fcl").model == rules
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 def test_the_scores_of_a_file_decide_as_the_rules_do(
@@ -172,7 +173,7 @@ def _kinds(condition: Condition | None) -> Iterator[type]:
             return
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("name", SAMPLES)
 def test_a_file_without_losses_reads_as_a_system_of_equal_answers(

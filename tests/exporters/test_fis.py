@@ -212,7 +212,7 @@ def test_rules_of_points_are_read_back_equal_where_no_input_is_tested_twice(
         assert read_fis(written.content, "r.fis").model == rules
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 def test_scores_read_back_are_within_the_bounds_of_the_losses(
@@ -507,6 +507,7 @@ def test_steps_have_corners_that_rise_for_octave(curve: Curve) -> None:
     assert corners[0] < corners[1] <= corners[-2] < corners[-1]
 
 
+@pytest.mark.heavy
 def test_the_same_model_gives_the_same_bytes() -> None:
     rules = rules_from_tree(random_tree(3))
     one, other = write(rules, allow_loss=True), write(rules, allow_loss=True)

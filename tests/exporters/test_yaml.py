@@ -61,7 +61,7 @@ def assert_kept(model: Model) -> bytes:
     return content
 
 
-@pytest.mark.one_in(10)
+@pytest.mark.one_in(20)
 @pytest.mark.parametrize("seed", range(30))
 def test_every_random_model_comes_back_bit_for_bit(seed: int) -> None:
     labels = itertools.cycle([None, "class 1", "class 2"])
@@ -112,6 +112,7 @@ def test_an_awkward_name_comes_back(name: str, kind: str) -> None:
         assert yaml.safe_load(content)["name"] == name
 
 
+@pytest.mark.heavy
 def test_all_awkward_names_come_back_together() -> None:
     assert_kept(named(AWKWARD))
     assert_kept(named(AWKWARD, kind="tree"))
@@ -163,6 +164,7 @@ SHAPES = (
 )
 
 
+@pytest.mark.heavy
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.lists(SHAPES, min_size=1, max_size=4), FINITE, FINITE, st.integers(0, 2**53))
 def test_any_numbers_come_back(

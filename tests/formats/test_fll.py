@@ -487,7 +487,7 @@ def test_what_is_no_text_file_is_reported_in_one_sentence(
     assert len(str(error.value).splitlines()) == 1
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize(
     "line",
     [

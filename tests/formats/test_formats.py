@@ -86,7 +86,7 @@ def _learnt(name: str, *, by_sklearn: bool) -> tuple[RuleBase, FloatArray]:
     return rules_from_tree(tree), values
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 @pytest.mark.parametrize("by_sklearn", [False, True])
 @pytest.mark.parametrize("name", ["iris", "wine", "breast_cancer"])
 @pytest.mark.parametrize("form", ["fcl", "fll", "fis", "fml"])
@@ -135,7 +135,7 @@ def test_every_outcome_has_a_sign_and_a_meaning() -> None:
     assert len(set(SIGNS.values())) == len(SIGNS)
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("name", TABLE)
 def test_a_format_carries_what_it_says(name: str) -> None:
     form = find_format(name)

@@ -168,6 +168,7 @@ EXPRESSIONS = st.recursive(
 )
 
 
+@pytest.mark.heavy
 @given(EXPRESSIONS)
 @settings(max_examples=400)
 def test_reading_a_written_formula_gives_the_equal_formula(formula: Expression) -> None:

@@ -88,6 +88,7 @@ def test_a_file_beyond_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
     assert str(caught.value) == "x.yaml:1:8: more than 3 entries"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "content",
     [

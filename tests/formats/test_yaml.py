@@ -151,7 +151,7 @@ def test_lines_are_swapped_without_an_error_of_another_kind() -> None:
             lines = RULES.splitlines(keepends=True)
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize(
     "value", ["", "~", "[]", "{}", "x", "1", "[[]]", "{a: b}", "''"]
 )

@@ -231,6 +231,7 @@ DEGREES = (
 )
 
 
+@pytest.mark.one_in(2)
 def test_degrees_of_every_term_are_read_as_the_engines_have_them(
     engine: Engine,
 ) -> None:
@@ -264,7 +265,7 @@ def test_degrees_of_every_term_are_read_as_the_engines_have_them(
 TYPES = ("", " Automatic", " TakagiSugeno", " Tsukamoto")
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("kind", TYPES)
 @pytest.mark.parametrize("method", ["WeightedAverage", "WeightedSum"])
 def test_weighted_numbers_of_every_term_are_read_as_the_engines_take_them(

@@ -113,7 +113,7 @@ def models() -> dict[str, Model]:
     }
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("name", models())
 def test_node_has_the_bits_of_the_reference_on_all_probes(
     program: Need, name: str
@@ -200,7 +200,7 @@ def run_alone(node: str, file: Path) -> tuple[int, str]:
 Kind = Literal["es", "script"]
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize(("module", "suffix"), [("es", ".mjs"), ("script", ".js")])
 @pytest.mark.parametrize("name", ["raw product", "tree", "system"])
 def test_a_file_tests_itself_and_tells_changed_numbers(

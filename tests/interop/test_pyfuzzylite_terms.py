@@ -279,7 +279,7 @@ def test_a_defuzzifier_answers_as_pyfuzzylites(method: DefuzzifierMethod) -> Non
         assert found.status == (Status.UNCOVERED if max(degrees) == 0.0 else 0)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("part", range(4))
 def test_random_systems_answer_as_pyfuzzylites_engines(part: int) -> None:
     seen: Counter[str] = Counter()

@@ -73,7 +73,7 @@ def _query(model: Model, dialect: Dialect) -> str:
     ).content.decode()
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("name", MODELS)
 def test_duckdb_answers_with_our_bits(name: str, library: Callable[[str], str]) -> None:
     duckdb = importlib.import_module(library("duckdb"))

@@ -278,6 +278,7 @@ def test_a_changed_constant_changes_an_answer(library: Need) -> None:
     assert any(one != other for one, other in answers)
 
 
+@pytest.mark.heavy
 def test_a_grammar_of_others_takes_every_model(library: Need) -> None:
     library(GRAMMAR)
     from tests.interop.st_evaluator import Block

@@ -49,7 +49,7 @@ def counted_by_fractions(values: list[float] | FloatArray, n: int) -> list[int]:
     ]
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize("low", [0.0, 0.1, 1e12, -3e-310])
 def test_two_valued_columns_are_counted_exactly(low: float, n: int) -> None:
@@ -75,6 +75,7 @@ def test_lattices_are_counted_exactly(
     assert counted(values, n) == counted_by_fractions(values, n)
 
 
+@pytest.mark.heavy
 @given(
     st.lists(st.floats(-1e6, 1e6) | st.floats(), min_size=1, max_size=12),
     st.integers(1, 8),

@@ -84,7 +84,7 @@ def faults(model: Model, values: FloatArray, found: Decisions) -> list[str]:
     return wrong
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 @pytest.mark.parametrize("conjunction", ["min", "product"])

@@ -16,7 +16,7 @@ from fuzzytree.testing import random_tree
 RUNTIMES = [runtime for runtime in all_runtimes() if is_installed(runtime)]
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize(
     "runtime", [r for r in RUNTIMES if "rules" in r.runs], ids=lambda r: r.name
 )

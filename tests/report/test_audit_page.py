@@ -297,6 +297,7 @@ def test_a_tree_is_drawn_with_the_rows_that_pass() -> None:
     assert "rows by class: 29" in text
 
 
+@pytest.mark.heavy
 def test_a_tree_of_many_leaves_is_printed_as_an_outline() -> None:
     tree = random_tree(3, leaves=130)
     text = Outline(page(audit_of(rule_base(), ()), tree)).text

@@ -211,7 +211,7 @@ def assert_fired(rules: RuleBase, values: FloatArray) -> None:
     assert np.array_equal(result.status, expected.status)
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("conjunction", ["min", "product"])
 @pytest.mark.parametrize("seed", range(3))
 def test_raw_rules_of_a_tree_are_won_as_by_firing(

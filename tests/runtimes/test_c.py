@@ -54,6 +54,7 @@ def grid_rules(count: int) -> RuleBase:
     return RuleBase("grid", ("x",), variables, tuple(rules))
 
 
+@pytest.mark.heavy
 @needs_compiler
 def test_the_first_of_rules_that_tie_is_found_by_search() -> None:
     rules = grid_rules(5)

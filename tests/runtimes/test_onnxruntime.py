@@ -139,7 +139,7 @@ def assert_equal_bits(result: Outcome, expected: Outcome) -> None:
         assert np.array_equal(result.strengths, expected.strengths, equal_nan=True)
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 @pytest.mark.parametrize("seed", range(12))
 def test_double_gives_the_bits_of_the_reference(seed: int) -> None:
     for model in random_models(seed):
@@ -151,7 +151,7 @@ def test_double_gives_the_bits_of_the_reference(seed: int) -> None:
             assert_equal_bits(result, expected)
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 @pytest.mark.parametrize("dtype", ["mixed", "float32"])
 @pytest.mark.parametrize("seed", range(12))
 def test_single_types_give_the_bits_of_numpy(seed: int, dtype: Dtype) -> None:

@@ -302,6 +302,7 @@ def test_facts_never_make_rules_of_a_system_that_answers_otherwise(
             assert again is None or again.rules != rules.rules
 
 
+@pytest.mark.heavy
 def test_changed_facts_give_no_rules_or_rules_of_that_very_system() -> None:
     rules = grip()
     chance = random.Random(1)

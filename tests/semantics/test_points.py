@@ -171,6 +171,7 @@ def test_a_degree_is_that_of_the_formula_to_a_few_units(shape: Points) -> None:
         assert abs(Fraction(degree(shape, value)) - exact) <= Fraction(4, 2**53)
 
 
+@pytest.mark.heavy
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.lists(points(), min_size=1, max_size=5))
 def test_numpy_and_best_first_have_the_bits_of_the_reference(

@@ -95,6 +95,7 @@ def boards(draw: st.DrawFn) -> Board:
     )
 
 
+@pytest.mark.heavy
 @settings(max_examples=30, deadline=None)
 @given(boards())
 def test_a_board_that_was_written_is_read_again_and_fits_the_schema(

@@ -293,6 +293,7 @@ def test_a_confusion_shows_counts_rates_and_the_whole() -> None:
     assert "0" not in said(figure)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("count", [1, 2, 12])
 def test_no_words_of_a_confusion_cover_each_other(count: int) -> None:
     table = np.full((count, count + 1), 3) + np.eye(count, count + 1, dtype=int) * 9990
@@ -336,6 +337,7 @@ def pictures() -> list[Figure]:
     ]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("suffix", plots.SUFFIXES)
 def test_the_same_pictures_are_the_same_bytes(suffix: str) -> None:
     for one, two in zip(pictures(), pictures(), strict=True):

@@ -299,6 +299,7 @@ def test_limits_say_where_decisions_are_compared() -> None:
     )
 
 
+@pytest.mark.heavy
 def test_what_cannot_be_decided_is_left_open_and_said_so() -> None:
     # The two meet at a third, which is no double.
     falls = Term("falls", Points((0.0, 1.0), (1.0, 0.0)))
@@ -335,6 +336,7 @@ def test_points_that_a_spent_budget_leaves_out_are_reported() -> None:
     assert int(left.sentence.split()[0]) > 5000 - rows.state.rows
 
 
+@pytest.mark.heavy
 def test_nothing_is_left_out_where_there_is_time() -> None:
     new = replace(grip(), rules=grip().rules[::-1])
     assert all(one.subject != "points" for one in results(grip(), new).answers)

@@ -323,6 +323,7 @@ def test_larger_bases_are_decided_without_contradiction(seed: int) -> None:
             assert max(leads) <= 0
 
 
+@pytest.mark.heavy
 def test_a_rule_hidden_by_two_others_in_four_inputs_is_proved_or_found() -> None:
     rules = random_base(1, 7, 4, "product", "lr")
     for level, expected in ((0.7, Proved), (0.7 - 1e-6, Witness)):

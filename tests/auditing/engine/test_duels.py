@@ -51,7 +51,7 @@ def _holds(
 KINDS = ["lr", "points", "band", "mixed"]
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(10)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shared", [0.0, 0.8])
 @pytest.mark.parametrize("seed", range(2))

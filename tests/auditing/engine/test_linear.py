@@ -89,6 +89,7 @@ def _solved(
     return [row[-1] for row in rows]
 
 
+@pytest.mark.heavy
 def test_a_point_is_found_exactly_where_the_corners_show_one() -> None:
     # The mean of all corners is inside each strict row, if any point is.
     seen = {True: 0, False: 0}

@@ -14,6 +14,7 @@ from fuzzytree.model.rulebase import Conjunction
 from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("conjunction", ["min", "product"])
 def test_a_rule_that_is_seen_to_win_does_so_in_fractions(
     conjunction: Conjunction,

@@ -28,6 +28,7 @@ SHAPES: list[Shape] = [
 ]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("shape", SHAPES, ids=range(len(SHAPES)))
 def test_every_degree_is_in_the_range_of_its_cell(shape: Shape) -> None:
     draw = random.Random(3)

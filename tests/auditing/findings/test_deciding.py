@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 
+import pytest
+
 from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
@@ -206,6 +208,7 @@ def test_without_time_the_rules_that_points_show_to_win_are_reported() -> None:
     assert not any(one.is_finding for one in found)
 
 
+@pytest.mark.heavy
 def test_rules_that_points_do_not_show_to_win_are_tested_first() -> None:
     base = with_hidden_rule(random_base(0, 7, 4))
     first = next(

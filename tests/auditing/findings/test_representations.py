@@ -70,6 +70,7 @@ def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
     assert {one.code for one in found} == {"FT601", "FT602"}
 
 
+@pytest.mark.heavy
 def test_a_damaged_graph_is_found_and_a_right_one_is_not() -> None:
     subject = subject_of(TREE)
     assert findings(subject, shipped(TREE)) == []

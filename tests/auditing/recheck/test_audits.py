@@ -347,6 +347,7 @@ def test_the_audit_with_rows_that_are_no_table_holds() -> None:
     assert wrong_of(rules_of((Clause("x", ("up",)),)), rows=rows) == []
 
 
+@pytest.mark.heavy
 def test_distances_in_sentences_about_rows_are_compared_with_their_measures() -> None:
     tree = random_tree(4, leaves=4)
     values = np.random.default_rng(1).uniform(-1.0, 1.0, (len(tree.inputs), 6))

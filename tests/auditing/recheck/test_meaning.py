@@ -58,6 +58,7 @@ def wins_of(base: RuleBase) -> tuple[model_records.Rules, list[bool]]:
     ]
 
 
+@pytest.mark.heavy
 def test_a_rule_that_wins_at_a_random_point_is_never_called_dead() -> None:
     dead = 0
     for seed in (0, 3):

@@ -220,6 +220,7 @@ def test_strengths_of_a_system_are_those_of_its_inference() -> None:
     assert checked > 9
 
 
+@pytest.mark.heavy
 def test_edits_of_a_system_audit_are_reported() -> None:
     text, content = audited(SMALL)
     for number, answer in enumerate(json.loads(text)["answers"]):

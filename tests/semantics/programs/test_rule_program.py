@@ -44,7 +44,7 @@ def assert_equal(rules: RuleBase, rows: list[dict[str, float]]) -> None:
         assert found.of("class") == (label,)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize("seed", range(6))
 def test_strengths_rule_status_and_class_are_those_of_the_reference(seed: int) -> None:
     for rules in bases(seed):

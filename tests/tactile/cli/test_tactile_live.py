@@ -198,6 +198,7 @@ def test_a_port_that_is_not_there_is_reported(call: Call) -> None:
     assert err.startswith("there is no port './gone'; there is ")
 
 
+@pytest.mark.heavy
 def test_a_board_is_answered_through_faults_and_a_pulled_plug(call: Call) -> None:
     # Nothing comes back, for a busy computer may miss the first of it.
     cycle = [*[SMALL] * 40, *[LARGE] * 40, *[NOTHING] * 20]
@@ -282,6 +283,7 @@ def ended(number: int, terminal: int) -> tuple[int, bytes]:
 FOREVER = ("simulator", "--model", "area.yaml")
 
 
+@pytest.mark.heavy
 def test_ctrl_c_gives_the_terminal_back_and_is_a_normal_end(
     call: Call, tmp_path: Path
 ) -> None:

@@ -113,6 +113,7 @@ def test_a_port_that_is_there_is_left_alone(call: Call) -> None:
     assert err == "port: cannot be made a port: something else is there\n"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_it_ends_when_it_is_reported_to_and_leaves_no_port(number: int) -> None:

@@ -17,6 +17,7 @@ def text_of(sensor: Sensor, *names: str) -> str:
     return write_frames_c(learnt_tree(sensor, names), sensor).content.decode("ascii")
 
 
+@pytest.mark.heavy
 def test_only_the_moments_that_the_model_uses_are_summed() -> None:
     found = [set(re.findall(r"sum_(\d\d) =", text_of(PLAIN, n))) for n in ("S1", "x")]
     assert found == [{"00", "10", "01", "20", "02"}, {"00", "10"}]
@@ -28,6 +29,7 @@ def test_weights_stand_in_no_table() -> None:
     assert max(sizes, default=0) < 100
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("sensor", "name", "kind"),
     [
@@ -51,6 +53,7 @@ def test_what_a_sensor_does_not_have_is_not_written() -> None:
     assert "uint16_t tree_offset[35]" in wide
 
 
+@pytest.mark.heavy
 def test_a_library_is_needed_for_roots_alone() -> None:
     assert "math.h" not in text_of(PLAIN, "S5")
     assert "math.h" in text_of(SMALL, "angle")

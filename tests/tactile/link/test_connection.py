@@ -156,6 +156,7 @@ def test_frames_can_be_taken_after_the_line_is_closed() -> None:
         assert line.take() is None
 
 
+@pytest.mark.heavy
 def test_a_line_waits_for_a_plug_that_was_pulled() -> None:
     """What the system had not given yet when the plug was pulled is lost."""
     faults = Faults(unplug=Pause(seconds=0.05, every=10))

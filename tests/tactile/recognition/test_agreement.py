@@ -38,6 +38,7 @@ def test_every_way_gives_the_same_bits_and_classes(sensor: Sensor) -> None:
     assert found.shown.saturated > 0
 
 
+@pytest.mark.heavy
 def test_what_is_too_weak_is_counted_as_unknown() -> None:
     rules = raw_rules(learnt_tree(PLAIN, ("S1", "S9")))
     found = check_frames_agree(rules, PLAIN, reject=0.5)

@@ -188,6 +188,7 @@ def test_the_last_event_reports_that_the_source_is_gone() -> None:
     assert views[-1]["status"] == "the source is gone: no more frames"
 
 
+@pytest.mark.heavy
 def test_closing_the_page_reports_browsers_that_it_is_over(live: Live) -> None:
     page = LivePage(live)
     found = events(wanted(page, "/events"))
