@@ -23,7 +23,7 @@ from soak import CASES, FAULTS, Pool, frame_key, pool_of
 from fuzzytree.tactile.boards import Board, Request
 from fuzzytree.tactile.link import Connection, open_connection
 from fuzzytree.tactile.sensor import Cells, Counters
-from fuzzytree.tactile.simulation.device import BoardCounts, Pause
+from fuzzytree.tactile.simulation.device import BoardCounts, Device, Pause
 
 # The cells of some frames hold the marker anyway.
 LINE_FAULTS = replace(FAULTS, marker=0.0, unplug=Pause(0.2, every=20_000))
@@ -88,7 +88,7 @@ def _frames(pool: Pool, until: float) -> Iterator[Cells]:
         yield cells
 
 
-def _listen(line: Connection, device: FaultyDevice, pool: Pool, heard: Heard) -> None:
+def _listen(line: Connection, device: Device, pool: Pool, heard: Heard) -> None:
     while True:
         frame = line.take(_QUIET_S)
         if frame is None and device.over.is_set():

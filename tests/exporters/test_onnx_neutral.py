@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.checking.stability.runs import unequal
+from fuzzytree.checking.comparing import unequal
 from fuzzytree.model.rulebase import (
     LR,
     Band,
