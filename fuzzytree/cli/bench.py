@@ -131,12 +131,11 @@ def command(options: BenchOptions) -> int:
     study early, keeps its results, and exits with 130; exit 1 if an error is larger
     than its certified bound.
     """
-    output = options.output
-    plots = options.plots
     from fuzzytree import api
     from fuzzytree.benchmarking import BenchSettings
     from fuzzytree.report import study_lines
 
+    output, plots = options.output, options.plots
     _check_places(output, plots)
     with (
         wrong_options(),
