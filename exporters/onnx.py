@@ -24,6 +24,7 @@ from fuzzytree.model import (
     Model,
     Written,
     fingerprint,
+    kind_of,
     narrowing_refusal,
 )
 from fuzzytree.semantics import from_system
@@ -322,24 +323,20 @@ def _facts(
     outputs: Sequence[Output],
 ) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists and records."""
-    carrier, kind = "rules", "rules"
+    kind: str = kind_of(model)
     inputs, classes, semantics = columns, tuple[str, ...](), {}
     names: dict[str, object] = {}
     if isinstance(model, FuzzySystem):
-        carrier, kind = "system", "system"
         names["names"] = [one.name for one in model.outputs]
     else:
         inputs, classes = model.inputs, model.classes
         semantics = msgspec.to_builtins(model.semantics)
-        if isinstance(model, FuzzyTree):
-            carrier, kind = "tree", "descent"
-        else:
-            kind = model.kind or kind
+        kind = "descent" if isinstance(model, FuzzyTree) else model.kind or kind
     texts = {
         "format": FORMAT_VERSION,
         "version": version(),
         "name": model.name,
-        "carrier": carrier,
+        "carrier": kind_of(model),
         "kind": kind,
         "dtype": dtype,
         "fingerprint": fingerprint(model),

@@ -10,7 +10,7 @@ from typing import TypedDict, Unpack, overload
 import msgspec
 import numpy as np
 
-from fuzzytree.checking import CALLED, as_model, kind_of
+from fuzzytree.checking import CALLED, as_model
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.files import read_bounded
 from fuzzytree.model import (
@@ -22,6 +22,7 @@ from fuzzytree.model import (
     ModelSource,
     Runtime,
     SystemRun,
+    kind_of,
 )
 from fuzzytree.runtimes import (
     OnnxModel,

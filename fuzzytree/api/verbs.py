@@ -48,6 +48,7 @@ from fuzzytree.model import (
     RuleBase,
     Written,
     as_names,
+    kind_of,
     name_choice,
     printable,
     with_label_type,
@@ -413,7 +414,7 @@ def _model_of(model: ModelSource, verb: str) -> Model:
 def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
     result = checking.as_model(model)
     if not isinstance(result, FuzzyTree):
-        kind = checking.CALLED[checking.kind_of(result)]
+        kind = checking.CALLED[kind_of(result)]
         raise TypeError(f"{verb} takes a tree, and {result.name} is a {kind}")
     return result
 

@@ -26,9 +26,18 @@ from fuzzytree.benchmarking.records import (
     Omission,
     Question,
 )
-from fuzzytree.checking import kind_of
 from fuzzytree.errors import install_hint
-from fuzzytree.model import LR, Band, Dtype, Model, Outcome, Prepared, RuleBase, Runtime
+from fuzzytree.model import (
+    LR,
+    Band,
+    Dtype,
+    Model,
+    Outcome,
+    Prepared,
+    RuleBase,
+    Runtime,
+    kind_of,
+)
 from fuzzytree.numerics import ApproximateRules, by_degree, by_points, certify
 from fuzzytree.runtimes import all_runtimes, is_installed, needed_by, predictions_of
 from fuzzytree.semantics import forms

@@ -7,10 +7,10 @@ from typing import Literal, cast
 
 import msgspec
 
-from fuzzytree.checking.converting import formed, kind_of
+from fuzzytree.checking.converting import formed
 from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.model import Document, Format, Written, options_of
+from fuzzytree.model import Document, Format, Written, kind_of, options_of
 from fuzzytree.semantics import all_samples
 
 Outcome = Literal["equal", "alike", "written", "points", "lossy", "refused", "no"]

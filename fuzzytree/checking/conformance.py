@@ -15,7 +15,6 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import get_args
 
-from fuzzytree.checking.converting import kind_of
 from fuzzytree.checking.equivalence import equivalence
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
 from fuzzytree.model import (
@@ -26,6 +25,7 @@ from fuzzytree.model import (
     Reading,
     Written,
     fingerprint,
+    kind_of,
 )
 
 _PATIENCE_S = 10.0  # for one hostile input

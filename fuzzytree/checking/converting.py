@@ -32,6 +32,7 @@ from fuzzytree.model import (
     RuleBase,
     Written,
     check_options,
+    kind_of,
     loss_text,
     sampled_values,
 )
@@ -101,17 +102,6 @@ class Conversion(msgspec.Struct, frozen=True):
     model: Document
     written: Written
     proof: Proof
-
-
-def kind_of(model: Document) -> ModelKind:
-    """Return which kind of model it is."""
-    match model:
-        case FuzzySystem():
-            return "system"
-        case RuleBase():
-            return "rules"
-        case FuzzyTree():
-            return "tree"
 
 
 def format_of(path: str | os.PathLike[str]) -> Format:

@@ -23,7 +23,6 @@ from fuzzytree.checking.comparing import (
     counted,
     probed,
 )
-from fuzzytree.checking.converting import kind_of
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters import Contents, contents
 from fuzzytree.exporters import write_onnx as write_onnx
@@ -46,6 +45,7 @@ from fuzzytree.model import (
     Shape,
     Use,
     fingerprint,
+    kind_of,
 )
 from fuzzytree.runtimes import axis_lines, baseline, find_runtime, plan_axes
 from fuzzytree.semantics import (

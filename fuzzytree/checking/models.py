@@ -25,7 +25,6 @@ from fuzzytree.checking.comparing import (
     probed,
     unequal,
 )
-from fuzzytree.checking.converting import kind_of
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     Certified,
@@ -39,6 +38,7 @@ from fuzzytree.model import (
     Run,
     Runtime,
     Use,
+    kind_of,
 )
 from fuzzytree.numerics import decide, open_paths, strength_bounds
 from fuzzytree.runtimes import baseline

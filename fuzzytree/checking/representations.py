@@ -15,7 +15,6 @@ import msgspec
 import numpy as np
 
 from fuzzytree.checking.comparing import Finding, RowSet, counted, judged
-from fuzzytree.checking.converting import kind_of
 from fuzzytree.checking.models import CheckedModel
 from fuzzytree.checking.programs import ProgramFile, check_program
 from fuzzytree.checking.systems import CheckedSystem
@@ -37,6 +36,7 @@ from fuzzytree.model import (
     SystemOutcome,
     checkpoint,
     fingerprint,
+    kind_of,
 )
 from fuzzytree.runtimes import (
     OnnxModel,

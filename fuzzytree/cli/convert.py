@@ -176,9 +176,9 @@ def carry(
         notes: Lines to print behind those of the file and its proof.
     """
     from fuzzytree import report
-    from fuzzytree.checking import export, kind_of, proved
+    from fuzzytree.checking import export, proved
     from fuzzytree.cli.representation import represented
-    from fuzzytree.model import loss_text
+    from fuzzytree.model import kind_of, loss_text
 
     model = represented(
         found.model,

@@ -122,8 +122,7 @@ def _facts(found: Reading) -> dict[str, object]:
     import msgspec
 
     from fuzzytree import report
-    from fuzzytree.checking import kind_of
-    from fuzzytree.model import FuzzySystem, fingerprint
+    from fuzzytree.model import FuzzySystem, fingerprint, kind_of
 
     model = found.model
     facts: dict[str, object] = {

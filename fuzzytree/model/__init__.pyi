@@ -30,6 +30,7 @@ from .contracts import Runtime as Runtime
 from .contracts import SystemOutcome as SystemOutcome
 from .contracts import SystemRun as SystemRun
 from .contracts import Written as Written
+from .contracts import kind_of as kind_of
 from .contracts import loss_text as loss_text
 from .contracts import narrowing_refusal as narrowing_refusal
 from .contracts import nowhere as nowhere

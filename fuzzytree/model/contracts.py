@@ -28,6 +28,17 @@ Document = FuzzyTree | RuleBase | FuzzySystem
 """What a file can hold."""
 
 
+def kind_of(model: Document) -> ModelKind:
+    """Return which kind of model it is."""
+    match model:
+        case FuzzySystem():
+            return "system"
+        case RuleBase():
+            return "rules"
+        case FuzzyTree():
+            return "tree"
+
+
 class Fitted(Protocol):
     """A fitted classifier that can say which tree it predicts with."""
 

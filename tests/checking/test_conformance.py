@@ -24,7 +24,7 @@ WRITERS = """
 import hashlib
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import all_formats
-from fuzzytree.checking.converting import kind_of
+from fuzzytree.model import kind_of
 from fuzzytree.testing import exporter_models
 models = list(exporter_models(rounds=0))
 for form in all_formats():

@@ -25,7 +25,6 @@ from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
-from fuzzytree.checking import kind_of
 from fuzzytree.errors import ReadError
 from fuzzytree.formats import in_system
 from fuzzytree.model import (
@@ -35,6 +34,7 @@ from fuzzytree.model import (
     Path,
     RuleBase,
     fingerprint,
+    kind_of,
     name_choice,
     version,
 )

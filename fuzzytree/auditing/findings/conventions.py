@@ -40,6 +40,7 @@ from fuzzytree.model import (
     Runtime,
     SystemOutcome,
     SystemRun,
+    kind_of,
 )
 from fuzzytree.numerics import TIE, decide, exact_answer
 from fuzzytree.runtimes import all_runtimes, is_installed
@@ -85,7 +86,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
 def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
     """Yield each form of a model in each runtime, the native ones first of a form."""
     for name, form in forms(model).items():
-        kind = "tree" if isinstance(form, FuzzyTree) else "rules"
+        kind = kind_of(form)
         for runtime in _runtimes():
             if kind in runtime.runs and is_installed(runtime):
                 with contextlib.suppress(LossError):  # other comparisons report it

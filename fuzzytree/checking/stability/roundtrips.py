@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import cast, get_args
 
 from fuzzytree.checking.comparing import strength_gap, unequal
-from fuzzytree.checking.converting import kind_of
 from fuzzytree.checking.equivalence import is_equivalent
 from fuzzytree.checking.stability.results import Criterion, Trial
 from fuzzytree.checking.stability.runs import first_line
@@ -22,6 +21,7 @@ from fuzzytree.model import (
     RuleBase,
     Run,
     Written,
+    kind_of,
 )
 from fuzzytree.runtimes import baseline, load_content, open_onnx
 from fuzzytree.semantics import EXACT, forms

@@ -21,12 +21,12 @@ from fuzzytree.model import (
     BoolArray,
     Dtype,
     FloatArray,
-    FuzzyTree,
     Model,
     Outcome,
     RuleBase,
     Run,
     Runtime,
+    kind_of,
 )
 from fuzzytree.numerics import Decisions, decide, strength_bounds
 from fuzzytree.runtimes import is_installed, needed_by
@@ -82,7 +82,7 @@ def loaded_form(
     representation: str, form: Model, runtime: Runtime, skipped: list[str]
 ) -> LoadedForm | None:
     """Return one form in one runtime; None if that cannot be, with a reason kept."""
-    kind = "tree" if isinstance(form, FuzzyTree) else "rules"
+    kind = kind_of(form)
     if kind not in runtime.runs:
         return None
     if not is_installed(runtime):

@@ -25,7 +25,7 @@ from fuzzytree.exporters import (
     require,
     version,
 )
-from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, fingerprint
+from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, fingerprint, kind_of
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
 from fuzzytree.tactile.features.plain import Shown, State, check_reject, plain_shown
@@ -163,7 +163,7 @@ def _facts(
         "version": version(),
         "name": model.name,
         "carrier": "frames",
-        "model": "tree" if isinstance(model, FuzzyTree) else "rules",
+        "model": kind_of(model),
         "dtype": "float64",
         "fingerprint": fingerprint(model),
     }
