@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from sklearn.naive_bayes import GaussianNB
 
-from fuzzytree.learning import Learner, LearningSettings, learn_arrays
+from fuzzytree.learning import ArrayLearner, LearningSettings, learn_arrays
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -87,7 +87,7 @@ def learn(values: FloatArray, labels: IntArray, settings: LearningSettings) -> i
 def learn_in_chunks(values: FloatArray, labels: IntArray, chunks: int) -> int:
     """Learn chunk by chunk and return the number of leaves."""
     columns = names("x", values.shape[1])
-    learner = Learner(columns, names("c", int(labels.max()) + 1))
+    learner = ArrayLearner(columns, names("c", int(labels.max()) + 1))
     for rows, codes in zip(
         np.array_split(values, chunks), np.array_split(labels, chunks), strict=True
     ):

@@ -26,6 +26,7 @@ from .estimator import FuzzyTreeClassifier as FuzzyTreeClassifier
 from .formats import from_simpful as from_simpful
 from .formats import from_skfuzzy as from_skfuzzy
 from .formats import from_sklearn as from_sklearn
+from .learning import Learner as Learner
 from .learning import LearningSettings as LearningSettings
 from .model import Agreement as Agreement
 from .model import CheckSettings as CheckSettings

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import MissingExtraError, install_hint
-from fuzzytree.learning import Learner, LearningReport, LearningSettings
+from fuzzytree.learning import ArrayLearner, LearningReport, LearningSettings
 from fuzzytree.model import FuzzyTree, label_type_of, with_label_type
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import Status, rules_from_tree
@@ -98,7 +98,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     classes_: LabelArray
     n_features_in_: int
     feature_names_in_: npt.NDArray[np.object_]
-    _learner: Learner
+    _learner: ArrayLearner
     _run: Callable[[ModelKind], Run]
 
     def __init__(
@@ -194,7 +194,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self.classes_ = classes
         names = [str(label) for label in classes]
         settings = self._settings()
-        self._learner = Learner(self._columns(), names, settings=settings)
+        self._learner = ArrayLearner(self._columns(), names, settings=settings)
 
     def _learn(self, values: FloatArray, labels: LabelArray) -> Self:
         self._learner.partial_fit(values, np.searchsorted(self.classes_, labels))

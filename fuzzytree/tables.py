@@ -1,15 +1,18 @@
 """Rows in from anything, with the names of their columns.
 
-A table is a path to a CSV or Parquet file, an open stream of either, a pandas, polars
-or arrow table, or a numpy array. Nothing is guessed: columns are found by their names,
-a number has a decimal point and no thousands separators, and a cell that is neither a
-number nor missing is an error that says where it stands.
+A table is a path, an open stream of CSV or Parquet, a pandas, polars or arrow table, or
+a numpy array. A path is a CSV, Parquet or Arrow file, a folder or a pattern of such
+files (`rows/*.csv`), or a place that pyarrow opens (`s3://place/rows.parquet`). Nothing
+is guessed: columns are found by their names, a number has a decimal point and no
+thousands separators, and a cell that is neither a number nor missing is an error that
+says where it stands.
 """
 
 from __future__ import annotations
 
 import codecs
 import difflib
+import glob
 import io
 import itertools
 import math
@@ -42,6 +45,9 @@ Only = frozenset[str] | None
 
 MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 """The texts, in small letters, that stand for a missing number."""
+
+SUFFIXES = (".csv", ".parquet", ".pq", ".arrow", ".feather")
+"""How the names of files end that are tables in a folder."""
 
 PIECE = 1 << 14
 """The most rows of a file that are handed on at a time."""
@@ -102,6 +108,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
         target: The column of the classes; empty if they came by themselves.
         remarks: Columns, and what they have and is left out.
         label_type: What the names of classes stand for, if not text.
+        weights: How many rows each row of a sample stands for; None of a whole table.
     """
 
     name: str
@@ -114,6 +121,13 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     target: str = ""
     remarks: tuple[tuple[str, str], ...] = ()
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
+    weights: FloatArray | None = None
+
+    @property
+    def rows(self) -> int:
+        """How many rows with a class the table has, or the one that was sampled."""
+        total = len(self.codes) if self.weights is None else self.weights.sum()
+        return round(float(total))
 
 
 class Batch(msgspec.Struct, frozen=True, eq=False):
@@ -435,7 +449,7 @@ def _is_missing(value: object) -> bool:
 def _labelled(
     name: str, columns: Sequence[str], values: FloatArray, names: list[str | None]
 ) -> Table:
-    classes = tuple(sorted({n for n in names if n is not None}, key=_class_order))
+    classes = tuple(sorted({n for n in names if n is not None}, key=class_order))
     position: dict[str | None, int] = {label: k for k, label in enumerate(classes)}
     codes = np.array([position.get(label, -1) for label in names], np.int64)
     kept = codes >= 0
@@ -448,9 +462,87 @@ def _labelled(
     return Table(name, tuple(columns), values, classes, codes, missing, unlabelled)
 
 
-def _class_order(label: str) -> tuple[bool, float, str]:
+def class_order(label: str) -> tuple[bool, float, str]:
+    """Return a key that sorts classes: whole numbers by size, then other names."""
     is_whole = re.fullmatch(r"0|-?[1-9][0-9]{0,14}", label) is not None
     return (not is_whole, float(label) if is_whole else 0.0, label)
+
+
+def learnt_names(
+    piece: TablePiece, target: str, ignore: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the columns of a table's part to learn from.
+
+    Raises:
+        TableError: If the target or an ignored column is absent, if no column is left,
+            or if one has no name: whether it counts the rows, only all rows show.
+    """
+    chosen = _learnt_columns(piece, target, ignore)
+    for k in chosen:
+        if not piece.written[k].strip():
+            raise TableError(
+                f"{piece.name}: column {k + 1} has no name\n  name it, or leave it out "
+                f"with ignore (--ignore 'column {k + 1}')"
+            )
+    return tuple(piece.columns[k] for k in chosen)
+
+
+def column_numbers(
+    piece: TablePiece, columns: Sequence[str], target: str
+) -> tuple[FloatArray, int]:
+    """Return some columns of a part, shape (columns, rows), and its missing cells.
+
+    Raises:
+        TableError: If one is absent, or holds text.
+    """
+    _refuse_absent(piece, [*columns, target], ", which other parts have")
+    position = {column: k for k, column in enumerate(piece.columns)}
+    numbers = _Numbers(piece.name, list(columns))
+    numbers.add(piece, [position[column] for column in columns])
+    if numbers.faults:
+        raise TableError(numbers.fault_text())
+    return numbers.joined(), numbers.missing
+
+
+def coded_classes(cells: Cells) -> tuple[IntArray, list[tuple[str, bool]], str]:
+    """Return the classes of the rows of a part.
+
+    Returns:
+        The position of each row's class, -1 where it is missing; the classes by name,
+        each with whether it came as a number with a fraction, as 1.0 does; and what the
+        labels are: `csv`, `text`, `boolean` or `number`.
+
+    Example:
+        >>> coded_classes(["a", "", "b", "a"])
+        (array([ 0, -1,  1,  0]), [('a', False), ('b', False)], 'text')
+        >>> coded_classes([1.0, 2.0])[1:]
+        ([('1.0', True), ('2.0', True)], 'number')
+    """
+    is_csv = not isinstance(cells, list | np.ndarray)
+    values: Iterable[object] = plain(cells)
+    if is_csv and hasattr(cells, "dictionary_encode") and len(cells):
+        encoded = cast("pa.ChunkedArray", cells).combine_chunks().dictionary_encode()
+        indices = np.from_dlpack(encoded.indices).astype(np.int64)
+        values = encoded.dictionary.to_pylist()
+    else:
+        known = list(values)
+        indices = np.arange(len(known))
+        values = known
+    keys: dict[tuple[str, bool], int] = {}
+    places: list[int] = []
+    labels: list[object] = []
+    for value in values:
+        name = _class_name(value, is_whole=False)
+        if name is None:
+            places.append(-1)
+            continue
+        key = (name, isinstance(value, float))
+        if key not in keys:
+            labels.append(value.item() if isinstance(value, np.generic) else value)
+        places.append(keys.setdefault(key, len(keys)))
+    codes = np.array(places, np.int64)[indices] if len(indices) else indices
+    kind = label_type_of(labels)
+    return codes, [*keys], "csv" if is_csv else kind or "text"
 
 
 class _Numbers:
@@ -712,20 +804,90 @@ def _refuse_repeated(name: str, columns: Sequence[str]) -> None:
 def _file_pieces(
     path: str | os.PathLike[str], delimiter: str | None, name: str | None, only: Only
 ) -> Iterator[TablePiece]:
-    title = name or os.fspath(path)
-    with _opened(path, title) as stream:
-        try:
-            yield from _stream_pieces(stream, title, delimiter, only)
-        except OSError as error:
-            raise TableError(f"{title}: cannot be read: {reason(error)}") from error
-
-
-def _opened(path: str | os.PathLike[str], title: str) -> io.BufferedReader:
     try:
+        files = _files(os.fspath(path))
+    except OSError as error:
+        raise TableError(f"{path}: cannot be read: {reason(error)}") from error
+    first: TablePiece | None = None
+    for file in files:
+        title = name if name and len(files) == 1 else file
+        with _opened(file, title) as stream:
+            try:
+                for piece in _stream_pieces(stream, title, delimiter, only):
+                    first = first or piece
+                    yield _arranged(piece, first)
+            except OSError as error:
+                raise TableError(f"{title}: cannot be read: {reason(error)}") from error
+
+
+def _files(path: str) -> list[str]:
+    """Return the files of a path: one, those of a folder, or those of a pattern.
+
+    Raises:
+        TableError: If a folder has no table, or a pattern fits no file.
+    """
+    if "://" in path or Path(path).is_file() or not Path(path).name:
+        return [path]
+    if Path(path).is_dir():
+        found = sorted(
+            str(file)
+            for file in Path(path).rglob("*")
+            if file.suffix.lower() in SUFFIXES and file.name[0] not in "._"
+        )
+        if not found:
+            known = ", ".join(SUFFIXES)
+            raise TableError(f"{path}: the folder has no table ({known})")
+        return found
+    if not glob.has_magic(path) or Path(path).exists():
+        return [path]
+    start = Path(path).anchor
+    files = Path(start).glob(path.removeprefix(start))
+    found = sorted(str(file) for file in files if not file.name.startswith("."))
+    if not found:
+        raise TableError(f"{path}: no file has such a name")
+    return found
+
+
+def _arranged(piece: TablePiece, first: TablePiece) -> TablePiece:
+    """Return a piece with its columns in the order of the first one.
+
+    Raises:
+        TableError: If it has other columns.
+    """
+    if piece.columns == first.columns:
+        return piece
+    if len(piece.columns) != len(first.columns):
+        _refuse_absent(first, piece.columns, f", which {piece.name} has")
+    _refuse_absent(piece, first.columns, f", which {first.name} has")
+    order = [piece.columns.index(column) for column in first.columns]
+    return msgspec.structs.replace(
+        piece,
+        columns=first.columns,
+        written=tuple(piece.written[k] for k in order),
+        cells=tuple(piece.cells[k] for k in order),
+    )
+
+
+def _opened(path: str, title: str) -> io.BufferedReader:
+    try:
+        if "://" in path:
+            return _fetched(path)
         check_stream(path)
         return Path(path).open("rb")
     except (OSError, ValueError) as error:
         raise TableError(f"{title}: cannot be read: {reason(error)}") from error
+
+
+def _fetched(path: str) -> io.BufferedReader:
+    """Return a file of an object store that pyarrow knows, such as s3://place/t.csv."""
+    import pyarrow as pa
+    from pyarrow import fs
+
+    try:
+        system, place = fs.FileSystem.from_uri(path)
+        return io.BufferedReader(system.open_input_file(place))
+    except pa.ArrowInvalid as error:
+        raise ValueError(str(error)) from error
 
 
 def _stream_pieces(

@@ -67,7 +67,7 @@ def learn_arrays(
         >>> len(found.tree.leaves)
         2
     """
-    learner = Learner(
+    learner = ArrayLearner(
         columns=columns,
         classes=classes,
         units=units or {},
@@ -79,7 +79,7 @@ def learn_arrays(
 
 
 @dataclass
-class Learner:
+class ArrayLearner:
     """Learns from chunks; neither their borders nor the rows' order change the tree.
 
     Attributes:
@@ -90,7 +90,7 @@ class Learner:
         settings: How to learn.
 
     Example:
-        >>> learner = Learner(columns=["cm"], classes=["small", "big"])
+        >>> learner = ArrayLearner(columns=["cm"], classes=["small", "big"])
         >>> learner.partial_fit(np.array([[1.0], [1.5], [2.0]]), np.array([0, 0, 0]))
         >>> learner.partial_fit(np.array([[7.0], [8.0]]), ["big", "big"])
         >>> len(learner.finish().tree.leaves)
@@ -102,15 +102,15 @@ class Learner:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     name: str = "tree"
     settings: LearningSettings = field(default_factory=LearningSettings)
-    _statistics: Statistics = field(init=False, repr=False)
+    statistics: Statistics = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the names and start with an empty table."""
-        _check_names(self.columns, self.classes, self.settings)
+        check_names(self.columns, self.classes, self.settings)
         for text in (self.name, *self.units.values()):
             if fault := text_fault(text):
                 raise ValueError(f"the name or unit {text!r} {fault}")
-        self._statistics = Statistics(
+        self.statistics = Statistics(
             len(self.classes), len(self.columns), self.settings.rows_per_class
         )
 
@@ -132,9 +132,9 @@ class Learner:
         _check_shape(values, codes, len(self.columns))
         if progress is not None:
             progress("counting", 0.0)
-        before = self._statistics.dropped
-        self._statistics.update(values, codes)
-        dropped = self._statistics.dropped - before
+        before = self.statistics.dropped
+        self.statistics.update(values, codes)
+        dropped = self.statistics.dropped - before
         if dropped and self.settings.missing == "refuse":
             raise LearningError(
                 f"{dropped} of {len(values)} rows hold a missing or infinite value "
@@ -143,7 +143,7 @@ class Learner:
         if progress is not None:
             progress("counting", 1.0)
 
-    def merge(self, other: Learner) -> Learner:
+    def merge(self, other: ArrayLearner) -> ArrayLearner:
         """Return a learner that has seen both tables; its tree is that of one pass.
 
         Raises:
@@ -154,10 +154,10 @@ class Learner:
             raise ValueError(
                 "learners with other columns, classes or settings do not merge"
             )
-        merged = Learner(
+        merged = ArrayLearner(
             self.columns, self.classes, self.units, self.name, self.settings
         )
-        merged._statistics = self._statistics.merge(other._statistics)
+        merged.statistics = self.statistics.merge(other.statistics)
         return merged
 
     def finish(self, *, progress: Progress | None = None) -> Learnt:
@@ -166,9 +166,9 @@ class Learner:
         Raises:
             LearningError: If there is no row, one class, or no column that varies.
         """
-        _check_rows(self._statistics, self.classes)
-        sample = self._statistics.sample()
-        moments = self._statistics.moments(sample.units)
+        _check_rows(self.statistics, self.classes)
+        sample = self.statistics.sample()
+        moments = self.statistics.moments(sample.units)
         _check_columns(moments)
         costs = np.array([self.settings.costs.get(c, 1.0) for c in self.columns])
         choice = chosen_tree(
@@ -180,7 +180,7 @@ class Learner:
         made = assembled(
             choice.grown.sketch,
             choice.patterns,
-            self._statistics,
+            self.statistics,
             names,
             points=self.settings.points,
             separate_sides=self.settings.separate_sides,
@@ -198,7 +198,7 @@ class Learner:
         return LearningReport(
             mode=self.settings.mode,
             rows=int(moments.counts.sum()),
-            rows_dropped=self._statistics.dropped,
+            rows_dropped=self.statistics.dropped,
             rows_sampled=len(sample.rows),
             classes_without_rows=tuple(
                 c for c, n in zip(self.classes, moments.counts, strict=True) if n == 0
@@ -234,9 +234,14 @@ def _features_per_node(grown: GrownTree) -> tuple[int, ...]:
     return tuple(len(split.axis.features) for split in grown.sketch.splits)
 
 
-def _check_names(
+def check_names(
     columns: Sequence[str], classes: Sequence[str], settings: LearningSettings
 ) -> None:
+    """Refuse names that stand twice or cannot be written, and unknown ones.
+
+    Raises:
+        ValueError: One sentence for the first fault.
+    """
     for kind, found in (("column", columns), ("class", classes)):
         seen: set[str] = set()
         for name in found:

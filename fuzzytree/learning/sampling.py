@@ -16,12 +16,13 @@ kept.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.learning.sums import runs
+from fuzzytree.learning.sums import runs, sized
 from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray, units_of
 
 Hashes = npt.NDArray[np.uint64]
@@ -132,6 +133,61 @@ class DistinctRows:
         joined._parts = [*self._parts, *other._parts]
         joined._settle()
         return joined
+
+    def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """Return the rows kept and the limits of what may be kept, as arrays."""
+        found = self._settle()
+        nothing = np.empty(0, np.int64)
+        return {
+            "rows": np.empty((0, self.features)) if found is None else found.values,
+            "codes": nothing if found is None else found.codes,
+            "copies": nothing if found is None else found.copies,
+            "limits": self._limits,
+            "refused": self._refused,
+        }
+
+    @classmethod
+    def of_arrays(
+        cls,
+        arrays: Mapping[str, npt.NDArray[np.generic]],
+        classes: int,
+        features: int,
+        most: int,
+    ) -> DistinctRows:
+        """Return the rows that `arrays` gave; their hashes are computed again.
+
+        Raises:
+            ValueError: If an array has another type or size than it must have, or holds
+                a row that cannot have been kept.
+        """
+        found = cls(classes, features, most)
+        kept = len(arrays.get("codes", ()))
+        codes: IntArray = sized(arrays, "codes", np.int64, (kept,))
+        values = sized(arrays, "rows", np.float64, (kept, features))
+        copies = sized(arrays, "copies", np.int64, (kept,))
+        found._limits = sized(arrays, "limits", np.uint64, (classes,))
+        found._refused = sized(arrays, "refused", np.uint64, (classes,))
+        is_class = (codes >= 0) & (codes < classes)
+        if not (is_class.all() and (copies > 0).all() and np.isfinite(values).all()):
+            raise ValueError("keeps a row that cannot have been kept")
+        if kept:
+            digits = hashed_digits(values)
+            part = _Rows(values + 0.0, codes, digits, hashed_rows(values + 0.0), copies)
+            found._parts, found._kept = [part], kept
+            found._settle()
+        return found
+
+    def placed(self, positions: IntArray, classes: int) -> DistinctRows:
+        """Return the rows with other numbers of classes; two may become one."""
+        found = DistinctRows(classes, self.features, self.most)
+        np.minimum.at(found._limits, positions, self._limits)
+        np.minimum.at(found._refused, positions, self._refused)
+        found._parts = [
+            replace(part, codes=positions[part.codes]) for part in self._parts
+        ]
+        found._kept = self._kept
+        found._settle()
+        return found
 
     def sample(self, lows: FloatArray, highs: FloatArray) -> Sample:
         """Return `most` rows of each class at most, in a canonical order.

@@ -8,13 +8,14 @@ alone (`sampling`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.learning.sampling import DistinctRows, Sample
-from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, runs
+from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, runs, sized
 from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
 
 BLOCK_VALUES = 1 << 18
@@ -143,6 +144,66 @@ class Statistics:
         joined._sums = self._sums.merge(other._sums)
         joined._rows = self._rows.merge(other._rows)
         return joined
+
+    def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """Return everything that was counted as arrays of one dimension, by name.
+
+        Whole numbers of any size are the bytes of two's complement, the lowest first.
+        """
+        self._absorb()
+        rows = self._rows.arrays()
+        counted = {"counts": self._counts, "lows": self._lows, "highs": self._highs}
+        arrays = {**counted, **self._sums.arrays(), **rows}
+        return {name: array.reshape(-1) for name, array in arrays.items()}
+
+    @classmethod
+    def of_arrays(
+        cls,
+        arrays: Mapping[str, npt.NDArray[np.generic]],
+        *,
+        classes: int,
+        features: int,
+        rows_per_class: int,
+        dropped: int,
+    ) -> Statistics:
+        """Return the statistics that `arrays` gave.
+
+        Raises:
+            ValueError: If an array has another type or size than it must have, or holds
+                what cannot be counted.
+        """
+        found = cls(classes, features, rows_per_class, dropped)
+        shape = (classes, features)
+        found._counts = sized(arrays, "counts", np.int64, (classes,))
+        found._lows = sized(arrays, "lows", np.float64, shape)
+        found._highs = sized(arrays, "highs", np.float64, shape)
+        is_empty = (found._counts == 0)[:, None]
+        if (found._counts < 0).any() or dropped < 0:
+            raise ValueError("counts a negative number of rows")
+        if not np.where(
+            is_empty, found._lows > found._highs, found._lows <= found._highs
+        ).all():
+            raise ValueError("has smallest values above the largest")
+        found._sums = Sums.of_arrays(arrays, classes, features)
+        found._rows = DistinctRows.of_arrays(arrays, classes, features, rows_per_class)
+        return found
+
+    def placed(self, positions: IntArray, classes: int) -> Statistics:
+        """Return the statistics with other numbers of classes.
+
+        Args:
+            positions: The new number of each class; two may become one.
+            classes: How many classes there are then.
+        """
+        self._absorb()
+        found = Statistics(classes, self.features, self.rows_per_class)
+        found.dropped = self.dropped
+        np.add.at(found._counts, positions, self._counts)
+        np.minimum.at(found._lows, positions, self._lows)
+        np.maximum.at(found._highs, positions, self._highs)
+        found._sums._take(self._sums, positions, np.arange(self.features))
+        found._rows = self._rows.placed(positions, classes)
+        return found
 
     def moments(self, units: ColumnUnits | None = None) -> Moments:
         """Return the moments of all rows taken so far, each number rounded once.

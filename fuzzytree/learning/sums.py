@@ -18,8 +18,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -276,7 +277,37 @@ class Sums:
             (self._squares, squares, 2),
         ):
             total[:, features] <<= (power * (mine - finer)).astype(object)
-            total[place] += added << (power * (unit - finer)).astype(object)
+            shifted = added << (power * (unit - finer)).astype(object)
+            np.add.at(total, place, shifted)  # two groups may become one
+
+    def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """Return the totals as arrays, whole numbers as bytes of one width."""
+        self._settle()
+        return {
+            "units": self._unit,
+            "sums": _bytes_of(self._sums),
+            "squares": _bytes_of(self._squares),
+        }
+
+    @classmethod
+    def of_arrays(
+        cls,
+        arrays: Mapping[str, npt.NDArray[np.generic]],
+        groups: int,
+        features: int,
+    ) -> Sums:
+        """Return the sums that `arrays` gave.
+
+        Raises:
+            ValueError: If an array has another type or size than it must have.
+        """
+        found = cls(groups, features)
+        found._unit = sized(arrays, "units", np.int64, (features,))
+        if not ((found._unit >= _LOWEST) & (found._unit <= _HIGHEST)).all():
+            raise ValueError("has a unit that no double has")
+        found._sums = _wholes_of(arrays, "sums", groups, features)
+        found._squares = _wholes_of(arrays, "squares", groups, features)
+        return found
 
     def merge(self, other: Sums) -> Sums:
         """Return the sums of both."""
@@ -328,6 +359,47 @@ class Sums:
             self._squares[:, feature].tolist(),
             int(self._unit[feature]),
         )
+
+
+def sized(
+    arrays: Mapping[str, npt.NDArray[np.generic]],
+    name: str,
+    kind: type[np.generic],
+    shape: tuple[int, ...],
+) -> npt.NDArray[Any]:
+    """Return one of some arrays in its shape.
+
+    Raises:
+        ValueError: If it is absent, or has another type or size.
+    """
+    array = arrays.get(name)
+    if array is None or array.dtype != kind or array.size != math.prod(shape):
+        wanted = f"{math.prod(shape)} numbers of type {kind.__name__}"
+        raise ValueError(f"has not the {wanted} that {name!r} needs")
+    return array.reshape(shape).copy()
+
+
+def _bytes_of(wholes: Wholes) -> npt.NDArray[np.generic]:
+    """Return the bytes of whole numbers, all as wide as the widest needs."""
+    numbers = wholes.reshape(-1).tolist()
+    width = max((number.bit_length() // 8 + 1 for number in numbers), default=1)
+    content = b"".join(
+        number.to_bytes(width, "little", signed=True) for number in numbers
+    )
+    return np.frombuffer(content, np.uint8)
+
+
+def _wholes_of(
+    arrays: Mapping[str, npt.NDArray[np.generic]], name: str, groups: int, features: int
+) -> Wholes:
+    count = groups * features
+    width = arrays[name].size // max(count, 1) if name in arrays else 0
+    content = sized(arrays, name, np.uint8, (count, width)).tobytes()
+    result = np.zeros(count, object)
+    for place in range(count if width else 0):
+        number = content[place * width : (place + 1) * width]
+        result[place] = int.from_bytes(number, "little", signed=True)
+    return result.reshape(groups, features)
 
 
 def _exponents(columns: FloatArray) -> IntArray:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LearningError
-from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
+from fuzzytree.learning import ArrayLearner, LearningSettings, Learnt, learn_arrays
 from fuzzytree.learning.combination import fisher_direction, node_view
 from fuzzytree.learning.patterns import Patterns, make_patterns
 from fuzzytree.learning.statistics import Statistics
@@ -275,7 +275,7 @@ def test_masked_cells_and_labels_are_missing_to_the_learner() -> None:
     rows = [[1.0], [2.0], [3.0], [7.0], [8.0], [9.0]]
     values = np.ma.MaskedArray(rows, [[True], *[[False]] * 5])
     labels = np.ma.MaskedArray([0, 0, 0, 1, 1, 1], [*[False] * 5, True])
-    learner = Learner(["a"], ["soft", "firm"])
+    learner = ArrayLearner(["a"], ["soft", "firm"])
     learner.partial_fit(values, labels)
     assert learner.finish().report.rows_dropped == 2
     with pytest.raises(ValueError, match=r"^the array holds timedelta64\[s\], and no"):

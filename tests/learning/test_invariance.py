@@ -14,7 +14,7 @@ import pytest
 from sklearn import datasets
 
 from fuzzytree.exporters import yaml
-from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
+from fuzzytree.learning import ArrayLearner, LearningSettings, Learnt, learn_arrays
 from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.reference import descend
@@ -47,11 +47,11 @@ ROWS_PER_CLASS = 100
 """Fewer than the rows of a class in the tables that are sampled."""
 
 
-def learner(table: Table, settings: LearningSettings | None = None) -> Learner:
+def learner(table: Table, settings: LearningSettings | None = None) -> ArrayLearner:
     values, labels = table
     columns = [f"x{k}" for k in range(values.shape[1])]
     classes = [f"c{k}" for k in range(int(labels.max()) + 1)]
-    return Learner(columns, classes, settings=settings or LearningSettings())
+    return ArrayLearner(columns, classes, settings=settings or LearningSettings())
 
 
 def learn(table: Table, settings: LearningSettings | None = None) -> Learnt:
@@ -179,7 +179,7 @@ def test_neither_order_nor_chunks_nor_merging_change_a_bit(
     shuffled = values[order], labels[order]
     assert written(learn(shuffled, settings)) == base
     borders = np.sort(rng.integers(0, len(labels), 9))
-    parts: list[Learner] = []
+    parts: list[ArrayLearner] = []
     in_chunks = learner(shuffled, settings)
     for rows, codes in zip(*(np.split(a, borders) for a in shuffled), strict=True):
         in_chunks.partial_fit(rows, codes)

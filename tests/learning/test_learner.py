@@ -13,7 +13,7 @@ from sklearn import datasets
 from sklearn.model_selection import StratifiedKFold
 
 from fuzzytree.errors import LearningError
-from fuzzytree.learning import Learner, LearningSettings, Learnt, learn_arrays
+from fuzzytree.learning import ArrayLearner, LearningSettings, Learnt, learn_arrays
 from fuzzytree.learning.units import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.crisp_regions import grid
@@ -79,7 +79,7 @@ def test_the_same_table_gives_the_same_tree(mode: Mode) -> None:
 def test_the_tree_does_not_depend_on_the_chunks() -> None:
     values, labels = datasets.load_breast_cancer(return_X_y=True)
     whole = learn(values, labels)
-    learner = Learner(whole.tree.columns, whole.tree.classes)
+    learner = ArrayLearner(whole.tree.columns, whole.tree.classes)
     for rows, codes in zip(
         np.array_split(values, 7), np.array_split(labels, 7), strict=True
     ):
@@ -89,7 +89,7 @@ def test_the_tree_does_not_depend_on_the_chunks() -> None:
 
 def test_merged_learners_have_seen_both_tables() -> None:
     values, labels = blobs()
-    parts = [Learner(["a", "b", "c"], ["c0", "c1"]) for _ in range(2)]
+    parts = [ArrayLearner(["a", "b", "c"], ["c0", "c1"]) for _ in range(2)]
     for part, rows, codes in zip(
         parts, np.split(values, 2), np.split(labels, 2), strict=True
     ):

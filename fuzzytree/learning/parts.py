@@ -1,0 +1,517 @@
+"""Learn from a table in parts, which lie where they lie: collect, merge, save, learn.
+
+What learning needs of all rows is a state of bounded size: counts, exact sums, smallest
+and largest values, and a sample that depends on the rows alone. States of parts are
+merged in any order and grouping, and the tree has the same bits as that of the whole
+table.
+
+A state's file is an Arrow file of one row: a list for each array, and a header in JSON
+in the schema's metadata. A digest of all of it is part of the header.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Final, cast
+
+import msgspec
+import numpy as np
+
+from fuzzytree.errors import LearningError, ReadError
+from fuzzytree.files import read_bounded, write_atomically
+from fuzzytree.learning.learner import ArrayLearner, Learnt
+from fuzzytree.learning.settings import LearningSettings
+from fuzzytree.learning.statistics import Statistics
+from fuzzytree.model import FuzzyTree, LabelType, as_names, is_label, with_label_type
+from fuzzytree.tables import (
+    Table,
+    TablePiece,
+    class_order,
+    coded_classes,
+    column_numbers,
+    learnt_names,
+    pieces,
+)
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+Progress = Callable[[str, float], None]
+
+MAGIC: Final = "fuzzytree state 1"
+"""The kind and the version of a state's file."""
+
+LIMIT: Final = 1 << 33
+"""The largest file of a state that is read, in bytes."""
+
+
+class _Header(msgspec.Struct, forbid_unknown_fields=True):
+    """What a state says about its table; see `Learner` for the meanings.
+
+    Attributes:
+        magic: `MAGIC`.
+        target: The column of the classes.
+        columns: The columns of numbers.
+        classes: The names of the classes, as they came.
+        floats: Which of them came as numbers with a fraction, as 1.0 does.
+        kinds: The kinds of labels that came, see `fuzzytree.tables.coded_classes`.
+        rows_per_class: How many rows of a class the sample keeps.
+        dropped: Rows that were left out as a value is missing.
+        unlabelled: Rows that were left out as they have no class.
+        missing: Cells without a value.
+        parts: The digests of the states that were merged.
+        digest: Of everything else.
+    """
+
+    magic: str
+    target: str
+    columns: list[str]
+    classes: list[str]
+    floats: list[bool]
+    kinds: list[str]
+    rows_per_class: int
+    dropped: int
+    unlabelled: int
+    missing: int
+    parts: list[str]
+    digest: str = ""
+
+
+class Learner:
+    """Learns from a table in parts; neither their borders nor their order matter.
+
+    Args:
+        target: The column of the classes.
+        columns: The columns to learn from, in the order in which the tree has them;
+            all columns of the first part, in its order, if None.
+        ignore: Columns that are no input.
+        units: The unit of a column, by name.
+        name: The name of the tree.
+        settings: How to learn.
+
+    Example:
+        >>> import pandas as pd
+        >>> soft = pd.DataFrame({"cm": [1.0, 1.5, 2.0], "size": "small"})
+        >>> firm = pd.DataFrame({"cm": [7.0, 8.0, 9.0], "size": "big"})
+        >>> here, there = Learner("size"), Learner("size")
+        >>> here.update(soft)
+        >>> there.update(firm)
+        >>> len(here.merge(there).learn().leaves)
+        2
+    """
+
+    def __init__(
+        self,
+        target: str,
+        *,
+        columns: Sequence[str] | None = None,
+        ignore: Sequence[str] = (),
+        units: Mapping[str, str] | None = None,
+        name: str = "tree",
+        settings: LearningSettings | None = None,
+    ) -> None:
+        self.target = target.strip()
+        self.columns = None if columns is None else tuple(as_names(columns))
+        self.ignore = tuple(column.strip() for column in as_names(ignore))
+        self.units = dict(units or {})
+        self.name = name
+        self.settings = settings or LearningSettings()
+        self.unlabelled = self.missing = 0
+        self._classes: dict[tuple[str, bool], int] = {}
+        self._kinds: set[str] = set()
+        self._parts: frozenset[str] = frozenset()
+        self._statistics: Statistics | None = None
+
+    def __repr__(self) -> str:
+        """Return what was collected, in a line."""
+        rows, columns = f"{self.rows:,} rows", len(self.columns or ())
+        of = f"{columns} columns, {len(self._classes)} classes"
+        return f"<Learner of {self.target!r}: {rows}, {of}>"
+
+    @property
+    def rows(self) -> int:
+        """How many rows were collected that have a class and all values."""
+        return 0 if self._statistics is None else int(self._statistics.counts().sum())
+
+    @property
+    def dropped(self) -> int:
+        """How many rows were left out as a value is missing or not finite."""
+        return 0 if self._statistics is None else self._statistics.dropped
+
+    def update(
+        self,
+        table: object,
+        *,
+        name: str | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Take the rows of one more part.
+
+        Args:
+            table: What `fuzzytree.table` takes: a path, a frame, an arrow table or
+                batch, an open file. Files are read piece by piece.
+            name: What messages call the part; its path unless given.
+            progress: Called with the number of rows so far, and 0.
+
+        Raises:
+            TableError: If a column is absent or holds text, or a file cannot be read;
+                nothing of the part is taken then.
+            LearningError: If a value is missing, and `missing` is `refuse`.
+        """
+        begun: Learner | None = None
+        for piece in pieces(table, name=name):
+            begun = self._empty() if begun is None else begun
+            begun._take(piece)
+            if progress is not None:
+                progress(f"{piece.name}: {begun.rows:,} rows", 0.0)
+        if begun is not None:
+            vars(self).update(vars(self.merge(begun)))
+
+    def merge(self, other: Learner, *, repeated: bool = False) -> Learner:
+        """Return a learner of the rows of both.
+
+        Args:
+            other: A learner of the same table.
+            repeated: Whether a saved state that is part of both counts twice.
+
+        Raises:
+            ValueError: If they have another target, other columns or another size of
+                the sample, or if one saved state is part of both.
+        """
+        twice = self._parts & other._parts
+        if twice and not repeated:
+            raise ValueError(
+                f"a state with the digest {min(twice)[:12]} is part of both; "
+                "pass repeated=True to count its rows twice"
+            )
+        for what, mine, others in (
+            ("target", [self.target], [other.target]),
+            ("columns", self.columns or other.columns, other.columns or self.columns),
+            (
+                "number of rows per class",
+                [str(self.settings.rows_per_class)],
+                [str(other.settings.rows_per_class)],
+            ),
+        ):
+            if mine != others:
+                raise ValueError(_difference(what, mine or (), others or ()))
+        result = self._empty()
+        result.columns = self.columns or other.columns
+        result.unlabelled = self.unlabelled + other.unlabelled
+        result.missing = self.missing + other.missing
+        result._kinds = self._kinds | other._kinds
+        result._parts = self._parts | other._parts
+        result._classes = {
+            key: place
+            for place, key in enumerate(
+                dict.fromkeys([*self._classes, *other._classes])
+            )
+        }
+        parts = [part._placed(result._classes) for part in (self, other)]
+        filled = [part for part in parts if part is not None]
+        if filled:
+            result._statistics = (
+                filled[0] if len(filled) < 2 else filled[0].merge(filled[1])
+            )
+        return result
+
+    def learn(self, *, progress: Progress | None = None) -> FuzzyTree:
+        """Return the tree of all rows; more may follow.
+
+        Raises:
+            LearningError: If there is no row, one class, or no column that varies.
+        """
+        return self.learnt(progress=progress).tree
+
+    def learnt(self, *, progress: Progress | None = None) -> Learnt:
+        """Return the tree, and what was counted on the way.
+
+        Raises:
+            LearningError: As `learn`.
+        """
+        statistics, order = self._joined()
+        columns = cast("tuple[str, ...]", self.columns)
+        for column in self.units:
+            if column not in columns:
+                raise LearningError(f"a unit for {column!r}, which is no column")
+        learner = ArrayLearner(columns, order, self.units, self.name, self.settings)
+        learner.statistics = statistics
+        learnt = learner.finish(progress=progress)
+        tree = with_label_type(learnt.tree, self._label_type(order))
+        return msgspec.structs.replace(learnt, tree=tree)
+
+    def table(self) -> Table:
+        """Return the sampled rows as a table, each with the rows that it stands for.
+
+        Of each class at most `rows_per_class` rows are kept; each of them stands for
+        as many rows of its class as there are for each that is kept.
+
+        Raises:
+            LearningError: If no row was collected.
+        """
+        statistics, classes = self._joined()
+        sample = statistics.sample()
+        kept = np.bincount(sample.codes, minlength=len(classes))
+        weights = statistics.counts() / np.maximum(kept, 1)
+        return Table(
+            self.name,
+            cast("tuple[str, ...]", self.columns),
+            sample.rows.T,
+            tuple(classes),
+            sample.codes,
+            self.missing,
+            self.unlabelled,
+            self.target,
+            weights=weights[sample.codes],
+        )
+
+    def facts(self) -> dict[str, int]:
+        """Return how many rows, columns and classes were collected."""
+        return {
+            "rows": self.rows,
+            "dropped": self.dropped,
+            "rows_without_class": self.unlabelled,
+            "missing_cells": self.missing,
+            "columns": len(self.columns or ()),
+            "classes": len(set(self._names().values())),
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> str:
+        """Write the state to a file whole, and return its digest.
+
+        Raises:
+            WriteError: If the file cannot be written.
+        """
+        content, digest = self._content()
+        write_atomically(path, content)
+        return digest
+
+    @classmethod
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        units: Mapping[str, str] | None = None,
+        name: str = "tree",
+        settings: LearningSettings | None = None,
+    ) -> Learner:
+        """Return the learner that a file holds.
+
+        Args:
+            path: The file.
+            units: As in `Learner`.
+            name: As in `Learner`.
+            settings: As in `Learner`; `rows_per_class` is that of the file.
+
+        Raises:
+            ReadError: If the file is none, is broken, or is of another version.
+        """
+        learner = _read(read_bounded(path, LIMIT), os.fspath(path))
+        learner.units, learner.name = dict(units or {}), name
+        if settings is not None:
+            most = learner.settings.rows_per_class
+            learner.settings = msgspec.structs.replace(settings, rows_per_class=most)
+        return learner
+
+    def _empty(self) -> Learner:
+        return Learner(
+            self.target,
+            columns=self.columns,
+            ignore=self.ignore,
+            units=self.units,
+            name=self.name,
+            settings=self.settings,
+        )
+
+    def _take(self, piece: TablePiece) -> None:
+        """Take the rows of a piece."""
+        if self.columns is None:
+            self.columns = learnt_names(piece, self.target, self.ignore)
+        values, missing = column_numbers(piece, self.columns, self.target)
+        codes, keys, kind = coded_classes(piece.cells[piece.columns.index(self.target)])
+        for key in keys:
+            self._classes.setdefault(key, len(self._classes))
+        statistics = self._placed(self._classes)
+        if statistics is None:
+            width, most = len(self.columns), self.settings.rows_per_class
+            statistics = Statistics(len(self._classes), width, most)
+        places = np.array([*(self._classes[key] for key in keys), -1], np.int64)
+        has_class = codes >= 0
+        before = statistics.dropped
+        statistics.update(values.T[has_class], places[codes[has_class]])
+        self._statistics = statistics
+        dropped = statistics.dropped - before
+        if dropped and self.settings.missing == "refuse":
+            raise LearningError(
+                f"{piece.name}: {dropped} of {piece.rows} rows hold a missing or "
+                "infinite value\n  pass missing='drop' to leave them out"
+            )
+        self.unlabelled += int(np.count_nonzero(~has_class))
+        self.missing += missing
+        if keys:
+            self._kinds.add(kind)
+
+    def _placed(self, places: Mapping[tuple[str, bool], int]) -> Statistics | None:
+        """Return the statistics with other numbers of the classes."""
+        if self._statistics is None:
+            return None
+        positions = np.array([places[key] for key in self._classes], np.int64)
+        size = max(places.values(), default=-1) + 1
+        is_same = size == self._statistics.classes and (np.diff(positions) == 1).all()
+        if is_same and (not size or positions[0] == 0):
+            return self._statistics
+        return self._statistics.placed(positions, size)
+
+    def _joined(self) -> tuple[Statistics, list[str]]:
+        """Return the statistics by the final names of classes, in their order."""
+        if self._statistics is None:
+            raise LearningError("cannot learn before a part of the table was taken")
+        names = self._names()
+        order = sorted(set(names.values()), key=class_order)
+        classes = {name: place for place, name in enumerate(order)}
+        places = {key: classes[name] for key, name in names.items()}
+        return cast("Statistics", self._placed(places)), order
+
+    def _names(self) -> dict[tuple[str, bool], str]:
+        """Return the name of each class: 1.0 is 1 where no class has a fraction."""
+        floats = [float(name) for name, is_float in self._classes if is_float]
+        is_whole = all(value.is_integer() for value in floats)
+        return {
+            (name, is_float): str(int(float(name))) if is_float and is_whole else name
+            for name, is_float in self._classes
+        }
+
+    def _label_type(self, names: Iterable[str]) -> LabelType | msgspec.UnsetType:
+        kinds = self._kinds - {"csv"}
+        if not kinds:
+            options: tuple[LabelType, ...] = ("boolean", "number")
+            known = [*names]
+            fitting = [one for one in options if all(is_label(n, one) for n in known)]
+            return fitting[0] if fitting else msgspec.UNSET
+        kind = kinds.pop()
+        if kinds or "csv" in self._kinds or kind == "text":
+            return msgspec.UNSET
+        return cast("LabelType", kind)
+
+    def _content(self) -> tuple[bytes, str]:
+        """Return the state as the content of a file, and its digest."""
+        import pyarrow as pa
+
+        if self._statistics is None or self.columns is None:
+            raise LearningError("cannot save a state before a part was taken")
+        arrays = self._statistics.arrays()
+        header = _Header(
+            magic=MAGIC,
+            target=self.target,
+            columns=[*self.columns],
+            classes=[name for name, _ in self._classes],
+            floats=[is_float for _, is_float in self._classes],
+            kinds=sorted(self._kinds),
+            rows_per_class=self.settings.rows_per_class,
+            dropped=self._statistics.dropped,
+            unlabelled=self.unlabelled,
+            missing=self.missing,
+            parts=sorted(self._parts),
+        )
+        digest = _digest(header, arrays)
+        header = msgspec.structs.replace(header, digest=digest)
+        lists = {name: pa.array([array]) for name, array in arrays.items()}
+        metadata = {b"fuzzytree": msgspec.json.encode(header)}
+        table = pa.table(lists).replace_schema_metadata(metadata)
+        sink = pa.BufferOutputStream()
+        with pa.ipc.new_file(sink, table.schema) as writer:
+            writer.write_table(table)
+        return sink.getvalue().to_pybytes(), digest
+
+
+def _difference(what: str, mine: Sequence[str], others: Sequence[str]) -> str:
+    """Return why two states do not merge."""
+    if what != "columns":
+        return f"the states have another {what}: {mine[0]}, and {others[0]}"
+    if set(mine) == set(others):
+        return (
+            f"the states have the columns in another order: {', '.join(mine)}, and "
+            f"{', '.join(others)}; name the columns to have one order (--columns)"
+        )
+    only = sorted({*mine} ^ {*others})
+    return f"the states have other columns: only one of them has {', '.join(only)}"
+
+
+def _digest(header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]) -> str:
+    """Return the digest of a header without its own, and of arrays."""
+    bare = msgspec.structs.replace(header, digest="")
+    total = hashlib.sha256(msgspec.json.encode(bare))
+    for name in sorted(arrays):
+        total.update(f"{name} {arrays[name].dtype} {arrays[name].size};".encode())
+        total.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return total.hexdigest()
+
+
+def _read(content: bytes, title: str) -> Learner:
+    """Return the learner that the content of a file holds.
+
+    Raises:
+        ReadError: If it is none, is broken, or is of another version.
+    """
+    try:
+        header, arrays = _opened(content)
+        if header.magic != MAGIC:
+            raise ValueError(f"is {header.magic!r}, and {MAGIC!r} is read")
+        if _digest(header, arrays) != header.digest:
+            raise ValueError("is broken: its digest is another")
+        return _learner_of(header, arrays)
+    except ValueError as error:
+        raise ReadError(f"{title}: {error}") from error
+
+
+def _opened(content: bytes) -> tuple[_Header, dict[str, npt.NDArray[np.generic]]]:
+    import pyarrow as pa
+
+    try:
+        with pa.ipc.open_file(pa.py_buffer(content)) as file:
+            if file.num_record_batches != 1:
+                raise ValueError("is no state: it must have one batch")
+            batch = file.get_batch(0)
+        batch.validate(full=True)
+        text = (batch.schema.metadata or {}).get(b"fuzzytree", b"")
+        header = msgspec.json.decode(text, type=_Header)
+        arrays: dict[str, npt.NDArray[np.generic]] = {
+            name: np.from_dlpack(column.flatten())
+            for name, column in zip(batch.schema.names, batch.columns, strict=True)
+        }
+    except (
+        pa.ArrowException,
+        msgspec.MsgspecError,
+        OSError,
+        TypeError,
+        AttributeError,
+        UnicodeDecodeError,
+    ) as error:
+        raise ValueError(
+            "is no state that `fuzzytree collect` wrote, or is cut short"
+        ) from error
+    return header, arrays
+
+
+def _learner_of(
+    header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]
+) -> Learner:
+    keys = [*zip(header.classes, header.floats, strict=True)]
+    if len(set(keys)) < len(keys) or len(set(header.columns)) < len(header.columns):
+        raise ValueError("names a column or a class twice")
+    settings = LearningSettings(rows_per_class=header.rows_per_class)
+    learner = Learner(header.target, columns=header.columns, settings=settings)
+    learner.unlabelled, learner.missing = header.unlabelled, header.missing
+    learner._classes = {key: place for place, key in enumerate(keys)}
+    learner._kinds = set(header.kinds)
+    learner._parts = frozenset([*header.parts, header.digest])
+    learner._statistics = Statistics.of_arrays(
+        arrays,
+        classes=len(keys),
+        features=len(header.columns),
+        rows_per_class=header.rows_per_class,
+        dropped=header.dropped,
+    )
+    return learner
