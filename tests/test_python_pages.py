@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 NEEDED = {
     "fuzzy-libraries.md": ("skfuzzy", "simpful"),
     "notebook.md": ("matplotlib", "pandas"),
+    "parts.md": ("pandas",),
 }
 
 

@@ -658,3 +658,60 @@ def test_a_pipe_is_read_like_its_file(tmp_path: Path) -> None:
     writer.start()
     assert read_table(path, target="grip").values.shape == (2, 3)
     writer.join()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder with a table in three files of three formats."""
+    (tmp_path / "t" / "more").mkdir(parents=True)
+    (tmp_path / "t" / "a.csv").write_text("x,y,kind\n1,2,soft\n3,4,firm\n", "utf-8")
+    (tmp_path / "t" / ".hidden.csv").write_text("nothing", "utf-8")
+    (tmp_path / "t" / "notes.txt").write_text("nothing", "utf-8")
+    part = {"kind": ["firm"], "y": [6.0], "x": [5.0]}
+    pq.write_table(pa.table(part), tmp_path / "t" / "b.parquet")
+    part = {"y": [8.0], "x": [7.0], "kind": ["soft"]}
+    with pa.ipc.new_file(
+        str(tmp_path / "t" / "more" / "c.arrow"), pa.table(part).schema
+    ) as w:
+        w.write_table(pa.table(part))
+    return tmp_path / "t"
+
+
+def test_the_files_of_a_folder_are_one_table(folder: Path) -> None:
+    table = read_table(folder, target="kind")
+    assert table.columns == ("x", "y")
+    assert table.values.tolist() == [[1.0, 3.0, 5.0, 7.0], [2.0, 4.0, 6.0, 8.0]]
+    assert table.codes.tolist() == [1, 0, 0, 1]
+    assert len(read_table(f"{folder}/*.csv", target="kind").codes) == 2
+    assert len(read_table(f"{folder}/**/*.[ac]*", target="kind").codes) == 3
+    assert len(read_table(f"file://{folder}/a.csv", target="kind").codes) == 2
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ("t/*.pq", "{}/t/*.pq: no file has such a name"),
+        ("empty", "{}/empty: the folder has no table (.csv, .parquet, .pq, .arrow, "),
+        ("other", "{0}/other/b.csv has no column 'y', which {0}/other/a.csv has"),
+        ("wider", "{0}/wider/a.csv has no column 'z', which {0}/wider/b.csv has"),
+        ("text", "{0}/text/b.csv:2: column 'x' holds text where a number is needed"),
+        ("x" * 5000, "cannot be read: file name too long"),
+    ],
+)
+def test_a_fault_in_one_of_many_files_is_one_sentence_with_its_name(
+    place: str, message: str, tmp_path: Path
+) -> None:
+    for name, second in (("other", "x,w"), ("wider", "x,y,z"), ("text", "x,y")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.csv").write_text("x,y\n1,2\n", "utf-8")
+        row = ",".join("q" for _ in second.split(","))
+        (tmp_path / name / "b.csv").write_text(f"{second}\n{row}\n", "utf-8")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(TableError) as caught:
+        read_table(f"{tmp_path}/{place}", target="y" if place == "text" else "x")
+    assert message.format(tmp_path) in str(caught.value)
+
+
+def test_a_file_whose_name_looks_like_a_pattern_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a[1].csv").write_text("x,kind\n1,soft\n2,firm\n", "utf-8")
+    assert len(read_table(tmp_path / "a[1].csv", target="kind").codes) == 2

@@ -108,7 +108,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
 
 def majority(table: Table) -> float:
     """Return the accuracy of predicting the most common class for every row."""
-    return int(np.bincount(table.codes).max()) / len(table.codes)
+    return float(np.bincount(table.codes, table.weights).max() / table.rows)
 
 
 def accuracy(
@@ -161,8 +161,9 @@ def accuracy(
         )
         predicted = _answered(learnt.tree, table, test)
         right = predicted == table.codes[test]
-        shares.append(float(np.count_nonzero(right)) / len(test))
-    return Accuracy(tuple(shares), len(rows), len(table.codes), is_nested)
+        weight = None if table.weights is None else table.weights[test]
+        shares.append(float(np.average(right, weights=weight)))
+    return Accuracy(tuple(shares), len(rows), table.rows, is_nested)
 
 
 def _of_fold(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fuzzytree.cli.collect import STATE
 from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
@@ -33,24 +35,24 @@ from fuzzytree.cli.representation import (
     terms_option,
     wanted_format,
 )
+from fuzzytree.errors import TableError
 from fuzzytree.files import check_place, read_bounded, write_atomically
 from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind, printable
 
 if TYPE_CHECKING:
     from fuzzytree.api import Accuracy, Summary
-    from fuzzytree.learning import LearningReport, LearningSettings, Learnt
+    from fuzzytree.learning import Learner, LearningReport, LearningSettings, Learnt
     from fuzzytree.tables import Table
 
 
 class LearnOptions:
     """The arguments and options of the verb."""
 
-    table: str = argument(metavar="TABLE")
-    target: str = option(
+    tables: Sequence[str] = argument(metavar="TABLE", nargs=-1, required=True)
+    target: str | None = option(
         "--target",
-        required=True,
         metavar="COLUMN",
-        help="Column that holds the class of each row.",
+        help="Column that holds the class of each row; states know theirs.",
     )
     output: str = option(
         "-o",
@@ -81,6 +83,11 @@ class LearnOptions:
         "--no-test",
         is_flag=True,
         help="Learn without measuring the cross-validated accuracy.",
+    )
+    repeated: bool = option(
+        "--repeated",
+        is_flag=True,
+        help="Count the rows of a state twice that is part of two others.",
     )
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option
@@ -170,14 +177,15 @@ def command(options: LearnOptions) -> None:
     Beside a program or a graph, which no verb reads as a model, the model itself is
     written as YAML, unless a file of that name is there already.
 
-    TABLE is CSV or Parquet, or `-` for standard input. The accuracy is cross-validated:
-    it is that of trees learnt without the rows that they are tested on, with settings
-    that each fold chooses anew. In a table of more than 32,768 numbers the folds take
-    the settings chosen from all rows, and are made of 20,000 rows at most.
+    TABLE is CSV or Parquet, or `-` for standard input; or there are several, the
+    states of all parts of a table, which `fuzzytree collect` wrote. The accuracy is
+    cross-validated: it is that of trees learnt without the rows that they are tested
+    on, with settings that each fold chooses anew. In a table of more than 32,768
+    numbers the folds take the settings chosen from all rows, and are made of 20,000
+    rows at most. Of states it is an estimate from the rows that they keep.
     """
     from fuzzytree.api import accuracy, export, learn_table
     from fuzzytree.learning import remarks
-    from fuzzytree.tables import read_table
 
     form = wanted_format(options.output, None)
     if options.output != "-":
@@ -185,22 +193,24 @@ def command(options: LearnOptions) -> None:
         check_place(_model_file(options.output, form))
     settings, units_of = _settings(options), dict(_pairs("--unit", options.units))
     begin = time.perf_counter()
-    found = read_table(
-        table_source(options.table, options.delimiter),
-        target=options.target,
-        ignore=options.ignore,
-        name="standard input" if options.table == "-" else None,
-    )
+    is_state = all(Path(one).suffix == STATE for one in options.tables)
+    learner = _merged(options, settings, units_of) if is_state else None
+    found = _table(options) if learner is None else learner.table()
     is_silent = options.quiet or options.output == "-"
     read = ("read", found.name, _timed(_read_text(found), begin))
     noticed = dict(remarks(found, lambda column: f"--ignore {shlex.quote(column)}"))
     begin = time.perf_counter()
-    title = options.name or (
-        "tree" if options.table == "-" else printable(Path(options.table).stem)
-    )
     with wrong_options(), progress_bar(quiet=is_silent) as show:
-        learnt = learn_table(
-            found, name=title, units=units_of, settings=settings, progress=show
+        learnt = (
+            learn_table(
+                found,
+                name=_title(options),
+                units=units_of,
+                settings=settings,
+                progress=show,
+            )
+            if learner is None
+            else learner.learnt(progress=show)
         )
     rows = [_tree_row(learnt, begin), read]
     rows += [("remark", column, f"has {text}") for column, text in noticed.items()]
@@ -228,7 +238,8 @@ def command(options: LearnOptions) -> None:
         answer_bytes(content)
         return
     write_atomically(options.output, content)
-    rest = [] if options.table == "-" else ["--data", options.table]
+    is_data = learner is None and options.tables[0] != "-"
+    rest = ["--data", options.tables[0]] if is_data else []
     rest += ["--delimiter", options.delimiter] if rest and options.delimiter else []
     written = _written_rows(model, options.output, form, rest)
     say_rows(*written, width=width, quiet=is_silent)
@@ -236,6 +247,67 @@ def command(options: LearnOptions) -> None:
         answer_json(
             _summary(found, noticed, learnt, tested, settings.seed, options.output)
         )
+
+
+def _table(options: LearnOptions) -> Table:
+    """Return the one table that is read whole."""
+    from fuzzytree.tables import read_table
+
+    if len(options.tables) > 1:
+        raise click.UsageError(
+            f"several tables: collect each of them first, as in `fuzzytree collect "
+            f"{options.tables[0]} --target COLUMN -o part1{STATE}`"
+        )
+    if options.target is None:
+        raise click.UsageError("name the column of the classes with --target")
+    return read_table(
+        table_source(options.tables[0], options.delimiter),
+        target=options.target,
+        ignore=options.ignore,
+        name="standard input" if options.tables[0] == "-" else None,
+    )
+
+
+def _merged(
+    options: LearnOptions, settings: LearningSettings, units: Mapping[str, str]
+) -> Learner:
+    """Return the learner of all states, merged in pairs."""
+    from fuzzytree.learning import Learner
+
+    def load(path: str) -> tuple[str, Learner]:
+        return path, Learner.load(
+            path, units=units, name=_title(options), settings=settings
+        )
+
+    found = [load(path) for path in options.tables]
+    while len(found) > 1:
+        pairs = itertools.zip_longest(found[::2], found[1::2])
+        found = [_joined(*pair, repeated=options.repeated) for pair in pairs]
+    if options.target not in (None, found[0][1].target):
+        raise click.UsageError(f"--target: the states have {found[0][1].target!r}")
+    return found[0][1]
+
+
+def _joined(
+    one: tuple[str, Learner],
+    other: tuple[str, Learner] | None,
+    *,
+    repeated: bool,
+) -> tuple[str, Learner]:
+    if other is None:
+        return one
+    try:
+        return one[0], one[1].merge(other[1], repeated=repeated)
+    except ValueError as error:
+        raise TableError(f"{other[0]}, beside {one[0]}: {error}") from error
+
+
+def _title(options: LearnOptions) -> str:
+    """Return the name of the tree."""
+    if options.name:
+        return options.name
+    is_named = len(options.tables) == 1 and options.tables[0] != "-"
+    return (printable(Path(options.tables[0]).stem) if is_named else "") or "tree"
 
 
 def _model_file(output: str, form: Format) -> str:
@@ -317,7 +389,7 @@ def _summary(
     return Summary(
         file=output,
         fingerprint=fingerprint(learnt.tree),
-        rows=len(table.codes),
+        rows=table.rows,
         columns=table.columns,
         classes=table.classes,
         missing_cells=table.missing,
@@ -339,7 +411,7 @@ def _read_text(table: Table) -> str:
     from fuzzytree.report import counted
 
     text = (
-        f"{counted(len(table.codes), 'row')}, {counted(len(table.columns), 'column')}, "
+        f"{counted(table.rows, 'row')}, {counted(len(table.columns), 'column')}, "
         f"{counted(len(table.classes), 'class', 'classes')}"
     )
     odd = [

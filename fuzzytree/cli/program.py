@@ -25,6 +25,7 @@ from fuzzytree.model import noticed
 VERBS: Mapping[str, str] = MappingProxyType(
     {
         "learn": "fuzzytree.cli.learn",
+        "collect": "fuzzytree.cli.collect",
         "show": "fuzzytree.cli.show",
         "export": "fuzzytree.cli.export",
         "convert": "fuzzytree.cli.convert",
@@ -157,6 +158,7 @@ def _error_text(error: FuzzyTreeError, verb: str) -> str:
     text = str(error).replace("pass dialect=", "pass --dialect ")
     text = text.replace("pass scores=", "pass --set scores=")
     text = text.replace("pass missing='drop'", "pass --missing drop")
+    text = text.replace("pass repeated=True", "pass --repeated")
     command = program.get_command(click.Context(program), verb)
     options = [name for one in command.params for name in one.opts] if command else []
     offer = "use `fuzzytree convert --allow-loss`"

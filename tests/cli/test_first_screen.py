@@ -20,6 +20,7 @@ SLOW = ("audit", "stability")
 
 FIRST_LINES = {
     "learn t.csv --target cultivar --entry 25 -o t.yaml": "accuracy 0.955",
+    "collect t.csv --target cultivar -o t.state": "collected 178 rows 13 columns, 3 ",
     "show wine.yaml": "wine: fuzzy tree, 2 nodes, 3 leaves, depth 2",
     "export wine.yaml -o wine.c": "wrote wine.c c, ",
     "convert wine.yaml wine.onnx": "wrote wine.onnx onnx, ",
