@@ -308,7 +308,50 @@ class Learner:
         Raises:
             ReadError: If the file is none, is broken, or is of another version.
         """
-        learner = _read(read_bounded(path, LIMIT), os.fspath(path))
+        content = read_bounded(path, LIMIT)
+        return cls.from_bytes(
+            content, os.fspath(path), units=units, name=name, settings=settings
+        )
+
+    def to_bytes(self) -> bytes:
+        """Return what `save` writes.
+
+        Raises:
+            LearningError: If no part was taken.
+        """
+        return self._content()[0]
+
+    @classmethod
+    def from_bytes(
+        cls,
+        content: bytes,
+        title: str = "the state",
+        *,
+        units: Mapping[str, str] | None = None,
+        name: str = "tree",
+        settings: LearningSettings | None = None,
+    ) -> Learner:
+        """Return the learner whose `to_bytes` these are.
+
+        Args:
+            content: The bytes.
+            title: What messages call them.
+            units: As in `Learner`.
+            name: As in `Learner`.
+            settings: As in `load`.
+
+        Raises:
+            ReadError: If they are none, are broken, or are of another version.
+        """
+        try:
+            header, arrays = open_state(content)
+            if header.magic != MAGIC:
+                raise ValueError(f"is {header.magic!r}, and {MAGIC!r} is read")
+            if state_digest(header, arrays) != header.digest:
+                raise ValueError("is broken: its digest is another")
+            learner = cls._of_state(header, arrays)
+        except ValueError as error:
+            raise ReadError(f"{title}: {error}") from error
         learner.units, learner.name = dict(units or {}), name
         if settings is not None:
             most = learner.settings.rows_per_class
@@ -387,13 +430,37 @@ class Learner:
         kinds = self._kinds - {"csv"}
         if not kinds:
             options: tuple[LabelType, ...] = ("boolean", "number")
-            known = [*names]
-            fitting = [one for one in options if all(is_label(n, one) for n in known)]
+            names = [*names]
+            fitting: list[LabelType] = [
+                one for one in options if all(is_label(n, one) for n in names)
+            ]
             return fitting[0] if fitting else msgspec.UNSET
         kind = kinds.pop()
         if kinds or "csv" in self._kinds or kind == "text":
             return msgspec.UNSET
         return cast("LabelType", kind)
+
+    @classmethod
+    def _of_state(
+        cls, header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]
+    ) -> Learner:
+        keys = [*zip(header.classes, header.floats, strict=True)]
+        if len(set(keys)) < len(keys) or len(set(header.columns)) < len(header.columns):
+            raise ValueError("names a column or a class twice")
+        settings = LearningSettings(rows_per_class=header.rows_per_class)
+        learner = cls(header.target, columns=header.columns, settings=settings)
+        learner.unlabelled, learner.missing = header.unlabelled, header.missing
+        learner._classes = {key: place for place, key in enumerate(keys)}
+        learner._kinds = set(header.kinds)
+        learner._parts = frozenset([*header.parts, header.digest])
+        learner._statistics = Statistics.of_arrays(
+            arrays,
+            classes=len(keys),
+            features=len(header.columns),
+            rows_per_class=header.rows_per_class,
+            dropped=header.dropped,
+        )
+        return learner
 
     def _content(self) -> tuple[bytes, str]:
         """Return the state as the content of a file, and its digest."""
@@ -415,7 +482,7 @@ class Learner:
             missing=self.missing,
             parts=sorted(self._parts),
         )
-        digest = _digest(header, arrays)
+        digest = state_digest(header, arrays)
         header = msgspec.structs.replace(header, digest=digest)
         lists = {name: pa.array([array]) for name, array in arrays.items()}
         metadata = {b"fuzzytree": msgspec.json.encode(header)}
@@ -439,7 +506,7 @@ def _difference(what: str, mine: Sequence[str], others: Sequence[str]) -> str:
     return f"the states have other columns: only one of them has {', '.join(only)}"
 
 
-def _digest(header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]) -> str:
+def state_digest(header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]) -> str:
     """Return the digest of a header without its own, and of arrays."""
     bare = msgspec.structs.replace(header, digest="")
     total = hashlib.sha256(msgspec.json.encode(bare))
@@ -449,24 +516,12 @@ def _digest(header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]) -> s
     return total.hexdigest()
 
 
-def _read(content: bytes, title: str) -> Learner:
-    """Return the learner that the content of a file holds.
+def open_state(content: bytes) -> tuple[_Header, dict[str, npt.NDArray[np.generic]]]:
+    """Return the header and the arrays of a state, before they are compared.
 
     Raises:
-        ReadError: If it is none, is broken, or is of another version.
+        ValueError: If it is none.
     """
-    try:
-        header, arrays = _opened(content)
-        if header.magic != MAGIC:
-            raise ValueError(f"is {header.magic!r}, and {MAGIC!r} is read")
-        if _digest(header, arrays) != header.digest:
-            raise ValueError("is broken: its digest is another")
-        return _learner_of(header, arrays)
-    except ValueError as error:
-        raise ReadError(f"{title}: {error}") from error
-
-
-def _opened(content: bytes) -> tuple[_Header, dict[str, npt.NDArray[np.generic]]]:
     import pyarrow as pa
 
     try:
@@ -493,25 +548,3 @@ def _opened(content: bytes) -> tuple[_Header, dict[str, npt.NDArray[np.generic]]
             "is no state that `fuzzytree collect` wrote, or is cut short"
         ) from error
     return header, arrays
-
-
-def _learner_of(
-    header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]
-) -> Learner:
-    keys = [*zip(header.classes, header.floats, strict=True)]
-    if len(set(keys)) < len(keys) or len(set(header.columns)) < len(header.columns):
-        raise ValueError("names a column or a class twice")
-    settings = LearningSettings(rows_per_class=header.rows_per_class)
-    learner = Learner(header.target, columns=header.columns, settings=settings)
-    learner.unlabelled, learner.missing = header.unlabelled, header.missing
-    learner._classes = {key: place for place, key in enumerate(keys)}
-    learner._kinds = set(header.kinds)
-    learner._parts = frozenset([*header.parts, header.digest])
-    learner._statistics = Statistics.of_arrays(
-        arrays,
-        classes=len(keys),
-        features=len(header.columns),
-        rows_per_class=header.rows_per_class,
-        dropped=header.dropped,
-    )
-    return learner

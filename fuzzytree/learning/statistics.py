@@ -201,7 +201,7 @@ class Statistics:
         np.add.at(found._counts, positions, self._counts)
         np.minimum.at(found._lows, positions, self._lows)
         np.maximum.at(found._highs, positions, self._highs)
-        found._sums._take(self._sums, positions, np.arange(self.features))
+        found._sums.take(self._sums, positions, np.arange(self.features))
         found._rows = self._rows.placed(positions, classes)
         return found
 

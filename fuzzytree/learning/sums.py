@@ -230,7 +230,7 @@ class Sums:
         small = np.where(waiting[chosen], columns[chosen], 0.0)
         part = Sums(len(present), len(chosen))
         part.add(small, np.arange(len(present)), starts, counts)
-        self._take(part, present, chosen)
+        self.take(part, present, chosen)
 
     def _count(self, grams: FloatArray, present: IntArray) -> None:
         """Add Gram matrices: sums of limbs, and products by the unit they have."""
@@ -253,7 +253,7 @@ class Sums:
         self._limb_squares[:] = 0
         self._blocks = 0
 
-    def _take(self, other: Sums, groups: IntArray, features: IntArray) -> None:
+    def take(self, other: Sums, groups: IntArray, features: IntArray) -> None:
         """Add the totals of some groups and features."""
         other._settle()
         self._add_wholes(other._unit, other._sums, other._squares, groups, features)
@@ -314,7 +314,7 @@ class Sums:
         joined = Sums(self.groups, self.features)
         everything = np.arange(self.groups), np.arange(self.features)
         for part in (self, other):
-            joined._take(part, *everything)
+            joined.take(part, *everything)
         return joined
 
     def moments(

@@ -152,7 +152,7 @@ def test_states_of_other_tables_do_not_merge() -> None:
     table = rows_of()
     one = learner_of(table)
     with pytest.raises(ValueError, match="order: a, b, c, d, and d, b, a, c; name"):
-        one.merge(learner_of(table[["kind", "d", "b", "a", "c"]]))
+        one.merge(learner_of(table.reindex(columns=["kind", "d", "b", "a", "c"])))
     with pytest.raises(ValueError, match="other columns: only one of them has d"):
         one.merge(learner_of(table.drop(columns="d")))
     with pytest.raises(ValueError, match="another number of rows per class: 5000, and"):
@@ -203,12 +203,12 @@ def test_a_file_that_is_cut_or_changed_is_refused(tmp_path: Path) -> None:
 
 def rewritten(path: Path, change: dict[str, object], drop: str = "") -> None:
     """Write a state again with another header, and with a digest that fits."""
-    from fuzzytree.learning.parts import _digest, _opened
+    from fuzzytree.learning.parts import open_state, state_digest
 
-    header, arrays = _opened(path.read_bytes())
+    header, arrays = open_state(path.read_bytes())
     arrays = {name: array for name, array in arrays.items() if name != drop}
     header = msgspec.structs.replace(header, **change)
-    header = msgspec.structs.replace(header, digest=_digest(header, arrays))
+    header = msgspec.structs.replace(header, digest=state_digest(header, arrays))
     lists = {name: pa.array([array]) for name, array in arrays.items()}
     table = pa.table(lists).replace_schema_metadata(
         {b"fuzzytree": msgspec.json.encode(header)}
