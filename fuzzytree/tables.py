@@ -18,6 +18,7 @@ import itertools
 import math
 import os
 import re
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -226,52 +227,201 @@ def read_table(
         >>> table.columns, table.values.tolist(), table.classes, table.codes.tolist()
         (('x1',), [[1.5, 2.5]], ('firm', 'soft'), [1, 0])
     """
-    shape = (0,) if isinstance(target, str) else getattr(target, "shape", (0,))
-    if len(shape) != 1:
-        raise TableError(
-            f"the target has the shape {tuple(shape)}, and it needs one class for each "
-            "row: pass the name of a column, or an array of shape (rows,)"
-        )
-    result = pieces(source, columns=columns, delimiter=delimiter, name=name)
-    first = next(result)
-    target = target.strip() if isinstance(target, str) else target
-    chosen = _learnt_columns(first, target, [c.strip() for c in as_names(ignore)])
-    numbers = _Numbers(first.name, [first.columns[k] for k in chosen])
-    classes: list[Cells] = [] if isinstance(target, str) else [target]
-    for piece in itertools.chain([first], result):
-        numbers.add(piece, chosen)
-        if isinstance(target, str):
-            classes.append(piece.cells[first.columns.index(target)])
-    if numbers.faults:
-        hint = " ".join(f"--ignore {_quoted(k)}" for k in _some(numbers.faults))
-        raise TableError(
-            f"{numbers.fault_text()}\n  leave columns out with ignore ({hint})"
-        )
-    values = numbers.joined()
-    if not values.shape[1]:
-        raise TableError(f"{first.name} has no rows")
-    names = class_names(classes)
-    if len(names) != values.shape[1]:
-        raise TableError(
-            f"{first.name} has {values.shape[1]} rows, and there are "
-            f"{len(names)} classes for them"
-        )
-    is_kept = [not _is_count(first, k, values[row]) for row, k in enumerate(chosen)]
-    if not all(is_kept):
-        values = values[is_kept]
-        if not len(values):
-            raise TableError(f"{first.name} has no column to learn from")
-    columns = list(itertools.compress(numbers.names, is_kept))
-    left_out = itertools.compress(numbers.names, (not kept for kept in is_kept))
-    text = "no name and counts the rows; it is left out"
-    remarks = [*((column, text) for column in left_out), *trimmed(first)]
-    table = _labelled(first.name, columns, values, names)
-    title = target if isinstance(target, str) else ""
-    is_csv = not isinstance(classes[0], list | np.ndarray) and bool(title)
-    label_type = _label_type(classes, names, is_csv=is_csv)
-    return msgspec.structs.replace(
-        table, target=title, remarks=tuple(remarks), label_type=label_type
+    rows = LearningRows(
+        source,
+        target=target,
+        ignore=ignore,
+        columns=columns,
+        delimiter=delimiter,
+        name=name,
     )
+    return rows.table([*rows])
+
+
+class LearningPiece(msgspec.Struct, frozen=True, eq=False):
+    """Some rows to learn from.
+
+    Attributes:
+        name: What messages call the table that they are of.
+        rows: How many rows were read.
+        values: Those of them that have a class, shape (columns, rows).
+        codes: The number of the class of each.
+    """
+
+    name: str
+    rows: int
+    values: FloatArray
+    codes: IntArray
+
+
+class LearningRows:
+    """The rows of a table to learn from, piece by piece, and what was noticed.
+
+    The arguments are those of `read_table`; attributes count what was read so far.
+
+    Args:
+        chosen: The columns to learn from, if other parts of the table have set them.
+        labels: The classes so far; more are added.
+        progress: Called with the number of rows so far, and 0.
+
+    Attributes:
+        name: What messages call the table.
+        names: The columns to learn from; None before the first piece.
+        labels: The classes.
+        rows: How many rows were read.
+        unlabelled: How many of them were left out because they have no class.
+        missing: How many cells of the others are missing.
+        remarks: Columns, and what they have and is left out.
+    """
+
+    def __init__(
+        self,
+        source: object,
+        *,
+        target: str | Sequence[object] | npt.NDArray[np.generic],
+        ignore: Sequence[str] = (),
+        columns: Sequence[str] | None = None,
+        delimiter: str | None = None,
+        name: str | None = None,
+        chosen: Sequence[str] | None = None,
+        labels: ClassLabels | None = None,
+        progress: Callable[[str, float], None] | None = None,
+    ) -> None:
+        shape = (0,) if isinstance(target, str) else getattr(target, "shape", (0,))
+        if len(shape) != 1:
+            raise TableError(
+                f"the target has the shape {tuple(shape)}, and it needs one class for "
+                "each row: pass the name of a column, or an array of shape (rows,)"
+            )
+        self.target = target.strip() if isinstance(target, str) else ""
+        self.names = None if chosen is None else tuple(chosen)
+        self.labels = labels or ClassLabels()
+        self.name, self.rows, self.unlabelled, self.missing = "", 0, 0, 0
+        self.remarks: list[tuple[str, str]] = []
+        self._ignore = [column.strip() for column in as_names(ignore)]
+        self._codes: IntArray | None = None
+        if not isinstance(target, str):
+            cells = target if isinstance(target, np.ndarray) else plain(target)
+            self._codes = self.labels.add(*coded_classes(cells))
+        self._counts: dict[int, frozenset[int]] = {}
+        self._progress = progress
+        self._pieces = pieces(source, columns=columns, delimiter=delimiter, name=name)
+
+    def __iter__(self) -> Iterator[LearningPiece]:
+        """Yield the rows piece by piece.
+
+        Raises:
+            TableError: If a column is absent or holds text, when all rows were read.
+        """
+        begin = time.monotonic()
+        first = next(self._pieces)
+        self.name = first.name
+        chosen = self._chosen(first)
+        is_kept = np.array([k not in self._counts for k in chosen], bool)
+        total = _Numbers(first.name, [first.columns[k] for k in chosen])
+        for piece in itertools.chain([first], self._pieces):
+            numbers = _Numbers(piece.name, total.names)
+            numbers.add(piece, chosen)
+            total.join_faults(numbers.faults)
+            values, codes = numbers.joined(), self._classes_of(piece)
+            for row in np.flatnonzero(~is_kept).tolist():
+                self._count(chosen[row], values[row])
+            self.rows += piece.rows
+            if self._progress is not None:
+                rate = self.rows / max(time.monotonic() - begin, 1e-3)
+                text = f"{piece.name}: {self.rows:,} rows, {rate:,.0f} rows/s"
+                self._progress(text, 0.0)
+            if total.faults or len(codes) != piece.rows:
+                continue
+            has_class = codes >= 0
+            if not is_kept.all():
+                values = values[is_kept]
+            if not has_class.all():
+                values, codes = values[:, has_class], codes[has_class]
+            self.unlabelled += piece.rows - len(codes)
+            self.missing += _missing_cells(values)
+            yield LearningPiece(piece.name, piece.rows, values, codes)
+        if total.faults:
+            hint = " ".join(f"--ignore {_quoted(k)}" for k in _some(total.faults))
+            raise TableError(
+                f"{total.fault_text()}\n  leave columns out with ignore ({hint})"
+            )
+
+    def refuse_empty(self) -> None:
+        """Check what all rows show.
+
+        Raises:
+            TableError: If there is no row, none with a class, or no column; or if a
+                column without a name does not count the rows.
+        """
+        if not self.rows:
+            raise TableError(f"{self.name} has no rows")
+        if self._codes is not None and len(self._codes) != self.rows:
+            raise TableError(
+                f"{self.name} has {self.rows} rows, and there are "
+                f"{len(self._codes)} classes for them"
+            )
+        for column, starts in self._counts.items():
+            if not starts:
+                raise TableError(
+                    f"{self.name}: column {column + 1} has no name\n  name it, or "
+                    f"leave it out with ignore (--ignore 'column {column + 1}')"
+                )
+        if not self.names:
+            raise TableError(f"{self.name} has no column to learn from")
+        if self.unlabelled == self.rows:
+            raise TableError(f"{self.name} has no row with a class")
+
+    def table(self, parts: Sequence[LearningPiece]) -> Table:
+        """Return all pieces as one table.
+
+        Raises:
+            TableError: As `refuse_empty`.
+        """
+        self.refuse_empty()
+        codes = np.concatenate([part.codes for part in parts])
+        values = [part.values for part in parts]
+        positions, classes = self.labels.ordered()
+        return Table(
+            self.name,
+            self.names or (),
+            values[0] if len(values) == 1 else np.hstack(values),
+            classes,
+            positions[codes],
+            self.missing,
+            self.unlabelled,
+            self.target,
+            tuple(self.remarks),
+            self.labels.label_type() if self.target else self.labels.kind(),
+        )
+
+    def _chosen(self, first: TablePiece) -> list[int]:
+        """Return the columns to read, of which those without a name count the rows."""
+        if self.names is not None:
+            wanted = [*self.names, self.target]
+            _refuse_absent(first, wanted, ", which other parts have")
+            return [first.columns.index(column) for column in self.names]
+        target = [self.target] if self._codes is None else []
+        chosen = _learnt_columns(first, [*target, *self._ignore])
+        unnamed = [k for k in chosen if not first.written[k].strip()]
+        self._counts = dict.fromkeys(unnamed, frozenset({0, 1}))
+        self.names = tuple(first.columns[k] for k in chosen if k not in unnamed)
+        text = "no name and counts the rows; it is left out"
+        self.remarks = [*((first.columns[k], text) for k in unnamed), *trimmed(first)]
+        return chosen
+
+    def _classes_of(self, piece: TablePiece) -> IntArray:
+        if self._codes is not None:
+            return self._codes[self.rows : self.rows + piece.rows]
+        cells = piece.cells[piece.columns.index(self.target)]
+        return self.labels.add(*coded_classes(cells))
+
+    def _count(self, column: int, values: FloatArray) -> None:
+        """Note from which of 0 and 1 a column without a name may count the rows."""
+        count = np.arange(self.rows, self.rows + len(values))
+        starts = self._counts[column]
+        fitting = {start for start in starts if np.array_equal(values, count + start)}
+        self._counts[column] = frozenset(fitting)
 
 
 def batches(
@@ -418,48 +568,10 @@ def _class_name(value: object, *, is_whole: bool) -> str | None:
     return str(value)
 
 
-def _label_type(
-    cells: Sequence[Cells], names: Sequence[str | None], *, is_csv: bool
-) -> LabelType | msgspec.UnsetType:
-    """Return what the names of classes stand for.
-
-    In a CSV file that are numbers or booleans where all names are written so.
-    """
-    known = {name for name in names if name is not None}
-    if is_csv:
-        kinds: tuple[LabelType, ...] = ("boolean", "number")
-        fitting: list[LabelType] = [
-            kind for kind in kinds if all(is_label(name, kind) for name in known)
-        ]
-        return fitting[0] if fitting else msgspec.UNSET
-    values = itertools.chain.from_iterable(map(plain, cells))
-    return label_type_of(
-        value.item() if isinstance(value, np.generic) else value
-        for value in values
-        if not _is_missing(value)
-    )
-
-
 def _is_missing(value: object) -> bool:
     if value is None or type(value).__name__ in ("NAType", "NaTType"):
         return True
     return isinstance(value, float) and math.isnan(value)
-
-
-def _labelled(
-    name: str, columns: Sequence[str], values: FloatArray, names: list[str | None]
-) -> Table:
-    classes = tuple(sorted({n for n in names if n is not None}, key=class_order))
-    position: dict[str | None, int] = {label: k for k, label in enumerate(classes)}
-    codes = np.array([position.get(label, -1) for label in names], np.int64)
-    kept = codes >= 0
-    unlabelled = int(np.count_nonzero(~kept))
-    if unlabelled:
-        values, codes = values[:, kept], codes[kept]
-    if not len(codes):
-        raise TableError(f"{name} has no row with a class")
-    missing = _missing_cells(values)
-    return Table(name, tuple(columns), values, classes, codes, missing, unlabelled)
 
 
 def class_order(label: str) -> tuple[bool, float, str]:
@@ -468,40 +580,70 @@ def class_order(label: str) -> tuple[bool, float, str]:
     return (not is_whole, float(label) if is_whole else 0.0, label)
 
 
-def learnt_names(
-    piece: TablePiece, target: str, ignore: Sequence[str]
-) -> tuple[str, ...]:
-    """Return the columns of a table's part to learn from.
+class ClassLabels:
+    """The classes of a table, numbered as they come.
 
-    Raises:
-        TableError: If the target or an ignored column is absent, if no column is left,
-            or if one has no name: whether it counts the rows, only all rows show.
+    Attributes:
+        keys: The number of each class, by its name and whether it came as a number with
+            a fraction, as 1.0 does.
+        kinds: What labels came: `csv`, `text`, `boolean` or `number`.
     """
-    chosen = _learnt_columns(piece, target, ignore)
-    for k in chosen:
-        if not piece.written[k].strip():
-            raise TableError(
-                f"{piece.name}: column {k + 1} has no name\n  name it, or leave it out "
-                f"with ignore (--ignore 'column {k + 1}')"
-            )
-    return tuple(piece.columns[k] for k in chosen)
 
+    def __init__(
+        self,
+        keys: Iterable[tuple[str, bool]] = (),
+        kinds: Iterable[str] = (),
+    ) -> None:
+        self.keys = {key: place for place, key in enumerate(dict.fromkeys(keys))}
+        self.kinds = {*kinds}
 
-def column_numbers(
-    piece: TablePiece, columns: Sequence[str], target: str
-) -> tuple[FloatArray, int]:
-    """Return some columns of a part, shape (columns, rows), and its missing cells.
+    def add(
+        self, codes: IntArray, keys: Sequence[tuple[str, bool]], kind: str
+    ) -> IntArray:
+        """Take what `coded_classes` returns, and return the codes in these numbers."""
+        if keys:
+            self.kinds.add(kind)
+        places = [self.keys.setdefault(key, len(self.keys)) for key in keys]
+        return np.array([*places, -1], np.int64)[codes]
 
-    Raises:
-        TableError: If one is absent, or holds text.
-    """
-    _refuse_absent(piece, [*columns, target], ", which other parts have")
-    position = {column: k for k, column in enumerate(piece.columns)}
-    numbers = _Numbers(piece.name, list(columns))
-    numbers.add(piece, [position[column] for column in columns])
-    if numbers.faults:
-        raise TableError(numbers.fault_text())
-    return numbers.joined(), numbers.missing
+    def merge(self, other: ClassLabels) -> ClassLabels:
+        """Return the classes of both; the first ones keep their numbers."""
+        return ClassLabels([*self.keys, *other.keys], self.kinds | other.kinds)
+
+    def ordered(self) -> tuple[IntArray, tuple[str, ...]]:
+        """Return the place of each number among the names in their order, and these."""
+        names = [*self.names()]
+        order = sorted(set(names), key=class_order)
+        places = {name: place for place, name in enumerate(order)}
+        return np.array([places[name] for name in names], np.int64), tuple(order)
+
+    def names(self) -> Iterator[str]:
+        """Yield the name of each class: 1.0 is 1 where no class has a fraction."""
+        floats = [float(name) for name, is_float in self.keys if is_float]
+        is_whole = all(one.is_integer() for one in floats if math.isfinite(one))
+        for name, is_float in self.keys:
+            is_short = is_float and is_whole and math.isfinite(float(name))
+            yield str(int(float(name))) if is_short else name
+
+    def label_type(self) -> LabelType | msgspec.UnsetType:
+        """Return what the names of classes stand for.
+
+        In a CSV file that are numbers or booleans where all names are written so.
+        """
+        if self.kinds != {"csv"}:
+            return self.kind()
+        kinds: tuple[LabelType, ...] = ("boolean", "number")
+        names = [*self.names()]
+        fitting: list[LabelType] = [
+            kind for kind in kinds if all(is_label(name, kind) for name in names)
+        ]
+        return fitting[0] if fitting else msgspec.UNSET
+
+    def kind(self) -> LabelType | msgspec.UnsetType:
+        """Return the type that all labels came with, if it is no text."""
+        kind = min(self.kinds, default="text")
+        is_one = len(self.kinds) == 1 and kind in ("boolean", "number")
+        return cast("LabelType", kind) if is_one else msgspec.UNSET
 
 
 def coded_classes(cells: Cells) -> tuple[IntArray, list[tuple[str, bool]], str]:
@@ -518,16 +660,7 @@ def coded_classes(cells: Cells) -> tuple[IntArray, list[tuple[str, bool]], str]:
         >>> coded_classes([1.0, 2.0])[1:]
         ([('1.0', True), ('2.0', True)], 'number')
     """
-    is_csv = not isinstance(cells, list | np.ndarray)
-    values: Iterable[object] = plain(cells)
-    if is_csv and hasattr(cells, "dictionary_encode") and len(cells):
-        encoded = cast("pa.ChunkedArray", cells).combine_chunks().dictionary_encode()
-        indices = np.from_dlpack(encoded.indices).astype(np.int64)
-        values = encoded.dictionary.to_pylist()
-    else:
-        known = list(values)
-        indices = np.arange(len(known))
-        values = known
+    indices, values = _distinct(cells)
     keys: dict[tuple[str, bool], int] = {}
     places: list[int] = []
     labels: list[object] = []
@@ -541,8 +674,27 @@ def coded_classes(cells: Cells) -> tuple[IntArray, list[tuple[str, bool]], str]:
             labels.append(value.item() if isinstance(value, np.generic) else value)
         places.append(keys.setdefault(key, len(keys)))
     codes = np.array(places, np.int64)[indices] if len(indices) else indices
-    kind = label_type_of(labels)
-    return codes, [*keys], "csv" if is_csv else kind or "text"
+    is_csv = not isinstance(cells, Sequence | np.ndarray)
+    return codes, [*keys], "csv" if is_csv else label_type_of(labels) or "text"
+
+
+def _distinct(cells: Cells) -> tuple[IntArray, Sequence[object]]:
+    """Return where the value of each cell is among values that rarely repeat."""
+    if isinstance(cells, np.ndarray) and cells.dtype.kind in _REAL:
+        numbers = cells.astype(np.float64) if cells.dtype.kind == "f" else cells
+        is_float = cells.dtype.kind == "f"  # whose bits tell -0.0 from 0.0
+        bits = numbers.view(np.int64) if is_float else np.ascontiguousarray(numbers)
+        distinct, indices = np.unique(bits, return_inverse=True)
+        return indices.astype(np.int64), distinct.view(numbers.dtype).tolist()
+    if hasattr(cells, "dictionary_encode") and len(cells):
+        encoded = cast("pa.ChunkedArray", cells).combine_chunks().dictionary_encode()
+        indices = np.from_dlpack(encoded.indices).astype(np.int64)
+        return indices, encoded.dictionary.to_pylist()
+    values = plain(cells)
+    if not {*map(type, values)} <= {str, type(None)}:  # 1, 1.0 and True are equal
+        return np.arange(len(values)), values
+    places = {value: place for place, value in enumerate(dict.fromkeys(values))}
+    return np.fromiter(map(places.__getitem__, values), np.int64), [*places]
 
 
 class _Numbers:
@@ -576,16 +728,20 @@ class _Numbers:
             if isinstance(cells, np.ndarray):
                 cells = numbers_only(cells, f"{self.name}: column {name!r}")
             values[row], bad = _numbers(cells)
-            if bad and name not in self.faults:
-                self.faults[name] = (piece.where(bad[0]), str(cells[bad[0]]), 0)
             if bad:
-                where, text, count = self.faults[name]
-                self.faults[name] = (where, text, count + len(bad))
+                first = piece.where(bad[0]), str(cells[bad[0]]), len(bad)
+                self.join_faults({name: first})
         self._take(values)
 
     def _take(self, values: FloatArray) -> None:
         self.missing += _missing_cells(values)
         self._parts.append(values)
+
+    def join_faults(self, faults: Mapping[str, tuple[str, str, int]]) -> None:
+        """Add what is wrong with later rows."""
+        for name, (where, text, count) in faults.items():
+            where, text, before = self.faults.get(name, (where, text, 0))
+            self.faults[name] = (where, text, before + count)
 
     def fault_text(self) -> str:
         """Return a sentence for each column that holds text."""
@@ -709,37 +865,15 @@ def trimmed(piece: TablePiece) -> list[tuple[str, str]]:
     return [(repr(title), text) for title in result[:1]]
 
 
-def _is_count(piece: TablePiece, column: int, values: FloatArray) -> bool:
-    """Return whether a column without a name counts the rows, from 0 or 1.
-
-    Raises:
-        TableError: If it has no name and holds something else.
-    """
-    if piece.written[column].strip():
-        return False
-    count = np.arange(len(values))
-    if np.array_equal(values, count) or np.array_equal(values, count + 1):
-        return True
-    raise TableError(
-        f"{piece.name}: column {column + 1} has no name\n  name it, or leave it out "
-        f"with ignore (--ignore 'column {column + 1}')"
-    )
-
-
 def _some(names: Iterable[str]) -> list[str]:
     """Return the first few of many names, and three dots for the others."""
     result = list(itertools.islice(names, _MOST_NAMES + 1))
     return [*result[:_MOST_NAMES], "..."] if len(result) > _MOST_NAMES else result
 
 
-def _learnt_columns(
-    piece: TablePiece,
-    target: str | Sequence[object] | npt.NDArray[np.generic],
-    ignore: Sequence[str],
-) -> list[int]:
-    wanted = [*([target] if isinstance(target, str) else []), *ignore]
-    _refuse_absent(piece, wanted, "")
-    left_out = frozenset(wanted)
+def _learnt_columns(piece: TablePiece, others: Sequence[str]) -> list[int]:
+    _refuse_absent(piece, others, "")
+    left_out = frozenset(others)
     chosen = [k for k, column in enumerate(piece.columns) if column not in left_out]
     if not chosen:
         raise TableError(f"{piece.name} has no column to learn from")

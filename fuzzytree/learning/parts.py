@@ -24,16 +24,8 @@ from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning.learner import ArrayLearner, Learnt
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Statistics
-from fuzzytree.model import FuzzyTree, LabelType, as_names, is_label, with_label_type
-from fuzzytree.tables import (
-    Table,
-    TablePiece,
-    class_order,
-    coded_classes,
-    column_numbers,
-    learnt_names,
-    pieces,
-)
+from fuzzytree.model import FuzzyTree, as_names, with_label_type
+from fuzzytree.tables import ClassLabels, LearningPiece, LearningRows, Table
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -119,15 +111,15 @@ class Learner:
         self.name = name
         self.settings = settings or LearningSettings()
         self.unlabelled = self.missing = 0
-        self._classes: dict[tuple[str, bool], int] = {}
-        self._kinds: set[str] = set()
+        self.remarks: tuple[tuple[str, str], ...] = ()
+        self._labels = ClassLabels()
         self._parts: frozenset[str] = frozenset()
         self._statistics: Statistics | None = None
 
     def __repr__(self) -> str:
         """Return what was collected, in a line."""
         rows, columns = f"{self.rows:,} rows", len(self.columns or ())
-        of = f"{columns} columns, {len(self._classes)} classes"
+        of = f"{columns} columns, {len(self._labels.keys)} classes"
         return f"<Learner of {self.target!r}: {rows}, {of}>"
 
     @property
@@ -160,14 +152,17 @@ class Learner:
                 nothing of the part is taken then.
             LearningError: If a value is missing, and `missing` is `refuse`.
         """
-        begun: Learner | None = None
-        for piece in pieces(table, name=name):
-            begun = self._empty() if begun is None else begun
-            begun._take(piece)
-            if progress is not None:
-                progress(f"{piece.name}: {begun.rows:,} rows", 0.0)
-        if begun is not None:
-            vars(self).update(vars(self.merge(begun)))
+        begun = self._empty()
+        rows = LearningRows(
+            table,
+            target=self.target,
+            ignore=self.ignore,
+            name=name,
+            chosen=self.columns,
+            progress=progress,
+        )
+        begun._collect(rows, rows)
+        vars(self).update(vars(self.merge(begun)))
 
     def merge(self, other: Learner, *, repeated: bool = False) -> Learner:
         """Return a learner of the rows of both.
@@ -201,15 +196,14 @@ class Learner:
         result.columns = self.columns or other.columns
         result.unlabelled = self.unlabelled + other.unlabelled
         result.missing = self.missing + other.missing
-        result._kinds = self._kinds | other._kinds
+        result.remarks = self.remarks or other.remarks
         result._parts = self._parts | other._parts
-        result._classes = {
-            key: place
-            for place, key in enumerate(
-                dict.fromkeys([*self._classes, *other._classes])
-            )
-        }
-        parts = [part._placed(result._classes) for part in (self, other)]
+        result._labels = self._labels.merge(other._labels)
+        places, size = result._labels.keys, len(result._labels.keys)
+        parts = [
+            part._placed([places[key] for key in part._labels.keys], size)
+            for part in (self, other)
+        ]
         filled = [part for part in parts if part is not None]
         if filled:
             result._statistics = (
@@ -239,7 +233,7 @@ class Learner:
         learner = ArrayLearner(columns, order, self.units, self.name, self.settings)
         learner.statistics = statistics
         learnt = learner.finish(progress=progress)
-        tree = with_label_type(learnt.tree, self._label_type(order))
+        tree = with_label_type(learnt.tree, self._labels.label_type())
         return msgspec.structs.replace(learnt, tree=tree)
 
     def table(self) -> Table:
@@ -259,11 +253,12 @@ class Learner:
             self.name,
             cast("tuple[str, ...]", self.columns),
             sample.rows.T,
-            tuple(classes),
+            classes,
             sample.codes,
             self.missing,
             self.unlabelled,
             self.target,
+            self.remarks,
             weights=weights[sample.codes],
         )
 
@@ -275,7 +270,7 @@ class Learner:
             "rows_without_class": self.unlabelled,
             "missing_cells": self.missing,
             "columns": len(self.columns or ()),
-            "classes": len(set(self._names().values())),
+            "classes": len(set(self._labels.names())),
         }
 
     def save(self, path: str | os.PathLike[str]) -> str:
@@ -368,77 +363,54 @@ class Learner:
             settings=self.settings,
         )
 
-    def _take(self, piece: TablePiece) -> None:
-        """Take the rows of a piece."""
-        if self.columns is None:
-            self.columns = learnt_names(piece, self.target, self.ignore)
-        values, missing = column_numbers(piece, self.columns, self.target)
-        codes, keys, kind = coded_classes(piece.cells[piece.columns.index(self.target)])
-        for key in keys:
-            self._classes.setdefault(key, len(self._classes))
-        statistics = self._placed(self._classes)
+    def _collect(self, rows: LearningRows, parts: Iterable[LearningPiece]) -> None:
+        """Take pieces of a table; nothing was taken before."""
+        for piece in parts:
+            self._take(piece, len(rows.labels.keys))
+        self.columns, self._labels = rows.names, rows.labels
+        self.unlabelled, self.missing = rows.unlabelled, rows.missing
+        self.remarks = tuple(rows.remarks)
+        if self._statistics is None:
+            width, most = len(self.columns or ()), self.settings.rows_per_class
+            self._statistics = Statistics(0, width, most)
+
+    def _take(self, piece: LearningPiece, classes: int) -> None:
+        """Take the rows of a piece of a table that has so many classes by now."""
+        statistics = self._statistics
         if statistics is None:
-            width, most = len(self.columns), self.settings.rows_per_class
-            statistics = Statistics(len(self._classes), width, most)
-        places = np.array([*(self._classes[key] for key in keys), -1], np.int64)
-        has_class = codes >= 0
-        before = statistics.dropped
-        statistics.update(values.T[has_class], places[codes[has_class]])
+            width, most = len(piece.values), self.settings.rows_per_class
+            statistics = Statistics(classes, width, most)
+        elif classes > statistics.classes:  # by half more, or each piece copies all
+            size = max(classes, statistics.classes * 3 // 2)
+            statistics = statistics.placed(np.arange(statistics.classes), size)
         self._statistics = statistics
+        before = statistics.dropped
+        statistics.update(piece.values.T, piece.codes)
         dropped = statistics.dropped - before
         if dropped and self.settings.missing == "refuse":
             raise LearningError(
                 f"{piece.name}: {dropped} of {piece.rows} rows hold a missing or "
                 "infinite value\n  pass missing='drop' to leave them out"
             )
-        self.unlabelled += int(np.count_nonzero(~has_class))
-        self.missing += missing
-        if keys:
-            self._kinds.add(kind)
 
-    def _placed(self, places: Mapping[tuple[str, bool], int]) -> Statistics | None:
+    def _placed(self, places: Sequence[int], size: int) -> Statistics | None:
         """Return the statistics with other numbers of the classes."""
-        if self._statistics is None:
-            return None
-        positions = np.array([places[key] for key in self._classes], np.int64)
-        size = max(places.values(), default=-1) + 1
-        is_same = size == self._statistics.classes and (np.diff(positions) == 1).all()
-        if is_same and (not size or positions[0] == 0):
-            return self._statistics
-        return self._statistics.placed(positions, size)
+        statistics = self._statistics
+        if statistics is None or (
+            statistics.classes == size and [*places] == [*range(size)]
+        ):
+            return statistics
+        positions = np.zeros(statistics.classes, np.int64)  # the rest has no rows
+        positions[: len(places)] = places
+        return statistics.placed(positions, size)
 
-    def _joined(self) -> tuple[Statistics, list[str]]:
+    def _joined(self) -> tuple[Statistics, tuple[str, ...]]:
         """Return the statistics by the final names of classes, in their order."""
-        if self._statistics is None:
+        positions, order = self._labels.ordered()
+        statistics = self._placed(positions.tolist(), len(order))
+        if statistics is None:
             raise LearningError("cannot learn before a part of the table was taken")
-        names = self._names()
-        order = sorted(set(names.values()), key=class_order)
-        classes = {name: place for place, name in enumerate(order)}
-        places = {key: classes[name] for key, name in names.items()}
-        return cast("Statistics", self._placed(places)), order
-
-    def _names(self) -> dict[tuple[str, bool], str]:
-        """Return the name of each class: 1.0 is 1 where no class has a fraction."""
-        floats = [float(name) for name, is_float in self._classes if is_float]
-        is_whole = all(value.is_integer() for value in floats)
-        return {
-            (name, is_float): str(int(float(name))) if is_float and is_whole else name
-            for name, is_float in self._classes
-        }
-
-    def _label_type(self, names: Iterable[str]) -> LabelType | msgspec.UnsetType:
-        kinds = self._kinds - {"csv"}
-        if not kinds:
-            options: tuple[LabelType, ...] = ("boolean", "number")
-            names = [*names]
-            fitting: list[LabelType] = [
-                one for one in options if all(is_label(n, one) for n in names)
-            ]
-            return fitting[0] if fitting else msgspec.UNSET
-        kind = kinds.pop()
-        if kinds or "csv" in self._kinds or kind == "text":
-            return msgspec.UNSET
-        return cast("LabelType", kind)
+        return statistics, order
 
     @classmethod
     def _of_state(
@@ -450,8 +422,7 @@ class Learner:
         settings = LearningSettings(rows_per_class=header.rows_per_class)
         learner = cls(header.target, columns=header.columns, settings=settings)
         learner.unlabelled, learner.missing = header.unlabelled, header.missing
-        learner._classes = {key: place for place, key in enumerate(keys)}
-        learner._kinds = set(header.kinds)
+        learner._labels = ClassLabels(keys, header.kinds)
         learner._parts = frozenset([*header.parts, header.digest])
         learner._statistics = Statistics.of_arrays(
             arrays,
@@ -466,18 +437,20 @@ class Learner:
         """Return the state as the content of a file, and its digest."""
         import pyarrow as pa
 
-        if self._statistics is None or self.columns is None:
+        keys = self._labels.keys
+        statistics = self._placed([*keys.values()], len(keys))
+        if statistics is None or self.columns is None:
             raise LearningError("cannot save a state before a part was taken")
-        arrays = self._statistics.arrays()
+        arrays = statistics.arrays()
         header = _Header(
             magic=MAGIC,
             target=self.target,
             columns=[*self.columns],
-            classes=[name for name, _ in self._classes],
-            floats=[is_float for _, is_float in self._classes],
-            kinds=sorted(self._kinds),
+            classes=[name for name, _ in keys],
+            floats=[is_float for _, is_float in keys],
+            kinds=sorted(self._labels.kinds),
             rows_per_class=self.settings.rows_per_class,
-            dropped=self._statistics.dropped,
+            dropped=statistics.dropped,
             unlabelled=self.unlabelled,
             missing=self.missing,
             parts=sorted(self._parts),
