@@ -400,9 +400,9 @@ class Learner:
             statistics.classes == size and [*places] == [*range(size)]
         ):
             return statistics
-        positions = np.zeros(statistics.classes, np.int64)  # the rest has no rows
-        positions[: len(places)] = places
-        return statistics.placed(positions, size)
+        known = places[: statistics.classes]
+        rest = statistics.classes - len(known)  # room for classes, without rows
+        return statistics.placed(np.array([*known, *[0] * rest], np.int64), size)
 
     def _joined(self) -> tuple[Statistics, tuple[str, ...]]:
         """Return the statistics by the final names of classes, in their order."""
