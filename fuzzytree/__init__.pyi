@@ -11,6 +11,7 @@ from .api import learn as learn
 from .api import load as load
 from .api import material as material
 from .api import needs as needs
+from .api import predict as predict
 from .api import read as read
 from .api import recheck as recheck
 from .api import rules_from_tree as rules_from_tree

@@ -1,11 +1,11 @@
 """Rows in from anything, with the names of their columns.
 
-A table is a path, an open stream of CSV or Parquet, a pandas, polars or arrow table, or
-a numpy array. A path is a CSV, Parquet or Arrow file, a folder or a pattern of such
-files (`rows/*.csv`), or a place that pyarrow opens (`s3://place/rows.parquet`). Nothing
-is guessed: columns are found by their names, a number has a decimal point and no
-thousands separators, and a cell that is neither a number nor missing is an error that
-says where it stands.
+A table is a path, an open stream of CSV or Parquet, a pandas, polars or arrow table, a
+reader of record batches, or a numpy array. A path is a CSV, Parquet or Arrow file, a
+folder or a pattern of such files (`rows/*.csv`), or a place that pyarrow opens
+(`s3://place/rows.parquet`). Nothing is guessed: columns are found by their names, a
+number has a decimal point and no thousands separators, and a cell that is neither a
+number nor missing is an error that says where it stands.
 """
 
 from __future__ import annotations
@@ -516,6 +516,10 @@ def pieces(
             array = cast("npt.NDArray[np.generic]", source)
             names = None if columns is None else as_names(columns)
             return iter([_array_piece(array, names, name or "the array")])
+        case _ if hasattr(source, "read_next_batch"):
+            reader = cast("pa.RecordBatchReader", source)
+            parts = itertools.chain([reader.schema.empty_table()], reader)
+            return _batch_pieces(parts, name or "the table", only)
         case _:
             return iter([_frame_piece(source, name or "the table", only=only)])
 
@@ -1068,14 +1072,26 @@ def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[TablePiec
 
     try:
         names, result = _record_batches(stream, name, only)
-        first = 0
-        for batch in result:
-            yield _frame_piece(pa.table(batch), name, first, only, names)
-            first += batch.num_rows
+        yield from _batch_pieces(result, name, only, names)
     except pa.ArrowMemoryError:
         raise
     except pa.ArrowException as error:
         raise TableError(f"{name}: broken Parquet or Arrow file: {error}") from error
+
+
+def _batch_pieces(
+    parts: Iterable[pa.RecordBatch | pa.Table],
+    name: str,
+    only: Only,
+    written: tuple[str, ...] | None = None,
+) -> Iterator[TablePiece]:
+    """Yield record batches; `written` are the columns of the file they are part of."""
+    import pyarrow as pa
+
+    first = 0
+    for part in parts:
+        yield _frame_piece(pa.table(part), name, first, only, written)
+        first += part.num_rows
 
 
 def _record_batches(

@@ -19,6 +19,7 @@ from .verbs import learn_table as learn_table
 from .verbs import load as load
 from .verbs import material as material
 from .verbs import needs as needs
+from .verbs import predict as predict
 from .verbs import read as read
 from .verbs import recheck as recheck
 from .verbs import rows_of as rows_of

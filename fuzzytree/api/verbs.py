@@ -9,7 +9,7 @@ import stat
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, TypeVar, cast, get_args
 
 import msgspec
 import numpy as np
@@ -25,6 +25,7 @@ from fuzzytree import (
 )
 from fuzzytree.api.answering import Carried, opened
 from fuzzytree.api.answering import run as run
+from fuzzytree.api.engines import engine_of
 from fuzzytree.checking import convert as convert
 from fuzzytree.checking import export as export
 from fuzzytree.checking import load as load
@@ -71,6 +72,9 @@ if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, Use
 
 
+Frame = TypeVar("Frame")
+
+
 def learn(
     table: object,
     *,
@@ -85,7 +89,8 @@ def learn(
 
     Args:
         table: A path, a pandas, polars or arrow table, an array of shape
-            (rows, columns), or what `fuzzytree.table` returns.
+            (rows, columns), or what `fuzzytree.table` returns; or a lazy frame of
+            Polars, DuckDB or Ibis, which is not collected.
         target: The column of the classes, or the classes themselves.
         ignore: Columns to leave out.
         name: Of the tree; the file's, or `tree`, unless given.
@@ -110,9 +115,27 @@ def learn(
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
-    result = read_table(table, target=target, ignore=ignore)
+    engine = engine_of(table)
+    learner = None
+    if engine is not None:
+        from fuzzytree.api.engines.core import collected
+
+        learner = collected(
+            table,
+            engine,
+            target,
+            ignore=ignore,
+            units=units,
+            name=name or "tree",
+            settings=settings,
+        )
+        result = msgspec.structs.replace(learner.table(), name="the table")
+    else:
+        result = read_table(table, target=target, ignore=ignore)
     for column, text in learning.remarks(result, lambda column: f"ignore=[{column!r}]"):
         warnings.warn(f"{result.name}: {column} has {text}", stacklevel=2)
+    if learner is not None:
+        return learner.learn(progress=progress)
     return learn_table(
         result,
         name=name or _name_of(table),
@@ -159,6 +182,44 @@ def learn_table(
 def _name_of(table: object) -> str:
     path = path_of(table)
     return (printable(Path(path).stem) if path else "") or "tree"
+
+
+def predict(frame: Frame, model: ModelSource) -> Frame:
+    """Return a frame with the predictions of a model beside its columns.
+
+    A lazy frame of Polars, DuckDB or Ibis comes back as a lazy frame: the rows are
+    predicted by the engine, when they are collected. The predictions have the same bits
+    as those of `run`.
+
+    Args:
+        frame: A lazy frame, or a pandas, polars or arrow table. Columns are found by
+            name.
+        model: A tree or a rule base, or the path of one.
+
+    Returns:
+        All columns of the frame, and `class`, of the type of the labels that the model
+        was learnt from, null for no class; `rule`, the number of the winning rule or
+        leaf, from 1, and 0 for none; `status`: decided, tie, uncovered or missing;
+        `strength`: the firing strength of the winning rule, in a tree of its relative
+        rule, null for none.
+
+    Raises:
+        TableError: If a column is absent or holds text, or has the name of one that is
+            added. In a lazy frame, text is noticed when it is collected.
+        ReadError: If the model cannot be read, or decides for no class.
+        MissingExtraError: If a package that the engine needs is not installed.
+        TypeError: If it is no frame.
+
+    Example:
+        >>> import pandas as pd
+        >>> frame = pd.DataFrame({"cm": [1.0, 1.5, 7.0], "size": ["s", "s", "b"]})
+        >>> tree = learn(frame, target="size")
+        >>> predict(frame, tree)["class"].tolist()
+        ['s', 's', 'b']
+    """
+    from fuzzytree.api.engines.core import Answer, predicted
+
+    return cast("Frame", predicted(frame, Answer(_model_of(model, "predict"))))
 
 
 def rules_from_tree(

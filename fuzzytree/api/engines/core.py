@@ -1,0 +1,286 @@
+"""What the adapters of all engines share, and what calls them.
+
+A `Fold` makes the state of a partition, `merge_states` makes one state of several, and
+an `Answer` predicts a batch of rows. All of them are pickled and sent to the workers of
+an engine. An adapter has two functions: `states`, which returns the states of a frame,
+and `answered`, which returns a lazy frame with the columns of an `Answer` as well.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import msgspec
+import narwhals as nw
+import numpy as np
+import pyarrow as pa
+
+from fuzzytree import errors
+from fuzzytree.api.answering import prepare_answering
+from fuzzytree.api.engines import Engine, engine_of
+from fuzzytree.errors import FuzzyTreeError, TableError
+from fuzzytree.learning import Learner, LearningSettings
+from fuzzytree.model import FuzzyTree, Model, label_of
+from fuzzytree.runtimes import Predictions, fire
+from fuzzytree.semantics import Status, rules_from_tree
+from fuzzytree.tables import batches
+
+if TYPE_CHECKING:
+    from fuzzytree.model import FloatArray, IntArray, Run
+
+_BLOCK: Final = 1 << 16
+"""The largest number of rows whose rules are fired at a time."""
+
+_STATE: Final = b"ARROW1"
+"""How a state begins; the sentence of an error begins otherwise."""
+
+_STATUSES: Final = pa.array([status.name.lower() for status in Status])
+
+
+def _names_of(frame: Any) -> list[str]:
+    if hasattr(frame, "collect_schema"):
+        return [*frame.collect_schema().names()]
+    return [str(name) for name in getattr(frame, "column_names", frame.columns)]
+
+
+def _without_rows(names: Iterable[str]) -> pa.Table:
+    return pa.schema([(name, pa.null()) for name in names]).empty_table()
+
+
+class Fold:
+    """Makes the state of a partition; workers call it.
+
+    Args:
+        names: The columns of the frame, as they are written there.
+        target: The column of the classes.
+        ignore: Columns that are no input.
+        settings: How to learn.
+
+    Attributes:
+        target: As the argument, without blanks around it.
+        columns: The columns to learn from, in the order of the frame.
+        selected: The columns that a partition needs, as they are written in the frame.
+
+    Raises:
+        TableError: If the target or an ignored column is absent, a name stands twice,
+            or no column is left.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        target: str,
+        *,
+        ignore: Sequence[str] = (),
+        settings: LearningSettings | None = None,
+    ) -> None:
+        self.target = target.strip()
+        self.settings = settings or LearningSettings()
+        probe = Learner(self.target, ignore=ignore)
+        probe.update(_without_rows(names))
+        self.columns = probe.columns or ()
+        wanted = {self.target, *self.columns}
+        self.selected = tuple(name for name in names if name.strip() in wanted)
+
+    def __call__(self, rows: Iterable[pa.RecordBatch], name: str) -> bytes:
+        """Return the state of a partition, empty if it has no row.
+
+        An error of ours comes back as bytes as well, for the driver to raise: an engine
+        would try again and bury its sentence.
+
+        Args:
+            rows: The rows, with the selected columns.
+            name: What messages call the partition, such as `partition 17`.
+        """
+        learner = Learner(self.target, columns=self.columns, settings=self.settings)
+        try:
+            batches = iter(rows)
+            for first in batches:
+                rest = itertools.chain([first], batches)
+                reader = pa.RecordBatchReader.from_batches(first.schema, rest)
+                learner.update(reader, name=name)
+            has_rows = learner.rows or learner.dropped or learner.unlabelled
+            return learner.to_bytes() if has_rows else b""
+        except FuzzyTreeError as error:
+            return msgspec.json.encode((type(error).__name__, str(error)))
+
+
+def merge_states(states: Iterable[bytes]) -> bytes:
+    """Return one state of several; the first error among them, if there is any."""
+    merged: Learner | None = None
+    for state in states:
+        if state and not state.startswith(_STATE):
+            return state
+        if state:
+            learner = Learner.from_bytes(state)
+            # partitions of equal rows have equal digests, and all of them count
+            merged = merged.merge(learner, repeated=True) if merged else learner
+    return merged.to_bytes() if merged else b""
+
+
+def collected(
+    frame: object,
+    engine: Engine,
+    target: object,
+    *,
+    ignore: Sequence[str] = (),
+    units: Mapping[str, str] | None = None,
+    name: str = "tree",
+    settings: LearningSettings | None = None,
+) -> Learner:
+    """Return a learner of all rows of a lazy frame, which is not collected.
+
+    The arguments are those of `fuzzytree.learn`.
+
+    Raises:
+        TableError: If a column is absent or holds text, or if there are no rows.
+        LearningError: If a value is missing, and `missing` is `refuse`.
+        MissingExtraError: If a package that the engine needs is not installed.
+    """
+    if not isinstance(target, str):
+        raise TableError(
+            f"the target of a {engine.type_name} of {engine.package} is one of its "
+            "columns: pass the name of the column"
+        )
+    adapter = engine.load()
+    fold = Fold(_names_of(frame), target, ignore=ignore, settings=settings)
+    state = merge_states(adapter.states(frame, fold))
+    if not state:
+        raise TableError("the table has no rows")
+    if not state.startswith(_STATE):
+        kind, text = msgspec.json.decode(state, type=tuple[str, str])
+        raise getattr(errors, kind)(text)
+    return Learner.from_bytes(state, units=units, name=name, settings=fold.settings)
+
+
+class Answer:
+    """Predicts batches of rows; workers call it.
+
+    Args:
+        model: The model.
+
+    Attributes:
+        inputs: The columns that it needs, without blanks around them.
+        schema: The columns that are added: `class`, of the type of the labels, `rule`,
+            `status` and `strength`.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.inputs = frozenset(name.strip() for name in model.inputs)
+        label_type = model.semantics.label_type
+        self._labels = pa.array([label_of(name, label_type) for name in model.classes])
+        self.schema = pa.schema(
+            [
+                ("class", self._labels.type),
+                ("rule", pa.int32()),
+                ("status", pa.string()),
+                ("strength", pa.float64()),
+            ]
+        )
+
+    def __reduce__(self) -> tuple[type[Answer], tuple[Model]]:
+        """Leave out what each process prepares for itself."""
+        return Answer, (self.model,)
+
+    @cached_property
+    def _ready(self) -> Any:
+        is_tree = isinstance(self.model, FuzzyTree)
+        return prepare_answering(self.model, with_strengths=not is_tree)
+
+    @cached_property
+    def _fire(self) -> list[Run]:
+        """Functions that fire one relative rule of a tree, for each of its leaves."""
+        rules = rules_from_tree(cast("FuzzyTree", self.model))
+        parts = [msgspec.structs.replace(rules, rules=(rule,)) for rule in rules.rules]
+        return [*map(fire, parts)]
+
+    def __call__(self, batch: pa.RecordBatch) -> pa.RecordBatch:
+        """Return a batch with the predictions beside its columns.
+
+        Raises:
+            TableError: If a column is absent or holds text.
+        """
+        more = self.predictions(batch)
+        return pa.RecordBatch.from_arrays(
+            [*batch.columns, *more.columns],
+            schema=pa.schema([*batch.schema, *self.schema]),
+        )
+
+    def predictions(self, rows: object) -> pa.RecordBatch:
+        """Return the predictions for the rows of a frame, without its columns.
+
+        The class is null where the model gives none, the strength where no rule fires.
+
+        Raises:
+            TableError: If a column is absent or holds text.
+        """
+        if isinstance(rows, pa.RecordBatch):
+            rows = pa.Table.from_batches([rows])
+        ready = self._ready
+        parts = [
+            self._block(batch.values[:, first : first + _BLOCK])
+            for batch in batches(
+                rows, ready.inputs, trained=ready.trained, name="a batch"
+            )
+            for first in range(0, max(batch.values.shape[1], 1), _BLOCK)
+        ]
+        codes, rule, status, strengths = map(np.concatenate, zip(*parts, strict=True))
+        columns = [
+            self._labels.take(pa.array(codes, mask=codes < 0)),
+            pa.array(rule, pa.int32()),
+            _STATUSES.take(pa.array(status)),
+            pa.array(strengths, mask=rule < 1),
+        ]
+        return pa.RecordBatch.from_arrays(columns, schema=self.schema)
+
+    def _block(
+        self, values: FloatArray
+    ) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+        """Return the classes, rules, statuses and strengths of some rows."""
+        result = cast("Predictions", self._ready.answer(values))
+        rule, strengths = result.rule, np.zeros(len(result))
+        if result.strengths is not None:
+            places = np.flatnonzero(rule)
+            strengths[places] = result.strengths[rule[places] - 1, places]
+        else:
+            for number in np.unique(rule[rule > 0]).tolist():
+                places = np.flatnonzero(rule == number)
+                fired = self._fire[number - 1](values[:, places]).strengths
+                strengths[places] = cast("FloatArray", fired)[0]
+        return result.codes, rule, result.status, strengths
+
+
+def predicted(frame: object, answer: Answer) -> object:
+    """Return a frame of the same kind with the predictions beside its columns.
+
+    A lazy frame comes back lazy, and nothing of it is computed yet.
+
+    Raises:
+        TableError: If a column is absent or holds text, or is named as one that is
+            added.
+        MissingExtraError: If a package that the engine needs is not installed.
+        TypeError: If it is no frame.
+    """
+    engine = engine_of(frame)
+    eager: Any = None
+    if engine is None:
+        eager = nw.from_native(cast("Any", frame), eager_only=True)
+    names = _names_of(frame)
+    is_blind = engine is not None and engine.ignores_case
+    taken = {name.lower() if is_blind else name: name for name in names}
+    clashes = [taken[name] for name in answer.schema.names if name in taken]
+    if clashes:
+        raise TableError(
+            f"the table has a column {clashes[0]!r} of its own, and predict adds one "
+            "of this name; rename the column"
+        )
+    answer.predictions(_without_rows(names))  # are all inputs there?
+    if engine is not None:
+        return engine.load().answered(frame, answer, answer.schema)
+    added = pa.Table.from_batches([answer.predictions(frame)])
+    more = nw.from_arrow(added, backend=eager.implementation)
+    return eager.with_columns(*(more[name] for name in more.columns)).to_native()
