@@ -65,8 +65,8 @@ class Fold:
         selected: The columns that a partition needs, as they are written in the frame.
 
     Raises:
-        TableError: If the target or an ignored column is absent, a name stands twice,
-            or no column is left.
+        TableError: If the target or an ignored column is absent, a column has no name
+            or that of another one, or no column is left.
     """
 
     def __init__(
@@ -79,6 +79,12 @@ class Fold:
     ) -> None:
         self.target = target.strip()
         self.settings = settings or LearningSettings()
+        for number, name in enumerate(names, 1):
+            if not name.strip() and f"column {number}" not in ignore:
+                raise TableError(
+                    f"the table: column {number} has no name; name it, or leave it out "
+                    f"with ignore=['column {number}']"
+                )
         probe = Learner(self.target, ignore=ignore)
         probe.update(_without_rows(names))
         self.columns = probe.columns or ()

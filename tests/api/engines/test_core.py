@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from typing import Any
 
@@ -62,10 +63,21 @@ def test_an_error_of_a_partition_comes_back_as_its_state() -> None:
     good = pa.record_batch({"cm": [1.0], "size": ["small"]})
     bad = pa.record_batch({"cm": ["wide"], "size": ["big"]})
     states = [fold([good], "partition 3"), fold([good, bad], "partition 17")]
-    assert merge_states(states).decode() == (
-        '["TableError","partition 17, row 2: column \'cm\' holds text where a number '
-        "is needed: 'wide'\"]"
+    kind, text = json.loads(merge_states(states))
+    assert kind == "TableError"
+    assert text.splitlines()[0] == (
+        "partition 17, row 2: column 'cm' holds text where a number is needed: 'wide'"
     )
+
+
+def test_a_column_without_a_name_is_refused() -> None:
+    with pytest.raises(TableError) as caught:
+        Fold(["cm", " ", "size"], "size")
+    assert str(caught.value) == (
+        "the table: column 2 has no name; name it, or leave it out with "
+        "ignore=['column 2']"
+    )
+    assert Fold(["cm", " ", "size"], "size", ignore=["column 2"]).columns == ("cm",)
 
 
 @pytest.mark.parametrize("form", ["pandas", "polars", "arrow"])
