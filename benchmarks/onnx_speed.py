@@ -20,7 +20,7 @@ from fuzzytree.benchmarking.clock import time_calls
 from fuzzytree.benchmarking.machine import machine
 from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import OnnxGraph
-from fuzzytree.exporters.onnx_session import open_session
+from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.model.contracts import Dtype
 from fuzzytree.model.rulebase import Band, Flank, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
@@ -86,10 +86,10 @@ def _band(low: float | None, high: float | None) -> Band:
 
 
 def _call(content: bytes, output: str, rows: int, kind: type) -> Callable[[], object]:
-    session = open_session(content)
+    bare = open_bare(content)
     values: npt.NDArray[np.generic]
     values = np.random.default_rng(0).normal(size=(rows, len(COLUMNS))).astype(kind)
-    return lambda: session([output], values)
+    return lambda: bare([output], {"inputs": values})
 
 
 def floor(rows: int) -> Callable[[], object]:

@@ -30,11 +30,8 @@ from .onnx_graph import np_to_onnx as np_to_onnx
 from .onnx_rules import rules_graph as rules_graph
 from .onnx_session import RUNTIME_ERRORS as RUNTIME_ERRORS
 from .onnx_session import Bare as Bare
-from .onnx_session import Session as Session
 from .onnx_session import first_line as first_line
-from .onnx_session import named as named
 from .onnx_session import open_bare as open_bare
-from .onnx_session import open_session as open_session
 from .onnx_steps import add_steps as add_steps
 from .onnx_steps import reduced as reduced
 from .onnx_tree import needs_plain as needs_plain

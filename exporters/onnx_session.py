@@ -45,34 +45,12 @@ _SILENT = 4
 
 
 Array = npt.NDArray[np.generic]
-Session = Callable[[Sequence[str], Array], dict[str, Array]]
-"""Answers the named outputs to `inputs`; raises one of `RUNTIME_ERRORS`."""
-
 Bare = Callable[[list[str], dict[str, Array]], Sequence[object]]
-"""The same as onnxruntime itself has it: names and arrays in, a list of arrays out."""
-
-
-def open_session(content: bytes) -> Session:
-    """Return a session that writes nothing to stderr and starts no thread.
-
-    Raises:
-        Exception: One of `RUNTIME_ERRORS`, if onnxruntime refuses the file.
-    """
-    return named(open_bare(content))
-
-
-def named(bare: Bare) -> Session:
-    """Return a session that gives its outputs by name."""
-
-    def run(names: Sequence[str], inputs: Array) -> dict[str, Array]:
-        result = bare(list(names), {"inputs": inputs})
-        return {name: np.asarray(f) for name, f in zip(names, result, strict=True)}
-
-    return run
+"""From output names and inputs to a list of arrays; raises one of `RUNTIME_ERRORS`."""
 
 
 def open_bare(content: bytes, threads: int = 1) -> Bare:
-    """Return the call of a silent session, with nothing of ours around it.
+    """Return the call of a session that writes nothing to stderr.
 
     Raises:
         Exception: One of `RUNTIME_ERRORS`, if onnxruntime refuses the file.
@@ -145,12 +123,13 @@ def proved_run(
         LossError: If onnxruntime does not load or run the file.
     """
     try:
-        return open_session(content)(names, values)
+        result = open_bare(content)(list(names), {"inputs": values})
     except RUNTIME_ERRORS as error:
         raise LossError(
             f"cannot write {model} as onnx: onnxruntime {onnxruntime.__version__} does "
             f"not run it: {first_line(error)}"
         ) from error
+    return {name: np.asarray(one) for name, one in zip(names, result, strict=True)}
 
 
 def _sample_rows(model: Model) -> Iterator[dict[str, float]]:

@@ -233,18 +233,18 @@ def _answering_onnx(
             f"runtime {runtime!r}: an ONNX file runs in onnxruntime; "
             "other runtimes need the YAML file"
         )
-    execute, label = model.run_system, model.labels
+    execute, run = model.run_system, model.run_labelled
     if execute is not None:
         return _answering_numbers(execute, model.inputs, model.columns, model.names)
-    if label is None:
+    if run is None:
         raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
     position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
 
     def answer(values: FloatArray) -> Predictions:
-        outcome = model.run(values)
+        outcome, labels = run(values)
         return Predictions(
             model.classes,
-            np.array([position.get(name, -1) for name in label(values)], np.int64),
+            np.array([position.get(name, -1) for name in labels], np.int64),
             outcome.rule,
             outcome.status,
             strengths=outcome.strengths if with_strengths else None,

@@ -197,9 +197,11 @@ class CheckedModel:
         model = self.model if isinstance(form, str) else form
         values = self.rows.values
         base = native_base(model, file.dtype, self.rows)
+        run = file.run_labelled
+        outcome, labels = (file.run(values), None) if run is None else run(values)
         answers = FileAnswers(
-            None if isinstance(form, str) else file.run(values),
-            None if file.labels is None else file.labels(values),
+            None if isinstance(form, str) else outcome,
+            labels,
             "status" in file.outputs,
         )
         is_float32 = file.dtype == "float32"

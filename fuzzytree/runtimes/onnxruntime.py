@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import onnx
 
-    Outputs = dict[str, npt.NDArray[np.generic]]
+    Outputs = dict[str, npt.NDArray[Any]]
 
 _LARGEST_FILE = 128 * 2**20
 _STANDARD_DOMAINS = ("", "ai.onnx", "ai.onnx.ml")
@@ -95,15 +95,15 @@ class OnnxModel(Facts, frozen=True, kw_only=True):
             A file without the output `status` does not tell ties, nor an overflow
             from an uncovered row. A fuzzy system has `run_system` instead, and this
             raises ValueError.
-        labels: The file's own labels for the same values, None for "no class"; None
-            in place of the function if the file has no output `label`.
+        run_labelled: The same with the file's own labels, None for "no class"; None in
+            place of the function if the file has no output `label`.
         content: The file.
         run_system: The numbers of a fuzzy system; None for trees and rules. A file
             without the output `status` does not tell a default from a number.
     """
 
     run: Run
-    labels: Callable[[FloatArray], Labels] | None
+    run_labelled: Callable[[FloatArray], tuple[Outcome, Labels]] | None
     content: bytes
     run_system: SystemRun | None = None
 
@@ -128,17 +128,15 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
     facts = _facts(proto, name)
     _check_signature(proto, facts, name)
 
-    session = exporters.named(loaded(content, name))
-    has_labels = "label" in facts.outputs
-    is_system = facts.representation == "system"
+    bare = loaded(content, name)
+    is_system, has_labels = facts.representation == "system", "label" in facts.outputs
+    refuse = functools.partial(_refuse, facts.name)
     return OnnxModel(
         **msgspec.structs.asdict(facts),
-        run=functools.partial(_refuse if is_system else _run, session, facts),
-        labels=functools.partial(_labels, session, facts) if has_labels else None,
+        run=refuse if is_system else _runner(bare, facts),
+        run_labelled=_labelled_runner(bare, facts) if has_labels else None,
         content=content,
-        run_system=functools.partial(_run_system, session, facts)
-        if is_system
-        else None,
+        run_system=_system_runner(bare, facts) if is_system else None,
     )
 
 
@@ -178,20 +176,14 @@ def prepare(
     ).content
     facts = _facts(_decoded(content, model.name), model.name)
     bare = exporters.open_bare(content, threads)
-    names: list[str] = [*outputs]
+    names: list[str] = [*facts.outputs]
     rows = _rows_at_once(facts)
 
     def call(table: npt.NDArray[np.generic]) -> None:
         for start in range(0, len(table), rows):
             bare(names, {"inputs": table[start : start + rows]})
 
-    return Prepared(
-        functools.partial(_run, exporters.named(bare), facts),
-        functools.partial(_table, facts),
-        call,
-        content,
-        dtype,
-    )
+    return Prepared(_runner(bare, facts), _tabulator(facts), call, content, dtype)
 
 
 def _require_packages(doing: str) -> None:
@@ -202,53 +194,122 @@ def _require_packages(doing: str) -> None:
             raise MissingExtraError(f"{doing} onnx files needs {install_hint('onnx')}")
 
 
-def _arrays(
-    session: exporters.Session, facts: Facts, values: FloatArray, names: Sequence[str]
-) -> dict[str, npt.NDArray[Any]]:
-    """Return outputs by name, rows last."""
-    widths, count = _widths(facts), values.shape[1]
-    arrays: dict[str, npt.NDArray[Any]] = {
-        name: np.empty((widths[name], count))
-        if name in widths
-        else np.empty(count, np.int64)
+def _caller(
+    bare: exporters.Bare, facts: Facts, names: Sequence[str]
+) -> Callable[[FloatArray], Outputs]:
+    """Return a function from values to some outputs by name, rows last.
+
+    What one row needs stands ready, for it takes longer than the session's call.
+    """
+    names, size, tabulated = list(names), _rows_at_once(facts), _tabulator(facts)
+    widths = {"strengths": facts.rules, "activations": facts.rules}
+    widths["outputs"] = len(facts.names)
+    kinds = dict.fromkeys(widths, np.dtype(np.float64)) | {"label": np.dtype(object)}
+    lasts = {"rule": facts.rules, "status": 3}
+    results = [
+        (
+            name,
+            (widths[name],) if name in widths else (),
+            kinds.get(name, np.dtype(np.int64)),
+            lasts.get(name),
+        )
         for name in names
-    }
-    for start, result in _chunks(session, facts, values, names):
-        for name, array in arrays.items():
-            array[..., start : start + len(result[name])] = result[name].T
-    return arrays
+    ]
+
+    def run_some(values: FloatArray) -> Outputs:
+        table = tabulated(values)
+        rows = len(table)
+        try:
+            arrays = bare(names, {"inputs": table})
+        except exporters.RUNTIME_ERRORS as error:
+            text = f"onnxruntime cannot run {facts.name}: {exporters.first_line(error)}"
+            raise LossError(text) from error
+        outputs: Outputs = {}
+        for (name, width, kind, last), result in zip(results, arrays, strict=True):
+            array = np.asarray(result, kind)
+            if array.shape != (rows, *width) or not _is_within(array, last):
+                raise LossError(
+                    f"{facts.name}: the ONNX file gives answers without meaning"
+                )
+            outputs[name] = array.T
+        return outputs
+
+    def run(values: FloatArray) -> Outputs:
+        count = values.shape[1]
+        if count <= size:
+            return run_some(values)
+        outputs = {name: np.empty((*w, count), kind) for name, w, kind, _ in results}
+        for start in range(0, count, size):
+            part = slice(start, start + size)
+            for name, array in run_some(values[:, part]).items():
+                outputs[name][..., part] = array
+        return outputs
+
+    return run
 
 
-def _widths(facts: Facts) -> dict[str, int]:
-    """Return how many numbers the outputs have that give several for a row."""
-    rules = facts.rules
-    return {"strengths": rules, "activations": rules, "outputs": len(facts.names)}
+def _is_within(array: npt.NDArray[Any], last: int | None) -> bool:
+    """Return whether all numbers lie in 0 to `last`, if there is one."""
+    if last is None or not array.size:
+        return True
+    if array.size == 1:  # the ufuncs would take as long as the rest
+        return bool(0 <= array.item() <= last)
+    return bool(array.min() >= 0 and array.max() <= last)
 
 
-def _run(session: exporters.Session, facts: Facts, values: FloatArray) -> Outcome:
-    values = checked(values, facts.inputs)
+def _runner(bare: exporters.Bare, facts: Facts) -> Run:
     names = [name for name in facts.outputs if name != "label"]
-    arrays = _arrays(session, facts, values, names)
-    rule = arrays["rule"]
-    none = np.where(np.isfinite(values).all(axis=0), 2, 3)
-    status = arrays.get("status", np.where(rule > 0, 0, none))
-    return Outcome(rule, status, arrays.get("strengths"))
+    call = _caller(bare, facts, names)
+
+    def run(values: FloatArray) -> Outcome:
+        values = checked(values, facts.inputs)
+        return _outcome(call(values), values)
+
+    return run
 
 
-def _refuse(session: exporters.Session, facts: Facts, values: FloatArray) -> Outcome:
-    raise ValueError(f"{facts.name} is a fuzzy system: call run_system")
+def _labelled_runner(
+    bare: exporters.Bare, facts: Facts
+) -> Callable[[FloatArray], tuple[Outcome, Labels]]:
+    call = _caller(bare, facts, facts.outputs)
+
+    def run(values: FloatArray) -> tuple[Outcome, Labels]:
+        values = checked(values, facts.inputs)
+        outputs = call(values)
+        labels = tuple([label or None for label in outputs["label"].tolist()])
+        return _outcome(outputs, values), labels
+
+    return run
 
 
-def _run_system(
-    session: exporters.Session, facts: Facts, values: FloatArray
-) -> SystemOutcome:
-    values = checked(values, facts.inputs)
-    arrays = _arrays(session, facts, values, facts.outputs)
-    outputs = arrays["outputs"]
-    is_known = np.isfinite(values).all(axis=0)
-    none = np.where(np.isnan(outputs).any(axis=0), 2, 0)
-    status = arrays.get("status", np.where(is_known, none, 3))
-    return SystemOutcome(outputs, status, arrays.get("activations"))
+def _outcome(outputs: Outputs, values: FloatArray) -> Outcome:
+    rule, status = outputs["rule"], outputs.get("status")
+    if status is None:
+        status = np.zeros(len(rule), np.int64)
+        if np.count_nonzero(rule) < len(rule):
+            none = np.where(np.isfinite(values).all(axis=0), 2, 3)
+            status = np.where(rule > 0, 0, none)
+    return Outcome(rule, status, outputs.get("strengths"))
+
+
+def _refuse(name: str, values: FloatArray) -> Outcome:
+    raise ValueError(f"{name} is a fuzzy system: call run_system")
+
+
+def _system_runner(bare: exporters.Bare, facts: Facts) -> SystemRun:
+    call = _caller(bare, facts, facts.outputs)
+
+    def run(values: FloatArray) -> SystemOutcome:
+        values = checked(values, facts.inputs)
+        result = call(values)
+        outputs, status = result["outputs"], result.get("status")
+        if status is None:
+            is_known = np.isfinite(values).all(axis=0)
+            none = np.where(np.isnan(outputs).any(axis=0), 2, 0)
+            status = np.where(is_known, none, 3)
+        return SystemOutcome(outputs, status, result.get("activations"))
+
+    return run
 
 
 def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
@@ -264,38 +325,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
     outputs = outputs if activations else outputs[:2]
     content = write_onnx(system, outputs=outputs, verify=False).content
     facts = _facts(_decoded(content, system.name), system.name)
-    return functools.partial(_run_system, exporters.open_session(content), facts)
-
-
-def _labels(session: exporters.Session, facts: Facts, values: FloatArray) -> Labels:
-    values = checked(values, facts.inputs)
-    return tuple(
-        label or None
-        for _, result in _chunks(session, facts, values, ["label"])
-        for label in result["label"].tolist()
-    )
-
-
-def _chunks(
-    session: exporters.Session,
-    facts: Facts,
-    values: FloatArray,
-    names: Sequence[str],
-) -> Iterator[tuple[int, Outputs]]:
-    """Yield the outputs, by name, of some rows at a time, with the first row."""
-    rows = _rows_at_once(facts)
-    for start in range(0, max(values.shape[1], 1), rows):
-        table = _table(facts, values[:, start : start + rows])
-        try:
-            result = session(names, table)
-        except exporters.RUNTIME_ERRORS as error:
-            text = f"onnxruntime cannot run {facts.name}: {exporters.first_line(error)}"
-            raise LossError(text) from error
-        if not _is_answer(facts, result, len(table)):
-            raise LossError(
-                f"{facts.name}: the ONNX file gives answers without meaning"
-            )
-        yield start, result
+    return _system_runner(exporters.open_bare(content), facts)
 
 
 def _rows_at_once(facts: Facts) -> int:
@@ -308,30 +338,22 @@ def _rows_at_once(facts: Facts) -> int:
     return max(128, min(2**13, _CACHE_BYTES // (degree * facts.rules)))
 
 
-def _table(facts: Facts, values: FloatArray) -> npt.NDArray[np.generic]:
-    """Return values of shape (inputs, rows) as the graph's input."""
-    dtype = np.dtype(np.float32 if facts.dtype == "float32" else np.float64)
+def _tabulator(facts: Facts) -> Callable[[FloatArray], npt.NDArray[np.generic]]:
+    """Return what makes values of shape (inputs, rows) the graph's input."""
+    width, is_single = len(facts.columns), facts.dtype == "float32"
+    kind = np.float32 if is_single else np.float64
     places = [facts.columns.index(name) for name in facts.inputs]
-    table = np.zeros((values.shape[1], len(facts.columns)), dtype)
-    with np.errstate(over="ignore"):  # beyond float32 is missing in float32
-        table[:, places] = values.T
-    return table
+    is_whole, at = places == [*range(width)], np.array(places, np.int64)
 
+    def tabulated(values: FloatArray) -> npt.NDArray[np.generic]:
+        if is_whole:
+            return values.T.astype(kind, "C", copy=False)
+        table = np.zeros((values.shape[1], width), kind)
+        table[:, at] = values.T
+        return table
 
-def _is_answer(facts: Facts, result: Outputs, rows: int) -> bool:
-    """Say whether outputs have the shapes and numbers that answers have."""
-    for name, width in _widths(facts).items():
-        if name in result and result[name].shape != (rows, width):
-            return False
-    for name, last in (("rule", facts.rules), ("status", 3)):
-        if name not in result:
-            continue
-        numbers = result[name].astype(np.int64)
-        if numbers.shape != (rows,) or rows == 0:
-            return numbers.shape == (rows,)
-        if numbers.min() < 0 or numbers.max() > last:
-            return False
-    return "label" not in result or result["label"].shape == (rows,)
+    # A value beyond float32 is missing in float32.
+    return np.errstate(over="ignore")(tabulated) if is_single else tabulated
 
 
 def parsed(content: bytes, name: str) -> onnx.ModelProto:

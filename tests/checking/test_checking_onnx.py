@@ -109,9 +109,9 @@ def backdoored(**facts: str) -> bytes:
 
 def test_a_backdoor_is_listed_whatever_version_the_file_states() -> None:
     shipped = opened(backdoored(version="0.0.1"))
-    assert shipped.labels is not None
+    assert shipped.run_labelled is not None
     row = np.full((len(TREE.inputs), 1), 13.123456)
-    assert shipped.labels(row) == ("class 1",)
+    assert shipped.run_labelled(row)[1] == ("class 1",)
     agreement = checked(TREE, shipped)
     assert verdicts(agreement) == {
         "the model's metadata": "agrees",

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters.onnx import write_onnx as write_onnx
-from fuzzytree.exporters.onnx_session import open_session
+from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.exporters.table import find_format
 from fuzzytree.formats.fll.fll_reader import read_fll as read_fll
 from fuzzytree.formats.fll.fll_words import SAMPLES as SAMPLED
@@ -295,7 +295,7 @@ def _onnx_difference(case: Case, ours: Outputs) -> tuple[float | None, list[str]
     except FuzzyTreeError as error:
         return None, [str(error)]
     rows = np.array(case.rows, np.float64)
-    found = open_session(content)(("outputs",), rows)["outputs"]
+    (found,) = open_bare(content)(["outputs"], {"inputs": rows})
     return relative(ours, [tuple(map(float, row)) for row in found]), []
 
 

@@ -263,8 +263,10 @@ def test_a_shipped_file_describes_itself_and_predicts_alone() -> None:
             descend(model, r) if isinstance(model, FuzzyTree) else evaluate(model, r)
             for r in rows
         ]
-        assert result.labels is not None
-        assert result.labels(values) == tuple(answer.label for answer in answers)
+        assert result.run_labelled is not None
+        outcome, labels = result.run_labelled(values)
+        assert_equal_bits(outcome, expected)
+        assert labels == tuple(answer.label for answer in answers)
 
 
 def test_a_file_without_status_separates_missing_from_uncovered() -> None:
