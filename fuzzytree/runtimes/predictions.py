@@ -23,7 +23,7 @@ from fuzzytree.model import (
     summary,
 )
 from fuzzytree.semantics import Status, axis_values, clause_degree, evaluate
-from fuzzytree.tables import arrow_table, pandas_frame
+from fuzzytree.tables import pandas_frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 By = Literal["class", "rule"]
 T = TypeVar("T")
 S = TypeVar("S", bound=msgspec.Struct)
+
+_WORDS = [status.name.lower() for status in Status]
 
 
 class Predictions(msgspec.Struct, frozen=True, eq=False):
@@ -119,14 +121,17 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
         Raises:
             ValueError: If strengths are requested that are not there.
         """
-        words = [status.name.lower() for status in Status]
         result: dict[str, Sequence[object]] = {
             "class": [name or "" for name in self.names],
             "rule": self.rule.tolist(),
-            "status": [words[status] for status in self.status.tolist()],
+            "status": [_WORDS[status] for status in self.status.tolist()],
         }
+        strength_rows = self._strengths(strengths)
+        return result | {name: _cells(row) for name, row in strength_rows.items()}
+
+    def _strengths(self, strengths: By | None) -> dict[str, FloatArray]:
         if strengths is None:
-            return result
+            return {}
         values = self.class_strengths if strengths == "class" else self.strengths
         if values is None:
             raise ValueError(
@@ -134,20 +139,30 @@ class Predictions(msgspec.Struct, frozen=True, eq=False):
                 "rules have them, and a tree follows one path"
             )
         names = self.choices if strengths == "class" else range(1, len(values) + 1)
-        for name, row in zip(names, values.tolist(), strict=True):
-            shown = ["" if math.isnan(value) else value for value in row]
-            result[f"strength of {strengths} {name}"] = shown
-        return result
+        titles = [f"strength of {strengths} {name}" for name in names]
+        return dict(zip(titles, values, strict=True))
 
     def to_arrow(self, strengths: By | None = None) -> pa.Table:
         """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
 
-        Classes are of the type of `classes`; what would be an empty cell is null.
+        Classes are of the type of `classes`, rules int32, the status a dictionary of
+        text, strengths float64; what would be an empty cell is null.
 
         Raises:
             ValueError: If strengths are requested that are not there.
         """
-        return arrow_table({**self.columns(strengths), "class": self.classes})
+        import pyarrow as pa
+
+        labels = pa.array([label_of(name, self.label_type) for name in self.choices])
+        codes = pa.array(self.codes, mask=self.codes < 0)
+        result = {
+            "class": labels.take(codes),
+            "rule": pa.array(self.rule, pa.int32()),
+            "status": _arrow_status(self.status),
+        }
+        for name, row in self._strengths(strengths).items():
+            result[name] = pa.array(row, from_pandas=True)  # NaN is null
+        return pa.table(result)
 
     def to_pandas(self, strengths: By | None = None) -> pd.DataFrame:
         """Return the columns of `to_csv` as a frame of pandas; needs pandas.
@@ -195,6 +210,8 @@ def joined(parts: Sequence[S]) -> S:
 
     An array that one of them lacks is None.
     """
+    if len(parts) == 1:
+        return parts[0]
     arrays: dict[str, object] = {}
     for name in parts[0].__struct_fields__:
         columns = [getattr(part, name) for part in parts]
@@ -332,20 +349,24 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         Raises:
             ValueError: If activations are requested that are not there.
         """
-        result: dict[str, Sequence[object]] = {
-            name: _cells(row) for name, row in zip(self.names, self.values, strict=True)
-        }
-        words = [status.name.lower() for status in Status]
+        texts = [_WORDS[status] for status in self.status.tolist()]
+        rows = self._rows(with_activations=with_activations).items()
+        return {name: texts if row is None else _cells(row) for name, row in rows}
+
+    def _rows(self, *, with_activations: bool) -> dict[str, FloatArray | None]:
+        """Return the numbers of all columns; None is the column of the status."""
+        result: dict[str, FloatArray | None]
+        result = dict(zip(self.names, self.values, strict=True))
         title = "status"
         while title in result:  # an output may have that name
             title += "_"
-        result[title] = [words[status] for status in self.status.tolist()]
+        result[title] = None
         if not with_activations:
             return result
         if self.activations is None:
             raise ValueError("there are no degrees of activation; ask for them")
         for number, row in enumerate(self.activations, 1):
-            result[f"strength of rule {number}"] = _cells(row)
+            result[f"strength of rule {number}"] = row
         return result
 
     def spans(self) -> dict[str, tuple[float, float]]:
@@ -374,7 +395,15 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         Raises:
             ValueError: If activations are requested that are not there.
         """
-        return arrow_table(self.columns(with_activations=with_activations))
+        import pyarrow as pa
+
+        arrays = {
+            name: _arrow_status(self.status)
+            if row is None
+            else pa.array(row, from_pandas=True)
+            for name, row in self._rows(with_activations=with_activations).items()
+        }
+        return pa.table(arrays)
 
     def to_pandas(self, *, with_activations: bool = False) -> pd.DataFrame:
         """Return the columns of `to_csv` as a frame of pandas; needs pandas.
@@ -396,6 +425,12 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         )
         spans = f"{len(self)} rows: {spans or 'no number'}"
         return "; ".join([spans, *_unusual(self)])
+
+
+def _arrow_status(status: IntArray) -> pa.DictionaryArray:
+    import pyarrow as pa
+
+    return pa.DictionaryArray.from_arrays(status.astype(np.int8), _WORDS)
 
 
 def _cells(row: FloatArray) -> list[object]:
