@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -66,25 +67,71 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
             TableError: If a row has another length, or the text is no UTF-8.
         """
         import pyarrow as pa
+
+        try:
+            return self._columns(width, wanted or [0], pa.string())
+        except pa.ArrowInvalid as error:
+            raise self._refusal(width, error) from error
+
+    def numbers(
+        self, width: int, wanted: Sequence[int], skipped: int, missing: Sequence[str]
+    ) -> list[npt.NDArray[np.generic]] | None:
+        """Return some columns as doubles; None if there is none, or another cell.
+
+        Every cell must be a finite number or missing.
+
+        Args:
+            width: How many cells a row has.
+            wanted: The positions of the columns.
+            skipped: How many rows to leave out at the start.
+            missing: The texts that stand for NaN.
+        """
+        import pyarrow as pa
+
+        if not wanted:
+            return None
+        try:
+            table = self._columns(width, wanted, pa.float64(), skipped, missing)
+        except pa.ArrowInvalid:
+            return None
+        result = [number_array(column) for column in table.columns]
+        finite = sum(int(np.count_nonzero(np.isfinite(row))) for row in result)
+        known = sum(len(column) - column.null_count for column in table.columns)
+        return result if finite == known else None
+
+    def _columns(
+        self,
+        width: int,
+        wanted: Sequence[int],
+        kind: pa.DataType,
+        skipped: int = 0,
+        missing: Sequence[str] = (),
+    ) -> pa.Table:
+        import pyarrow as pa
         from pyarrow import csv as arrow_csv
 
         names = list(map(str, range(width)))
-        chosen = [names[k] for k in wanted or [0]]
-        types = dict.fromkeys(chosen, pa.string())
+        chosen = [names[k] for k in wanted]
         content = self.content
         if content.startswith(codecs.BOM_UTF8):
             content = b"\n" + content  # inside a file it is text, which would be lost
-        try:
-            return arrow_csv.read_csv(
-                pa.BufferReader(content),
-                arrow_csv.ReadOptions(column_names=names, block_size=len(content) + 1),
-                arrow_csv.ParseOptions(
-                    delimiter=self.mark.decode(), newlines_in_values=True
-                ),
-                arrow_csv.ConvertOptions(column_types=types, include_columns=chosen),
-            )
-        except pa.ArrowInvalid as error:
-            raise self._refusal(width, error) from error
+        return arrow_csv.read_csv(
+            pa.BufferReader(content),
+            arrow_csv.ReadOptions(
+                column_names=names,
+                block_size=len(content) + 1,
+                skip_rows_after_names=skipped,
+                use_threads=False,
+            ),
+            arrow_csv.ParseOptions(
+                delimiter=self.mark.decode(), newlines_in_values=True
+            ),
+            arrow_csv.ConvertOptions(
+                column_types=dict.fromkeys(chosen, kind),
+                include_columns=chosen,
+                null_values=missing,
+            ),
+        )
 
     def _refusal(self, width: int, error: Exception) -> TableError:
         """Return which row has another length than the first one, or what it is."""
@@ -240,6 +287,33 @@ def count_breaks(text: bytes) -> int:
     """
     pairs = text.count(b"\r\n") if b"\r" in text else 0
     return text.count(b"\n") + text.count(b"\r") - pairs
+
+
+def number_array(column: pa.ChunkedArray) -> npt.NDArray[np.generic]:
+    """Return a column of integers or floats, NaN where it is null."""
+    # pyarrow's to_numpy would import pandas where it is installed.
+    import pyarrow as pa
+
+    if column.null_count and pa.types.is_integer(column.type):
+        column = column.cast(pa.float64(), safe=False)
+    parts = [_number_chunk(chunk) for chunk in column.chunks]
+    if len(parts) == 1:
+        return parts[0]
+    return np.concatenate([np.empty(0, column.type.to_pandas_dtype()), *parts])
+
+
+def _number_chunk(array: pa.Array) -> npt.NDArray[np.generic]:
+    if not array.null_count:
+        return np.from_dlpack(array)
+    valid, data = array.buffers()
+    kind = np.dtype(array.type.to_pandas_dtype())
+    start, skipped = divmod(array.offset, 8)
+    size = (skipped + len(array) + 7) // 8
+    bits = np.frombuffer(valid, np.uint8, size, start)
+    is_known = np.unpackbits(bits, bitorder="little")[skipped : skipped + len(array)]
+    result = np.frombuffer(data, kind, len(array), array.offset * kind.itemsize).copy()
+    result[is_known == 0] = math.nan
+    return result
 
 
 def _counted(count: int, what: str) -> str:

@@ -11,24 +11,28 @@ number nor missing is an error that says where it stands.
 from __future__ import annotations
 
 import codecs
+import contextlib
 import difflib
+import functools
 import glob
 import io
 import itertools
 import math
+import mmap
 import os
 import re
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, TypeAlias, cast
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias, TypeVar, cast
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.csv_rows import BLOCK, CsvRows, blocks
+from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, number_array
 from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
 from fuzzytree.model import LabelType, as_names, is_label, label_type_of
@@ -43,6 +47,8 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Only = frozenset[str] | None
+S = TypeVar("S")
+T = TypeVar("T")
 
 MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 """The texts, in small letters, that stand for a missing number."""
@@ -51,12 +57,24 @@ SUFFIXES = (".csv", ".parquet", ".pq", ".arrow", ".feather")
 """How the names of files end that are tables in a folder."""
 
 PIECE = 1 << 14
-"""The most rows of a file that are handed on at a time."""
+"""The most rows of a file that are handed on at a time; fewer of a wide table."""
 
+THREADS = min(
+    8,
+    len(os.sched_getaffinity(0))
+    if hasattr(os, "sched_getaffinity")
+    else os.cpu_count() or 1,
+)
+"""How many threads parse files and predict."""
+
+_CELLS = 1 << 18  # of a piece of a wide table
+_BUFFER = 1 << 16  # bytes of a column of a Parquet file that are read at a time
+_UNRETURNED = 64  # pieces of a mapped file that may stay in memory
 _REAL = frozenset("biuf")  # numpy's letters for truth values, integers, floats
 _MOST_NAMES = 20
 _NUMBERS = (bool, int, float, np.bool_, np.integer, np.floating)
 _NO_NUMBER = frozenset("cmMSV")  # complex, times, bytes
+_EMPTY = sorted({way(text) for text in MISSING for way in (str, str.upper, str.title)})
 _MISSING = f"(?i)^(?:{'|'.join(sorted(MISSING))})$"
 _DELIMITERS = (",", ";", "\t")
 _NUMBER = re.compile(
@@ -82,6 +100,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
         written: The names of all columns, as they came.
         is_named: Whether the names came with the table; if not they are x1, x2, ...
         whole: All cells as one array of shape (columns, rows), where they are one.
+        frame: The rows as a frame of pandas, polars or arrow, where they are one.
     """
 
     name: str
@@ -92,6 +111,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
     written: tuple[str, ...]
     is_named: bool = True
     whole: FloatArray | None = None
+    frame: object = None
 
 
 class Table(msgspec.Struct, frozen=True, eq=False):
@@ -456,21 +476,92 @@ def batches(
             different lengths.
         TypeError: If the source is no table.
     """
-    chosen: list[int] | None = None
+    for prepare in batch_steps(
+        source,
+        inputs,
+        trained=trained,
+        columns=columns,
+        delimiter=delimiter,
+        name=name,
+        with_others=with_others,
+    ):
+        yield prepare()
+
+
+def batch_steps(
+    source: object,
+    inputs: Sequence[str],
+    *,
+    trained: Sequence[str] = (),
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    name: str | None = None,
+    with_others: bool = False,
+) -> Iterator[Callable[[], Batch]]:
+    """Yield for each batch of `batches` a function that returns it, in any thread."""
     inputs, trained = ([c.strip() for c in names] for names in (inputs, trained))
     _refuse_repeated("the model", inputs)
     only = None if with_others else frozenset(inputs)
-    for piece in pieces(
-        source, columns=columns, delimiter=delimiter, name=name, only=only
-    ):
-        if chosen is None:
-            chosen = _needed_columns(piece, inputs, trained)
-        numbers = _Numbers(piece.name, list(inputs))
-        numbers.add(piece, chosen)
-        if numbers.faults:
-            raise TableError(numbers.fault_text())
-        extras = len(piece.columns) - len(chosen)
-        yield Batch(numbers.joined(), numbers.missing, extras, piece)
+    result = pieces(source, columns=columns, delimiter=delimiter, name=name, only=only)
+    first = next(result)
+    chosen = _needed_columns(first, inputs, trained)
+    for piece in itertools.chain([first], result):
+        yield functools.partial(_batch, piece, inputs, chosen)
+
+
+def _batch(piece: TablePiece, inputs: list[str], chosen: Sequence[int]) -> Batch:
+    numbers = _Numbers(piece.name, inputs)
+    numbers.add(piece, chosen)
+    if numbers.faults:
+        raise TableError(numbers.fault_text())
+    extras = len(piece.columns) - len(chosen)
+    return Batch(numbers.joined(), numbers.missing, extras, piece)
+
+
+def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:
+    """Yield what a function returns for each item, in their order, on all cores.
+
+    Items are taken a few ahead. The first error in the order of the items is raised,
+    be it of the function or of the iterator.
+
+    Example:
+        >>> list(in_order(abs, [-1, 2, -3]))
+        [1, 2, 3]
+    """
+    steps = _steps(function, items)
+    ahead = [*itertools.islice(steps, 2)]
+    if len(ahead) < 2 or THREADS < 2:
+        yield from (step() for step in itertools.chain(ahead, steps))
+        return
+    pool = ThreadPoolExecutor(THREADS)
+    running: deque[Future[T]] = deque()
+    try:
+        for step in itertools.chain(ahead, steps):
+            running.append(pool.submit(step))
+            if len(running) > 2 * THREADS:
+                yield running.popleft().result()
+        while running:
+            yield running.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _steps(function: Callable[[S], T], items: Iterable[S]) -> Iterator[Callable[[], T]]:
+    """Yield calls of a function; the last one raises the error of the iterator."""
+
+    def fail(error: Exception) -> T:
+        raise error
+
+    rest = iter(items)
+    while True:
+        try:
+            item = next(rest)
+        except StopIteration:
+            return
+        except Exception as error:  # raised again, in its turn
+            yield functools.partial(fail, error)
+            return
+        yield functools.partial(function, item)
 
 
 def pieces(
@@ -488,7 +579,8 @@ def pieces(
         columns: The names of an array's columns.
         delimiter: As in `read_table`.
         name: As in `read_table`.
-        only: The columns whose cells are wanted; all of them if None.
+        only: The columns whose cells are wanted, as numbers where they all are;
+            all columns if None.
 
     Raises:
         TableError: If columns have no names of their own, or rows no equal length.
@@ -1071,8 +1163,13 @@ def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[TablePiec
     import pyarrow as pa
 
     try:
-        names, result = _record_batches(stream, name, only)
-        yield from _batch_pieces(result, name, only, names)
+        schema, result = _record_batches(stream, name, only)
+        is_empty = True
+        for piece in _batch_pieces(result, name, only, tuple(schema.names)):
+            is_empty = False
+            yield piece
+        if is_empty:
+            yield _frame_piece(schema.empty_table(), name, only=only)
     except pa.ArrowMemoryError:
         raise
     except pa.ArrowException as error:
@@ -1096,27 +1193,54 @@ def _batch_pieces(
 
 def _record_batches(
     stream: BinaryIO, name: str, only: Only
-) -> tuple[tuple[str, ...], Iterator[pa.RecordBatch]]:
-    """Return the names of all columns, and batches with those that are wanted."""
+) -> tuple[pa.Schema, Iterator[pa.RecordBatch]]:
+    """Return all columns, and batches of some rows with those that are wanted."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    result: Iterator[pa.RecordBatch]
     is_arrow = stream.read(len(_ARROW)) == _ARROW
     stream.seek(-len(_ARROW), io.SEEK_CUR)
     if is_arrow:
-        file = pa.ipc.open_file(stream)
-        count, schema = file.num_record_batches, file.schema
-        result = map(file.get_batch, range(count))
-    else:
-        parquet = pq.ParquetFile(stream)
-        count, schema = parquet.metadata.num_rows, parquet.schema_arrow
-        pairs = zip(schema.names, _named(name, schema.names), strict=True)
-        wanted = [written for written, c in pairs if only is None or c in only]
-        result = parquet.iter_batches(batch_size=PIECE, columns=wanted)
-    if not count:
-        result = iter([pa.RecordBatch.from_pylist([], schema)])
-    return tuple(schema.names), result
+        schema = pa.ipc.open_file(stream).schema
+        return schema, _slices(stream, _wanted(name, schema, only))
+    # A row group may be as large as the file: columns are read bit by bit.
+    parquet = pq.ParquetFile(stream, pre_buffer=False, buffer_size=_BUFFER)
+    schema = parquet.schema_arrow
+    wanted = _wanted(name, schema, only)
+    columns, rows = [schema.names[k] for k in wanted], _piece_rows(len(wanted))
+    return schema, parquet.iter_batches(batch_size=rows, columns=columns)
+
+
+def _wanted(name: str, schema: pa.Schema, only: Only) -> list[int]:
+    columns = enumerate(_named(name, schema.names))
+    return [k for k, column in columns if only is None or column in only]
+
+
+def _slices(stream: BinaryIO, wanted: list[int]) -> Iterator[pa.RecordBatch]:
+    """Yield some columns of an Arrow file, which is mapped into memory if it can be.
+
+    A batch may be as large as the file: what has been read of it is given back.
+    """
+    import pyarrow as pa
+
+    options = pa.ipc.IpcReadOptions(included_fields=wanted or [0])
+    mapped: mmap.mmap | None = None
+    with contextlib.suppress(OSError):  # a stream in memory, or of an object store
+        mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+    source = stream if mapped is None else pa.py_buffer(mapped)
+    file = pa.ipc.open_file(source, options=options)
+    rows, unreturned = _piece_rows(len(wanted)), 0
+    for number in range(file.num_record_batches):
+        batch = file.get_batch(number)
+        for first in range(0, batch.num_rows, rows):
+            yield batch.slice(first, rows)
+            unreturned += 1
+            if mapped is not None and unreturned % _UNRETURNED == 0:
+                mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def _piece_rows(columns: int) -> int:
+    return max(1, min(PIECE, _CELLS // max(columns, 1)))
 
 
 def _csv_pieces(
@@ -1138,33 +1262,43 @@ def _csv_pieces(
                 f"{name}: a delimiter is one character such as ';', "
                 f"and not {mark[:20]!r}"
             )
-        written: tuple[str, ...] = ()
-        for rows in blocks(head, read, mark.encode(), name):
-            is_first = not written
-            written = written or rows.header()
-            yield from _rows_pieces(rows, written, only, is_first=is_first)
+        result = blocks(head, read, mark.encode(), name)
+        start = next(result)
+        parse = functools.partial(_rows_pieces, written=start.header(), only=only)
+        for parsed in in_order(parse, itertools.chain([start], result)):
+            yield from parsed
     except UnicodeDecodeError as error:
         raise TableError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
 
 
 def _rows_pieces(
-    rows: CsvRows, written: tuple[str, ...], only: Only, *, is_first: bool
-) -> Iterator[TablePiece]:
-    """Yield the rows of a block; at least one piece, if it is the first one."""
+    rows: CsvRows, written: tuple[str, ...], only: Only
+) -> list[TablePiece]:
+    """Return the rows of a block; at least one piece, if it is the first one."""
     columns = _named(rows.name, written)
     wanted = [k for k, column in enumerate(columns) if only is None or column in only]
-    table = rows.table(len(columns), wanted)
-    start = 1 if is_first else 0  # the first row holds the names
-    for first in range(start, max(table.num_rows, 2 * start), PIECE):
-        count = min(PIECE, table.num_rows - first)
+    start = 1 if rows.line == 1 else 0  # the first row holds the names
+    numbers = None
+    if only is not None:
+        numbers = rows.numbers(len(columns), wanted, start, _EMPTY)
+    data: Sequence[Cells] = (
+        rows.table(len(columns), wanted).slice(start).columns
+        if numbers is None
+        else numbers
+    )
+    count, step = len(data[0]), _piece_rows(len(wanted))
+    result: list[TablePiece] = []
+    for first in range(0, max(count, start), step):
         cells: list[Cells] = [()] * len(columns)
-        for place, column in zip(wanted, table.columns, strict=False):
-            cells[place] = column.slice(first, count)
+        for place, column in zip(wanted, data, strict=False):
+            cells[place] = column[first : first + step]
 
         def where(row: int, first: int = first) -> str:
-            return f"{rows.name}:{rows.line_of(first + row)}"
+            return f"{rows.name}:{rows.line_of(start + first + row)}"
 
-        yield TablePiece(rows.name, columns, tuple(cells), count, where, written)
+        part = min(step, count - first)
+        result.append(TablePiece(rows.name, columns, (*cells,), part, where, written))
+    return result
 
 
 def _delimiter(line: str, name: str) -> str:
@@ -1243,23 +1377,26 @@ def _frame_piece(
             cells.append(())
             continue
         series = frame.get_column(there[title])
-        is_number = series.dtype.is_numeric()
-        cells.append(series.to_numpy() if is_number else series.to_list())
+        native = series.to_native()
+        if not series.dtype.is_numeric():
+            cells.append(series.to_list())
+        elif hasattr(native, "iterchunks") and not series.dtype.is_decimal():
+            cells.append(number_array(native))
+        else:
+            cells.append(series.to_numpy())
     return TablePiece(
-        name, columns, tuple(cells), len(frame), _row_names(name, first), written
+        name,
+        columns,
+        tuple(cells),
+        len(frame),
+        _row_names(name, first),
+        written,
+        frame=source,
     )
 
 
 def _row_names(name: str, first: int = 0) -> Callable[[int], str]:
     return lambda row: f"{name}, row {first + row + 1}"
-
-
-def arrow_table(columns: Mapping[str, Sequence[object]]) -> pa.Table:
-    """Return columns as a table of pyarrow, empty cells as null."""
-    import pyarrow as pa
-
-    cells = {name: [_or_none(one) for one in row] for name, row in columns.items()}
-    return pa.table(cells)
 
 
 def pandas_frame(columns: Mapping[str, Sequence[object]]) -> pd.DataFrame:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+import threading
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
-from typing import TypedDict, Unpack, overload
+from typing import TypedDict, TypeVar, Unpack, overload
 
 import msgspec
 import numpy as np
@@ -36,7 +38,9 @@ from fuzzytree.runtimes import (
     open_onnx,
     predictions_of,
 )
-from fuzzytree.tables import Batch, batches
+from fuzzytree.tables import Batch, batch_steps, in_order
+
+T = TypeVar("T")
 
 Carried = ModelSource | OnnxModel | bytes
 """A model, an ONNX file opened or as bytes, or the path of a file of either."""
@@ -129,7 +133,7 @@ def run(
     """
     result = opened(model, allow_loss=allow_loss)
     ready = prepare_answering(result, runtime, with_strengths=with_strengths)
-    return joined([one for _, one in ready(table, columns=columns)])
+    return joined([*ready(table, lambda _, one: one, columns=columns)])
 
 
 class Answering(msgspec.Struct, frozen=True):
@@ -139,39 +143,49 @@ class Answering(msgspec.Struct, frozen=True):
         inputs: The columns that it needs, in order.
         trained: The columns of the table that it was learnt from, if any.
         answer: Predicts for values of shape (inputs, rows).
+        is_parallel: Whether several threads may call it at the same time.
     """
 
     inputs: tuple[str, ...]
     trained: tuple[str, ...]
     answer: Callable[[FloatArray], Predictions | Outputs]
+    is_parallel: bool = False
 
     def __call__(
         self,
         table: object,
+        finish: Callable[[Batch, Predictions | Outputs], T],
         *,
         columns: Sequence[str] | None = None,
         name: str | None = None,
         with_others: bool = False,
-    ) -> Iterator[tuple[Batch, Predictions | Outputs]]:
-        """Yield the rows of a table in batches, with the answers to them.
+    ) -> Generator[T]:
+        """Yield what a function makes of each batch of rows and the answers to it.
 
-        The arguments are those of `fuzzytree.tables.batches`.
+        Batches are answered in threads, in which `finish` is called too, and yielded
+        in order. The other arguments are those of `fuzzytree.tables.batches`.
 
         Raises:
             TableError: If a column is absent or holds text.
         """
-        for batch in batches(
+        turn = contextlib.nullcontext() if self.is_parallel else threading.Lock()
+
+        def answered(prepare: Callable[[], Batch]) -> T:
+            batch = prepare()
+            starts = range(0, max(batch.values.shape[1], 1), _BLOCK)
+            with turn:
+                result = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
+            return finish(batch, joined(result))
+
+        steps = batch_steps(
             table,
             self.inputs,
             trained=self.trained,
             columns=columns,
             name=name,
             with_others=with_others,
-        ):
-            rows = batch.values.shape[1]
-            starts = range(0, max(rows, 1), _BLOCK)
-            result = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
-            yield batch, joined(result)
+        )
+        return in_order(answered, steps)
 
 
 def prepare_answering(
@@ -191,13 +205,14 @@ def prepare_answering(
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
     if isinstance(model, FuzzySystem):
         return _answering_system(model, runtime, with_strengths=with_strengths)
-    execute = _runtime(runtime or baseline().name, model).load(model)
+    used = _runtime(runtime or baseline().name, model)
+    execute = used.load(model)
 
     def answer(values: FloatArray) -> Predictions:
         outcome = execute(np.ascontiguousarray(values))
         return predictions_of(outcome, model, with_strengths=with_strengths)
 
-    return Answering(model.inputs, model.columns, answer)
+    return Answering(model.inputs, model.columns, answer, used.is_baseline)
 
 
 def _answering_system(
@@ -209,7 +224,10 @@ def _answering_system(
         raise LossError(f"cannot run {system.name} in {name}: it runs no systems")
     execute = result.load_system(system, activations=with_strengths)
     names = tuple(one.name for one in system.outputs)
-    return _answering_numbers(execute, system.columns, (), names)
+    return msgspec.structs.replace(
+        _answering_numbers(execute, system.columns, (), names),
+        is_parallel=result.is_baseline,
+    )
 
 
 def _answering_numbers(

@@ -234,8 +234,10 @@ def wrong_options() -> Generator[None]:
 
 
 @contextlib.contextmanager
-def progress_bar(*, quiet: bool = False) -> Generator[Callable[[str, float], None]]:
-    """Give a function that shows the current work and its share in [0, 1].
+def progress_bar(
+    *, quiet: bool = False
+) -> Generator[Callable[[str, float | None], None]]:
+    """Give a function that shows the current work and its share in [0, 1], if known.
 
     A bar appears on stderr, only on a terminal, and only after half a second.
     """
@@ -245,13 +247,15 @@ def progress_bar(*, quiet: bool = False) -> Generator[Callable[[str, float], Non
     begin = time.monotonic()
     bars: list[Progress] = []
 
-    def show(text: str, share: float) -> None:
+    def show(text: str, share: float | None) -> None:
         if not bars:
             if time.monotonic() - begin < _PATIENCE_S:
                 return
             bars.append(_new_bar())
         shown = printable(text).replace("[", r"\[")  # what rich takes for a style
-        bars[0].update(bars[0].task_ids[0], description=shown, completed=share)
+        task = bars[0].tasks[0]
+        task.total = None if share is None else 1.0
+        bars[0].update(task.id, description=shown, completed=share or 0.0)
 
     try:
         yield show

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import io
-import itertools
 import json
 import sys
-from collections.abc import Callable, Generator, Iterator, Sequence
-from typing import TYPE_CHECKING, BinaryIO, TextIO
+import time
+from collections.abc import Callable, Generator, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 import click
+import msgspec
 
 from fuzzytree.cli.console import (
     allow_loss_option,
     argument,
     delimiter_option,
     option,
+    progress_bar,
     quiet_option,
     say_rows,
     table_source,
@@ -30,13 +32,25 @@ from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase, printable_json
 from fuzzytree.semantics import rules_from_tree
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from fuzzytree.model import Document
     from fuzzytree.runtimes import By, OnnxModel, Outputs, Predictions
     from fuzzytree.tables import Batch
 
 Columns = dict[str, Sequence[object]]
+Finished: TypeAlias = (
+    "tuple[Batch, Predictions | Outputs, bytes, bytes | pa.Table]"  # head and rows
+)
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a cell begins
+_BINARY = {
+    ".parquet": "a Parquet file",
+    ".pq": "a Parquet file",
+    ".arrow": "an Arrow file",
+    ".feather": "an Arrow file",
+}
+_GROUP = 1 << 26  # bytes of rows that a binary file gets at a time
 
 
 class RunOptions:
@@ -49,7 +63,8 @@ class RunOptions:
         "--output",
         default="-",
         metavar="FILE",
-        help="CSV file to write; stdout by default.",
+        help="File to write: CSV, or Parquet or Arrow if its name ends in .parquet, "
+        ".arrow or .feather; CSV on stdout by default.",
     )
     strengths: By | None = option(
         "--strengths",
@@ -95,6 +110,15 @@ def command(options: RunOptions) -> None:
     """
     from fuzzytree import api
 
+    binary = _BINARY.get(Path(options.output).suffix.lower(), "")
+    for is_set, flag, what in (
+        (options.as_json, "--json", "JSON lines"),
+        (options.safe_csv, "--safe-csv", "CSV"),
+    ):
+        if is_set and binary:
+            raise click.UsageError(
+                f"{flag} is about {what}, and {options.output} is {binary}"
+            )
     if options.as_json and options.safe_csv:
         raise click.UsageError("--safe-csv is about CSV, and --json writes none")
     found = api.opened(options.model, allow_loss=options.allow_loss)
@@ -115,46 +139,119 @@ def command(options: RunOptions) -> None:
         )
     source = table_source(options.table, options.delimiter)
     name = "standard input" if options.table == "-" else options.table
-    tally = _Tally(_has_status(found))
-    with _opened(options.output) as stream:
-        batches = answer(source, name=name, with_others=options.keep)
-        write = (
-            _json_writer(stream)
-            if options.as_json
-            else _csv_writer(stream, options.safe_csv)
-        )
-        for batch, answers in batches:
-            columns = _kept(batch) if options.keep else {}
-            _add(columns, _answered(answers, options.strengths, options.model), name)
-            if reason:
-                _add(columns, {"why": reason(batch, answers)}, name)
-            write(columns)
+    finish = _finishing(options, name, reason, is_binary=bool(binary))
+    tally, begin = _Tally(_has_status(found)), time.monotonic()
+    is_mixed = options.output == "-" and sys.stdout.isatty()
+    with (
+        _opened(options.output) as stream,
+        _table_writer(stream, binary) as write,
+        progress_bar(quiet=options.quiet or is_mixed) as show,
+        contextlib.closing(
+            answer(source, finish, name=name, with_others=options.keep)
+        ) as parts,
+    ):
+        for batch, answers, head, rows in parts:
+            if isinstance(rows, bytes):
+                stream.write(rows if tally.rows else head + rows)
+            else:
+                write(rows, batch.piece.name)
             tally.add(batch, answers)
+            rate = tally.rows / (time.monotonic() - begin)
+            show(f"{tally.rows:,} rows, {rate:,.0f} rows/s", None)
     tally.report(options.output, quiet=options.quiet)
 
 
+def _finishing(
+    options: RunOptions,
+    name: str,
+    reason: Callable[[Batch, Predictions | Outputs], list[str]] | None,
+    *,
+    is_binary: bool,
+) -> Callable[[Batch, Predictions | Outputs], Finished]:
+    """Return a function that makes what is written of the rows of a batch."""
+
+    def lines(columns: Columns) -> list[str]:
+        if options.as_json:
+            return _json_lines(columns)
+        return _csv_lines(zip(*columns.values(), strict=True), options.safe_csv)
+
+    def head(columns: Columns) -> bytes:
+        names = [] if options.as_json else _csv_lines([[*columns]], options.safe_csv)
+        return "".join(names).encode()
+
+    def finish(batch: Batch, answers: Predictions | Outputs) -> Finished:
+        from fuzzytree.runtimes import Predictions
+
+        is_short = not (options.keep or options.strengths or reason)
+        if is_short and not is_binary and isinstance(answers, Predictions):
+            columns, text = _few_lines(answers, lines)
+            return batch, answers, head(columns), text.encode()
+        columns = _kept(batch, as_arrow=is_binary) if options.keep else {}
+        _add(columns, _answered(answers, options, as_arrow=is_binary), name)
+        if reason:
+            _add(columns, {"why": reason(batch, answers)}, name)
+        if is_binary:
+            import pyarrow as pa
+
+            return batch, answers, b"", pa.table(columns)
+        return batch, answers, head(columns), "".join(lines(columns)).encode()
+
+    return finish
+
+
+def _few_lines(
+    answers: Predictions, lines: Callable[[Columns], list[str]]
+) -> tuple[Columns, str]:
+    """Return the lines of predictions, each different one made once."""
+    keys = ((answers.codes << 34) | (answers.rule << 2) | answers.status).tolist()
+    rows = {key: row for row, key in enumerate(keys)}
+    few = [*rows.values()]
+    columns = msgspec.structs.replace(
+        answers,
+        codes=answers.codes[few],
+        rule=answers.rule[few],
+        status=answers.status[few],
+        strengths=None,
+    ).columns()
+    line = dict(zip(rows, lines(columns), strict=True))
+    return columns, "".join(map(line.__getitem__, keys))
+
+
 def _answered(
-    answers: Predictions | Outputs, strengths: By | None, model: str
+    answers: Predictions | Outputs, options: RunOptions, *, as_arrow: bool
 ) -> Columns:
     from fuzzytree.runtimes import Outputs
 
-    if isinstance(answers, Outputs):
-        return answers.columns(with_activations=strengths is not None)
     try:
-        return answers.columns(strengths)
+        if isinstance(answers, Outputs):
+            is_weighed = options.strengths is not None
+            if not as_arrow:
+                return answers.columns(with_activations=is_weighed)
+            table = answers.to_arrow(with_activations=is_weighed)
+        elif not as_arrow:
+            return answers.columns(options.strengths)
+        else:
+            table = answers.to_arrow(options.strengths)
     except ValueError as error:
         raise click.UsageError(
-            f"--strengths {strengths}: {model} does not report them; "
+            f"--strengths {options.strengths}: {options.model} does not report them; "
             "export it with --outputs label,rule,status,strengths, "
             "or run the YAML file"
         ) from error
+    return dict(zip(table.column_names, table.columns, strict=True))
 
 
-def _kept(batch: Batch) -> Columns:
+def _kept(batch: Batch, *, as_arrow: bool) -> Columns:
     from fuzzytree.tables import plain
 
-    cells = map(plain, batch.piece.cells)
-    return dict(zip(batch.piece.columns, cells, strict=True))
+    piece = batch.piece
+    cells: Sequence[Any] = piece.cells
+    if as_arrow and piece.frame is not None:
+        frame: Any = piece.frame
+        cells = [frame.column(name) for name in piece.written]
+    elif not as_arrow:
+        cells = [plain(column) for column in cells]
+    return dict(zip(piece.columns, cells, strict=True))
 
 
 def _add(columns: Columns, more: Columns, name: str) -> None:
@@ -196,38 +293,94 @@ def _reasons(
 
 
 @contextlib.contextmanager
-def _opened(output: str) -> Generator[TextIO]:
-    """Open the output as text; a file appears only when all rows are answered."""
+def _opened(output: str) -> Generator[BinaryIO]:
+    """Open the output; a file appears only when all rows are answered."""
     if output == "-":
         sys.stdout.flush()
-        with _as_text(sys.stdout.buffer) as text:
-            yield text
+        yield sys.stdout.buffer
+        sys.stdout.buffer.flush()
         return
-    with open_atomically(output) as file, _as_text(file) as text:
-        yield text
+    with open_atomically(output) as file:
+        yield file
 
 
 @contextlib.contextmanager
-def _as_text(file: BinaryIO) -> Generator[TextIO]:
-    text = io.TextIOWrapper(file, "utf-8", newline="")
+def _table_writer(
+    stream: BinaryIO, binary: str
+) -> Generator[Callable[[pa.Table, str], None]]:
+    """Give a function that writes some rows, of a table with a name, to a binary file.
+
+    Rows are written in groups of some 64 MB.
+    """
+    rows: list[pa.Table] = []
+    files: list[Any] = []
+    schemas: list[pa.Schema] = []
+
+    def write(table: pa.Table, name: str) -> None:
+        if not files:
+            files.append(_new_writer(stream, table.schema, binary))
+            schemas.append(table.schema)
+        if table.schema != schemas[0]:
+            table = _cast(table, schemas[0], name)
+        rows.append(table)
+        if sum(one.nbytes for one in rows) >= _GROUP:
+            flush()
+
+    def flush() -> None:
+        import pyarrow as pa
+
+        files[0].write_table(pa.concat_tables(rows))
+        rows.clear()
+
     try:
-        yield text
-        text.flush()
-    finally:
-        text.detach()  # it would close a file that is not ours to close
+        yield write
+        if rows:
+            flush()
+    except BaseException:
+        with contextlib.suppress(OSError):  # the file is thrown away
+            for file in files:
+                file.close()
+        raise
+    for file in files:
+        file.close()
 
 
-def _csv_writer(stream: TextIO, is_safe: bool) -> Callable[[Columns], None]:
-    writer = csv.writer(stream, lineterminator="\n")
-    headed = itertools.count()
+def _cast(table: pa.Table, schema: pa.Schema, name: str) -> pa.Table:
+    import pyarrow as pa
 
-    def write(columns: Columns) -> None:
-        rows: Iterator[Sequence[object]] = zip(*columns.values(), strict=True)
-        if next(headed) == 0:
-            rows = itertools.chain([[*columns]], rows)
-        writer.writerows(map(_spreadsheet_row, rows) if is_safe else rows)
+    try:
+        return table.cast(schema)
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
+        pairs = zip(table.schema, schema, strict=True)
+        one, known = next((a, b) for a, b in pairs if a.type != b.type)
+        raise TableError(
+            f"{name}: column {one.name!r} has the type {one.type}, and {known.type} in "
+            "the files before it; leave out --keep, or convert the column"
+        ) from error
 
-    return write
+
+def _new_writer(stream: BinaryIO, schema: pa.Schema, binary: str) -> Any:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if binary == _BINARY[".parquet"]:
+        return pq.ParquetWriter(stream, schema)
+    return pa.ipc.new_file(stream, schema)
+
+
+class _Lines(list[str]):
+    """The lines that a CSV writer writes."""
+
+    def write(self, line: str) -> None:
+        """Take a line."""
+        self.append(line)
+
+
+def _csv_lines(rows: Iterable[Sequence[object]], is_safe: bool) -> list[str]:
+    lines = _Lines()
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerows(map(_spreadsheet_row, rows) if is_safe else rows)
+    return lines
 
 
 def _spreadsheet_row(row: Sequence[object]) -> list[object]:
@@ -253,15 +406,13 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _json_writer(stream: TextIO) -> Callable[[Columns], None]:
-    def write(columns: Columns) -> None:
-        for row in zip(*columns.values(), strict=True):
-            cells = (None if cell == "" else cell for cell in row)
-            facts = dict(zip(columns, cells, strict=True))
-            line = printable_json(json.dumps(facts, ensure_ascii=False))
-            stream.write(f"{line}\n")
-
-    return write
+def _json_lines(columns: Columns) -> list[str]:
+    result: list[str] = []
+    for row in zip(*columns.values(), strict=True):
+        cells = (None if cell == "" else cell for cell in row)
+        facts = dict(zip(columns, cells, strict=True))
+        result.append(printable_json(json.dumps(facts, ensure_ascii=False)) + "\n")
+    return result
 
 
 class _Tally:
