@@ -49,6 +49,7 @@ IntArray = npt.NDArray[np.int64]
 Only = frozenset[str] | None
 S = TypeVar("S")
 T = TypeVar("T")
+_Coded: TypeAlias = tuple[IntArray, list[tuple[str, bool]], str]
 
 MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 """The texts, in small letters, that stand for a missing number."""
@@ -339,11 +340,23 @@ class LearningRows:
         chosen = self._chosen(first)
         is_kept = np.array([k not in self._counts for k in chosen], bool)
         total = _Numbers(first.name, [first.columns[k] for k in chosen])
-        for piece in itertools.chain([first], self._pieces):
+
+        def read(piece: TablePiece) -> tuple[TablePiece, _Numbers, _Coded | None]:
             numbers = _Numbers(piece.name, total.names)
             numbers.add(piece, chosen)
+            if self._codes is not None:
+                return piece, numbers, None
+            cells = piece.cells[piece.columns.index(self.target)]
+            return piece, numbers, coded_classes(cells)
+
+        later = in_order(read, self._pieces)
+        for piece, numbers, coded in itertools.chain([read(first)], later):
             total.join_faults(numbers.faults)
-            values, codes = numbers.joined(), self._classes_of(piece)
+            values = numbers.joined()
+            if coded is not None:
+                codes = self.labels.add(*coded)
+            else:
+                codes = cast("IntArray", self._codes)[self.rows :][: piece.rows]
             for row in np.flatnonzero(~is_kept).tolist():
                 self._count(chosen[row], values[row])
             self.rows += piece.rows
@@ -429,12 +442,6 @@ class LearningRows:
         text = "no name and counts the rows; it is left out"
         self.remarks = [*((first.columns[k], text) for k in unnamed), *trimmed(first)]
         return chosen
-
-    def _classes_of(self, piece: TablePiece) -> IntArray:
-        if self._codes is not None:
-            return self._codes[self.rows : self.rows + piece.rows]
-        cells = piece.cells[piece.columns.index(self.target)]
-        return self.labels.add(*coded_classes(cells))
 
     def _count(self, column: int, values: FloatArray) -> None:
         """Note from which of 0 and 1 a column without a name may count the rows."""
@@ -742,7 +749,7 @@ class ClassLabels:
         return cast("LabelType", kind) if is_one else msgspec.UNSET
 
 
-def coded_classes(cells: Cells) -> tuple[IntArray, list[tuple[str, bool]], str]:
+def coded_classes(cells: Cells) -> _Coded:
     """Return the classes of the rows of a part.
 
     Returns:

@@ -62,7 +62,6 @@ from fuzzytree.tables import (
     batches,
     class_names,
     path_of,
-    read_table,
 )
 
 if TYPE_CHECKING:
@@ -90,7 +89,8 @@ def learn(
     Args:
         table: A path, a pandas, polars or arrow table, an array of shape
             (rows, columns), or what `fuzzytree.table` returns; or a lazy frame of
-            Polars, DuckDB or Ibis, which is not collected.
+            Polars, DuckDB or Ibis, which is not collected. Files of any length are
+            read in bounded memory.
         target: The column of the classes, or the classes themselves.
         ignore: Columns to leave out.
         name: Of the tree; the file's, or `tree`, unless given.
@@ -115,38 +115,37 @@ def learn(
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
-    engine = engine_of(table)
-    learner = None
+    chosen, engine = settings or learning.LearningSettings(), engine_of(table)
     if engine is not None:
         from fuzzytree.api.engines.core import collected
 
-        learner = collected(
+        result = collected(
             table,
             engine,
             target,
             ignore=ignore,
             units=units,
-            name=name or "tree",
-            settings=settings,
+            name="the table",
+            settings=chosen,
         )
-        result = msgspec.structs.replace(learner.table(), name="the table")
     else:
-        result = read_table(table, target=target, ignore=ignore)
-    for column, text in learning.remarks(result, lambda column: f"ignore=[{column!r}]"):
-        warnings.warn(f"{result.name}: {column} has {text}", stacklevel=2)
-    if learner is not None:
-        return learner.learn(progress=progress)
+        result = learning.read_or_collect(
+            table, target=target, ignore=ignore, settings=chosen, progress=progress
+        )
+    rows = result if isinstance(result, Table) else result.table()
+    for column, text in learning.remarks(rows, lambda column: f"ignore=[{column!r}]"):
+        warnings.warn(f"{rows.name}: {column} has {text}", stacklevel=2)
     return learn_table(
         result,
         name=name or _name_of(table),
         units=units or {},
-        settings=settings or learning.LearningSettings(),
+        settings=chosen,
         progress=progress,
     ).tree
 
 
 def learn_table(
-    table: Table,
+    table: Table | learning.Learner,
     *,
     name: str,
     units: Mapping[str, str],
@@ -155,16 +154,22 @@ def learn_table(
 ) -> learning.Learnt:
     """Learn from a table that was read, and return the report beside the tree.
 
+    A table that was collected is a learner, with settings of its own.
+
     Raises:
         TableError: If a unit is given for a column that is not there.
         LearningError: If nothing can be learnt from the table.
     """
-    absent = [column for column in units if column not in table.columns]
+    columns = table.columns or ()
+    absent = [column for column in units if column not in columns]
     if absent:
-        known = ", ".join(table.columns)
+        known = ", ".join(columns)
         raise TableError(
             f"a unit for {absent[0]!r}, which is no column; it has {known}"
         )
+    if isinstance(table, learning.Learner):
+        table.name, table.units = name, dict(units)
+        return table.learnt(progress=progress)
     learnt = learning.learn_arrays(
         table.values.T,
         table.codes,

@@ -177,15 +177,19 @@ def command(options: LearnOptions) -> None:
     Beside a program or a graph, which no verb reads as a model, the model itself is
     written as YAML, unless a file of that name is there already.
 
-    TABLE is CSV or Parquet, or `-` for standard input; or there are several, the
-    states of all parts of a table, which `fuzzytree collect` wrote. The accuracy is
+    TABLE is CSV, Parquet or Arrow: a file, a folder, a pattern such as 'rows/*.csv', a
+    place such as s3://place/rows.parquet, or `-` for standard input; or there are
+    several, the states of all parts of a table, which `fuzzytree collect` wrote. Files
+    of any length are read in bounded memory. The accuracy is
     cross-validated: it is that of trees learnt without the rows that they are tested
     on, with settings that each fold chooses anew. In a table of more than 32,768
     numbers the folds take the settings chosen from all rows, and are made of 20,000
-    rows at most. Of states it is an estimate from the rows that they keep.
+    rows at most. Of states, and of a table with more than 2^25 numbers, it is an
+    estimate from the rows that are kept, as the supports of leaves are.
     """
     from fuzzytree.api import accuracy, export, learn_table
     from fuzzytree.learning import remarks
+    from fuzzytree.tables import Table
 
     form = wanted_format(options.output, None)
     if options.output != "-":
@@ -193,28 +197,30 @@ def command(options: LearnOptions) -> None:
         check_place(_model_file(options.output, form))
     settings, units_of = _settings(options), dict(_pairs("--unit", options.units))
     begin = time.perf_counter()
-    is_state = all(Path(one).suffix == STATE for one in options.tables)
-    learner = _merged(options, settings, units_of) if is_state else None
-    found = _table(options) if learner is None else learner.table()
+    is_state = _is_states(options.tables)
     is_silent = options.quiet or options.output == "-"
+    with progress_bar(quiet=is_silent) as show:
+        result = (
+            _merged(options, settings) if is_state else _read(options, settings, show)
+        )
+    found = result if isinstance(result, Table) else result.table()
     read = ("read", found.name, _timed(_read_text(found), begin))
     noticed = dict(remarks(found, lambda column: f"--ignore {shlex.quote(column)}"))
     begin = time.perf_counter()
     with wrong_options(), progress_bar(quiet=is_silent) as show:
-        learnt = (
-            learn_table(
-                found,
-                name=_title(options),
-                units=units_of,
-                settings=settings,
-                progress=show,
-            )
-            if learner is None
-            else learner.learnt(progress=show)
+        learnt = learn_table(
+            result,
+            name=_title(options),
+            units=units_of,
+            settings=settings,
+            progress=show,
         )
     rows = [_tree_row(learnt, begin), read]
     rows += [("remark", column, f"has {text}") for column, text in noticed.items()]
     rows += _report_rows(learnt.report, is_verbose=options.verbose)
+    if found.weights is not None and learnt.report.rows_sampled < learnt.report.rows:
+        text = "from the rows that were kept; `collect --for` counts all rows"
+        rows.append(("estimated", "supports of leaves", text))
     tested = None
     if not options.no_test:
         begin = time.perf_counter()
@@ -238,7 +244,7 @@ def command(options: LearnOptions) -> None:
         answer_bytes(content)
         return
     write_atomically(options.output, content)
-    is_data = learner is None and options.tables[0] != "-"
+    is_data = not is_state and options.tables[0] != "-"
     rest = ["--data", options.tables[0]] if is_data else []
     rest += ["--delimiter", options.delimiter] if rest and options.delimiter else []
     written = _written_rows(model, options.output, form, rest)
@@ -249,35 +255,49 @@ def command(options: LearnOptions) -> None:
         )
 
 
-def _table(options: LearnOptions) -> Table:
-    """Return the one table that is read whole."""
-    from fuzzytree.tables import read_table
-
-    if len(options.tables) > 1:
+def _is_states(tables: Sequence[str]) -> bool:
+    """Return whether all tables are states; tables are refused beside another one."""
+    states = [one for one in tables if Path(one).suffix == STATE]
+    if states and len(states) < len(tables):
+        other = next(one for one in tables if one not in states)
+        raise click.UsageError(
+            f"{states[0]} is a state, and {other} is none: collect the tables first, "
+            "and learn from states alone"
+        )
+    if len(tables) > 1 and not states:
         raise click.UsageError(
             f"several tables: collect each of them first, as in `fuzzytree collect "
-            f"{options.tables[0]} --target COLUMN -o part1{STATE}`"
+            f"{tables[0]} --target COLUMN -o part1{STATE}`"
         )
+    return bool(states)
+
+
+def _read(
+    options: LearnOptions,
+    settings: LearningSettings,
+    progress: Callable[[str, float], None],
+) -> Table | Learner:
+    """Return the one table, or a learner of a table that is too large for memory."""
+    from fuzzytree.learning import read_or_collect
+
     if options.target is None:
         raise click.UsageError("name the column of the classes with --target")
-    return read_table(
+    return read_or_collect(
         table_source(options.tables[0], options.delimiter),
         target=options.target,
         ignore=options.ignore,
+        settings=settings,
         name="standard input" if options.tables[0] == "-" else None,
+        progress=progress,
     )
 
 
-def _merged(
-    options: LearnOptions, settings: LearningSettings, units: Mapping[str, str]
-) -> Learner:
+def _merged(options: LearnOptions, settings: LearningSettings) -> Learner:
     """Return the learner of all states, merged in pairs."""
     from fuzzytree.learning import Learner
 
     def load(path: str) -> tuple[str, Learner]:
-        return path, Learner.load(
-            path, units=units, name=_title(options), settings=settings
-        )
+        return path, Learner.load(path, name=_title(options), settings=settings)
 
     found = [load(path) for path in options.tables]
     while len(found) > 1:
@@ -432,9 +452,9 @@ def _accuracy_text(tested: Accuracy | None, table: Table) -> str:
     if tested is None:
         return f"too few rows for cross-validation ({baseline})"
     folds = counted(len(tested.folds), "fold")
-    part = (
-        f" on {tested.rows:,} of {tested.of:,} rows" if tested.rows < tested.of else ""
-    )
+    kept = f"the {len(table.codes):,} rows that were kept of "
+    part = f" on {tested.rows:,} of {kept if table.weights is not None else ''}"
+    part = f"{part}{tested.of:,} rows" if tested.rows < tested.of else ""
     how = "" if tested.is_nested else ", settings chosen on all rows"
     span = f"{min(tested.folds):.3f} to {max(tested.folds):.3f}"
     return f"cross-validated ({baseline}; {folds}{part}{how}: {span})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -13,7 +13,7 @@ import numpy as np
 from fuzzytree.errors import LearningError
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray
+    from fuzzytree.model import FloatArray, IntArray
     from fuzzytree.tables import Table
 
 
@@ -146,9 +146,9 @@ def remarks(table: Table, ignoring: Callable[[str], str]) -> Iterator[tuple[str,
             numbers, and two of these are true: there are more than 20 different ones,
             some have fractions, more than half of the rows have one to themselves.
     """
-    _refuse_measurements(table)
+    refuse_measurements(table.name, table.target, table.classes, table.codes)
     yield from table.remarks
-    rows, classes = len(table.codes), len(table.classes)
+    rows, classes = table.rows, len(table.classes)
     if classes > _MANY and rows < _ROWS_PER_CLASS * classes:
         text = f"{classes} classes in {rows} rows, {rows / classes:.1f} rows for each"
         yield table.target or "the target", text
@@ -158,19 +158,22 @@ def remarks(table: Table, ignoring: Callable[[str], str]) -> Iterator[tuple[str,
             yield name, f"{text}; {ignoring(name)} leaves it out"
 
 
-def _refuse_measurements(table: Table) -> None:
-    numbers = [*map(_number, table.classes)]
+def refuse_measurements(
+    name: str, target: str, classes: Sequence[str], codes: IntArray
+) -> None:
+    """Raise a LearningError if a target holds measurements; see `remarks`."""
+    numbers = [*map(_number, classes)]
     if not all(map(math.isfinite, numbers)):
         return
     has_fractions = any(not number.is_integer() for number in numbers)
-    single = int(np.count_nonzero(np.bincount(table.codes) == 1))
-    is_spread = 2 * single > len(table.codes)
+    single = int(np.count_nonzero(np.bincount(codes) == 1))
+    is_spread = 2 * single > len(codes)
     is_many = len(numbers) > _MANY
     if has_fractions + is_spread + is_many >= 2:
-        of = f" {table.target!r}" if table.target else ""
+        of = f" {target!r}" if target else ""
         raise LearningError(
-            f"{table.name}: the target{of} is continuous, with {len(numbers)} "
-            f"different numbers in {len(table.codes)} rows, and a tree predicts "
+            f"{name}: the target{of} is continuous, with {len(numbers)} "
+            f"different numbers in {len(codes)} rows, and a tree predicts "
             "classes; divide the numbers into ranges and learn these"
         )
 

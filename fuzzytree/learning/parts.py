@@ -11,9 +11,13 @@ in the schema's metadata. A digest of all of it is part of the header.
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import itertools
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Final, cast
 
 import msgspec
@@ -21,11 +25,18 @@ import numpy as np
 
 from fuzzytree.errors import LearningError, ReadError
 from fuzzytree.files import read_bounded, write_atomically
+from fuzzytree.learning.findings import refuse_measurements
 from fuzzytree.learning.learner import ArrayLearner, Learnt
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.model import FuzzyTree, as_names, with_label_type
-from fuzzytree.tables import ClassLabels, LearningPiece, LearningRows, Table
+from fuzzytree.tables import (
+    THREADS,
+    ClassLabels,
+    LearningPiece,
+    LearningRows,
+    Table,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -34,6 +45,12 @@ Progress = Callable[[str, float], None]
 
 MAGIC: Final = "fuzzytree state 1"
 """The kind and the version of a state's file."""
+
+MOST_CELLS: Final = 1 << 25
+"""The most numbers of a table that is read whole."""
+
+_LARGE: Final = 1 << 24
+"""The most numbers of a sample for each thread to have its own."""
 
 LIMIT: Final = 1 << 33
 """The largest file of a state that is read, in bytes."""
@@ -138,6 +155,7 @@ class Learner:
         *,
         name: str | None = None,
         progress: Progress | None = None,
+        threads: int | None = None,
     ) -> None:
         """Take the rows of one more part.
 
@@ -146,6 +164,8 @@ class Learner:
                 batch, an open file. Files are read piece by piece.
             name: What messages call the part; its path unless given.
             progress: Called with the number of rows so far, and 0.
+            threads: How many threads count; one for each core unless given. The tree
+                has the same bits for any number.
 
         Raises:
             TableError: If a column is absent or holds text, or a file cannot be read;
@@ -161,7 +181,7 @@ class Learner:
             chosen=self.columns,
             progress=progress,
         )
-        begun._collect(rows, rows)
+        begun._collect(rows, rows, threads or THREADS)
         vars(self).update(vars(self.merge(begun)))
 
     def merge(self, other: Learner, *, repeated: bool = False) -> Learner:
@@ -229,7 +249,10 @@ class Learner:
         columns = cast("tuple[str, ...]", self.columns)
         for column in self.units:
             if column not in columns:
-                raise LearningError(f"a unit for {column!r}, which is no column")
+                known = ", ".join(columns)
+                raise LearningError(
+                    f"a unit for {column!r}, which is no column; it has {known}"
+                )
         learner = ArrayLearner(columns, order, self.units, self.name, self.settings)
         learner.statistics = statistics
         learnt = learner.finish(progress=progress)
@@ -363,16 +386,32 @@ class Learner:
             settings=self.settings,
         )
 
-    def _collect(self, rows: LearningRows, parts: Iterable[LearningPiece]) -> None:
-        """Take pieces of a table; nothing was taken before."""
-        for piece in parts:
-            self._take(piece, len(rows.labels.keys))
+    def _collect(
+        self, rows: LearningRows, parts: Iterable[LearningPiece], threads: int
+    ) -> None:
+        """Take pieces of a table in threads; nothing was taken before."""
+        most = self.settings.rows_per_class
+        lanes = [self._empty() for _ in range(threads)]
+        waiting: deque[Future[None]] = deque()
+        with ThreadPoolExecutor(threads) as pool:
+            for number, piece in enumerate(parts):
+                classes = len(rows.labels.keys)
+                if classes * len(piece.values) * most > _LARGE:
+                    threads = 1
+                while len(waiting) >= threads:
+                    waiting.popleft().result()
+                lane = lanes[number % threads]
+                waiting.append(pool.submit(lane._take, piece, classes))
+            for future in waiting:
+                future.result()
+        size = len(rows.labels.keys)
+        counted = [lane._placed(range(size), size) for lane in lanes]
+        full = [one for one in counted if one is not None]
+        empty = Statistics(size, len(rows.names or ()), most)
+        self._statistics = functools.reduce(Statistics.merge, full or [empty])
         self.columns, self._labels = rows.names, rows.labels
         self.unlabelled, self.missing = rows.unlabelled, rows.missing
         self.remarks = tuple(rows.remarks)
-        if self._statistics is None:
-            width, most = len(self.columns or ()), self.settings.rows_per_class
-            self._statistics = Statistics(0, width, most)
 
     def _take(self, piece: LearningPiece, classes: int) -> None:
         """Take the rows of a piece of a table that has so many classes by now."""
@@ -464,6 +503,60 @@ class Learner:
         with pa.ipc.new_file(sink, table.schema) as writer:
             writer.write_table(table)
         return sink.getvalue().to_pybytes(), digest
+
+
+def read_or_collect(
+    source: object,
+    *,
+    target: str | Sequence[object] | npt.NDArray[np.generic],
+    ignore: Sequence[str] = (),
+    settings: LearningSettings,
+    name: str | None = None,
+    progress: Progress | None = None,
+) -> Table | Learner:
+    """Read a table to learn from: whole, or piece by piece into a learner.
+
+    What is read piece by piece are files with more than `MOST_CELLS` numbers. The
+    learner has the name of the table.
+
+    Args:
+        source: The table, as `read_table` takes it.
+        target: The column of the classes, or the classes themselves.
+        ignore: Columns to leave out.
+        settings: How to learn.
+        name: What messages call the table; its path unless given.
+        progress: Called with the number of rows so far, and 0.
+
+    Raises:
+        TableError: As `read_table`.
+        LearningError: If the target holds measurements and no classes; or if a value
+            is missing, and `missing` is `refuse`.
+    """
+    rows = LearningRows(
+        source, target=target, ignore=ignore, name=name, progress=progress
+    )
+    whole, cells, pieces = list[LearningPiece](), 0, iter(rows)
+    for piece in pieces:
+        whole.append(piece)
+        cells += piece.values.size
+        if cells > MOST_CELLS and len(whole) > 1:
+            break
+    else:
+        return rows.table(whole)
+    positions, classes = rows.labels.ordered()
+    codes = np.concatenate([piece.codes for piece in whole])
+    refuse_measurements(rows.name, rows.target, classes, positions[codes])
+    learner = Learner(rows.target, name=rows.name, settings=settings)
+    learner._collect(rows, itertools.chain(_emptied(whole), pieces), THREADS)
+    rows.refuse_empty()
+    return learner
+
+
+def _emptied(pieces: list[LearningPiece]) -> Iterator[LearningPiece]:
+    """Yield the pieces of a list and drop each of them."""
+    pieces.reverse()
+    while pieces:
+        yield pieces.pop()
 
 
 def _difference(what: str, mine: Sequence[str], others: Sequence[str]) -> str:

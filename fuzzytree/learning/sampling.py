@@ -131,6 +131,7 @@ class DistinctRows:
         joined._limits = np.minimum(self._limits, other._limits)
         joined._refused = np.minimum(self._refused, other._refused)
         joined._parts = [*self._parts, *other._parts]
+        joined._kept = self._kept + other._kept
         joined._settle()
         return joined
 

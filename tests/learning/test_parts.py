@@ -136,6 +136,30 @@ def test_an_empty_part_changes_nothing() -> None:
     assert fingerprint(learner_of(table.iloc[:0]).merge(learner).learn()) == expected
 
 
+def test_a_learner_without_rows_changes_no_byte_of_a_state() -> None:
+    table = rows_of()
+    learner = learner_of(table, rows_per_class=50)
+    merged = learner_of(table.iloc[:0], rows_per_class=50).merge(learner)
+    assert merged.to_bytes() == learner.to_bytes()
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_any_number_of_threads_gives_the_same_tree(suffix: str, tmp_path: Path) -> None:
+    table = pd.concat([rows_of(seed) for seed in range(30)])
+    path = tmp_path / f"t.{suffix}"
+    if suffix == "csv":
+        table.to_csv(path, index=False)
+    else:
+        table.to_parquet(path, index=False)
+    settings = ft.LearningSettings(rows_per_class=50)
+    expected = fingerprint(ft.learn(table, target="kind", settings=settings))
+    for threads in (1, 2, 7):
+        learner = Learner("kind", settings=settings)
+        learner.update(path, threads=threads)
+        assert learner.rows == 30 * (ROWS - 2)
+        assert fingerprint(learner.learn()) == expected
+
+
 def test_a_saved_state_counts_once_unless_it_may_count_twice(tmp_path: Path) -> None:
     table = rows_of()
     digest = learner_of(table.iloc[:900]).save(tmp_path / "a.state")

@@ -1,0 +1,173 @@
+"""A table that is too large for memory gives what a table that is read whole gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import fuzzytree as ft
+from fuzzytree import tables
+from fuzzytree.errors import LearningError, TableError
+from fuzzytree.learning import Learner, parts
+from fuzzytree.model import fingerprint
+from fuzzytree.tables import Table
+
+PIECE = 64
+
+
+@pytest.fixture(autouse=True)
+def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a table of a few rows have several pieces."""
+    monkeypatch.setattr(tables, "PIECE", PIECE)
+
+
+@pytest.fixture
+def low_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every table of more than one piece be too large."""
+    monkeypatch.setattr(parts, "MOST_CELLS", 8)
+
+
+def rows_of(count: int = 2 * PIECE + 50) -> pd.DataFrame:
+    """Return a table of three pieces with a missing cell and a row without a class."""
+    random = np.random.default_rng(1)
+    codes = random.integers(0, 3, count)
+    values = random.normal(size=(count, 3)) + codes[:, None] * [2.0, 1.0, 0.0]
+    table = pd.DataFrame(values, columns=["a", "b", "c"])
+    table["kind"] = codes
+    table = table.astype({"kind": object})
+    table.loc[7, "b"] = np.nan
+    table.loc[11, "kind"] = None
+    return table
+
+
+def written(table: pd.DataFrame, path: Path, *, index: bool = False) -> str:
+    """Write a table to a file."""
+    if path.suffix == ".csv":
+        table.to_csv(path, index=index)
+    else:
+        table.to_parquet(path, index=index)
+    return str(path)
+
+
+def both(
+    path: str, monkeypatch: pytest.MonkeyPatch, **options: str
+) -> tuple[Table, Learner]:
+    """Return a table that is read whole, and the same one that is not."""
+    settings = ft.LearningSettings()
+    whole = parts.read_or_collect(path, target="kind", settings=settings, **options)
+    monkeypatch.setattr(parts, "MOST_CELLS", 8)
+    result = parts.read_or_collect(path, target="kind", settings=settings, **options)
+    assert isinstance(whole, Table)
+    assert isinstance(result, Learner)
+    return whole, result
+
+
+@pytest.mark.parametrize("name", ["t.csv", "t.parquet"])
+def test_a_table_read_piece_by_piece_gives_the_same_tree(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = rows_of()
+    if name == "t.parquet":  # which has one type in a column
+        table = table.astype({"kind": "Int64"})
+    path = written(table, tmp_path / name)
+    expected = ft.learn(path, target="kind")
+    whole, learner = both(path, monkeypatch)
+    assert fingerprint(ft.learn(path, target="kind")) == fingerprint(expected)
+    sampled = learner.table()
+    for field in ("name", "columns", "classes", "missing", "unlabelled", "target"):
+        assert getattr(sampled, field) == getattr(whole, field)
+    dropped = 1  # no row stands for what no row can be learnt from
+    assert sampled.rows == whole.rows - dropped
+    assert ft.learn(path, target="kind").name == "t"
+
+
+def test_classes_that_come_by_themselves_are_cut_into_pieces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = rows_of().dropna()
+    path = written(table[["a", "b", "c"]], tmp_path / "t.csv")
+    labels = table["kind"].tolist()
+    expected = ft.learn(path, target=labels)
+    monkeypatch.setattr(parts, "MOST_CELLS", 8)
+    result = ft.learn(path, target=labels)
+    assert result.semantics.label_type == expected.semantics.label_type == "number"
+    assert fingerprint(result) == fingerprint(expected)
+    with pytest.raises(TableError, match=rf"t.csv has {len(labels)} rows, and there "):
+        ft.learn(path, target=labels[:-1])
+
+
+def test_a_column_that_counts_the_rows_and_blanks_are_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = rows_of().rename(columns={"c": " c "})
+    path = written(table, tmp_path / "t.csv", index=True)
+    whole, learner = both(path, monkeypatch)
+    assert learner.columns == whole.columns == ("a", "b", "c")
+    assert learner.table().remarks == whole.remarks
+    assert [column for column, _ in whole.remarks] == ["column 1", "' c '"]
+
+
+@pytest.mark.parametrize("fault", ["text", "unnamed", "class", "unit", "rows"])
+def test_the_messages_are_those_of_a_table_that_is_read_whole(
+    fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = rows_of().astype(object)
+    if fault == "text":
+        table.loc[PIECE + 20, "c"] = "heavy"
+        table.loc[PIECE + 40, "a"] = "1,5"
+        table.loc[[2, PIECE + 50], "b"] = "soft"
+    table = table.iloc[::-1] if fault == "unnamed" else table
+    path = written(table, tmp_path / "t.csv", index=fault == "unnamed")
+    target = "class" if fault == "class" else "kind"
+    units = {"z": "N"} if fault == "unit" else None
+    if fault == "rows":
+        table["kind"] = None
+        path = written(table, tmp_path / "t.csv")
+    messages: list[str] = []
+    for cells in (parts.MOST_CELLS, 8):
+        monkeypatch.setattr(parts, "MOST_CELLS", cells)
+        with pytest.raises(TableError) as caught:
+            ft.learn(path, target=target, units=units)
+        messages.append(str(caught.value))
+    assert messages[0] == messages[1]
+    start = {
+        "text": f"{path}:4: column 'b' holds text where a number",
+        "unnamed": f"{path}: column 1 has no name",
+        "class": f"{path} has no column 'class'",
+        "unit": "a unit for 'z', which is no column; it has a, b, c",
+        "rows": f"{path} has no row with a class",
+    }
+    assert messages[0].startswith(start[fault])
+    if fault == "text":
+        assert f"\n{path}:{PIECE + 42}: column 'a' holds text where" in messages[0]
+        assert "'soft' (and 1 more)" in messages[0]
+        assert messages[0].endswith("(--ignore b --ignore a --ignore c)")
+
+
+@pytest.mark.usefixtures("low_limit")
+def test_measurements_are_refused_before_all_rows_are_read(tmp_path: Path) -> None:
+    table = rows_of()
+    table["kind"] = table["a"]
+    path = written(table, tmp_path / "t.csv")
+    with pytest.raises(LearningError, match="the target 'kind' is continuous, with"):
+        ft.learn(path, target="kind")
+
+
+@pytest.mark.usefixtures("low_limit")
+def test_missing_values_are_refused_where_they_may_not_be(tmp_path: Path) -> None:
+    path = written(rows_of(), tmp_path / "t.csv")
+    settings = ft.LearningSettings(missing="refuse")
+    with pytest.raises(LearningError, match=r"t\.csv: 1 of \d+ rows hold a missing"):
+        ft.learn(path, target="kind", settings=settings)
+
+
+@pytest.mark.usefixtures("low_limit")
+def test_progress_has_the_rows_so_far_and_their_speed(tmp_path: Path) -> None:
+    path = written(rows_of(), tmp_path / "t.csv")
+    texts: list[str] = []
+    ft.learn(path, target="kind", progress=lambda text, _: texts.append(text))
+    reading = [text for text in texts if text.endswith("rows/s")]
+    assert reading[-1].startswith(f"{path}: {2 * PIECE + 50:,} rows, ")
