@@ -52,14 +52,12 @@ def written(table: pd.DataFrame, path: Path, *, index: bool = False) -> str:
     return str(path)
 
 
-def both(
-    path: str, monkeypatch: pytest.MonkeyPatch, **options: str
-) -> tuple[Table, Learner]:
+def both(path: str, monkeypatch: pytest.MonkeyPatch) -> tuple[Table, Learner]:
     """Return a table that is read whole, and the same one that is not."""
     settings = ft.LearningSettings()
-    whole = parts.read_or_collect(path, target="kind", settings=settings, **options)
+    whole = parts.read_or_collect(path, target="kind", settings=settings)
     monkeypatch.setattr(parts, "MOST_CELLS", 8)
-    result = parts.read_or_collect(path, target="kind", settings=settings, **options)
+    result = parts.read_or_collect(path, target="kind", settings=settings)
     assert isinstance(whole, Table)
     assert isinstance(result, Learner)
     return whole, result
@@ -88,7 +86,7 @@ def test_classes_that_come_by_themselves_are_cut_into_pieces(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     table = rows_of().dropna()
-    path = written(table[["a", "b", "c"]], tmp_path / "t.csv")
+    path = written(table.drop(columns="kind"), tmp_path / "t.csv")
     labels = table["kind"].tolist()
     expected = ft.learn(path, target=labels)
     monkeypatch.setattr(parts, "MOST_CELLS", 8)
