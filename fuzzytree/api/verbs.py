@@ -116,6 +116,7 @@ def learn(
         ['soft', 'firm']
     """
     chosen, engine = settings or learning.LearningSettings(), engine_of(table)
+    result: Table | learning.Learner
     if engine is not None:
         from fuzzytree.api.engines.core import collected
 

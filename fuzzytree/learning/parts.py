@@ -181,7 +181,7 @@ class Learner:
             chosen=self.columns,
             progress=progress,
         )
-        begun._collect(rows, rows, threads or THREADS)
+        begun.collect(rows, rows, threads or THREADS)
         vars(self).update(vars(self.merge(begun)))
 
     def merge(self, other: Learner, *, repeated: bool = False) -> Learner:
@@ -386,7 +386,7 @@ class Learner:
             settings=self.settings,
         )
 
-    def _collect(
+    def collect(
         self, rows: LearningRows, parts: Iterable[LearningPiece], threads: int
     ) -> None:
         """Take pieces of a table in threads; nothing was taken before."""
@@ -547,7 +547,7 @@ def read_or_collect(
     codes = np.concatenate([piece.codes for piece in whole])
     refuse_measurements(rows.name, rows.target, classes, positions[codes])
     learner = Learner(rows.target, name=rows.name, settings=settings)
-    learner._collect(rows, itertools.chain(_emptied(whole), pieces), THREADS)
+    learner.collect(rows, itertools.chain(_emptied(whole), pieces), THREADS)
     rows.refuse_empty()
     return learner
 
