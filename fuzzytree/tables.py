@@ -60,13 +60,20 @@ SUFFIXES = (".csv", ".parquet", ".pq", ".arrow", ".feather")
 PIECE = 1 << 14
 """The most rows of a file that are handed on at a time; fewer of a wide table."""
 
-THREADS = min(
-    8,
-    len(os.sched_getaffinity(0))
-    if hasattr(os, "sched_getaffinity")
-    else os.cpu_count() or 1,
-)
-"""How many threads parse files and predict."""
+_MOST_THREADS = 8
+
+
+def _thread_count() -> int:
+    has_mask = hasattr(os, "sched_getaffinity")
+    processors = len(os.sched_getaffinity(0)) if has_mask else os.cpu_count() or 1
+    limit = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+    most = int(limit) if limit.isdecimal() else 0
+    return min(processors, most or processors, _MOST_THREADS)
+
+
+THREADS = _thread_count()
+"""How many threads parse files and predict: one for each processor that the process may
+use, at most 8 and at most the environment's `OMP_NUM_THREADS`."""
 
 _CELLS = 1 << 18  # of a piece of a wide table
 _BUFFER = 1 << 16  # bytes of a column of a Parquet file that are read at a time

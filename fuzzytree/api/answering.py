@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import threading
 from collections.abc import Callable, Generator, Sequence
@@ -112,6 +113,8 @@ def run(
     """Answer the rows of a table: classes, or the numbers of a fuzzy system.
 
     Classes are numbers, booleans or text, as the labels that the model was learnt from.
+    Native runtimes and onnxruntime use all processors, or as many as `OMP_NUM_THREADS`
+    says, with the same bits for any number.
 
     Args:
         model: The model; see `Carried`.
@@ -172,10 +175,14 @@ class Answering(msgspec.Struct, frozen=True):
 
         def answered(prepare: Callable[[], Batch]) -> T:
             batch = prepare()
-            starts = range(0, max(batch.values.shape[1], 1), _BLOCK)
+            rows = batch.values.shape[1]
+            size = math.ceil(rows / max(math.ceil(rows / _BLOCK), 1)) or 1
+            starts = range(0, max(rows, 1), size)
+            blocks = [batch.values[:, k : k + size] for k in starts]
+            over = in_order if self.is_parallel else map
             with turn:
-                result = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
-            return finish(batch, joined(result))
+                result = [*over(self.answer, blocks)]
+            return finish(batch, result[0] if len(result) == 1 else joined(result))
 
         steps = batch_steps(
             table,
@@ -212,7 +219,7 @@ def prepare_answering(
         outcome = execute(np.ascontiguousarray(values))
         return predictions_of(outcome, model, with_strengths=with_strengths)
 
-    return Answering(model.inputs, model.columns, answer, used.is_baseline)
+    return Answering(model.inputs, model.columns, answer, used.is_reentrant)
 
 
 def _answering_system(
@@ -224,9 +231,8 @@ def _answering_system(
         raise LossError(f"cannot run {system.name} in {name}: it runs no systems")
     execute = result.load_system(system, activations=with_strengths)
     names = tuple(one.name for one in system.outputs)
-    return msgspec.structs.replace(
-        _answering_numbers(execute, system.columns, (), names),
-        is_parallel=result.is_baseline,
+    return _answering_numbers(
+        execute, system.columns, (), names, is_parallel=result.is_reentrant
     )
 
 
@@ -235,12 +241,14 @@ def _answering_numbers(
     inputs: tuple[str, ...],
     trained: tuple[str, ...],
     names: tuple[str, ...],
+    *,
+    is_parallel: bool = True,
 ) -> Answering:
     def answer(values: FloatArray) -> Outputs:
         outcome = execute(np.ascontiguousarray(values))
         return Outputs(names, outcome.outputs, outcome.status, outcome.activations)
 
-    return Answering(inputs, trained, answer)
+    return Answering(inputs, trained, answer, is_parallel)
 
 
 def _answering_onnx(
@@ -269,7 +277,7 @@ def _answering_onnx(
             label_type=model.semantics.label_type,
         )
 
-    return Answering(model.inputs, model.columns, answer)
+    return Answering(model.inputs, model.columns, answer, is_parallel=True)
 
 
 def _runtime(name: str, model: Document) -> Runtime:

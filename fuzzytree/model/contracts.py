@@ -258,6 +258,7 @@ class Runtime(msgspec.Struct, frozen=True):
         is_definition: Whether it evaluates the definition, row by row, and so is the
             one that a baseline is compared with.
         in_audits: Whether an audit compares it.
+        is_reentrant: Whether several threads may use what it loads at once.
         in_variants: Whether a benchmark also measures it on approximated curves.
         prepare: Makes a graph of a model, for a number of threads, so that a benchmark
             times the call of the graph alone; None if it runs no graph.
@@ -279,6 +280,7 @@ class Runtime(msgspec.Struct, frozen=True):
     is_baseline: bool = False
     is_definition: bool = False
     in_audits: bool = False
+    is_reentrant: bool = False
     in_variants: bool = False
     prepare: Callable[..., Prepared] | None = None
     size: Callable[[Model], int] | None = None

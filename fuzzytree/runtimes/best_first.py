@@ -52,7 +52,7 @@ from fuzzytree.runtimes.envelope import (
 from fuzzytree.runtimes.native_rules import fire
 from fuzzytree.runtimes.rows import axis_lines, checked, missing_rows, plan_axes
 
-_CHUNK = 1 << 13  # rows: their cells shall stay in the cache
+_CHUNK = 1 << 16  # rows: short steps would keep threads waiting for each other
 _PAIRS = 1 << 11  # rows and rules whose strengths are computed together
 _WIDEST = 1 << 20  # branches that are followed together
 _CROWD = 16  # branches of a row, or a share of all rules, from which it is fired

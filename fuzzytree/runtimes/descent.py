@@ -40,7 +40,7 @@ _SMALL = 24  # tests up to which all of them are evaluated on all rows
 _SHARE = 0.05  # of the leaves: what a test at the top must decide to pay
 _MOST_EXITS = 255
 _LIVE = 0.6  # share of rows still walking below which the others leave
-CHUNK = 1 << 15
+CHUNK = 1 << 16
 """Rows that go through together: their values and answers stay in the cache."""
 
 

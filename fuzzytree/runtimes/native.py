@@ -51,6 +51,7 @@ RUNTIMES = (
         load_system=run_system,
         is_baseline=True,
         in_audits=True,
+        is_reentrant=True,
         in_variants=True,
     ),
     Runtime(
@@ -60,6 +61,7 @@ RUNTIMES = (
         dtype="mixed",
         is_baseline=True,
         in_audits=True,
+        is_reentrant=True,
     ),
     Runtime(
         "native float32",
@@ -69,12 +71,14 @@ RUNTIMES = (
         cannot=(_FLOAT32,),
         is_baseline=True,
         in_audits=True,
+        is_reentrant=True,
     ),
     Runtime(
         "best-first",
         ("rules",),
         load_best_first,
         cannot=("strengths of rules",),
+        is_reentrant=True,
         note="the winner without the strengths of the others",
     ),
 )

@@ -520,6 +520,7 @@ def _runtime(
         extra="onnx",
         modules=("onnx", "onnxruntime"),
         in_audits=in_audits,
+        is_reentrant=True,
         in_variants=in_audits and dtype == "float64",
         prepare=make,
         note="the session's call alone; the table is laid out before",

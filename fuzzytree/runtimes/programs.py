@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     Values = npt.NDArray[Any]
     Function = Callable[..., Values]
 
-_WORKING_SET = 1 << 16  # numbers that all buffers of a chunk may hold together
-_SMALLEST_CHUNK, _LARGEST_CHUNK = 512, 1 << 13
+_WORKING_SET = 1 << 20  # numbers that all buffers of a chunk may hold together
+_SMALLEST_CHUNK, _LARGEST_CHUNK = 512, 1 << 16
 
 
 def _total(samples: Values, *, out: Values) -> Values:
