@@ -24,12 +24,12 @@ from fuzzytree.api.engines import Engine, engine_of
 from fuzzytree.errors import FuzzyTreeError, TableError
 from fuzzytree.learning import Learner, LearningSettings
 from fuzzytree.model import FuzzyTree, Model, label_of
-from fuzzytree.runtimes import Predictions, fire
-from fuzzytree.semantics import Status, rules_from_tree
+from fuzzytree.runtimes import Predictions
+from fuzzytree.semantics import Status
 from fuzzytree.tables import batches
 
 if TYPE_CHECKING:
-    from fuzzytree.model import FloatArray, IntArray, Run
+    from fuzzytree.model import FloatArray, IntArray
 
 _BLOCK: Final = 1 << 16
 """The largest number of rows whose rules are fired at a time."""
@@ -197,13 +197,6 @@ class Answer:
         is_tree = isinstance(self.model, FuzzyTree)
         return prepare_answering(self.model, with_strengths=not is_tree)
 
-    @cached_property
-    def _fire(self) -> list[Run]:
-        """Functions that fire one relative rule of a tree, for each of its leaves."""
-        rules = rules_from_tree(cast("FuzzyTree", self.model))
-        parts = [msgspec.structs.replace(rules, rules=(rule,)) for rule in rules.rules]
-        return [*map(fire, parts)]
-
     def __call__(self, batch: pa.RecordBatch) -> pa.RecordBatch:
         """Return a batch with the predictions beside its columns.
 
@@ -249,14 +242,10 @@ class Answer:
         """Return the classes, rules, statuses and strengths of some rows."""
         result = cast("Predictions", self._ready.answer(values))
         rule, strengths = result.rule, np.zeros(len(result))
-        if result.strengths is not None:
-            places = np.flatnonzero(rule)
-            strengths[places] = result.strengths[rule[places] - 1, places]
-        else:
-            for number in np.unique(rule[rule > 0]).tolist():
-                places = np.flatnonzero(rule == number)
-                fired = self._fire[number - 1](values[:, places]).strengths
-                strengths[places] = cast("FloatArray", fired)[0]
+        places = np.flatnonzero(rule)
+        # of a tree's relative rules the winner has a strength of exactly 1
+        fired = result.strengths
+        strengths[places] = 1.0 if fired is None else fired[rule[places] - 1, places]
         return result.codes, rule, result.status, strengths
 
 

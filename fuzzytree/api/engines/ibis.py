@@ -1,0 +1,52 @@
+"""Tables of Ibis: states from their record batches, predictions as a query.
+
+The query is that of DuckDB, translated to the dialect of the table's backend.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import ibis
+import ibis.expr.operations as ops
+import sqlglot
+
+from fuzzytree.api.engines import duckdb
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    from ibis.expr.types import Table
+
+    from fuzzytree.api.engines.core import Answer, Fold
+
+
+def states(frame: Table, fold: Fold) -> list[bytes]:
+    """Return the state of all rows; few batches of them are in memory at a time."""
+    chosen = frame.select(*fold.selected)
+    backend: Any = ibis.get_backend(chosen)
+    if backend.name != "duckdb":
+        return [fold(chosen.to_pyarrow_batches(), "the table")]
+    # to_pyarrow_batches calls what DuckDB 2 has under another name only
+    chosen.limit(0).to_pyarrow()  # registers tables in memory
+    return duckdb.states(backend.con.sql(str(ibis.to_sql(chosen))), fold)
+
+
+def answered(frame: Table, answer: Answer, schema: pa.Schema) -> Table:
+    """Return the table with the predictions beside its columns.
+
+    Raises:
+        TableError: If an input is no column of numbers.
+        LossError: If the model has more rules or levels than a query can have.
+    """
+    before = frame.schema()
+    numbers = {
+        name: kind.is_decimal()
+        for name, kind in before.items()
+        if kind.is_numeric() or kind.is_boolean()
+    }
+    kinds = {name: str(kind) for name, kind in before.items()}
+    query = duckdb.prediction_query(answer, kinds, numbers, schema)
+    backend: Any = ibis.get_backend(frame)
+    [text] = sqlglot.transpile(query, read="duckdb", write=backend.dialect)
+    after = ibis.schema({**before, **ibis.Schema.from_pyarrow(schema)})
+    return ops.SQLStringView(frame.alias(duckdb.TABLE), text, after).to_expr()
