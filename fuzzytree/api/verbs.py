@@ -120,15 +120,7 @@ def learn(
     if engine is not None:
         from fuzzytree.api.engines.core import collected
 
-        result = collected(
-            table,
-            engine,
-            target,
-            ignore=ignore,
-            units=units,
-            name="the table",
-            settings=chosen,
-        )
+        result = collected(table, engine, target, ignore=ignore, settings=chosen)
     else:
         result = learning.read_or_collect(
             table, target=target, ignore=ignore, settings=chosen, progress=progress

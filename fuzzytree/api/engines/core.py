@@ -9,7 +9,7 @@ and `answered`, which returns a lazy frame with the columns of an `Answer` as we
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -26,7 +26,7 @@ from fuzzytree.learning import Learner, LearningSettings
 from fuzzytree.model import FuzzyTree, Model, label_of
 from fuzzytree.runtimes import Predictions
 from fuzzytree.semantics import Status
-from fuzzytree.tables import batches
+from fuzzytree.tables import batches, in_order
 
 if TYPE_CHECKING:
     from fuzzytree.model import FloatArray, IntArray
@@ -133,8 +133,6 @@ def collected(
     target: object,
     *,
     ignore: Sequence[str] = (),
-    units: Mapping[str, str] | None = None,
-    name: str = "tree",
     settings: LearningSettings | None = None,
 ) -> Learner:
     """Return a learner of all rows of a lazy frame, which is not collected.
@@ -159,7 +157,7 @@ def collected(
     if not state.startswith(_STATE):
         kind, text = msgspec.json.decode(state, type=tuple[str, str])
         raise getattr(errors, kind)(text)
-    return Learner.from_bytes(state, units=units, name=name, settings=fold.settings)
+    return Learner.from_bytes(state, name="the table", settings=fold.settings)
 
 
 class Answer:
@@ -221,11 +219,11 @@ class Answer:
             rows = pa.Table.from_batches([rows])
         ready = self._ready
         parts = [
-            self._block(batch.values[:, first : first + _BLOCK])
+            part
             for batch in batches(
                 rows, ready.inputs, trained=ready.trained, name="a batch"
             )
-            for first in range(0, max(batch.values.shape[1], 1), _BLOCK)
+            for part in in_order(self._block, _blocks(batch.values))
         ]
         codes, rule, status, strengths = map(np.concatenate, zip(*parts, strict=True))
         columns = [
@@ -247,6 +245,12 @@ class Answer:
         fired = result.strengths
         strengths[places] = 1.0 if fired is None else fired[rule[places] - 1, places]
         return result.codes, rule, result.status, strengths
+
+
+def _blocks(values: FloatArray) -> Iterator[FloatArray]:
+    rows = values.shape[1]
+    for first in range(0, max(rows, 1), _BLOCK):
+        yield values[:, first : first + _BLOCK]
 
 
 def predicted(frame: object, answer: Answer) -> object:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 from fuzzytree.checking import export
 from fuzzytree.errors import TableError
@@ -61,7 +61,8 @@ def answered(
         for name, kind in kinds.items()
         if numbers[name] or kind.startswith("DECIMAL")
     }
-    return frame.query(TABLE, prediction_query(answer, kinds, exact, schema))
+    query = prediction_query(answer, kinds, exact, schema)
+    return cast("DuckDBPyRelation", frame.query(TABLE, query))  # None is for INSERT
 
 
 def prediction_query(
@@ -98,8 +99,7 @@ def prediction_query(
         text = f"CAST({_quoted(name)} AS VARCHAR)" if numbers[name] else _quoted(name)
         columns.append(f"CAST({text} AS DOUBLE) AS {_quoted(title)}")
     model, strength = answer.model, "1e0"
-    is_tree = isinstance(model, FuzzyTree)
-    if not is_tree:
+    if not isinstance(model, FuzzyTree):
         names = [f"strength_{rule}" for rule in range(1, len(model.rules) + 1)]
         strength = f"GREATEST({', '.join(names)})"
     written = export(
@@ -108,7 +108,7 @@ def prediction_query(
         dialect="duckdb",
         table="numbers",
         keep=[*kept.values()],
-        strengths=not is_tree,
+        strengths=not isinstance(model, FuzzyTree),
     )
     # steps that are kept in memory whole would end streaming
     steps = re.sub(r"(?m)^(\w+ AS) MATERIALIZED \($", r"\1 (", written.content.decode())

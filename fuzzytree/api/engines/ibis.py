@@ -49,4 +49,5 @@ def answered(frame: Table, answer: Answer, schema: pa.Schema) -> Table:
     backend: Any = ibis.get_backend(frame)
     [text] = sqlglot.transpile(query, read="duckdb", write=backend.dialect)
     after = ibis.schema({**before, **ibis.Schema.from_pyarrow(schema)})
-    return ops.SQLStringView(frame.alias(duckdb.TABLE), text, after).to_expr()
+    parent: Any = frame.alias(duckdb.TABLE)
+    return ops.SQLStringView(parent, text, after).to_expr()
