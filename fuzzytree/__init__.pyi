@@ -1,3 +1,4 @@
+from .api import LeafCounts as LeafCounts
 from .api import audit as audit
 from .api import bench as bench
 from .api import certify as certify

@@ -289,6 +289,7 @@ class LearningRows:
 
     Args:
         chosen: The columns to learn from, if other parts of the table have set them.
+        chosen_by: What has set them, for messages.
         labels: The classes so far; more are added.
         progress: Called with the number of rows so far, and 0.
 
@@ -312,6 +313,7 @@ class LearningRows:
         delimiter: str | None = None,
         name: str | None = None,
         chosen: Sequence[str] | None = None,
+        chosen_by: str = "other parts have",
         labels: ClassLabels | None = None,
         progress: Callable[[str, float], None] | None = None,
     ) -> None:
@@ -323,6 +325,7 @@ class LearningRows:
             )
         self.target = target.strip() if isinstance(target, str) else ""
         self.names = None if chosen is None else tuple(chosen)
+        self._chosen_by = chosen_by
         self.labels = labels or ClassLabels()
         self.name, self.rows, self.unlabelled, self.missing = "", 0, 0, 0
         self.remarks: list[tuple[str, str]] = []
@@ -438,8 +441,8 @@ class LearningRows:
     def _chosen(self, first: TablePiece) -> list[int]:
         """Return the columns to read, of which those without a name count the rows."""
         if self.names is not None:
-            wanted = [*self.names, self.target]
-            _refuse_absent(first, wanted, ", which other parts have")
+            _refuse_absent(first, [self.target], "")
+            _refuse_absent(first, self.names, f", which {self._chosen_by}")
             return [first.columns.index(column) for column in self.names]
         target = [self.target] if self._codes is None else []
         chosen = _learnt_columns(first, [*target, *self._ignore])

@@ -5,6 +5,7 @@ from .holdout import Accuracy as Accuracy
 from .holdout import Summary as Summary
 from .holdout import accuracy as accuracy
 from .holdout import majority as majority
+from .leaf_counts import LeafCounts as LeafCounts
 from .verbs import audit as audit
 from .verbs import bench as bench
 from .verbs import certify as certify

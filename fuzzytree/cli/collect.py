@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -24,6 +25,10 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.files import check_places
 
+if TYPE_CHECKING:
+    from fuzzytree.api import LeafCounts
+    from fuzzytree.learning import Learner
+
 STATE = ".state"
 """How the name of a state's file ends."""
 
@@ -40,6 +45,11 @@ class CollectOptions:
     )
     output: str = option(
         "-o", "--output", required=True, metavar="FILE.state", help="File to write."
+    )
+    model: str | None = option(
+        "--for",
+        metavar="MODEL",
+        help="Count the rows in each leaf of a tree: the second pass.",
     )
     columns: str | None = option(
         "--columns",
@@ -76,25 +86,24 @@ def command(options: CollectOptions) -> None:
     PART is a table as `learn` reads it. Collect where the parts lie; `fuzzytree learn`
     takes the files of all parts, in any order, and learns the tree of the whole table.
     The file's size depends on columns and classes, and not on rows.
-    """
-    from fuzzytree.learning import Learner, LearningSettings
 
+    With --for, the rows that each leaf of MODEL predicts are counted by class, in a
+    file for `fuzzytree learn --for MODEL`, which writes the exact supports of leaves
+    and prints the accuracy on all rows.
+    """
     check_places([options.output], options.parts)
     if Path(options.output).suffix != STATE:
         raise click.UsageError(f"-o {options.output}: the name must end in {STATE}")
-    given = {"rows_per_class": options.rows_per_class, "missing": options.missing}
-    chosen = {name: value for name, value in given.items() if value is not None}
-    names = None if options.columns is None else options.columns.split(",")
-    learner = Learner(
-        options.target,
-        columns=names,
-        ignore=options.ignore,
-        settings=LearningSettings(**chosen),  # type: ignore[arg-type]  # click checked
-    )
+    if states := [one for one in options.parts if Path(one).suffix == STATE]:
+        raise click.UsageError(
+            f"{states[0]} is a state, and a part is a table; `fuzzytree learn` takes "
+            "states"
+        )
     if twice := sorted(one for one, n in Counter(options.parts).items() if n > 1):
         raise click.UsageError(f"{twice[0]} is named more than once")
     begin = time.perf_counter()
     with wrong_options(), progress_bar(quiet=options.quiet) as show:
+        learner = _learner(options) if options.model is None else _counts(options)
         for part in options.parts:
             title = "standard input" if part == "-" else None
             source = table_source(part, options.delimiter)
@@ -104,15 +113,21 @@ def command(options: CollectOptions) -> None:
     facts = learner.facts()
     rows = f"{learner.rows:,} rows"
     said = f"{facts['columns']} columns, {facts['classes']} classes, {seconds:.2f} s"
+    reasons = {
+        "dropped": "left out: a value is missing or not finite",
+        "rows_without_class": "left out: they have no class",
+        "ties": "decided by the order of the leaves",
+        "no_rule": "with no rule fired",
+        "missing": "with a missing input",
+    }
     lost = [
-        ("left out", f"{count:,} rows", why)
-        for count, why in (
-            (learner.dropped, "a value is missing or not finite"),
-            (learner.unlabelled, "they have no class"),
-        )
-        if count
+        ("rows", f"{facts[name]:,} rows", why)
+        for name, why in reasons.items()
+        if facts.get(name)
     ]
-    after = f"sha256 {digest[:16]}; next: fuzzytree learn {options.output} ... -o FILE"
+    mode = "" if options.model is None else f" --for {options.model}"
+    after = f"next: fuzzytree learn {options.output} ...{mode} -o FILE"
+    after = f"sha256 {digest[:16]}; {after}"
     say_rows(
         ("collected", rows, said),
         *lost,
@@ -121,3 +136,29 @@ def command(options: CollectOptions) -> None:
     )
     if options.as_json:
         answer_json({"file": options.output, "digest": digest, **facts})
+
+
+def _learner(options: CollectOptions) -> Learner:
+    """Return what collects for learning."""
+    from fuzzytree.learning import Learner, LearningSettings
+
+    values = {"rows_per_class": options.rows_per_class, "missing": options.missing}
+    chosen = {name: value for name, value in values.items() if value is not None}
+    return Learner(
+        options.target,
+        columns=None if options.columns is None else options.columns.split(","),
+        ignore=options.ignore,
+        settings=LearningSettings(**chosen),  # type: ignore[arg-type]  # click checked
+    )
+
+
+def _counts(options: CollectOptions) -> LeafCounts:
+    """Return what counts for a model, which has its columns and settings."""
+    from fuzzytree.api import LeafCounts
+
+    for name in ("columns", "ignore", "rows_per_class", "missing"):
+        if getattr(options, name):
+            raise click.UsageError(
+                f"--{name.replace('_', '-')}: --for counts what the model needs"
+            )
+    return LeafCounts(str(options.model), options.target)

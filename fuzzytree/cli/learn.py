@@ -7,9 +7,10 @@ import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
+import msgspec
 
 from fuzzytree.cli.collect import STATE
 from fuzzytree.cli.console import (
@@ -40,9 +41,14 @@ from fuzzytree.files import check_place, read_bounded, write_atomically
 from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind, printable
 
 if TYPE_CHECKING:
-    from fuzzytree.api import Accuracy, Summary
+    from fuzzytree.api import Accuracy, LeafCounts, Summary
     from fuzzytree.learning import Learner, LearningReport, LearningSettings, Learnt
+    from fuzzytree.model import FuzzyTree
     from fuzzytree.tables import Table
+
+State = TypeVar("State", "Learner", "LeafCounts")
+Lines = list[tuple[str, str, str]]
+Progress = Callable[[str, float], None]
 
 
 class LearnOptions:
@@ -83,6 +89,11 @@ class LearnOptions:
         "--no-test",
         is_flag=True,
         help="Learn without measuring the cross-validated accuracy.",
+    )
+    model: str | None = option(
+        "--for",
+        metavar="MODEL",
+        help="Write this tree with the supports that states of `collect --for` count.",
     )
     repeated: bool = option(
         "--repeated",
@@ -187,21 +198,32 @@ def command(options: LearnOptions) -> None:
     rows at most. Of states, and of a table with more than 2^25 numbers, it is an
     estimate from the rows that are kept, as the supports of leaves are.
     """
-    from fuzzytree.api import accuracy, export, learn_table
-    from fuzzytree.learning import remarks
-    from fuzzytree.tables import Table
-
     form = wanted_format(options.output, None)
     if options.output != "-":
         check_place(options.output)
         check_place(_model_file(options.output, form))
+    is_state = _is_states(options.tables)
+    work = _learnt if options.model is None else _counted
+    tree, rows, facts = work(options, is_state=is_state)
+    _write(options, tree, rows, form, is_data=not is_state and options.tables[0] != "-")
+    if options.as_json and options.output != "-":
+        answer_json(facts)
+
+
+def _learnt(
+    options: LearnOptions, *, is_state: bool
+) -> tuple[FuzzyTree, Lines, object]:
+    """Return a tree of all rows, what to say about it, and the facts."""
+    from fuzzytree.api import accuracy, learn_table
+    from fuzzytree.learning import remarks
+    from fuzzytree.tables import Table
+
     settings, units_of = _settings(options), dict(_pairs("--unit", options.units))
     begin = time.perf_counter()
-    is_state = _is_states(options.tables)
     is_silent = options.quiet or options.output == "-"
     with progress_bar(quiet=is_silent) as show:
         result = (
-            _merged(options, settings) if is_state else _read(options, settings, show)
+            _states(options, settings) if is_state else _read(options, settings, show)
         )
     found = result if isinstance(result, Table) else result.table()
     read = ("read", found.name, _timed(_read_text(found), begin))
@@ -230,10 +252,62 @@ def command(options: LearnOptions) -> None:
             )
         said = _timed(_accuracy_text(tested, found), begin)
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
+    facts = _summary(found, noticed, learnt, tested, settings.seed, options.output)
+    return learnt.tree, rows, facts
+
+
+def _counted(
+    options: LearnOptions, *, is_state: bool
+) -> tuple[FuzzyTree, Lines, object]:
+    """Return a tree with exact supports, what to say about it, and the facts."""
+    from fuzzytree.api import LeafCounts
+    from fuzzytree.model import fingerprint
+    from fuzzytree.report import counted
+
+    if not is_state:
+        raise click.UsageError(
+            f"--for takes states: fuzzytree collect --for {options.model} "
+            f"{options.tables[0]} --target COLUMN -o part1{STATE}"
+        )
+    model = str(options.model)
+    counts = _merged(options, lambda path: LeafCounts.load(path, model))
+    tree, facts, confusion = counts.learn(), counts.facts(), counts.confusion()
+    if options.name:
+        tree = msgspec.structs.replace(tree, name=options.name)
+    text = "on the rows that it was learnt from"
+    share = counts.accuracy() if counts.rows else None
+    rows = [("accuracy", "-" if share is None else f"{share:.3f}", text)]
+    rows.append(("counted", counted(facts["rows"], "row"), "by leaf and class"))
+    for name, why in (
+        ("ties", "decided by the order of the leaves"),
+        ("no_rule", "with no rule fired"),
+        ("missing", "with a missing input"),
+    ):
+        if facts[name]:
+            rows.append((name.replace("_", " "), counted(facts[name], "row"), why))
+    most = None if options.verbose else 8
+    for name, row in itertools.islice(confusion.items(), most):
+        pairs = sorted(row.items(), key=lambda pair: (-pair[1], pair[0]))
+        said = ", ".join(f"{other or 'no class'} {count:,}" for other, count in pairs)
+        rows.append(("class", printable(name), f"predicted {printable(said)}"))
+    if most and len(confusion) > most:
+        rest = counted(len(confusion) - most, "more class", "more classes")
+        rows.append(("class", rest, "--verbose lists them"))
+    first = {"file": options.output, "fingerprint": fingerprint(tree)}
+    return tree, rows, {**first, "accuracy": share, **facts, "confusion": confusion}
+
+
+def _write(
+    options: LearnOptions, tree: FuzzyTree, rows: Lines, form: Format, *, is_data: bool
+) -> None:
+    """Say what was done, and write the model."""
+    from fuzzytree.api import export
+
+    is_silent = options.quiet or options.output == "-"
     width = max(map(len, (options.output, *(thing for _, thing, _ in rows))))
     say_rows(*rows, width=width, quiet=is_silent)
     model = represented(
-        learnt.tree,
+        tree,
         form,
         representation=options.representation,
         kind=options.kind,
@@ -244,15 +318,10 @@ def command(options: LearnOptions) -> None:
         answer_bytes(content)
         return
     write_atomically(options.output, content)
-    is_data = not is_state and options.tables[0] != "-"
     rest = ["--data", options.tables[0]] if is_data else []
     rest += ["--delimiter", options.delimiter] if rest and options.delimiter else []
     written = _written_rows(model, options.output, form, rest)
     say_rows(*written, width=width, quiet=is_silent)
-    if options.as_json:
-        answer_json(
-            _summary(found, noticed, learnt, tested, settings.seed, options.output)
-        )
 
 
 def _is_states(tables: Sequence[str]) -> bool:
@@ -275,7 +344,7 @@ def _is_states(tables: Sequence[str]) -> bool:
 def _read(
     options: LearnOptions,
     settings: LearningSettings,
-    progress: Callable[[str, float], None],
+    progress: Progress,
 ) -> Table | Learner:
     """Return the one table, or a learner of a table that is too large for memory."""
     from fuzzytree.learning import read_or_collect
@@ -292,32 +361,36 @@ def _read(
     )
 
 
-def _merged(options: LearnOptions, settings: LearningSettings) -> Learner:
-    """Return the learner of all states, merged in pairs."""
+def _states(options: LearnOptions, settings: LearningSettings) -> Learner:
+    """Return the learner of all states."""
     from fuzzytree.learning import Learner
 
-    def load(path: str) -> tuple[str, Learner]:
-        return path, Learner.load(path, name=_title(options), settings=settings)
+    name = _title(options)
+    return _merged(
+        options, lambda path: Learner.load(path, name=name, settings=settings)
+    )
 
-    found = [load(path) for path in options.tables]
+
+def _merged(options: LearnOptions, load: Callable[[str], State]) -> State:
+    """Return the states of all files as one, merged in pairs."""
+    found = [(path, load(path)) for path in options.tables]
     while len(found) > 1:
         pairs = itertools.zip_longest(found[::2], found[1::2])
         found = [_joined(*pair, repeated=options.repeated) for pair in pairs]
-    if options.target not in (None, found[0][1].target):
-        raise click.UsageError(f"--target: the states have {found[0][1].target!r}")
-    return found[0][1]
+    state = found[0][1]
+    if options.target not in (None, state.target):
+        raise click.UsageError(f"--target: the states have {state.target!r}")
+    return state
 
 
 def _joined(
-    one: tuple[str, Learner],
-    other: tuple[str, Learner] | None,
-    *,
-    repeated: bool,
-) -> tuple[str, Learner]:
+    one: tuple[str, State], other: tuple[str, State] | None, *, repeated: bool
+) -> tuple[str, State]:
     if other is None:
         return one
     try:
-        return one[0], one[1].merge(other[1], repeated=repeated)
+        merge = cast("Callable[..., State]", one[1].merge)  # of two of one kind
+        return one[0], merge(other[1], repeated=repeated)
     except ValueError as error:
         raise TableError(f"{other[0]}, beside {one[0]}: {error}") from error
 

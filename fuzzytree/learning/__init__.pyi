@@ -4,5 +4,9 @@ from .learner import ArrayLearner as ArrayLearner
 from .learner import Learnt as Learnt
 from .learner import learn_arrays as learn_arrays
 from .parts import Learner as Learner
+from .parts import StateHeader as StateHeader
+from .parts import open_state as open_state
 from .parts import read_or_collect as read_or_collect
+from .parts import refuse_repeated as refuse_repeated
+from .parts import state_content as state_content
 from .settings import LearningSettings as LearningSettings

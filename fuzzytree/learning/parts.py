@@ -18,7 +18,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 import msgspec
 import numpy as np
@@ -56,36 +56,64 @@ LIMIT: Final = 1 << 33
 """The largest file of a state that is read, in bytes."""
 
 
-class _Header(msgspec.Struct, forbid_unknown_fields=True):
-    """What a state says about its table; see `Learner` for the meanings.
+_WRITERS: Final = {
+    MAGIC: "`fuzzytree collect`",
+    "fuzzytree leaf counts 1": "`fuzzytree collect --for`",
+}
+
+
+class StateHeader(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """What every state says about itself and its table.
 
     Attributes:
-        magic: `MAGIC`.
+        magic: The kind and the version of the file.
         target: The column of the classes.
-        columns: The columns of numbers.
         classes: The names of the classes, as they came.
         floats: Which of them came as numbers with a fraction, as 1.0 does.
         kinds: The kinds of labels that came, see `fuzzytree.tables.coded_classes`.
-        rows_per_class: How many rows of a class the sample keeps.
-        dropped: Rows that were left out as a value is missing.
         unlabelled: Rows that were left out as they have no class.
-        missing: Cells without a value.
         parts: The digests of the states that were merged.
         digest: Of everything else.
     """
 
     magic: str
     target: str
-    columns: list[str]
     classes: list[str]
     floats: list[bool]
     kinds: list[str]
-    rows_per_class: int
-    dropped: int
     unlabelled: int
-    missing: int
     parts: list[str]
     digest: str = ""
+
+    def labels(self) -> ClassLabels:
+        """Return the classes.
+
+        Raises:
+            ValueError: If one stands twice.
+        """
+        labels = ClassLabels(zip(self.classes, self.floats, strict=True), self.kinds)
+        if len(labels.keys) < len(self.classes):
+            raise ValueError("names a column or a class twice")
+        return labels
+
+
+class _Header(StateHeader, forbid_unknown_fields=True, kw_only=True):
+    """What the state of a learner says beside; see `Learner` for the meanings.
+
+    Attributes:
+        columns: The columns of numbers.
+        rows_per_class: How many rows of a class the sample keeps.
+        dropped: Rows that were left out as a value is missing.
+        missing: Cells without a value.
+    """
+
+    columns: list[str]
+    rows_per_class: int
+    dropped: int
+    missing: int
+
+
+Header = TypeVar("Header", bound=StateHeader)
 
 
 class Learner:
@@ -195,12 +223,8 @@ class Learner:
             ValueError: If they have another target, other columns or another size of
                 the sample, or if one saved state is part of both.
         """
-        twice = self._parts & other._parts
-        if twice and not repeated:
-            raise ValueError(
-                f"a state with the digest {min(twice)[:12]} is part of both; "
-                "pass repeated=True to count its rows twice"
-            )
+        if not repeated:
+            refuse_repeated(self._parts, other._parts)
         for what, mine, others in (
             ("target", [self.target], [other.target]),
             ("columns", self.columns or other.columns, other.columns or self.columns),
@@ -362,11 +386,7 @@ class Learner:
             ReadError: If they are none, are broken, or are of another version.
         """
         try:
-            header, arrays = open_state(content)
-            if header.magic != MAGIC:
-                raise ValueError(f"is {header.magic!r}, and {MAGIC!r} is read")
-            if state_digest(header, arrays) != header.digest:
-                raise ValueError("is broken: its digest is another")
+            header, arrays = open_state(content, _Header, MAGIC)
             learner = cls._of_state(header, arrays)
         except ValueError as error:
             raise ReadError(f"{title}: {error}") from error
@@ -455,17 +475,17 @@ class Learner:
     def _of_state(
         cls, header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]
     ) -> Learner:
-        keys = [*zip(header.classes, header.floats, strict=True)]
-        if len(set(keys)) < len(keys) or len(set(header.columns)) < len(header.columns):
+        labels = header.labels()
+        if len(set(header.columns)) < len(header.columns):
             raise ValueError("names a column or a class twice")
         settings = LearningSettings(rows_per_class=header.rows_per_class)
         learner = cls(header.target, columns=header.columns, settings=settings)
         learner.unlabelled, learner.missing = header.unlabelled, header.missing
-        learner._labels = ClassLabels(keys, header.kinds)
+        learner._labels = labels
         learner._parts = frozenset([*header.parts, header.digest])
         learner._statistics = Statistics.of_arrays(
             arrays,
-            classes=len(keys),
+            classes=len(labels.keys),
             features=len(header.columns),
             rows_per_class=header.rows_per_class,
             dropped=header.dropped,
@@ -474,8 +494,6 @@ class Learner:
 
     def _content(self) -> tuple[bytes, str]:
         """Return the state as the content of a file, and its digest."""
-        import pyarrow as pa
-
         keys = self._labels.keys
         statistics = self._placed([*keys.values()], len(keys))
         if statistics is None or self.columns is None:
@@ -494,15 +512,7 @@ class Learner:
             missing=self.missing,
             parts=sorted(self._parts),
         )
-        digest = state_digest(header, arrays)
-        header = msgspec.structs.replace(header, digest=digest)
-        lists = {name: pa.array([array]) for name, array in arrays.items()}
-        metadata = {b"fuzzytree": msgspec.json.encode(header)}
-        table = pa.table(lists).replace_schema_metadata(metadata)
-        sink = pa.BufferOutputStream()
-        with pa.ipc.new_file(sink, table.schema) as writer:
-            writer.write_table(table)
-        return sink.getvalue().to_pybytes(), digest
+        return state_content(header, arrays)
 
 
 def read_or_collect(
@@ -572,7 +582,35 @@ def _difference(what: str, mine: Sequence[str], others: Sequence[str]) -> str:
     return f"the states have other columns: only one of them has {', '.join(only)}"
 
 
-def state_digest(header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]) -> str:
+def refuse_repeated(parts: frozenset[str], others: frozenset[str]) -> None:
+    """Raise a ValueError if two states have one that was saved as a part of both."""
+    if twice := parts & others:
+        raise ValueError(
+            f"a state with the digest {min(twice)[:12]} is part of both; "
+            "pass repeated=True to count its rows twice"
+        )
+
+
+def state_content(
+    header: StateHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
+) -> tuple[bytes, str]:
+    """Return a state as the content of a file, and its digest."""
+    import pyarrow as pa
+
+    digest = state_digest(header, arrays)
+    header = msgspec.structs.replace(header, digest=digest)
+    lists = {name: pa.array([array]) for name, array in arrays.items()}
+    metadata = {b"fuzzytree": msgspec.json.encode(header)}
+    table = pa.table(lists).replace_schema_metadata(metadata)
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_file(sink, table.schema) as writer:
+        writer.write_table(table)
+    return sink.getvalue().to_pybytes(), digest
+
+
+def state_digest(
+    header: StateHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
+) -> str:
     """Return the digest of a header without its own, and of arrays."""
     bare = msgspec.structs.replace(header, digest="")
     total = hashlib.sha256(msgspec.json.encode(bare))
@@ -582,11 +620,13 @@ def state_digest(header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]])
     return total.hexdigest()
 
 
-def open_state(content: bytes) -> tuple[_Header, dict[str, npt.NDArray[np.generic]]]:
-    """Return the header and the arrays of a state, before they are compared.
+def open_state(
+    content: bytes, kind: type[Header], magic: str
+) -> tuple[Header, dict[str, npt.NDArray[np.generic]]]:
+    """Return the header and the arrays of a state of a kind.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If it is none, is of another kind or version, or is broken.
     """
     import pyarrow as pa
 
@@ -597,7 +637,10 @@ def open_state(content: bytes) -> tuple[_Header, dict[str, npt.NDArray[np.generi
             batch = file.get_batch(0)
         batch.validate(full=True)
         text = (batch.schema.metadata or {}).get(b"fuzzytree", b"")
-        header = msgspec.json.decode(text, type=_Header)
+        found = msgspec.json.decode(text, type=_Magic).magic
+        if found != magic:
+            raise ValueError(_otherwise(found, magic))
+        header = msgspec.json.decode(text, type=kind)
         arrays: dict[str, npt.NDArray[np.generic]] = {
             name: np.from_dlpack(column.flatten())
             for name, column in zip(batch.schema.names, batch.columns, strict=True)
@@ -613,4 +656,17 @@ def open_state(content: bytes) -> tuple[_Header, dict[str, npt.NDArray[np.generi
         raise ValueError(
             "is no state that `fuzzytree collect` wrote, or is cut short"
         ) from error
+    if state_digest(header, arrays) != header.digest:
+        raise ValueError("is broken: its digest is another")
     return header, arrays
+
+
+class _Magic(msgspec.Struct):
+    magic: str
+
+
+def _otherwise(found: str, magic: str) -> str:
+    """Return that a state is of another kind or version."""
+    if writer := _WRITERS.get(found):
+        return f"is a state of {writer}, and one of {_WRITERS[magic]} is needed"
+    return f"is {found!r}, and {magic!r} is read"

@@ -13,7 +13,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.errors import LearningError, ReadError, TableError
-from fuzzytree.learning import Learner
+from fuzzytree.learning import Learner, parts
 from fuzzytree.model import fingerprint
 
 ROWS = 2_000
@@ -227,24 +227,17 @@ def test_a_file_that_is_cut_or_changed_is_refused(tmp_path: Path) -> None:
 
 def rewritten(path: Path, change: dict[str, object], drop: str = "") -> None:
     """Write a state again with another header, and with a digest that fits."""
-    from fuzzytree.learning.parts import open_state, state_digest
-
-    header, arrays = open_state(path.read_bytes())
+    header, arrays = parts.open_state(path.read_bytes(), parts._Header, parts.MAGIC)
     arrays = {name: array for name, array in arrays.items() if name != drop}
     header = msgspec.structs.replace(header, **change)
-    header = msgspec.structs.replace(header, digest=state_digest(header, arrays))
-    lists = {name: pa.array([array]) for name, array in arrays.items()}
-    table = pa.table(lists).replace_schema_metadata(
-        {b"fuzzytree": msgspec.json.encode(header)}
-    )
-    with pa.ipc.new_file(str(path), table.schema) as writer:
-        writer.write_table(table)
+    path.write_bytes(parts.state_content(header, arrays)[0])
 
 
 @pytest.mark.parametrize(
     ("change", "drop", "message"),
     [
         ({"magic": "fuzzytree state 2"}, "", "is 'fuzzytree state 2', and 'fuzzytree"),
+        ({"magic": "fuzzytree leaf counts 1"}, "", "of `fuzzytree collect --for`, and"),
         ({"columns": ["a", "b", "c"]}, "", "has not the 9 numbers of type float64"),
         ({"columns": ["a", "a", "c", "d"]}, "", "names a column or a class twice"),
         ({"classes": ["x"], "floats": [False]}, "", "has not the 1 numbers of type"),
