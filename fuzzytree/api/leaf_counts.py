@@ -34,7 +34,7 @@ LIMIT: Final = 1 << 33
 _WAITING = 64  # pieces whose counts are not added up yet
 
 
-class _Header(StateHeader, forbid_unknown_fields=True, kw_only=True):
+class LeafCountsHeader(StateHeader, forbid_unknown_fields=True, kw_only=True):
     """What the file says beside.
 
     Attributes:
@@ -215,7 +215,7 @@ class LeafCounts:
         Raises:
             WriteError: If the file cannot be written.
         """
-        header = _Header(
+        header = LeafCountsHeader(
             magic=MAGIC,
             target=self.target,
             classes=[name for name, _ in self._labels.keys],
@@ -244,7 +244,9 @@ class LeafCounts:
                 another tree.
         """
         try:
-            header, arrays = open_state(read_bounded(path, LIMIT), _Header, MAGIC)
+            header, arrays = open_state(
+                read_bounded(path, LIMIT), LeafCountsHeader, MAGIC
+            )
             result = cls(model, header.target)
             _refuse_another(header.model, result.tree)
             result._take(header, arrays)
@@ -255,7 +257,7 @@ class LeafCounts:
         return result
 
     def _take(
-        self, header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]
+        self, header: LeafCountsHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
     ) -> None:
         """Take what a file holds.
 

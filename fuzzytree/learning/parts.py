@@ -97,7 +97,7 @@ class StateHeader(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
         return labels
 
 
-class _Header(StateHeader, forbid_unknown_fields=True, kw_only=True):
+class LearnerHeader(StateHeader, forbid_unknown_fields=True, kw_only=True):
     """What the state of a learner says beside; see `Learner` for the meanings.
 
     Attributes:
@@ -386,7 +386,7 @@ class Learner:
             ReadError: If they are none, are broken, or are of another version.
         """
         try:
-            header, arrays = open_state(content, _Header, MAGIC)
+            header, arrays = open_state(content, LearnerHeader, MAGIC)
             learner = cls._of_state(header, arrays)
         except ValueError as error:
             raise ReadError(f"{title}: {error}") from error
@@ -473,7 +473,7 @@ class Learner:
 
     @classmethod
     def _of_state(
-        cls, header: _Header, arrays: Mapping[str, npt.NDArray[np.generic]]
+        cls, header: LearnerHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
     ) -> Learner:
         labels = header.labels()
         if len(set(header.columns)) < len(header.columns):
@@ -499,7 +499,7 @@ class Learner:
         if statistics is None or self.columns is None:
             raise LearningError("cannot save a state before a part was taken")
         arrays = statistics.arrays()
-        header = _Header(
+        header = LearnerHeader(
             magic=MAGIC,
             target=self.target,
             columns=[*self.columns],

@@ -167,19 +167,24 @@ def test_a_file_that_is_cut_or_changed_is_refused(
     path, whole = tmp_path / "a.state", counts_of(tree, table)
     whole.save(path)
     content = path.read_bytes()
-    header, arrays = open_state(content, leaf_counts._Header, leaf_counts.MAGIC)
+    header, arrays = open_state(
+        content, leaf_counts.LeafCountsHeader, leaf_counts.MAGIC
+    )
+    ends, codes, counts = (
+        arrays[name].astype(np.int64) for name in ("ends", "codes", "counts")
+    )
     spoilt = [content[:size] for size in range(0, len(content), 101)]
     spoilt += [
         state_content(header, {**arrays, name: array})[0]
         for name, array in (
-            ("ends", arrays["ends"] + len(tree.leaves)),
-            ("codes", arrays["codes"] - 1),
-            ("counts", arrays["counts"] * 0),
-            ("counts", arrays["counts"][:-1]),
-            ("counts", arrays["counts"].astype(np.float64)),
+            ("ends", ends + len(tree.leaves)),
+            ("codes", codes - 1),
+            ("counts", counts * 0),
+            ("counts", counts[:-1]),
+            ("counts", counts.astype(np.float64)),
         )
     ]
-    spoilt.append(state_content(header, {"ends": arrays["ends"]})[0])
+    spoilt.append(state_content(header, {"ends": ends})[0])
     for one in spoilt:
         path.write_bytes(one)
         with pytest.raises(ReadError, match=r"^.*a\.state: (is|counts) [^\n]*$"):
