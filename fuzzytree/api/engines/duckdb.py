@@ -42,7 +42,7 @@ _STATUS: Final = (
 def states(frame: DuckDBPyRelation, fold: Fold) -> list[bytes]:
     """Return the state of all rows; few batches of them are in memory at a time."""
     chosen = frame.project(", ".join(map(_quoted, fold.selected)))
-    return [fold(chosen.fetch_record_batch(_ROWS), "the table")]
+    return [fold(chosen.to_arrow_reader(_ROWS), "the table")]
 
 
 def answered(

@@ -35,6 +35,6 @@ def answered(frame: pl.LazyFrame, answer: Answer, schema: pa.Schema) -> pl.LazyF
         return pl.DataFrame(answer.predictions(table)).to_struct()
 
     names = frame.collect_schema().names()
-    inputs = [name for name in names if name.strip() in answer.inputs]
+    inputs = [name for name in names if name.strip() in answer.inputs] or names[:1]
     rows = pl.struct(inputs).map_batches(predict, pl.Struct(added), is_elementwise=True)
     return frame.with_columns(rows.alias("class")).unnest("class")
