@@ -89,8 +89,8 @@ def learn(
     Args:
         table: A path, a pandas, polars or arrow table, an array of shape
             (rows, columns), or what `fuzzytree.table` returns; or a lazy frame of
-            Polars, DuckDB or Ibis, which is not collected. Files of any length are
-            read in bounded memory.
+            Polars, DuckDB, Ibis, Spark or Dask, which is not collected. Files of any
+            length are read in bounded memory.
         target: The column of the classes, or the classes themselves.
         ignore: Columns to leave out.
         name: Of the tree; the file's, or `tree`, unless given.
@@ -185,9 +185,9 @@ def _name_of(table: object) -> str:
 def predict(frame: Frame, model: ModelSource) -> Frame:
     """Return a frame with the predictions of a model beside its columns.
 
-    A lazy frame of Polars, DuckDB or Ibis comes back as a lazy frame: the rows are
-    predicted by the engine, when they are collected. The predictions have the same bits
-    as those of `run`.
+    A lazy frame of Polars, DuckDB, Ibis, Spark or Dask comes back as a lazy frame: the
+    rows are predicted by the engine, when they are collected. The predictions have the
+    same bits as those of `run`.
 
     Args:
         frame: A lazy frame, or a pandas, polars or arrow table. Columns are found by

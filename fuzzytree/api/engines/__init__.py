@@ -44,6 +44,8 @@ ENGINES: Final = (
     Engine("polars", "LazyFrame", "polars"),
     Engine("duckdb", "DuckDBPyRelation", "duckdb", ignores_case=True),
     Engine("ibis", "Table", "ibis", ignores_case=True),
+    Engine("pyspark.sql", "DataFrame", "spark", ignores_case=True),
+    Engine("dask", "DataFrame", "dask"),
 )
 
 

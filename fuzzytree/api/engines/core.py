@@ -29,6 +29,8 @@ from fuzzytree.semantics import Status
 from fuzzytree.tables import batches, in_order
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from fuzzytree.model import FloatArray, IntArray
 
 _BLOCK: Final = 1 << 16
@@ -41,9 +43,11 @@ _STATUSES: Final = pa.array([status.name.lower() for status in Status])
 
 
 def _names_of(frame: Any) -> list[str]:
-    if hasattr(frame, "collect_schema"):
+    kind = type(frame)  # frames of Spark and Dask have their columns as attributes
+    if hasattr(kind, "collect_schema"):
         return [*frame.collect_schema().names()]
-    return [str(name) for name in getattr(frame, "column_names", frame.columns)]
+    is_arrow = hasattr(kind, "column_names")
+    return [*map(str, frame.column_names if is_arrow else frame.columns)]
 
 
 def _without_rows(names: Iterable[str]) -> pa.Table:
@@ -91,7 +95,9 @@ class Fold:
         wanted = {self.target, *self.columns}
         self.selected = tuple(name for name in names if name.strip() in wanted)
 
-    def __call__(self, rows: Iterable[pa.RecordBatch], name: str) -> bytes:
+    def __call__(
+        self, rows: Iterable[pa.RecordBatch] | pd.DataFrame, name: str
+    ) -> bytes:
         """Return the state of a partition, empty if it has no row.
 
         An error of ours comes back as bytes as well, for the driver to raise: an engine
@@ -103,6 +109,9 @@ class Fold:
         """
         learner = Learner(self.target, columns=self.columns, settings=self.settings)
         try:
+            if hasattr(rows, "columns"):
+                learner.update(rows, name=name)
+                rows = ()
             batches = iter(rows)
             for first in batches:
                 rest = itertools.chain([first], batches)
