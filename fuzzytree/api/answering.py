@@ -23,6 +23,7 @@ from fuzzytree.model import (
     FuzzySystem,
     Model,
     ModelSource,
+    RuleBase,
     Runtime,
     SystemRun,
     kind_of,
@@ -120,8 +121,8 @@ def run(
         model: The model; see `Carried`.
         table: A path, a pandas, polars or arrow table, or an array of shape
             (rows, columns). Columns are found by name.
-        runtime: What executes the model: `native` unless given; an ONNX file is
-            always executed by onnxruntime.
+        runtime: What executes the model: `native` unless given, or `best-first` for
+            rules without strengths; an ONNX file is always executed by onnxruntime.
         columns: The names of an array's columns; unless given those of the table
             that the model was learnt from.
         with_strengths: Whether to keep the strengths of the rules, 8 bytes for each
@@ -212,6 +213,8 @@ def prepare_answering(
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
     if isinstance(model, FuzzySystem):
         return _answering_system(model, runtime, with_strengths=with_strengths)
+    if runtime is None and isinstance(model, RuleBase) and not with_strengths:
+        runtime = "best-first"  # gives the same classes, rules and statuses
     used = _runtime(runtime or baseline().name, model)
     execute = used.load(model)
 

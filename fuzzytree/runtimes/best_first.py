@@ -18,10 +18,16 @@ their axes (`envelope.py`), which are looked up and not computed:
 
 Where the plateaus of each node's branches are disjoint and cover the axis (relative
 rules), nothing can reach the branch with degree 1: the search is a descent.
+
+A search of few rows, or of rules that are fired in less time than their bounds are
+looked up, would be slower than firing: such calls fire. So do all rows after some of
+which more than half had to be fired.
 """
 
 from __future__ import annotations
 
+import functools
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -49,14 +55,17 @@ from fuzzytree.runtimes.envelope import (
     plan_envelope,
     spread,
 )
-from fuzzytree.runtimes.native_rules import fire
+from fuzzytree.runtimes.native_rules import fire_plan, firing_cost, plan_rules
 from fuzzytree.runtimes.rows import axis_lines, checked, missing_rows, plan_axes
 
 _CHUNK = 1 << 16  # rows: short steps would keep threads waiting for each other
 _PAIRS = 1 << 11  # rows and rules whose strengths are computed together
 _WIDEST = 1 << 20  # branches that are followed together
-_CROWD = 16  # branches of a row, or a share of all rules, from which it is fired
-_SHARE = 8
+_LEAST_COST = 300.0  # of firing a row, in ns, from which bounds pay
+_FOLLOW_COST = 1000.0  # from which it pays to follow the rows that bounds leave open
+_BRANCH_COST = 150.0  # of following a branch, in ns
+_CALL_COST = 2.5e6  # of firing all rows of a call, in ns, from which a search pays
+_CROWD = 0.5  # the share of rows to be fired from which all the others are fired too
 _ALWAYS = Clause("", ())
 
 
@@ -92,6 +101,8 @@ class Net:
         envelope: Bounds and degrees of the clauses.
         is_split: Whether all branches of each fork ask for the same axis.
         is_product: Whether degrees are multiplied.
+        limit: The most branches of a row that are followed at once; rows with more
+            are fired.
     """
 
     first: IntArray
@@ -106,6 +117,7 @@ class Net:
     envelope: Envelope
     is_split: bool
     is_product: bool
+    limit: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +164,7 @@ class Frontier:
 def search(rules: RuleBase) -> Run:
     """Return a function that finds the winning rule of every row.
 
-    The more the rules share, the more is saved.
+    The more the rules share, the more is saved; it is as fast as firing at least.
 
     Returns:
         A function from values of shape (inputs, rows) to an outcome with the rule and
@@ -170,29 +182,46 @@ def search(rules: RuleBase) -> Run:
     splits = _splits(rules, forks, axes.line)
     if splits is not None:
         return descend_by(axes, plan_descent(splits, axes.dtype), rules.inputs)
-    net, fired = _net(rules, forks, axes.line), fire(rules)
+    plan = plan_rules(rules)
+    fired, cost = fire_plan(plan, rules.inputs, with_strengths=False), firing_cost(plan)
+    if cost < _LEAST_COST:
+        return fired
+    fewest = 1 + int(_CALL_COST / cost)
+    limit = int(cost / _BRANCH_COST) if cost >= _FOLLOW_COST else 0
+    pays: bool | None = None  # unknown until some rows were searched
+
+    planned = functools.cache(lambda: _net(rules, forks, axes.line, limit))
+    planning = threading.Lock()
 
     def run(values: FloatArray) -> Outcome:
+        nonlocal pays
         array = checked(values, rules.inputs)
-        rule, status = np.zeros((2, array.shape[1]), np.int64)
+        count = array.shape[1]
+        if count < fewest or (pays is False and count < fewest << 5):
+            return fired(array)
+        with planning:  # not before: calls of few rows do without it
+            net = planned()
+        rule, status = np.zeros((2, count), np.int64)
         crowded: list[IntArray] = []
+        stop, size = 0, _CHUNK if pays else max(fewest, count >> 5)
         with np.errstate(all="ignore"):
-            for start in range(0, array.shape[1], _CHUNK):
-                part = axis_lines(axes, array[:, start : start + _CHUNK])
+            while stop < count:
+                start, stop = stop, stop + size
+                part = axis_lines(axes, array[:, start:stop])
                 lines = part.astype(np.float64, copy=False)
-                here = slice(start, start + lines.shape[1])
+                whole = np.arange(lines.shape[1])
                 missing = missing_rows(lines)
-                if missing is None:
-                    rule[here], status[here], many = _search(net, lines)
-                    crowded.append(many + start)
-                    continue
-                status[here][missing] = 3
-                whole = np.flatnonzero(~missing)
-                result = _search(net, lines.take(whole, axis=1))
+                if missing is not None:
+                    status[start:stop][missing] = 3
+                    whole = np.flatnonzero(~missing)
+                    lines = lines.take(whole, axis=1)
                 whole += start
-                rule[whole], status[whole] = result[:2]
-                crowded.append(whole[result[2]])
-        many = np.concatenate([np.empty(0, np.int64), *crowded])
+                rule[whole], status[whole], many = _search(net, lines)
+                crowded.append(whole[many])
+                pays, size = len(many) <= _CROWD * len(whole), _CHUNK
+                if not pays:
+                    break
+        many = np.concatenate([*crowded, np.arange(min(stop, count), count)])
         if len(many):
             outcome = fired(array.take(many, axis=1))
             rule[many], status[many] = outcome.rule, outcome.status
@@ -296,7 +325,9 @@ def _plateau(shape: Shape) -> tuple[float | None, float | None] | None:
             )
 
 
-def _net(rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int]) -> Net:
+def _net(
+    rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int], limit: int
+) -> Net:
     """Return the forks as arrays; rules that end at no leaf get a branch."""
     ends = [list(fork.rules) for fork in forks]
     branches = [list(zip(f.clauses, f.targets, strict=True)) for f in forks]
@@ -330,6 +361,7 @@ def _net(rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int]) 
         envelope,
         all(len({c.variable for c, _ in part}) <= 1 for part in branches),
         rules.semantics.conjunction == "product",
+        limit,
     )
 
 
@@ -353,6 +385,8 @@ def _search(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
     rule, floor, rival = _run_down(net, rows)
     status = np.zeros(lines.shape[1], np.int64)
     unsure = np.flatnonzero(rival >= floor)
+    if not net.limit:
+        return rule, status, unsure
     vague = unsure[floor.take(unsure) == 0]
     floor[vague] = _strengths(net, rows, vague, rule.take(vague))
     rule[unsure], status[unsure] = 0, 2
@@ -456,7 +490,6 @@ def _reachable(
 
     Rows with too many branches at once come second, and are at no end.
     """
-    limit = max(_CROWD, len(net.length) // _SHARE)
     is_crowded = np.zeros(len(floor), np.bool_)
     ones = np.ones(len(unsure))
     here = Frontier(unsure, np.zeros(len(unsure), np.int64), ones, ones)
@@ -472,7 +505,7 @@ def _reachable(
         low = _join(net, here.low.take(stay), low)
         fork = net.target.take(branch.take(stay))
         here = Frontier(here.row.take(stay), fork, low, high.take(stay))
-        is_crowded |= np.bincount(here.row, minlength=len(floor)) > limit
+        is_crowded |= np.bincount(here.row, minlength=len(floor)) > net.limit
         is_end = net.rule.take(fork) > 0
         ends.append(here.take(np.flatnonzero(is_end)))
         here = here.take(np.flatnonzero(~is_end & ~is_crowded.take(here.row)))

@@ -120,12 +120,22 @@ def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
         >>> fire(rules)(np.zeros((len(rules.inputs), 2))).strengths.shape
         (7, 2)
     """
-    plan = plan_rules(rules, dtype)
+    return fire_plan(plan_rules(rules, dtype), rules.inputs)
+
+
+def fire_plan(
+    plan: RulePlan, inputs: tuple[str, ...], *, with_strengths: bool = True
+) -> Run:
+    """Return a function that fires the rules of a plan, without strengths if need be.
+
+    `inputs` are the names of the model's inputs.
+    """
+    rules = len(plan.prefixes.rules) if with_strengths else 0
 
     def run(values: FloatArray) -> Outcome:
-        array = checked(values, rules.inputs)
+        array = checked(values, inputs)
         count = array.shape[1]
-        strengths = np.empty((len(rules.rules), count), np.float64)
+        strengths = np.empty((rules, count), np.float64)
         result = np.empty((2, count), np.int64)
         with np.errstate(all="ignore"):
             for start in range(0, count, plan.rows):
@@ -137,12 +147,22 @@ def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
                     missing = np.zeros(fired.shape[1], np.bool_)
                 else:
                     fired[:, missing] = 0
-                strengths[:, part] = fired
                 result[:, part] = winners(fired, missing)
+                strengths[:, part] = fired[:rules]
                 strengths[:, part][:, missing] = np.nan
-        return Outcome(result[0], result[1], strengths)
+        return Outcome(result[0], result[1], strengths if with_strengths else None)
 
     return run
+
+
+def firing_cost(plan: RulePlan) -> float:
+    """Return about how many nanoseconds firing takes for each of many rows.
+
+    The weights were fitted to trees and grids of 2 to 1,000 rules.
+    """
+    joined = sum(choice.terms.size for choice in plan.degrees.choices)
+    lines = plan.degrees.count + joined + plan.prefixes.count
+    return 7.0 * plan.degrees.atoms + 1.2 * lines + 5.0 * len(plan.prefixes.rules)
 
 
 def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> RulePlan:

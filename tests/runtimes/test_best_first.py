@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from fuzzytree.model.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.runtimes import best_first
 from fuzzytree.runtimes.envelope import (
     AxisCells,
     Envelope,
@@ -36,7 +38,8 @@ from fuzzytree.semantics.reference import degree
 from fuzzytree.testing import probe_values, random_tree
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
+    from fuzzytree.runtimes.best_first import Net
 
 LARGEST = float(np.finfo(np.float64).max)
 STEEP = (1.4, -3.0, 2.5, -4.0, 5.0)  # a body that overshoots at both ends
@@ -265,3 +268,78 @@ def test_a_rule_may_end_where_another_goes_on() -> None:
     assert result.rule.tolist() == [2, 1, 1, 0]
     assert result.status.tolist() == [0, 1, 1, 2]
     assert_fired(model, values)
+
+
+def grid(size: int, inputs: int) -> RuleBase:
+    """Return rules for all combinations of overlapping terms."""
+    side = Side(0.8, (0.6, 0.3), 3.0)
+    terms = tuple(Term(f"t{k}", LR(float(k), side, side)) for k in range(size))
+    variables = tuple(Variable(f"x{k}", terms) for k in range(inputs))
+    choices = itertools.product(terms, repeat=inputs)
+    rules = tuple(
+        Rule(
+            tuple(
+                Clause(v.name, (term.name,))
+                for v, term in zip(variables, choice, strict=True)
+            ),
+            "y",
+        )
+        for choice in choices
+    )
+    return RuleBase(f"{size}^{inputs}", ("y",), variables, rules)
+
+
+@pytest.fixture
+def searches(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Choose between search and firing as in use; return the rows of each search."""
+    monkeypatch.undo()
+    rows: list[int] = []
+    search = best_first._search
+
+    def noted(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+        rows.append(lines.shape[1])
+        return search(net, lines)
+
+    monkeypatch.setattr(best_first, "_search", noted)
+    return rows
+
+
+def test_few_rules_and_few_rows_are_fired_and_many_of_both_searched(
+    searches: list[int],
+) -> None:
+    few, many = grid(3, 2), grid(5, 4)
+    near = np.random.default_rng(0).normal(2.0, 1.5, size=(4, 3000))
+    assert_fired(few, near[:2])
+    assert_fired(many, near[:, :100])
+    assert searches == []
+    assert_fired(many, near)
+    assert sum(searches) == 3000
+
+
+def test_rows_that_bounds_leave_open_are_fired_after_the_first_of_them(
+    searches: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(best_first, "_CALL_COST", 1e5)
+    rules = grid(5, 3)
+    run, fire = load_best_first(rules), load(rules)
+    tied = np.full((3, 8000), 1.5)  # between two terms of every axis
+    near = np.random.default_rng(0).normal(2.0, 0.1, size=(3, 8000))
+    for values in (tied[:, :2000], near[:, :2000], tied, near):
+        result, expected = run(values), fire(values)
+        assert np.array_equal(result.rule, expected.rule)
+        assert np.array_equal(result.status, expected.status)
+    few_tied, many_tied, *all_near = searches
+    assert max(few_tied, many_tied) < 300
+    assert sum(all_near) == 8000
+
+
+def test_ties_gaps_and_missing_values_are_found_by_searching_and_by_firing(
+    searches: list[int],
+) -> None:
+    values = np.random.default_rng(1).normal(2.0, 3.0, size=(4, 5000))
+    values[:, ::11] = np.rint(values[:, ::11])
+    values[0, ::5], values[1, ::7] = np.nan, np.inf
+    values[:, 3::13] = 1e9
+    assert_fired(grid(5, 4), values)
+    assert_fired(grid(3, 4), values)
+    assert searches
