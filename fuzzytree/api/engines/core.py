@@ -9,7 +9,7 @@ and `answered`, which returns a lazy frame with the columns of an `Answer` as we
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -24,17 +24,12 @@ from fuzzytree.api.engines import Engine, engine_of
 from fuzzytree.errors import FuzzyTreeError, TableError
 from fuzzytree.learning import Learner, LearningSettings
 from fuzzytree.model import FuzzyTree, Model, label_of
-from fuzzytree.runtimes import Predictions
+from fuzzytree.runtimes import Predictions, joined
 from fuzzytree.semantics import Status
-from fuzzytree.tables import batches, in_order
+from fuzzytree.tables import Batch
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from fuzzytree.model import FloatArray, IntArray
-
-_BLOCK: Final = 1 << 16
-"""The largest number of rows whose rules are fired at a time."""
 
 _STATE: Final = b"ARROW1"
 """How a state begins; the sentence of an error begins otherwise."""
@@ -226,40 +221,23 @@ class Answer:
         """
         if isinstance(rows, pa.RecordBatch):
             rows = pa.Table.from_batches([rows])
-        ready = self._ready
-        parts = [
-            part
-            for batch in batches(
-                rows, ready.inputs, trained=ready.trained, name="a batch"
-            )
-            for part in in_order(self._block, _blocks(batch.values))
-        ]
-        codes, rule, status, strengths = map(np.concatenate, zip(*parts, strict=True))
+
+        def only_predictions(batch: Batch, result: Predictions) -> Predictions:
+            return result
+
+        result = joined([*self._ready(rows, only_predictions, name="a batch")])
+        places, fired = np.flatnonzero(result.rule), result.strengths
+        # of a tree's relative rules the winner has a strength of exactly 1
+        strengths = np.ones(len(result))
+        if fired is not None:
+            strengths[places] = fired[result.rule[places] - 1, places]
         columns = [
-            self._labels.take(pa.array(codes, mask=codes < 0)),
-            pa.array(rule, pa.int32()),
-            _STATUSES.take(pa.array(status)),
-            pa.array(strengths, mask=rule < 1),
+            self._labels.take(pa.array(result.codes, mask=result.codes < 0)),
+            pa.array(result.rule, pa.int32()),
+            _STATUSES.take(pa.array(result.status)),
+            pa.array(strengths, mask=result.rule < 1),
         ]
         return pa.RecordBatch.from_arrays(columns, schema=self.schema)
-
-    def _block(
-        self, values: FloatArray
-    ) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-        """Return the classes, rules, statuses and strengths of some rows."""
-        result = cast("Predictions", self._ready.answer(values))
-        rule, strengths = result.rule, np.zeros(len(result))
-        places = np.flatnonzero(rule)
-        # of a tree's relative rules the winner has a strength of exactly 1
-        fired = result.strengths
-        strengths[places] = 1.0 if fired is None else fired[rule[places] - 1, places]
-        return result.codes, rule, result.status, strengths
-
-
-def _blocks(values: FloatArray) -> Iterator[FloatArray]:
-    rows = values.shape[1]
-    for first in range(0, max(rows, 1), _BLOCK):
-        yield values[:, first : first + _BLOCK]
 
 
 def predicted(frame: object, answer: Answer) -> object:

@@ -23,16 +23,7 @@ if TYPE_CHECKING:
 _ROWS: Final = 1 << 16
 """How many rows a record batch has at most."""
 
-TABLE: Final = "fuzzytree_rows"
-"""What a query calls the table that it reads."""
-
-_NUMBER = re.compile(r"(U?(HUGE|BIG|SMALL|TINY)?INT(EGER)?|FLOAT|DOUBLE|BOOLEAN)")
-_TYPES: Final = {
-    "int64": "BIGINT",
-    "double": "DOUBLE",
-    "bool": "BOOLEAN",
-    "uint64": "UBIGINT",
-}
+_NUMBER = re.compile(r"\w*INT(EGER)?|FLOAT|DOUBLE|BOOLEAN|DECIMAL.*")
 _STATUS: Final = (
     "CASE \"status\" WHEN 0 THEN 'decided' WHEN 1 THEN 'tie' "
     "WHEN 2 THEN 'uncovered' ELSE 'missing' END"
@@ -54,75 +45,70 @@ def answered(
         TableError: If an input is no column of numbers.
         LossError: If the model has more rules or levels than a query can have.
     """
-    kinds = dict(zip(frame.columns, map(str, frame.types), strict=True))
-    numbers = {name: _NUMBER.fullmatch(kind) for name, kind in kinds.items()}
-    exact = {
-        name: kind.startswith("DECIMAL") or "HUGE" in kind
-        for name, kind in kinds.items()
-        if numbers[name] or kind.startswith("DECIMAL")
+    numbers = {
+        name: "DECIMAL" in str(kind) or "HUGE" in str(kind)
+        if _NUMBER.fullmatch(str(kind))
+        else None
+        for name, kind in zip(frame.columns, frame.types, strict=True)
     }
-    query = prediction_query(answer, kinds, exact, schema)
-    return cast("DuckDBPyRelation", frame.query(TABLE, query))  # None is for INSERT
+    query = prediction_query("fuzzytree_rows", numbers, answer, schema)
+    return cast("DuckDBPyRelation", frame.query("fuzzytree_rows", query))
 
 
 def prediction_query(
-    answer: Answer,
-    kinds: Mapping[str, str],
-    numbers: Mapping[str, bool],
-    schema: pa.Schema,
+    table: str, numbers: Mapping[str, bool | None], answer: Answer, schema: pa.Schema
 ) -> str:
-    """Return the query that adds the predictions to the columns of `TABLE`.
+    """Return the query that adds the predictions to the columns of a table.
 
     Args:
+        table: The name of the table.
+        numbers: Its columns: whether a number may have more digits than a double; None
+            for a column of anything else.
         answer: The model.
-        kinds: The type of each column, as messages name it.
-        numbers: Whether a column of numbers has more digits than a double, for each of
-            them.
         schema: The columns that are added.
 
     Raises:
         TableError: If an input is no column of numbers.
         LossError: If the model has more rules or levels than a query can have.
     """
-    kept = {name: f"kept {place}" for place, name in enumerate(kinds, 1)}
-    columns = [f"{_quoted(name)} AS {_quoted(kept[name])}" for name in kinds]
-    for place, (name, kind) in enumerate(kinds.items(), 1):
-        title = name.strip() or f"column {place}"
+    columns: list[str] = []
+    for place, (name, is_long) in enumerate(numbers.items(), 1):
+        cell, title = _quoted(name), name.strip() or f"column {place}"
+        columns.append(f'{cell} AS "kept {place}"')
         if title not in answer.inputs:
             continue
-        if name not in numbers:
+        if is_long is None:
             raise TableError(
-                f"the table: column {title!r} is of type {kind}, and the model needs "
-                "numbers: cast it to DOUBLE before"
+                f"the table: column {title!r} is no column of numbers, which the model "
+                "needs: cast it to DOUBLE before"
             )
-        # engines do not round long decimals to the nearest double; reading text does
-        text = f"CAST({_quoted(name)} AS VARCHAR)" if numbers[name] else _quoted(name)
+        # an engine may not round to the nearest double, unless it reads a text
+        text = f"CAST({cell} AS VARCHAR)" if is_long else cell
         columns.append(f"CAST({text} AS DOUBLE) AS {_quoted(title)}")
-    model, strength = answer.model, "1e0"
-    if not isinstance(model, FuzzyTree):
-        names = [f"strength_{rule}" for rule in range(1, len(model.rules) + 1)]
-        strength = f"GREATEST({', '.join(names)})"
+    model = answer.model
+    rules = () if isinstance(model, FuzzyTree) else range(1, len(model.rules) + 1)
     written = export(
         model,
         "sql",
         dialect="duckdb",
         table="numbers",
-        keep=[*kept.values()],
-        strengths=not isinstance(model, FuzzyTree),
-    )
-    # steps that are kept in memory whole would end streaming
-    steps = re.sub(r"(?m)^(\w+ AS) MATERIALIZED \($", r"\1 (", written.content.decode())
-    kind = _TYPES.get(str(schema.field("class").type), "VARCHAR")
+        keep=[f"kept {place}" for place in range(1, len(numbers) + 1)],
+        strengths=bool(rules),
+    ).content.decode()
+    # a step that is materialized is in memory whole
+    steps = re.sub(r"(?m)^(\w+ AS) MATERIALIZED \($", r"\1 (", written)
+    strengths = ", ".join(f"strength_{rule}" for rule in rules)
+    kind = str(schema.field("class").type).upper()
+    kept = [f'"kept {k}" AS {_quoted(name)}' for k, name in enumerate(numbers, 1)]
     return (
-        f"WITH numbers AS (SELECT {', '.join(columns)} FROM {TABLE}),\n"
+        f"WITH numbers AS (SELECT {', '.join(columns)} FROM {table}),\n"
         f"predictions AS (\n{steps})\n"
-        f"SELECT {', '.join(f'{_quoted(k)} AS {_quoted(n)}' for n, k in kept.items())},"
-        f' CAST("class" AS {kind}) AS "class", CAST("rule" AS INTEGER) AS "rule",'
-        f' {_STATUS} AS "status",'
-        f' CASE WHEN "rule" > 0 THEN {strength} END AS "strength"\nFROM predictions'
+        f'SELECT {", ".join(kept)}, CAST("class" AS {kind}) AS "class",\n'
+        f'CAST("rule" AS INTEGER) AS "rule", {_STATUS} AS "status",\n'
+        f'CASE WHEN "rule" > 0 THEN {f"GREATEST({strengths})" if strengths else "1e0"} '
+        'END AS "strength" FROM predictions'
     )
 
 
 def _quoted(name: str) -> str:
-    mark = '"'
-    return mark + name.replace(mark, mark * 2) + mark
+    return '"' + name.replace('"', '""') + '"'

@@ -5,6 +5,7 @@ The query is that of DuckDB, translated to the dialect of the table's backend.
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import ibis
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from ibis.expr.types import Table
 
     from fuzzytree.api.engines.core import Answer, Fold
+
+_NUMBERS = itertools.count(1)  # a name of its own for each table in a query
 
 
 def states(frame: Table, fold: Fold) -> list[bytes]:
@@ -40,14 +43,12 @@ def answered(frame: Table, answer: Answer, schema: pa.Schema) -> Table:
     """
     before = frame.schema()
     numbers = {
-        name: kind.is_decimal()
+        name: kind.is_decimal() if kind.is_numeric() or kind.is_boolean() else None
         for name, kind in before.items()
-        if kind.is_numeric() or kind.is_boolean()
     }
-    kinds = {name: str(kind) for name, kind in before.items()}
-    query = duckdb.prediction_query(answer, kinds, numbers, schema)
+    rows: Any = frame.alias(f"fuzzytree_rows_{next(_NUMBERS)}")
+    query = duckdb.prediction_query(rows.get_name(), numbers, answer, schema)
     backend: Any = ibis.get_backend(frame)
     [text] = sqlglot.transpile(query, read="duckdb", write=backend.dialect)
     after = ibis.schema({**before, **ibis.Schema.from_pyarrow(schema)})
-    parent: Any = frame.alias(duckdb.TABLE)
-    return ops.SQLStringView(parent, text, after).to_expr()
+    return ops.SQLStringView(rows, text, after).to_expr()

@@ -270,7 +270,7 @@ def test_an_input_of_text_is_refused_before_or_in_the_engine(
 ) -> None:
     tree = ft.learn("examples/wine/wine.csv", target="cultivar")
     table = pa.table({name: ["wide"] for name in tree.inputs})
-    with pytest.raises(Exception, match=r"column 'alcohol' (is of type|holds)") as e:
+    with pytest.raises(Exception, match=r"column .alcohol. (is no|holds)") as e:
         collected(ft.predict(frame_of(table), tree))
     assert engine == "polars" or isinstance(e.value, TableError)
 
@@ -333,11 +333,11 @@ def test_nothing_runs_before_a_frame_is_collected(engine: str) -> None:
         duckdb = importlib.import_module("duckdb")
         connection = duckdb.connect()
 
-        def count(row: int) -> float:
+        def count_row(row: int) -> float:
             calls.append(row)
             return 1.0
 
-        connection.create_function("count_row", count, ["BIGINT"], "DOUBLE")
+        connection.create_function("count_row", count_row, ["BIGINT"], "DOUBLE")
         names = ", ".join(f"count_row(range) AS {name}" for name in columns)
         query = f"SELECT {names} FROM range(10)"
         frame = connection.sql(query)
@@ -356,3 +356,23 @@ def test_nothing_runs_before_a_frame_is_collected(engine: str) -> None:
 def test_other_tables_have_no_engine() -> None:
     assert engine_of(pd.DataFrame()) is engine_of("rows.csv") is None
     assert engine_of(pa.table({})) is None
+
+
+def test_predictions_of_two_models_stand_in_one_query(
+    frame_of: Frame, engine: str
+) -> None:
+    table = rows_of().drop(["note"])
+    tree = quietly_learnt(table)
+    rules = ft.rules_from_tree(tree, "raw")
+    first = ft.predict(frame_of(table), tree)
+    titles = {name: f"tree {name}" for name in ADDED}
+    if engine == "duckdb":
+        pairs = ", ".join(f'"{a}" AS "{b}"' for a, b in titles.items())
+        first = first.project(f"* RENAME ({pairs})")
+    elif engine == "ibis":
+        first = first.rename({b: a for a, b in titles.items()})
+    else:
+        first = first.rename(titles)
+    got = collected(ft.predict(first, rules))
+    assert got["tree rule"].to_pylist() == ft.run(tree, table).rule.tolist()
+    assert got["rule"].to_pylist() == ft.run(rules, table).rule.tolist()
