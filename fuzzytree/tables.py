@@ -1219,7 +1219,7 @@ def _record_batches(
     stream.seek(-len(_ARROW), io.SEEK_CUR)
     if is_arrow:
         schema = pa.ipc.open_file(stream).schema
-        return schema, _slices(stream, _wanted(name, schema, only))
+        return schema, _slices(stream, schema, _wanted(name, schema, only))
     # A row group may be as large as the file: columns are read bit by bit.
     parquet = pq.ParquetFile(stream, pre_buffer=False, buffer_size=_BUFFER)
     schema = parquet.schema_arrow
@@ -1233,27 +1233,49 @@ def _wanted(name: str, schema: pa.Schema, only: Only) -> list[int]:
     return [k for k, column in columns if only is None or column in only]
 
 
-def _slices(stream: BinaryIO, wanted: list[int]) -> Iterator[pa.RecordBatch]:
-    """Yield some columns of an Arrow file, which is mapped into memory if it can be.
+def _slices(
+    stream: BinaryIO, schema: pa.Schema, wanted: list[int]
+) -> Iterator[pa.RecordBatch]:
+    """Yield some columns of an Arrow file.
 
-    A batch may be as large as the file: what has been read of it is given back.
+    A batch may be as large as the file. Where it is not compressed, it is mapped into
+    memory, and the memory of what has been read is given back.
     """
     import pyarrow as pa
 
-    options = pa.ipc.IpcReadOptions(included_fields=wanted or [0])
     mapped: mmap.mmap | None = None
+    file: pa.RecordBatchFileReader | None = None
     with contextlib.suppress(OSError):  # a stream in memory, or of an object store
         mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-    source = stream if mapped is None else pa.py_buffer(mapped)
-    file = pa.ipc.open_file(source, options=options)
-    rows, unreturned = _piece_rows(len(wanted)), 0
+        file = _uncopied(pa.py_buffer(mapped))
+    if file is None:
+        options = pa.ipc.IpcReadOptions(included_fields=wanted or [0])
+        mapped, file = None, pa.ipc.open_file(stream, options=options)
+    names = [schema.names[k] for k in wanted]
+    rows, count = _piece_rows(len(wanted)), 0
     for number in range(file.num_record_batches):
-        batch = file.get_batch(number)
+        batch = file.get_batch(number).select(names)
         for first in range(0, batch.num_rows, rows):
             yield batch.slice(first, rows)
-            unreturned += 1
-            if mapped is not None and unreturned % _UNRETURNED == 0:
+            count += 1
+            if mapped is None or count % _UNRETURNED:
+                continue
+            if hasattr(mmap, "MADV_DONTNEED"):
                 mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def _uncopied(buffer: pa.Buffer) -> pa.RecordBatchFileReader | None:
+    """Return an Arrow file whose cells are read where they lie, None if they are not.
+
+    Options that choose columns, or a compression, would have them copied.
+    """
+    import pyarrow as pa
+
+    file = pa.ipc.open_file(buffer)
+    columns = file.get_batch(0).columns if file.num_record_batches else []
+    parts = [part for column in columns for part in column.buffers() if part]
+    offsets = [part.address - buffer.address for part in parts]
+    return file if all(0 <= offset < buffer.size for offset in offsets) else None
 
 
 def _piece_rows(columns: int) -> int:

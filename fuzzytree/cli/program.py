@@ -11,7 +11,9 @@ import difflib
 import importlib
 import io
 import os
+import signal
 import sys
+import threading
 from collections.abc import Generator, Mapping, Sequence
 from types import MappingProxyType
 
@@ -141,9 +143,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _interruptible() -> Generator[None]:
     """Report a Ctrl-C as one, although an interrupted library raised another error.
 
-    An extension module that is being imported does so.
+    An extension module that is being imported does so. SIGTERM is a Ctrl-C too.
     """
-    with noticed() as check:
+    is_main = threading.current_thread() is threading.main_thread()
+    with noticed() as check, contextlib.ExitStack() as stack:
+        if is_main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+            signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+            stack.callback(signal.signal, signal.SIGTERM, signal.SIG_DFL)
         try:
             yield
         except (FuzzyTreeError, click.ClickException, click.exceptions.Exit):
