@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from fuzzytree.tables import Batch
 
 Columns = dict[str, Sequence[object]]
-Finished: TypeAlias = (
+RunPart: TypeAlias = (
     "tuple[Batch, Predictions | Outputs, bytes, bytes | pa.Table]"  # head and rows
 )
 
@@ -105,8 +105,9 @@ def command(options: RunOptions) -> None:
     """Predict the rows of TABLE: a class, a rule number and a status for each.
 
     A fuzzy system predicts a number for each output, and a status. MODEL is a readable
-    file or ONNX; TABLE is CSV or Parquet, or `-` for standard input. Columns are
-    matched by name. Rule numbers count from 1; 0 is no rule.
+    file or ONNX; TABLE is a file, a folder or a pattern of files of CSV, Parquet or
+    Arrow, or `-` for standard input. Columns are matched by name. Rule numbers count
+    from 1; 0 is no rule.
     """
     from fuzzytree import api
 
@@ -139,7 +140,7 @@ def command(options: RunOptions) -> None:
         )
     source = table_source(options.table, options.delimiter)
     name = "standard input" if options.table == "-" else options.table
-    finish = _finishing(options, name, reason, is_binary=bool(binary))
+    finish = _part_maker(options, name, reason, is_binary=bool(binary))
     tally, begin = _Tally(_has_status(found)), time.monotonic()
     is_mixed = options.output == "-" and sys.stdout.isatty()
     with (
@@ -150,24 +151,24 @@ def command(options: RunOptions) -> None:
             answer(source, finish, name=name, with_others=options.keep)
         ) as parts,
     ):
-        for batch, answers, head, rows in parts:
+        for number, (batch, answers, head, rows) in enumerate(parts):
             if isinstance(rows, bytes):
-                stream.write(rows if tally.rows else head + rows)
+                stream.write(rows if number else head + rows)
             else:
                 write(rows, batch.piece.name)
             tally.add(batch, answers)
-            rate = tally.rows / (time.monotonic() - begin)
+            rate = tally.rows / max(time.monotonic() - begin, 1e-3)
             show(f"{tally.rows:,} rows, {rate:,.0f} rows/s", None)
     tally.report(options.output, quiet=options.quiet)
 
 
-def _finishing(
+def _part_maker(
     options: RunOptions,
     name: str,
     reason: Callable[[Batch, Predictions | Outputs], list[str]] | None,
     *,
     is_binary: bool,
-) -> Callable[[Batch, Predictions | Outputs], Finished]:
+) -> Callable[[Batch, Predictions | Outputs], RunPart]:
     """Return a function that makes what is written of the rows of a batch."""
 
     def lines(columns: Columns) -> list[str]:
@@ -179,7 +180,7 @@ def _finishing(
         names = [] if options.as_json else _csv_lines([[*columns]], options.safe_csv)
         return "".join(names).encode()
 
-    def finish(batch: Batch, answers: Predictions | Outputs) -> Finished:
+    def finish(batch: Batch, answers: Predictions | Outputs) -> RunPart:
         from fuzzytree.runtimes import Predictions
 
         is_short = not (options.keep or options.strengths or reason)
