@@ -147,9 +147,10 @@ def _appearing(target: Path, mode: int | None, *, replace: bool) -> Generator[Bi
     if mode is not None and not os.access(target, os.W_OK):
         raise PermissionError(None, "it is write-protected")
     _remove_leftovers(target)
-    temporary, file = _new_part(target)
-    try:
-        with file:
+    part = f"{_part_prefix(target)}{secrets.token_hex(8)}.part"
+    temporary = target.with_name(part)
+    try:  # from here on: a Ctrl-C may come as soon as the file is there
+        with _new_part(temporary) as file:
             if mode is not None:
                 temporary.chmod(stat.S_IMODE(mode))
             yield file
@@ -164,18 +165,15 @@ def _appearing(target: Path, mode: int | None, *, replace: bool) -> Generator[Bi
         raise
 
 
-def _new_part(target: Path) -> tuple[Path, BinaryIO]:
-    """Open a new file beside the target, locked for as long as it is open."""
+def _new_part(temporary: Path) -> BinaryIO:
+    """Open a new file, locked for as long as it is open."""
     while True:
-        temporary = target.with_name(
-            f"{_part_prefix(target)}{secrets.token_hex(8)}.part"
-        )
         # Created with 0o666, so that the kernel applies the user's mask.
         handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         with contextlib.suppress(OSError):  # a file system without locks
             _lock(handle)
         if os.fstat(handle).st_nlink or os.name == "nt":
-            return temporary, os.fdopen(handle, "wb")
+            return os.fdopen(handle, "wb")
         os.close(handle)  # another process took it for a leftover before the lock
 
 

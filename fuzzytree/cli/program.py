@@ -22,7 +22,7 @@ import click
 from fuzzytree.cli.console import say
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
-from fuzzytree.model import noticed
+from fuzzytree.model import noticed, watched
 
 VERBS: Mapping[str, str] = MappingProxyType(
     {
@@ -146,7 +146,7 @@ def _interruptible() -> Generator[None]:
     An extension module that is being imported does so. SIGTERM is a Ctrl-C too.
     """
     is_main = threading.current_thread() is threading.main_thread()
-    with noticed() as check, contextlib.ExitStack() as stack:
+    with noticed() as check, watched(check), contextlib.ExitStack() as stack:
         if is_main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
             signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
             stack.callback(signal.signal, signal.SIGTERM, signal.SIG_DFL)

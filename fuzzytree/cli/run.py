@@ -28,7 +28,13 @@ from fuzzytree.cli.console import (
 )
 from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
-from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase, printable_json
+from fuzzytree.model import (
+    FuzzySystem,
+    FuzzyTree,
+    RuleBase,
+    checkpoint,
+    printable_json,
+)
 from fuzzytree.semantics import rules_from_tree
 
 if TYPE_CHECKING:
@@ -152,6 +158,7 @@ def command(options: RunOptions) -> None:
         ) as parts,
     ):
         for number, (batch, answers, head, rows) in enumerate(parts):
+            checkpoint()
             if isinstance(rows, bytes):
                 stream.write(rows if number else head + rows)
             else:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -280,7 +280,7 @@ def test_progress_reports_rows_and_their_rate(
     shown: list[tuple[str, float | None]] = []
 
     @contextmanager
-    def bar(*, quiet: bool) -> Iterator[Callable[[str, float | None], None]]:
+    def bar(*, quiet: bool) -> Generator[Callable[[str, float | None], None]]:
         yield lambda text, share: None if quiet else shown.append((text, share))
 
     monkeypatch.setattr(run, "progress_bar", bar)
