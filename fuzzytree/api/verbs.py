@@ -118,9 +118,9 @@ def learn(
     chosen, engine = settings or learning.LearningSettings(), engine_of(table)
     result: Table | learning.Learner
     if engine is not None:
-        from fuzzytree.api.engines.core import collected
+        from fuzzytree.api.engines.core import collect_frame
 
-        result = collected(table, engine, target, ignore=ignore, settings=chosen)
+        result = collect_frame(table, engine, target, ignore=ignore, settings=chosen)
     else:
         result = learning.read_or_collect(
             table, target=target, ignore=ignore, settings=chosen, progress=progress
@@ -215,9 +215,9 @@ def predict(frame: Frame, model: ModelSource) -> Frame:
         >>> predict(frame, tree)["class"].tolist()
         ['s', 's', 'b']
     """
-    from fuzzytree.api.engines.core import Answer, predicted
+    from fuzzytree.api.engines.core import Predictor, predict_frame
 
-    return cast("Frame", predicted(frame, Answer(_model_of(model, "predict"))))
+    return cast("Frame", predict_frame(frame, Predictor(_model_of(model, "predict"))))
 
 
 def rules_from_tree(

@@ -1,9 +1,9 @@
 """What the adapters of all engines share, and what calls them.
 
 A `Fold` makes the state of a partition, `merge_states` makes one state of several, and
-an `Answer` predicts a batch of rows. All of them are pickled and sent to the workers of
-an engine. An adapter has two functions: `states`, which returns the states of a frame,
-and `answered`, which returns a lazy frame with the columns of an `Answer` as well.
+a `Predictor` predicts a batch of rows. All are pickled and sent to the workers of an
+engine. An adapter has two functions: `states` returns the states of a frame, and
+`predictions` a lazy frame with the columns of a `Predictor` beside its own.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def merge_states(states: Iterable[bytes]) -> bytes:
     return merged.to_bytes() if merged else b""
 
 
-def collected(
+def collect_frame(
     frame: object,
     engine: Engine,
     target: object,
@@ -164,7 +164,7 @@ def collected(
     return Learner.from_bytes(state, name="the table", settings=fold.settings)
 
 
-class Answer:
+class Predictor:
     """Predicts batches of rows; workers call it.
 
     Args:
@@ -190,9 +190,9 @@ class Answer:
             ]
         )
 
-    def __reduce__(self) -> tuple[type[Answer], tuple[Model]]:
+    def __reduce__(self) -> tuple[type[Predictor], tuple[Model]]:
         """Leave out what each process prepares for itself."""
-        return Answer, (self.model,)
+        return Predictor, (self.model,)
 
     @cached_property
     def _ready(self) -> Any:
@@ -240,7 +240,7 @@ class Answer:
         return pa.RecordBatch.from_arrays(columns, schema=self.schema)
 
 
-def predicted(frame: object, answer: Answer) -> object:
+def predict_frame(frame: object, predictor: Predictor) -> object:
     """Return a frame of the same kind with the predictions beside its columns.
 
     A lazy frame comes back lazy, and nothing of it is computed yet.
@@ -258,15 +258,15 @@ def predicted(frame: object, answer: Answer) -> object:
     names = _names_of(frame)
     is_blind = engine is not None and engine.ignores_case
     taken = {name.lower() if is_blind else name: name for name in names}
-    clashes = [taken[name] for name in answer.schema.names if name in taken]
+    clashes = [taken[name] for name in predictor.schema.names if name in taken]
     if clashes:
         raise TableError(
             f"the table has a column {clashes[0]!r} of its own, and predict adds one "
             "of this name; rename the column"
         )
-    answer.predictions(_without_rows(names))  # are all inputs there?
+    predictor.predictions(_without_rows(names))  # are all inputs there?
     if engine is not None:
-        return engine.load().answered(frame, answer, answer.schema)
-    added = pa.Table.from_batches([answer.predictions(frame)])
+        return engine.load().predictions(frame, predictor, predictor.schema)
+    added = pa.Table.from_batches([predictor.predictions(frame)])
     more = nw.from_arrow(added, backend=eager.implementation)
     return eager.with_columns(*(more[name] for name in more.columns)).to_native()

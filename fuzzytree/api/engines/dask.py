@@ -10,7 +10,7 @@ from dask.base import compute
 from dask.dataframe.dispatch import make_meta
 from dask.delayed import delayed
 
-from fuzzytree.api.engines.core import Answer, Fold, merge_states
+from fuzzytree.api.engines.core import Fold, Predictor, merge_states
 
 if TYPE_CHECKING:
     from dask.dataframe import DataFrame
@@ -33,7 +33,7 @@ def states(frame: DataFrame, fold: Fold) -> list[bytes]:
     return [*compute(*result)]
 
 
-def answered(frame: DataFrame, answer: Answer, schema: pa.Schema) -> DataFrame:
+def predictions(frame: DataFrame, predictor: Predictor, schema: pa.Schema) -> DataFrame:
     """Return the frame with the predictions beside its columns; nothing runs yet.
 
     The class of numbers or booleans has a pandas type that may be missing.
@@ -41,7 +41,7 @@ def answered(frame: DataFrame, answer: Answer, schema: pa.Schema) -> DataFrame:
     types = {pa.int64(): pd.Int64Dtype(), pa.bool_(): pd.BooleanDtype()}
 
     def predicted(part: pd.DataFrame) -> pd.DataFrame:
-        more = answer.predictions(part).to_pandas(types_mapper=types.get)
+        more = predictor.predictions(part).to_pandas(types_mapper=types.get)
         return part.assign(**{name: more[name].array for name in schema.names})
 
     return frame.map_partitions(predicted, meta=predicted(make_meta(frame)))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from duckdb import DuckDBPyRelation
 
-    from fuzzytree.api.engines.core import Answer, Fold
+    from fuzzytree.api.engines.core import Fold, Predictor
 
 _ROWS: Final = 1 << 16
 """How many rows a record batch has at most."""
@@ -36,8 +36,8 @@ def states(frame: DuckDBPyRelation, fold: Fold) -> list[bytes]:
     return [fold(chosen.to_arrow_reader(_ROWS), "the table")]
 
 
-def answered(
-    frame: DuckDBPyRelation, answer: Answer, schema: pa.Schema
+def predictions(
+    frame: DuckDBPyRelation, predictor: Predictor, schema: pa.Schema
 ) -> DuckDBPyRelation:
     """Return the relation with the predictions beside its columns.
 
@@ -51,12 +51,15 @@ def answered(
         else None
         for name, kind in zip(frame.columns, frame.types, strict=True)
     }
-    query = prediction_query("fuzzytree_rows", numbers, answer, schema)
+    query = prediction_query("fuzzytree_rows", numbers, predictor, schema)
     return cast("DuckDBPyRelation", frame.query("fuzzytree_rows", query))
 
 
 def prediction_query(
-    table: str, numbers: Mapping[str, bool | None], answer: Answer, schema: pa.Schema
+    table: str,
+    numbers: Mapping[str, bool | None],
+    predictor: Predictor,
+    schema: pa.Schema,
 ) -> str:
     """Return the query that adds the predictions to the columns of a table.
 
@@ -64,7 +67,7 @@ def prediction_query(
         table: The name of the table.
         numbers: Its columns: whether a number may have more digits than a double; None
             for a column of anything else.
-        answer: The model.
+        predictor: The model.
         schema: The columns that are added.
 
     Raises:
@@ -75,7 +78,7 @@ def prediction_query(
     for place, (name, is_long) in enumerate(numbers.items(), 1):
         cell, title = _quoted(name), name.strip() or f"column {place}"
         columns.append(f'{cell} AS "kept {place}"')
-        if title not in answer.inputs:
+        if title not in predictor.inputs:
             continue
         if is_long is None:
             raise TableError(
@@ -85,7 +88,7 @@ def prediction_query(
         # an engine may not round to the nearest double, unless it reads a text
         text = f"CAST({cell} AS VARCHAR)" if is_long else cell
         columns.append(f"CAST({text} AS DOUBLE) AS {_quoted(title)}")
-    model = answer.model
+    model = predictor.model
     rules = () if isinstance(model, FuzzyTree) else range(1, len(model.rules) + 1)
     written = export(
         model,

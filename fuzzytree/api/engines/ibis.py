@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from ibis.expr.types import Table
 
-    from fuzzytree.api.engines.core import Answer, Fold
+    from fuzzytree.api.engines.core import Fold, Predictor
 
 _NUMBERS = itertools.count(1)  # a name of its own for each table in a query
 
@@ -34,7 +34,7 @@ def states(frame: Table, fold: Fold) -> list[bytes]:
     return duckdb.states(backend.con.sql(str(ibis.to_sql(chosen))), fold)
 
 
-def answered(frame: Table, answer: Answer, schema: pa.Schema) -> Table:
+def predictions(frame: Table, predictor: Predictor, schema: pa.Schema) -> Table:
     """Return the table with the predictions beside its columns.
 
     Raises:
@@ -47,7 +47,7 @@ def answered(frame: Table, answer: Answer, schema: pa.Schema) -> Table:
         for name, kind in before.items()
     }
     rows: Any = frame.alias(f"fuzzytree_rows_{next(_NUMBERS)}")
-    query = duckdb.prediction_query(rows.get_name(), numbers, answer, schema)
+    query = duckdb.prediction_query(rows.get_name(), numbers, predictor, schema)
     backend: Any = ibis.get_backend(frame)
     [text] = sqlglot.transpile(query, read="duckdb", write=backend.dialect)
     after = ibis.schema({**before, **ibis.Schema.from_pyarrow(schema)})

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from fuzzytree.api.engines.core import Answer, Fold
+    from fuzzytree.api.engines.core import Fold, Predictor
 
 
 def states(frame: pl.LazyFrame, fold: Fold) -> list[bytes]:
@@ -26,15 +26,17 @@ def states(frame: pl.LazyFrame, fold: Fold) -> list[bytes]:
     return [fold(rows(), "the table")]
 
 
-def answered(frame: pl.LazyFrame, answer: Answer, schema: pa.Schema) -> pl.LazyFrame:
+def predictions(
+    frame: pl.LazyFrame, predictor: Predictor, schema: pa.Schema
+) -> pl.LazyFrame:
     """Return the frame with the predictions beside its columns."""
     added = pl.DataFrame(schema.empty_table()).schema
 
     def predict(rows: pl.Series) -> pl.Series:
         table = rows.struct.unnest().to_arrow()
-        return pl.DataFrame(answer.predictions(table)).to_struct()
+        return pl.DataFrame(predictor.predictions(table)).to_struct()
 
     names = frame.collect_schema().names()
-    inputs = [name for name in names if name.strip() in answer.inputs] or names[:1]
+    inputs = [name for name in names if name.strip() in predictor.inputs] or names[:1]
     rows = pl.struct(inputs).map_batches(predict, pl.Struct(added), is_elementwise=True)
     return frame.with_columns(rows.alias("class")).unnest("class")

@@ -11,7 +11,7 @@ from pyspark import TaskContext
 from pyspark.sql.pandas.types import from_arrow_schema
 from pyspark.sql.types import StructType
 
-from fuzzytree.api.engines.core import Answer, Fold, merge_states
+from fuzzytree.api.engines.core import Fold, Predictor, merge_states
 
 if TYPE_CHECKING:
     from pyspark.sql import DataFrame
@@ -51,12 +51,12 @@ def states(frame: DataFrame, fold: Fold) -> list[bytes]:
     return [bytes(row["state"]) for row in result.collect()]
 
 
-def answered(frame: DataFrame, answer: Answer, schema: pa.Schema) -> DataFrame:
+def predictions(frame: DataFrame, predictor: Predictor, schema: pa.Schema) -> DataFrame:
     """Return the frame with the predictions beside its columns; nothing runs yet."""
     names = frame.columns
 
     def predicted(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
-        return (answer(batch.rename_columns(names)) for batch in batches)
+        return (predictor(batch.rename_columns(names)) for batch in batches)
 
     numbered = frame.toDF(*(f"c{number}" for number in range(len(names))))
     fields = [*frame.schema, *from_arrow_schema(schema)]

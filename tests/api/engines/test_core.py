@@ -13,7 +13,7 @@ import pyarrow as pa
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.api.engines.core import Answer, Fold, merge_states
+from fuzzytree.api.engines.core import Fold, Predictor, merge_states
 from fuzzytree.errors import TableError
 from fuzzytree.learning import Learner
 from fuzzytree.model import fingerprint
@@ -112,9 +112,9 @@ def test_rows_without_a_rule_have_no_strength() -> None:
     table = wine().head(2).astype({"proline": float})
     table.loc[1, [*tree.inputs]] = np.nan
     batch = pa.RecordBatch.from_pandas(table, preserve_index=False)
-    answer = pickle.loads(pickle.dumps(Answer(tree)))
-    last = answer(batch).to_pylist()[1]
-    named = {name: last[name] for name in answer.schema.names}
+    predictor = pickle.loads(pickle.dumps(Predictor(tree)))
+    last = predictor(batch).to_pylist()[1]
+    named = {name: last[name] for name in predictor.schema.names}
     assert named == {"class": None, "rule": 0, "status": "missing", "strength": None}
 
 
@@ -126,8 +126,8 @@ def test_the_classes_have_the_type_of_the_labels(
     labels: list[object], kind: pa.DataType
 ) -> None:
     table = pd.DataFrame({"cm": [1.0, 7.0] * 3, "size": labels * 3})
-    answer = Answer(ft.learn(table, target="size"))
-    got = answer(pa.RecordBatch.from_pandas(table, preserve_index=False))
+    predictor = Predictor(ft.learn(table, target="size"))
+    got = predictor(pa.RecordBatch.from_pandas(table, preserve_index=False))
     assert got.schema.field("class").type == kind
     assert got.column("class").to_pylist() == labels * 3
 
