@@ -216,9 +216,11 @@ def _caller(
         for name in names
     ]
 
-    def run_some(values: FloatArray) -> Outputs:
+    def run(values: FloatArray) -> Outputs:
+        rows = values.shape[1]
+        if rows > size:
+            return in_chunks(values)
         table = tabulated(values)
-        rows = len(table)
         try:
             arrays = bare(names, {"inputs": table})
         except exporters.RUNTIME_ERRORS as error:
@@ -231,17 +233,15 @@ def _caller(
                 raise LossError(
                     f"{facts.name}: the ONNX file gives answers without meaning"
                 )
-            outputs[name] = array.T
+            outputs[name] = array.T if width else array
         return outputs
 
-    def run(values: FloatArray) -> Outputs:
+    def in_chunks(values: FloatArray) -> Outputs:
         count = values.shape[1]
-        if count <= size:
-            return run_some(values)
         outputs = {name: np.empty((*w, count), kind) for name, w, kind, _ in results}
         for start in range(0, count, size):
             part = slice(start, start + size)
-            for name, array in run_some(values[:, part]).items():
+            for name, array in run(values[:, part]).items():
                 outputs[name][..., part] = array
         return outputs
 
@@ -286,7 +286,7 @@ def _outcome(outputs: Outputs, values: FloatArray) -> Outcome:
     rule, status = outputs["rule"], outputs.get("status")
     if status is None:
         status = np.zeros(len(rule), np.int64)
-        if np.count_nonzero(rule) < len(rule):
+        if not (rule.item() if len(rule) == 1 else rule.all()):
             none = np.where(np.isfinite(values).all(axis=0), 2, 3)
             status = np.where(rule > 0, 0, none)
     return Outcome(rule, status, outputs.get("strengths"))
@@ -341,7 +341,7 @@ def _rows_at_once(facts: Facts) -> int:
 def _tabulator(facts: Facts) -> Callable[[FloatArray], npt.NDArray[np.generic]]:
     """Return what makes values of shape (inputs, rows) the graph's input."""
     width, is_single = len(facts.columns), facts.dtype == "float32"
-    kind = np.float32 if is_single else np.float64
+    kind = np.dtype(np.float32 if is_single else np.float64)
     places = [facts.columns.index(name) for name in facts.inputs]
     is_whole, at = places == [*range(width)], np.array(places, np.int64)
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import onnx
@@ -276,6 +276,42 @@ def test_a_file_without_status_separates_missing_from_uncovered() -> None:
     )
     result = open_onnx(write_onnx(rules).content, "r.onnx")
     assert result.run(np.array([[-1.0, 1.0, np.nan]])).status.tolist() == [0, 2, 3]
+
+
+OUTPUTS: tuple[tuple[Output, ...], ...] = (
+    ("rule",),
+    ("label", "rule"),
+    ("rule", "status"),
+    ("label", "rule", "status"),
+)
+
+
+@pytest.mark.parametrize("signature", ["needed", "all"])
+@pytest.mark.parametrize("outputs", OUTPUTS, ids="+".join)
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_one_row_of_a_file_has_the_bits_of_many(
+    dtype: Dtype, outputs: tuple[Output, ...], signature: Literal["needed", "all"]
+) -> None:
+    tree = random_tree(7, leaves=9, inputs=3)
+    values = probe_values(tree, 60)
+    rows = range(values.shape[1])
+    values[0, ::5], values[1, 1::7], values[2, 2::9] = np.nan, np.inf, -1e300
+    for model in (tree, rules_from_tree(tree, "raw")):
+        all_outputs = outputs if model is tree else (*outputs, "strengths")
+        content = write_onnx(
+            model, dtype=dtype, outputs=all_outputs, signature=signature
+        ).content
+        file = open_onnx(content, "model.onnx")
+        many = file.run(values)
+        for row in rows:
+            assert_equal_bits(
+                file.run(values[:, [row]]), many.part(slice(row, row + 1))
+            )
+        if file.run_labelled is not None:
+            outcome, labels = file.run_labelled(values)
+            assert_equal_bits(outcome, many)
+            ones = [file.run_labelled(values[:, [row]])[1] for row in rows]
+            assert labels == tuple(label for one in ones for label in one)
 
 
 def _other_graph() -> bytes:
