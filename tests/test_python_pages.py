@@ -9,13 +9,17 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 NEEDED = {
+    "duckdb.md": ("duckdb",),
     "fuzzy-libraries.md": ("skfuzzy", "simpful"),
+    "ibis.md": ("ibis",),
     "notebook.md": ("matplotlib", "pandas"),
     "parts.md": ("pandas",),
+    "polars.md": ("polars",),
 }
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning:skfuzzy")
+@pytest.mark.filterwarnings("ignore:fetch_arrow_table:DeprecationWarning")
 @pytest.mark.parametrize("page", NEEDED)
 def test_each_example_prints_what_stands_below_it(
     page: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
