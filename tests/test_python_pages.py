@@ -27,6 +27,11 @@ def test_each_example_prints_what_stands_below_it(
     for module in NEEDED[page]:
         pytest.importorskip(module)
     monkeypatch.chdir(ROOT)
+    run_page(page, capsys)
+
+
+def run_page(page: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Run the examples of a page and compare what they print."""
     text = next((ROOT / "docs").rglob(page)).read_text("utf-8")
     blocks = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, re.DOTALL)
     names: dict[str, object] = {}

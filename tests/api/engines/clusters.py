@@ -107,17 +107,25 @@ def _spark_home(folder: Path) -> Iterator[pytest.MonkeyPatch]:
 @contextlib.contextmanager
 def spark_cluster(folder: Path) -> Iterator[Any]:
     """Yield a session of Spark with a driver and two worker processes."""
-    from pyspark import SparkContext
     from pyspark.sql import SparkSession
+
+    with spark_driver(folder):
+        builder: Any = SparkSession.builder
+        session = builder.master("local-cluster[2,1,1024]").getOrCreate()
+        try:
+            yield session
+        finally:
+            session.stop()
+
+
+@contextlib.contextmanager
+def spark_driver(folder: Path) -> Iterator[None]:
+    """Stop the virtual machine that drives the Spark that starts inside."""
+    from pyspark import SparkContext
 
     with _spark_home(folder):
         try:
-            builder: Any = SparkSession.builder
-            session = builder.master("local-cluster[2,1,1024]").getOrCreate()
-            try:
-                yield session
-            finally:
-                session.stop()
+            yield
         finally:
             gateway: Any = SparkContext._gateway
             if gateway is not None:
@@ -166,7 +174,7 @@ def dask_cluster(folder: Path) -> Iterator[Any]:
         patch.chdir(folder)
         with (
             distributed.LocalCluster(
-                n_workers=2, threads_per_worker=1, dashboard_address=None
+                n_workers=2, threads_per_worker=1, dashboard_address=":0"
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
