@@ -12,6 +12,7 @@ NEEDED = {
     "duckdb.md": ("duckdb",),
     "fuzzy-libraries.md": ("skfuzzy", "simpful"),
     "ibis.md": ("ibis",),
+    "large-tables.md": ("pandas",),
     "notebook.md": ("matplotlib", "pandas"),
     "parts.md": ("pandas",),
     "polars.md": ("polars",),
