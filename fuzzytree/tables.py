@@ -493,46 +493,21 @@ def batches(
             different lengths.
         TypeError: If the source is no table.
     """
-    for prepare in batch_steps(
-        source,
-        inputs,
-        trained=trained,
-        columns=columns,
-        delimiter=delimiter,
-        name=name,
-        with_others=with_others,
-    ):
-        yield prepare()
-
-
-def batch_steps(
-    source: object,
-    inputs: Sequence[str],
-    *,
-    trained: Sequence[str] = (),
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
-    name: str | None = None,
-    with_others: bool = False,
-) -> Iterator[Callable[[], Batch]]:
-    """Yield for each batch of `batches` a function that returns it, in any thread."""
     inputs, trained = ([c.strip() for c in names] for names in (inputs, trained))
     _refuse_repeated("the model", inputs)
     only = None if with_others else frozenset(inputs)
-    result = pieces(source, columns=columns, delimiter=delimiter, name=name, only=only)
-    first = next(result)
-    chosen = _needed_columns(first, inputs, trained)
-    for piece in itertools.chain([first], result):
-        yield functools.partial(_batch, piece, inputs, chosen)
-
-
-def _batch(piece: TablePiece, inputs: list[str], chosen: Sequence[int]) -> Batch:
-    numbers = _Numbers(piece.name, inputs)
-    numbers.add(piece, chosen)
-    if numbers.faults:
-        raise TableError(numbers.fault_text())
-    extras = len(piece.columns) - len(chosen)
-    return Batch(numbers.joined(), numbers.missing, extras, piece)
+    chosen: list[int] | None = None
+    for piece in pieces(
+        source, columns=columns, delimiter=delimiter, name=name, only=only
+    ):
+        if chosen is None:
+            chosen = _needed_columns(piece, inputs, trained)
+        numbers = _Numbers(piece.name, list(inputs))
+        numbers.add(piece, chosen)
+        if numbers.faults:
+            raise TableError(numbers.fault_text())
+        extras = len(piece.columns) - len(chosen)
+        yield Batch(numbers.joined(), numbers.missing, extras, piece)
 
 
 def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:

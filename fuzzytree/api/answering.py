@@ -40,7 +40,7 @@ from fuzzytree.runtimes import (
     open_onnx,
     predictions_of,
 )
-from fuzzytree.tables import Batch, batch_steps, in_order
+from fuzzytree.tables import Batch, batches, in_order
 
 T = TypeVar("T")
 
@@ -174,8 +174,7 @@ class Answering(msgspec.Struct, frozen=True):
         """
         turn = contextlib.nullcontext() if self.is_parallel else threading.Lock()
 
-        def answered(prepare: Callable[[], Batch]) -> T:
-            batch = prepare()
+        def answered(batch: Batch) -> T:
             rows = batch.values.shape[1]
             size = math.ceil(rows / max(math.ceil(rows / _BLOCK), 1)) or 1
             starts = range(0, max(rows, 1), size)
@@ -185,7 +184,7 @@ class Answering(msgspec.Struct, frozen=True):
                 result = [*over(self.answer, blocks)]
             return finish(batch, result[0] if len(result) == 1 else joined(result))
 
-        steps = batch_steps(
+        parts = batches(
             table,
             self.inputs,
             trained=self.trained,
@@ -193,7 +192,7 @@ class Answering(msgspec.Struct, frozen=True):
             name=name,
             with_others=with_others,
         )
-        return in_order(answered, steps)
+        return in_order(answered, parts)
 
 
 def prepare_answering(

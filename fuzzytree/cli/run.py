@@ -50,12 +50,7 @@ RunPart: TypeAlias = (
 )
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a cell begins
-_BINARY = {
-    ".parquet": "a Parquet file",
-    ".pq": "a Parquet file",
-    ".arrow": "an Arrow file",
-    ".feather": "an Arrow file",
-}
+_BINARY = (".parquet", ".pq", ".arrow", ".feather")  # files that are no text
 _GROUP = 1 << 26  # bytes of rows that a binary file gets at a time
 
 
@@ -117,15 +112,13 @@ def command(options: RunOptions) -> None:
     """
     from fuzzytree import api
 
-    binary = _BINARY.get(Path(options.output).suffix.lower(), "")
-    for is_set, flag, what in (
-        (options.as_json, "--json", "JSON lines"),
-        (options.safe_csv, "--safe-csv", "CSV"),
-    ):
-        if is_set and binary:
-            raise click.UsageError(
-                f"{flag} is about {what}, and {options.output} is {binary}"
-            )
+    suffix = Path(options.output).suffix.lower()
+    is_binary = suffix in _BINARY
+    if is_binary and (options.as_json or options.safe_csv):
+        flag = "--json" if options.as_json else "--safe-csv"
+        raise click.UsageError(
+            f"{flag} is about text, and {options.output} is a binary file"
+        )
     if options.as_json and options.safe_csv:
         raise click.UsageError("--safe-csv is about CSV, and --json writes none")
     found = api.opened(options.model, allow_loss=options.allow_loss)
@@ -146,12 +139,12 @@ def command(options: RunOptions) -> None:
         )
     source = table_source(options.table, options.delimiter)
     name = "standard input" if options.table == "-" else options.table
-    finish = _part_maker(options, name, reason, is_binary=bool(binary))
+    finish = _part_maker(options, name, reason, is_binary=is_binary)
     tally, begin = _Tally(_has_status(found)), time.monotonic()
     is_mixed = options.output == "-" and sys.stdout.isatty()
     with (
         _opened(options.output) as stream,
-        _table_writer(stream, binary) as write,
+        _table_writer(stream, suffix) as write,
         progress_bar(quiet=options.quiet or is_mixed) as show,
         contextlib.closing(
             answer(source, finish, name=name, with_others=options.keep)
@@ -230,23 +223,19 @@ def _answered(
 ) -> Columns:
     from fuzzytree.runtimes import Outputs
 
+    columns: Any = answers.to_arrow if as_arrow else answers.columns
     try:
         if isinstance(answers, Outputs):
-            is_weighed = options.strengths is not None
-            if not as_arrow:
-                return answers.columns(with_activations=is_weighed)
-            table = answers.to_arrow(with_activations=is_weighed)
-        elif not as_arrow:
-            return answers.columns(options.strengths)
+            result = columns(with_activations=options.strengths is not None)
         else:
-            table = answers.to_arrow(options.strengths)
+            result = columns(options.strengths)
     except ValueError as error:
         raise click.UsageError(
             f"--strengths {options.strengths}: {options.model} does not report them; "
             "export it with --outputs label,rule,status,strengths, "
             "or run the YAML file"
         ) from error
-    return dict(zip(table.column_names, table.columns, strict=True))
+    return {name: result[name] for name in result.column_names} if as_arrow else result
 
 
 def _kept(batch: Batch, *, as_arrow: bool) -> Columns:
@@ -314,43 +303,34 @@ def _opened(output: str) -> Generator[BinaryIO]:
 
 @contextlib.contextmanager
 def _table_writer(
-    stream: BinaryIO, binary: str
+    stream: BinaryIO, suffix: str
 ) -> Generator[Callable[[pa.Table, str], None]]:
     """Give a function that writes some rows, of a table with a name, to a binary file.
 
     Rows are written in groups of some 64 MB.
     """
     rows: list[pa.Table] = []
-    files: list[Any] = []
-    schemas: list[pa.Schema] = []
+    with contextlib.ExitStack() as stack:
+        files: list[tuple[Any, pa.Schema]] = []
 
-    def write(table: pa.Table, name: str) -> None:
-        if not files:
-            files.append(_new_writer(stream, table.schema, binary))
-            schemas.append(table.schema)
-        if table.schema != schemas[0]:
-            table = _cast(table, schemas[0], name)
-        rows.append(table)
-        if sum(one.nbytes for one in rows) >= _GROUP:
-            flush()
+        def write(table: pa.Table, name: str) -> None:
+            if not files:
+                file = _new_writer(stream, table.schema, suffix)
+                stack.callback(file.close)
+                files.append((file, table.schema))
+            rows.append(_cast(table, files[0][1], name))
+            if sum(one.nbytes for one in rows) >= _GROUP:
+                flush()
 
-    def flush() -> None:
-        import pyarrow as pa
+        def flush() -> None:
+            import pyarrow as pa
 
-        files[0].write_table(pa.concat_tables(rows))
-        rows.clear()
+            files[0][0].write_table(pa.concat_tables(rows))
+            rows.clear()
 
-    try:
         yield write
         if rows:
             flush()
-    except BaseException:
-        with contextlib.suppress(OSError):  # the file is thrown away
-            for file in files:
-                file.close()
-        raise
-    for file in files:
-        file.close()
 
 
 def _cast(table: pa.Table, schema: pa.Schema, name: str) -> pa.Table:
@@ -359,21 +339,18 @@ def _cast(table: pa.Table, schema: pa.Schema, name: str) -> pa.Table:
     try:
         return table.cast(schema)
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
-        pairs = zip(table.schema, schema, strict=True)
-        one, known = next((a, b) for a, b in pairs if a.type != b.type)
         raise TableError(
-            f"{name}: column {one.name!r} has the type {one.type}, and {known.type} in "
-            "the files before it; leave out --keep, or convert the column"
+            f"{name}: columns have other types than in the files before it; leave out "
+            f"--keep, or convert them: {error}"
         ) from error
 
 
-def _new_writer(stream: BinaryIO, schema: pa.Schema, binary: str) -> Any:
+def _new_writer(stream: BinaryIO, schema: pa.Schema, suffix: str) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if binary == _BINARY[".parquet"]:
-        return pq.ParquetWriter(stream, schema)
-    return pa.ipc.new_file(stream, schema)
+    is_parquet = suffix in _BINARY[:2]
+    return (pq.ParquetWriter if is_parquet else pa.ipc.new_file)(stream, schema)
 
 
 class _Lines(list[str]):

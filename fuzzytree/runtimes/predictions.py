@@ -349,24 +349,19 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         Raises:
             ValueError: If activations are requested that are not there.
         """
-        texts = [_WORDS[status] for status in self.status.tolist()]
-        rows = self._rows(with_activations=with_activations).items()
-        return {name: texts if row is None else _cells(row) for name, row in rows}
-
-    def _rows(self, *, with_activations: bool) -> dict[str, FloatArray | None]:
-        """Return the numbers of all columns; None is the column of the status."""
-        result: dict[str, FloatArray | None]
-        result = dict(zip(self.names, self.values, strict=True))
+        result: dict[str, Sequence[object]] = {
+            name: _cells(row) for name, row in zip(self.names, self.values, strict=True)
+        }
         title = "status"
         while title in result:  # an output may have that name
             title += "_"
-        result[title] = None
+        result[title] = [_WORDS[status] for status in self.status.tolist()]
         if not with_activations:
             return result
         if self.activations is None:
             raise ValueError("there are no degrees of activation; ask for them")
         for number, row in enumerate(self.activations, 1):
-            result[f"strength of rule {number}"] = row
+            result[f"strength of rule {number}"] = _cells(row)
         return result
 
     def spans(self) -> dict[str, tuple[float, float]]:
@@ -397,13 +392,12 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         """
         import pyarrow as pa
 
-        arrays = {
-            name: _arrow_status(self.status)
-            if row is None
-            else pa.array(row, from_pandas=True)
-            for name, row in self._rows(with_activations=with_activations).items()
-        }
-        return pa.table(arrays)
+        titles = self.columns(with_activations=with_activations)
+        activations = () if self.activations is None else self.activations
+        numbers = [*self.values, *activations]
+        rows = [pa.array(row, from_pandas=True) for row in numbers]  # NaN is null
+        rows.insert(len(self.names), _arrow_status(self.status))
+        return pa.table(rows[: len(titles)], [*titles])
 
     def to_pandas(self, *, with_activations: bool = False) -> pd.DataFrame:
         """Return the columns of `to_csv` as a frame of pandas; needs pandas.
