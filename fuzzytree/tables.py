@@ -21,6 +21,7 @@ import math
 import mmap
 import os
 import re
+import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
@@ -61,6 +62,7 @@ PIECE = 1 << 14
 """The most rows of a file that are handed on at a time; fewer of a wide table."""
 
 _MOST_THREADS = 8
+_THREAD_NAME = "fuzzytree rows"
 
 
 def _thread_count() -> int:
@@ -514,7 +516,8 @@ def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:
     """Yield what a function returns for each item, in their order, on all cores.
 
     Items are taken a few ahead. The first error in the order of the items is raised,
-    be it of the function or of the iterator.
+    be it of the function or of the iterator. Within such a function no more threads are
+    started.
 
     Example:
         >>> list(in_order(abs, [-1, 2, -3]))
@@ -522,10 +525,11 @@ def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:
     """
     steps = _steps(function, items)
     ahead = [*itertools.islice(steps, 2)]
-    if len(ahead) < 2 or THREADS < 2:
+    is_inside = threading.current_thread().name.startswith(_THREAD_NAME)
+    if len(ahead) < 2 or THREADS < 2 or is_inside:
         yield from (step() for step in itertools.chain(ahead, steps))
         return
-    pool = ThreadPoolExecutor(THREADS)
+    pool = ThreadPoolExecutor(THREADS, _THREAD_NAME)
     running: deque[Future[T]] = deque()
     try:
         for step in itertools.chain(ahead, steps):

@@ -182,7 +182,7 @@ class Answering(msgspec.Struct, frozen=True):
             over = in_order if self.is_parallel else map
             with turn:
                 result = [*over(self.answer, blocks)]
-            return finish(batch, result[0] if len(result) == 1 else joined(result))
+            return finish(batch, joined(result))
 
         parts = batches(
             table,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,7 +48,7 @@ def _predicted(
     return joined([*ready(table, lambda _, one: one, columns=ready.inputs)])
 
 
-def _refuse(count: int) -> None:
+def _refuse(count: int, _: str) -> None:
     raise AssertionError(f"{count} threads were started")
 
 
@@ -90,3 +91,14 @@ def test_one_block_and_the_run_of_a_runtime_start_no_thread(
     _predicted(TREE, None, table[: 1 << 16])
     with pytest.raises(AssertionError, match="2 threads were started"):
         _predicted(TREE, None, table)
+
+
+def test_threads_start_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tables, "THREADS", 2)
+
+    def names(_: int) -> set[str]:
+        inner = tables.in_order(lambda _: threading.current_thread().name, range(4))
+        return {*inner, threading.current_thread().name}
+
+    for one in tables.in_order(names, range(4)):
+        assert len(one) == 1
