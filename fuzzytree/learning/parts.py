@@ -440,8 +440,7 @@ class Learner:
             width, most = len(piece.values), self.settings.rows_per_class
             statistics = Statistics(classes, width, most)
         elif classes > statistics.classes:  # by half more, or each piece copies all
-            size = max(classes, statistics.classes * 3 // 2)
-            statistics = statistics.placed(np.arange(statistics.classes), size)
+            statistics.grow(max(classes, statistics.classes * 3 // 2))
         self._statistics = statistics
         before = statistics.dropped
         statistics.update(piece.values.T, piece.codes)

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.learning.sums import runs, sized
+from fuzzytree.learning.sums import padded, runs, sized
 from fuzzytree.learning.units import ColumnUnits, FloatArray, IntArray, units_of
 
 Hashes = npt.NDArray[np.uint64]
@@ -177,6 +177,13 @@ class DistinctRows:
             found._parts, found._kept = [part], kept
             found._settle()
         return found
+
+    def grow(self, classes: int) -> None:
+        """Make room for classes without rows."""
+        more, all_hashes = classes - self.classes, np.iinfo(np.uint64).max
+        self._limits = padded(self._limits, more, all_hashes)
+        self._refused = padded(self._refused, more, all_hashes)
+        self.classes = classes
 
     def placed(self, positions: IntArray, classes: int) -> DistinctRows:
         """Return the rows with other numbers of classes; two may become one."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.learning.sampling import DistinctRows, Sample
-from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, runs, sized
+from fuzzytree.learning.sums import MOST_ROWS, Sums, Totals, padded, runs, sized
 from fuzzytree.learning.units import BoolArray, ColumnUnits, FloatArray, IntArray
 
 BLOCK_VALUES = 1 << 18
@@ -187,6 +187,16 @@ class Statistics:
         found._sums = Sums.of_arrays(arrays, classes, features)
         found._rows = DistinctRows.of_arrays(arrays, classes, features, rows_per_class)
         return found
+
+    def grow(self, classes: int) -> None:
+        """Make room for classes without rows."""
+        more = classes - self.classes
+        self._counts = padded(self._counts, more, 0)
+        self._lows = padded(self._lows, more, np.inf)
+        self._highs = padded(self._highs, more, -np.inf)
+        self._sums.grow(classes)
+        self._rows.grow(classes)
+        self.classes = classes
 
     def placed(self, positions: IntArray, classes: int) -> Statistics:
         """Return the statistics with other numbers of classes.

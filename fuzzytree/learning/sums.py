@@ -253,6 +253,15 @@ class Sums:
         self._limb_squares[:] = 0
         self._blocks = 0
 
+    def grow(self, groups: int) -> None:
+        """Make room for groups without values."""
+        more = groups - self.groups
+        self._limb_sums = padded(self._limb_sums, more, 0)
+        self._limb_squares = padded(self._limb_squares, more, 0)
+        self._sums = padded(self._sums, more, 0)
+        self._squares = padded(self._squares, more, 0)
+        self.groups = groups
+
     def take(self, other: Sums, groups: IntArray, features: IntArray) -> None:
         """Add the totals of some groups and features."""
         other._settle()
@@ -377,6 +386,12 @@ def sized(
         wanted = f"{math.prod(shape)} numbers of type {kind.__name__}"
         raise ValueError(f"has not the {wanted} that {name!r} needs")
     return array.reshape(shape).copy()
+
+
+def padded(array: npt.NDArray[Any], more: int, value: float) -> npt.NDArray[Any]:
+    """Return an array with some more entries of one value along the first axis."""
+    rest = np.full((more, *array.shape[1:]), value, array.dtype)
+    return np.concatenate([array, rest])
 
 
 def _bytes_of(wholes: Wholes) -> npt.NDArray[np.generic]:
