@@ -442,6 +442,11 @@ class LearningRows:
 
     def _chosen(self, first: TablePiece) -> list[int]:
         """Return the columns to read, of which those without a name count the rows."""
+        if self.target not in first.columns and {"codes", "counts"} <= {*first.columns}:
+            raise TableError(
+                f"{first.name} is a state that `fuzzytree collect` wrote, and no "
+                "table; `fuzzytree learn` takes states"
+            )
         if self.names is not None:
             _refuse_absent(first, [self.target], "")
             _refuse_absent(first, self.names, f", which {self._chosen_by}")

@@ -166,7 +166,7 @@ class ArrayLearner:
         Raises:
             LearningError: If there is no row, one class, or no column that varies.
         """
-        _check_rows(self.statistics, self.classes)
+        check_rows(self.statistics, self.classes)
         sample = self.statistics.sample()
         moments = self.statistics.moments(sample.units)
         _check_columns(moments)
@@ -297,7 +297,8 @@ def _codes(
     return codes
 
 
-def _check_rows(statistics: Statistics, classes: Sequence[str]) -> None:
+def check_rows(statistics: Statistics, classes: Sequence[str]) -> None:
+    """Raise a LearningError if there are too few rows to learn from."""
     counts, dropped = statistics.counts(), statistics.dropped
     rows = int(counts.sum())
     if rows == 0 and dropped:

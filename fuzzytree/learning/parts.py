@@ -26,7 +26,7 @@ import numpy as np
 from fuzzytree.errors import LearningError, ReadError
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning.findings import refuse_measurements
-from fuzzytree.learning.learner import ArrayLearner, Learnt
+from fuzzytree.learning.learner import ArrayLearner, Learnt, check_rows
 from fuzzytree.learning.settings import LearningSettings
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.model import FuzzyTree, as_names, with_label_type
@@ -293,6 +293,8 @@ class Learner:
             LearningError: If no row was collected.
         """
         statistics, classes = self._joined()
+        if not self.rows:
+            check_rows(statistics, classes)
         sample = statistics.sample()
         kept = np.bincount(sample.codes, minlength=len(classes))
         weights = statistics.counts() / np.maximum(kept, 1)

@@ -114,6 +114,30 @@ def test_columns_are_found_by_name_in_each_batch() -> None:
     assert fingerprint(learner.learn()) == fingerprint(ft.learn(table, target="kind"))
 
 
+@pytest.mark.parametrize(
+    "kind", [pa.int8(), pa.uint64(), pa.float32(), pa.bool_(), pa.decimal128(5, 2)]
+)
+def test_parts_may_have_numbers_of_other_types(kind: pa.DataType) -> None:
+    values = pa.array([0.0, 1.0] * 20)
+    labels = pa.array(["soft", "firm"] * 20)
+    floats = pa.table({"a": values, "b": values, "kind": labels})
+    numbers = pa.array([False, True] * 20) if kind == pa.bool_() else values.cast(kind)
+    others = pa.table({"kind": labels, "b": values, "a": numbers})
+    parts = Learner("kind")
+    parts.update(floats)
+    parts.update(others)
+    whole = pa.concat_tables([floats, floats])
+    assert fingerprint(parts.learn()) == fingerprint(ft.learn(whole, target="kind"))
+
+
+def test_a_state_is_no_part(tmp_path: Path) -> None:
+    learner_of(rows_of()).save(tmp_path / "a.state")
+    with pytest.raises(
+        TableError, match=r"a\.state is a state that `fuzzytree collect`"
+    ):
+        Learner("kind").update(tmp_path / "a.state")
+
+
 def test_a_part_with_a_fault_leaves_the_learner_as_it_was() -> None:
     table = rows_of()
     learner = learner_of(table.iloc[:1000])
