@@ -349,7 +349,10 @@ def _tabulator(facts: Facts) -> Callable[[FloatArray], npt.NDArray[np.generic]]:
         if is_whole:
             return values.T.astype(kind, "C", copy=False)
         table = np.zeros((values.shape[1], width), kind)
-        table[:, at] = values.T
+        if len(table) == 1:
+            table.put(at, values)  # in half the time
+        else:
+            table[:, at] = values.T
         return table
 
     # A value beyond float32 is missing in float32.
