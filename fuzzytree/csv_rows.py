@@ -291,29 +291,18 @@ def count_breaks(text: bytes) -> int:
 
 def number_array(column: pa.ChunkedArray) -> npt.NDArray[np.generic]:
     """Return a column of integers or floats, NaN where it is null."""
-    # pyarrow's to_numpy would import pandas where it is installed.
-    import pyarrow as pa
+    # pyarrow's to_numpy and pa.scalar would import pandas where it is installed.
+    if column.null_count:
+        import pyarrow as pa
+        import pyarrow.compute as pc
 
-    if column.null_count and pa.types.is_integer(column.type):
-        column = column.cast(pa.float64(), safe=False)
-    parts = [_number_chunk(chunk) for chunk in column.chunks]
-    if len(parts) == 1:
-        return parts[0]
-    return np.concatenate([np.empty(0, column.type.to_pandas_dtype()), *parts])
-
-
-def _number_chunk(array: pa.Array) -> npt.NDArray[np.generic]:
-    if not array.null_count:
-        return np.from_dlpack(array)
-    valid, data = array.buffers()
-    kind = np.dtype(array.type.to_pandas_dtype())
-    start, skipped = divmod(array.offset, 8)
-    size = (skipped + len(array) + 7) // 8
-    bits = np.frombuffer(valid, np.uint8, size, start)
-    is_known = np.unpackbits(bits, bitorder="little")[skipped : skipped + len(array)]
-    result = np.frombuffer(data, kind, len(array), array.offset * kind.itemsize).copy()
-    result[is_known == 0] = math.nan
-    return result
+        is_short = column.type == pa.float32()
+        column = column.cast(pa.float32() if is_short else pa.float64(), safe=False)
+        buffer = pa.py_buffer(np.array([math.nan]))
+        nan = pa.Array.from_buffers(pa.float64(), 1, [None, buffer])[0]
+        column = pc.call_function("coalesce", [column, nan.cast(column.type)])
+    parts = [np.from_dlpack(chunk) for chunk in column.chunks]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty(0)])
 
 
 def _counted(count: int, what: str) -> str:

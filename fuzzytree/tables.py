@@ -1188,7 +1188,9 @@ def _batch_pieces(
 
     first = 0
     for part in parts:
-        yield _frame_piece(pa.table(part), name, first, only, written)
+        is_batch = isinstance(part, pa.RecordBatch)  # pa.table would import pandas
+        table = pa.Table.from_batches([part]) if is_batch else part
+        yield _frame_piece(table, name, first, only, written)
         first += part.num_rows
 
 

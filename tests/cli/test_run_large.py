@@ -27,6 +27,7 @@ from fuzzytree.model import Semantics
 from fuzzytree.tables import batches, in_order
 from fuzzytree.testing import random_system
 from tests.cli.conftest import Call, grip
+from tests.cli.test_loads import loaded
 
 ROOT = Path(__file__).parents[2]
 
@@ -292,6 +293,14 @@ def test_progress_reports_rows_and_their_rate(
     assert all(rate.endswith(" rows/s") for _, rate in texts)
 
 
+def test_binary_tables_are_read_without_pandas(folder: Path) -> None:
+    pq.write_table(_rows(20), "rows.parquet")
+    _write_arrow(_rows(20), "rows.arrow")
+    words = ("run", "grip.yaml", "--quiet")
+    lines = [(*words, "rows.parquet"), (*words, "rows.arrow")]
+    assert loaded(folder, lines, ("pandas",)) == [[0], [0]]
+
+
 CELLS = (
     "1", " 2.5 ", "", "NA", "nan", "None", "+3", "1e400", "-1e-400", ".5", "7.",
     "inf", "n/a", "0x1", "1_0", "1,5", "wet", "9007199254740993", "1e23", "-0",
@@ -324,8 +333,11 @@ def _stream(text: str) -> object:
     "kind", [pa.int8(), pa.uint64(), pa.int64(), pa.float32(), pa.float64()], ids=str
 )
 @pytest.mark.parametrize("start", [0, 3, 8, 13])
-def test_numbers_with_null_become_nan(kind: pa.DataType, start: int) -> None:
-    cells = [None if k % 5 == 2 else k for k in range(40)]
+@pytest.mark.parametrize("has_null", [False, True])
+def test_numbers_become_an_array_and_null_nan(
+    kind: pa.DataType, start: int, has_null: bool
+) -> None:
+    cells = [None if has_null and k % 5 == 2 else k for k in range(40)]
     column = pa.chunked_array([pa.array(cells, kind)] * 2).slice(start, 50)
     found, expected = csv_rows.number_array(column), column.to_numpy()
     assert found.dtype == expected.dtype
