@@ -204,6 +204,7 @@ def predict(frame: Frame, model: ModelSource) -> Frame:
     Raises:
         TableError: If a column is absent or holds text, or has the name of one that is
             added. In a lazy frame, text is noticed when it is collected.
+        LossError: If a query in DuckDB or Ibis cannot hold the model.
         ReadError: If the model cannot be read, or decides for no class.
         MissingExtraError: If a package that the engine needs is not installed.
         TypeError: If it is no frame.

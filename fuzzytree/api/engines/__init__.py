@@ -54,7 +54,7 @@ def engine_of(frame: object) -> Engine | None:
     kinds = {(kind.__module__, kind.__name__) for kind in type(frame).__mro__}
     for engine in ENGINES:
         for module, name in kinds:
-            is_inside = f"{module}.".startswith(f"{engine.package}.")
+            is_inside = f"{module.lstrip('_')}.".startswith(f"{engine.package}.")
             if is_inside and name == engine.type_name:
                 return engine
     return None

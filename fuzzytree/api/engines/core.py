@@ -139,15 +139,7 @@ def collect_frame(
     ignore: Sequence[str] = (),
     settings: LearningSettings | None = None,
 ) -> Learner:
-    """Return a learner of all rows of a lazy frame, which is not collected.
-
-    The arguments are those of `fuzzytree.learn`.
-
-    Raises:
-        TableError: If a column is absent or holds text, or if there are no rows.
-        LearningError: If a value is missing, and `missing` is `refuse`.
-        MissingExtraError: If a package that the engine needs is not installed.
-    """
+    """Return a learner of all rows of a lazy frame; see `fuzzytree.learn`."""
     if not isinstance(target, str):
         raise TableError(
             f"the target of a {engine.type_name} of {engine.package} is one of its "
@@ -200,11 +192,7 @@ class Predictor:
         return prepare_answering(self.model, with_strengths=not is_tree)
 
     def __call__(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        """Return a batch with the predictions beside its columns.
-
-        Raises:
-            TableError: If a column is absent or holds text.
-        """
+        """Return a batch with the predictions beside its columns."""
         more = self.predictions(batch)
         return pa.RecordBatch.from_arrays(
             [*batch.columns, *more.columns],
@@ -241,16 +229,7 @@ class Predictor:
 
 
 def predict_frame(frame: object, predictor: Predictor) -> object:
-    """Return a frame of the same kind with the predictions beside its columns.
-
-    A lazy frame comes back lazy, and nothing of it is computed yet.
-
-    Raises:
-        TableError: If a column is absent or holds text, or is named as one that is
-            added.
-        MissingExtraError: If a package that the engine needs is not installed.
-        TypeError: If it is no frame.
-    """
+    """Return a frame of the same kind with predictions; see `fuzzytree.predict`."""
     engine = engine_of(frame)
     eager: Any = None
     if engine is None:

@@ -6,6 +6,7 @@ that the result joins, aggregates and is stored like any relation.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, cast
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 _ROWS: Final = 1 << 16
 """How many rows a record batch has at most."""
 
+TABLES = map("fuzzytree_rows_{}".format, itertools.count(1))
+"""Names for tables in queries, each of its own."""
+
 _NUMBER = re.compile(r"\w*INT(EGER)?|FLOAT|DOUBLE|BOOLEAN|DECIMAL.*")
 _STATUS: Final = (
     "CASE \"status\" WHEN 0 THEN 'decided' WHEN 1 THEN 'tie' "
@@ -33,26 +37,24 @@ _STATUS: Final = (
 def states(frame: DuckDBPyRelation, fold: Fold) -> list[bytes]:
     """Return the state of all rows; few batches of them are in memory at a time."""
     chosen = frame.project(", ".join(map(_quoted, fold.selected)))
-    return [fold(chosen.to_arrow_reader(_ROWS), "the table")]
+    # DuckDB 1.4 has the old name alone, and DuckDB 2 warns of it
+    read = getattr(chosen, "to_arrow_reader", None) or chosen.fetch_record_batch
+    return [fold(read(_ROWS), "the table")]
 
 
 def predictions(
     frame: DuckDBPyRelation, predictor: Predictor, schema: pa.Schema
 ) -> DuckDBPyRelation:
-    """Return the relation with the predictions beside its columns.
-
-    Raises:
-        TableError: If an input is no column of numbers.
-        LossError: If the model has more rules or levels than a query can have.
-    """
+    """Return the relation with the predictions beside its columns."""
     numbers = {
         name: "DECIMAL" in str(kind) or "HUGE" in str(kind)
         if _NUMBER.fullmatch(str(kind))
         else None
         for name, kind in zip(frame.columns, frame.types, strict=True)
     }
-    query = prediction_query("fuzzytree_rows", numbers, predictor, schema)
-    return cast("DuckDBPyRelation", frame.query("fuzzytree_rows", query))
+    table = next(TABLES)
+    query = prediction_query(table, numbers, predictor, schema)
+    return cast("DuckDBPyRelation", frame.query(table, query))
 
 
 def prediction_query(

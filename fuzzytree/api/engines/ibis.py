@@ -5,7 +5,6 @@ The query is that of DuckDB, translated to the dialect of the table's backend.
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING, Any
 
 import ibis
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 
     from fuzzytree.api.engines.core import Fold, Predictor
 
-_NUMBERS = itertools.count(1)  # a name of its own for each table in a query
-
 
 def states(frame: Table, fold: Fold) -> list[bytes]:
     """Return the state of all rows; few batches of them are in memory at a time."""
@@ -35,19 +32,15 @@ def states(frame: Table, fold: Fold) -> list[bytes]:
 
 
 def predictions(frame: Table, predictor: Predictor, schema: pa.Schema) -> Table:
-    """Return the table with the predictions beside its columns.
-
-    Raises:
-        TableError: If an input is no column of numbers.
-        LossError: If the model has more rules or levels than a query can have.
-    """
+    """Return the table with the predictions beside its columns."""
     before = frame.schema()
     numbers = {
         name: kind.is_decimal() if kind.is_numeric() or kind.is_boolean() else None
         for name, kind in before.items()
     }
-    rows: Any = frame.alias(f"fuzzytree_rows_{next(_NUMBERS)}")
-    query = duckdb.prediction_query(rows.get_name(), numbers, predictor, schema)
+    table = next(duckdb.TABLES)
+    rows: Any = frame.alias(table)
+    query = duckdb.prediction_query(table, numbers, predictor, schema)
     backend: Any = ibis.get_backend(frame)
     [text] = sqlglot.transpile(query, read="duckdb", write=backend.dialect)
     after = ibis.schema({**before, **ibis.Schema.from_pyarrow(schema)})
