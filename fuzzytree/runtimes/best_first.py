@@ -99,7 +99,7 @@ class Net:
         begin: Where each rule's path begins, from rule 1.
         length: Its length.
         envelope: Bounds and degrees of the clauses.
-        is_split: Whether all branches of each fork ask for the same axis.
+        is_split: Whether all branches of each fork test the same axis.
         is_product: Whether degrees are multiplied.
         limit: The most branches of a row that are followed at once; rows with more
             are fired.

@@ -92,14 +92,14 @@ class OnnxModel(Facts, frozen=True, kw_only=True):
 
     Attributes:
         run: Answers to values of shape (inputs, rows), in the order of `inputs`.
-            A file without the output `status` does not tell ties, nor an overflow
-            from an uncovered row. A fuzzy system has `run_system` instead, and this
+            A file without the output `status` reports no ties, and an overflow as an
+            uncovered row. A fuzzy system has `run_system` instead, and this
             raises ValueError.
         run_labelled: The same with the file's own labels, None for "no class"; None in
             place of the function if the file has no output `label`.
         content: The file.
         run_system: The numbers of a fuzzy system; None for trees and rules. A file
-            without the output `status` does not tell a default from a number.
+            without the output `status` does not distinguish a default from a number.
     """
 
     run: Run
