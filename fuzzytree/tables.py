@@ -110,7 +110,7 @@ class TablePiece(msgspec.Struct, frozen=True, eq=False):
         written: The names of all columns, as they came.
         is_named: Whether the names came with the table; if not they are x1, x2, ...
         whole: All cells as one array of shape (columns, rows), where they are one.
-        frame: The rows as a frame of pandas, polars or arrow, where they are one.
+        frame: The rows as a table of pyarrow, of a Parquet or Arrow file.
     """
 
     name: str
@@ -1170,7 +1170,7 @@ def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[TablePiec
             is_empty = False
             yield piece
         if is_empty:
-            yield _frame_piece(schema.empty_table(), name, only=only)
+            yield from _batch_pieces([schema.empty_table()], name, only)
     except pa.ArrowMemoryError:
         raise
     except pa.ArrowException as error:
@@ -1190,8 +1190,19 @@ def _batch_pieces(
     for part in parts:
         is_batch = isinstance(part, pa.RecordBatch)  # pa.table would import pandas
         table = pa.Table.from_batches([part]) if is_batch else part
-        yield _frame_piece(table, name, first, only, written)
-        first += part.num_rows
+        titles = written or tuple(table.column_names)
+        columns = _named(name, titles)
+        cells: list[Cells] = [()] * len(columns)
+        places = {title: place for place, title in enumerate(titles)}
+        for title, data in zip(table.column_names, table.columns, strict=True):
+            place = places[title]
+            if only is None or columns[place] in only:
+                kind = data.type
+                is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
+                cells[place] = number_array(data) if is_number else data.to_pylist()
+        where, count = _row_names(name, first), table.num_rows
+        yield TablePiece(name, columns, (*cells,), count, where, titles, frame=table)
+        first += count
 
 
 def _record_batches(
@@ -1366,14 +1377,7 @@ def _array_piece(
     return TablePiece(name, named, cells, count, where, written, is_named, whole)
 
 
-def _frame_piece(
-    source: object,
-    name: str,
-    first: int = 0,
-    only: Only = None,
-    written: tuple[str, ...] | None = None,
-) -> TablePiece:
-    """Return a frame's columns; `written` are those of the table it is part of."""
+def _frame_piece(source: object, name: str, only: Only = None) -> TablePiece:
     import narwhals as nw
     from narwhals.exceptions import DuplicateError
 
@@ -1393,7 +1397,8 @@ def _frame_piece(
         wanted = [column for column, c in pairs if only is None or c in only]
         written = names
         frame = frame.select(wanted or names).collect()
-    written = written or tuple(map(str, frame.columns))
+    else:
+        written = tuple(map(str, frame.columns))
     columns = _named(name, written)
     there = dict(zip(map(str, frame.columns), frame.columns, strict=True))
     cells: list[Cells] = []
@@ -1402,21 +1407,10 @@ def _frame_piece(
             cells.append(())
             continue
         series = frame.get_column(there[title])
-        native = series.to_native()
-        if not series.dtype.is_numeric():
-            cells.append(series.to_list())
-        elif hasattr(native, "iterchunks") and not series.dtype.is_decimal():
-            cells.append(number_array(native))
-        else:
-            cells.append(series.to_numpy())
+        is_number = series.dtype.is_numeric()
+        cells.append(series.to_numpy() if is_number else series.to_list())
     return TablePiece(
-        name,
-        columns,
-        tuple(cells),
-        len(frame),
-        _row_names(name, first),
-        written,
-        frame=source,
+        name, columns, tuple(cells), len(frame), _row_names(name), written
     )
 
 
