@@ -9,6 +9,7 @@ well: they are merged in any order, saved and loaded.
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping
 from typing import Final
 
@@ -30,20 +31,6 @@ MAGIC: Final = "fuzzytree leaf counts 1"
 
 LIMIT: Final = 1 << 33
 """The largest file that is read, in bytes."""
-
-_WAITING = 64  # pieces whose counts are not added up yet
-
-
-class LeafCountsHeader(StateHeader, forbid_unknown_fields=True, kw_only=True):
-    """What the file says beside.
-
-    Attributes:
-        model: The fingerprint of the tree.
-        ties: Rows that more than one leaf claims.
-    """
-
-    model: str
-    ties: int
 
 
 class LeafCounts:
@@ -77,12 +64,12 @@ class LeafCounts:
         self.unlabelled = self.ties = 0
         self._labels = ClassLabels()
         self._parts: frozenset[str] = frozenset()
-        self._ends = self._codes = self._counts = np.empty(0, np.int64)
+        self._counts: Counter[tuple[int, tuple[str, bool]]] = Counter()
 
     @property
     def rows(self) -> int:
         """How many rows with a class were counted."""
-        return int(self._counts.sum())
+        return self._counts.total()
 
     def update(
         self,
@@ -121,16 +108,16 @@ class LeafCounts:
             ties = int(np.count_nonzero(outcome.status == Status.TIE))
             return ends, piece.codes, ties
 
-        waiting: list[tuple[IntArray, IntArray, IntArray]] = []
+        counts: Counter[tuple[int, int]] = Counter()
         for ends, codes, ties in in_order(predict, rows):
             part.ties += ties
-            waiting.append(_summed(ends, codes, np.ones(len(ends), np.int64)))
-            if len(waiting) > _WAITING:
-                waiting = [_summed(*map(np.concatenate, zip(*waiting, strict=True)))]
+            size = len(part._labels.keys)
+            pairs, numbers = np.unique(ends * size + codes, return_counts=True)
+            for pair, number in zip(pairs.tolist(), numbers.tolist(), strict=True):
+                counts[divmod(pair, size)] += number
+        keys = [*part._labels.keys]
+        part._counts.update({(end, keys[k]): n for (end, k), n in counts.items()})
         part.unlabelled = rows.unlabelled
-        part._ends, part._codes, part._counts = _summed(
-            *map(np.concatenate, zip(*waiting, strict=True))
-        )
         vars(self).update(vars(self.merge(part)))
 
     def merge(self, other: LeafCounts, *, repeated: bool = False) -> LeafCounts:
@@ -156,22 +143,17 @@ class LeafCounts:
         result.ties = self.ties + other.ties
         result._parts = self._parts | other._parts
         result._labels = self._labels.merge(other._labels)
-        keys = other._labels.keys
-        places = np.array([result._labels.keys[key] for key in keys], np.int64)
-        result._ends, result._codes, result._counts = _summed(
-            np.concatenate([self._ends, other._ends]),
-            np.concatenate([self._codes, places[other._codes]]),
-            np.concatenate([self._counts, other._counts]),
-        )
+        result._counts = self._counts + other._counts
         return result
 
     def learn(self) -> FuzzyTree:
         """Return the tree with the number of rows that each leaf predicts."""
-        size = len(self.tree.leaves) + 2
-        support = np.bincount(self._ends, self._counts, size)[1:-1].tolist()
+        support: Counter[int] = Counter()
+        for (end, _), count in self._counts.items():
+            support[end] += count
         leaves = [
-            msgspec.structs.replace(leaf, support=round(count))
-            for leaf, count in zip(self.tree.leaves, support, strict=True)
+            msgspec.structs.replace(leaf, support=support[end])
+            for end, leaf in enumerate(self.tree.leaves, 1)
         ]
         return msgspec.structs.replace(self.tree, leaves=tuple(leaves))
 
@@ -183,13 +165,13 @@ class LeafCounts:
         semantics = self.tree.semantics
         labels = [leaf.label for leaf in self.tree.leaves]
         answers = [semantics.uncovered or "", *labels, semantics.missing or ""]
-        positions, classes = self._labels.ordered()
-        result: dict[str, dict[str, int]] = {name: {} for name in classes}
-        found = self._ends, self._codes, self._counts
-        for end, code, count in zip(*(one.tolist() for one in found), strict=True):
-            row, answer = result[classes[positions[code]]], answers[end]
-            row[answer] = row.get(answer, 0) + count
-        return result
+        names = dict(zip(self._labels.keys, self._labels.names(), strict=True))
+        result: dict[str, Counter[str]] = {
+            name: Counter() for name in self._labels.ordered()[1]
+        }
+        for (end, key), count in sorted(self._counts.items()):
+            result[names[key]][answers[end]] += count
+        return {name: dict(row) for name, row in result.items()}
 
     def accuracy(self) -> float:
         """Return the share of rows that are predicted right; NaN without rows."""
@@ -198,13 +180,13 @@ class LeafCounts:
 
     def facts(self) -> dict[str, int]:
         """Return how many rows were counted, and how many in no leaf."""
-        missing = self._ends == len(self.tree.leaves) + 1
+        ends, last = self._counts.items(), len(self.tree.leaves) + 1
         return {
             "rows": self.rows,
             "rows_without_class": self.unlabelled,
             "ties": self.ties,
-            "no_rule": int(self._counts[self._ends == 0].sum()),
-            "missing": int(self._counts[missing].sum()),
+            "no_rule": sum(count for (end, _), count in ends if not end),
+            "missing": sum(count for (end, _), count in ends if end == last),
             "columns": len(self.tree.inputs),
             "classes": len(set(self._labels.names())),
         }
@@ -215,9 +197,10 @@ class LeafCounts:
         Raises:
             WriteError: If the file cannot be written.
         """
-        header = LeafCountsHeader(
+        header = StateHeader(
             magic=MAGIC,
             target=self.target,
+            columns=[*self.tree.inputs],
             classes=[name for name, _ in self._labels.keys],
             floats=[is_float for _, is_float in self._labels.keys],
             kinds=sorted(self._labels.kinds),
@@ -226,7 +209,11 @@ class LeafCounts:
             model=fingerprint(self.tree),
             ties=self.ties,
         )
-        arrays = {"ends": self._ends, "codes": self._codes, "counts": self._counts}
+        pairs = sorted((end, self._labels.keys[key]) for end, key in self._counts)
+        keys = [*self._labels.keys]
+        counts = [self._counts[end, keys[code]] for end, code in pairs]
+        ends, codes = np.array(pairs, np.int64).reshape(-1, 2).T
+        arrays = {"ends": ends, "codes": codes, "counts": np.array(counts, np.int64)}
         content, digest = state_content(header, arrays)
         write_atomically(path, content)
         return digest
@@ -244,9 +231,7 @@ class LeafCounts:
                 another tree.
         """
         try:
-            header, arrays = open_state(
-                read_bounded(path, LIMIT), LeafCountsHeader, MAGIC
-            )
+            header, arrays = open_state(read_bounded(path, LIMIT), MAGIC)
             result = cls(model, header.target)
             _refuse_another(header.model, result.tree)
             result._take(header, arrays)
@@ -257,7 +242,7 @@ class LeafCounts:
         return result
 
     def _take(
-        self, header: LeafCountsHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
+        self, header: StateHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
     ) -> None:
         """Take what a file holds.
 
@@ -268,18 +253,17 @@ class LeafCounts:
         self.unlabelled, self.ties = header.unlabelled, header.ties
         self._parts = frozenset([*header.parts, header.digest])
         found = [arrays.get(name, np.empty(0)) for name in ("ends", "codes", "counts")]
-        ends, codes, counts = (one.astype(np.int64, copy=False) for one in found)
-        limits = len(self.tree.leaves) + 2, len(self._labels.keys)
+        ends, codes, counts = (one.tolist() for one in found)
+        keys, last = [*self._labels.keys], len(self.tree.leaves) + 1
         if (
-            any(one.dtype != np.int64 or one.shape != ends.shape for one in found)
-            or any(
-                (one < 0).any() or (one >= size).any()
-                for one, size in zip((ends, codes), limits, strict=True)
-            )
-            or (counts < 1).any()
+            any(one.dtype != np.int64 or len(one) != len(ends) for one in found)
+            or not all(0 <= end <= last for end in ends)
+            or not all(0 <= code < len(keys) for code in codes)
+            or min(counts, default=1) < 1
         ):
             raise ValueError("counts rows that no leaf or class can have")
-        self._ends, self._codes, self._counts = ends, codes, counts
+        for end, code, count in zip(ends, codes, counts, strict=True):
+            self._counts[end, keys[code]] += count
 
 
 def _refuse_another(model: str, tree: FuzzyTree) -> None:
@@ -290,13 +274,3 @@ def _refuse_another(model: str, tree: FuzzyTree) -> None:
             f"counts the leaves of another model, with the fingerprint {model[:12]}, "
             f"and {tree.name} has {mine[:12]}"
         )
-
-
-def _summed(
-    ends: IntArray, codes: IntArray, counts: IntArray
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Return each pair of an end and a class once, with the sum of its counts."""
-    pairs, places = np.unique(ends << np.int64(32) | codes, return_inverse=True)
-    total = np.zeros(len(pairs), np.int64)
-    np.add.at(total, places, counts)
-    return pairs >> np.int64(32), pairs & np.int64((1 << 32) - 1), total

@@ -277,14 +277,12 @@ def _counted(
     text = "on the rows that it was learnt from"
     share = counts.accuracy() if counts.rows else None
     rows = [("accuracy", "-" if share is None else f"{share:.3f}", text)]
-    rows.append(("counted", counted(facts["rows"], "row"), "by leaf and class"))
-    for name, why in (
-        ("ties", "decided by the order of the leaves"),
-        ("no_rule", "with no rule fired"),
-        ("missing", "with a missing input"),
-    ):
-        if facts[name]:
-            rows.append((name.replace("_", " "), counted(facts[name], "row"), why))
+    odd = (
+        f"{facts['ties']} decided by the order of the leaves, "
+        f"{facts['no_rule']} with no rule fired, "
+        f"{facts['missing']} with a missing input"
+    )
+    rows.append(("counted", counted(facts["rows"], "row"), odd))
     most = None if options.verbose else 8
     for name, row in itertools.islice(confusion.items(), most):
         pairs = sorted(row.items(), key=lambda pair: (-pair[1], pair[0]))

@@ -143,23 +143,6 @@ class ArrayLearner:
         if progress is not None:
             progress("counting", 1.0)
 
-    def merge(self, other: ArrayLearner) -> ArrayLearner:
-        """Return a learner that has seen both tables; its tree is that of one pass.
-
-        Raises:
-            ValueError: If columns, classes or settings differ.
-        """
-        mine = (tuple(self.columns), tuple(self.classes), self.settings)
-        if mine != (tuple(other.columns), tuple(other.classes), other.settings):
-            raise ValueError(
-                "learners with other columns, classes or settings do not merge"
-            )
-        merged = ArrayLearner(
-            self.columns, self.classes, self.units, self.name, self.settings
-        )
-        merged.statistics = self.statistics.merge(other.statistics)
-        return merged
-
     def finish(self, *, progress: Progress | None = None) -> Learnt:
         """Return the tree of all rows taken so far; more may follow.
 

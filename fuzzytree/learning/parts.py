@@ -18,7 +18,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Final, TypeVar, cast
+from typing import TYPE_CHECKING, Final, cast
 
 import msgspec
 import numpy as np
@@ -62,58 +62,51 @@ _WRITERS: Final = {
 }
 
 
-class StateHeader(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """What every state says about itself and its table.
+class StateHeader(msgspec.Struct, forbid_unknown_fields=True):
+    """What a state says about its table; see `Learner` for the meanings.
 
     Attributes:
         magic: The kind and the version of the file.
         target: The column of the classes.
+        columns: The columns of numbers.
         classes: The names of the classes, as they came.
         floats: Which of them came as numbers with a fraction, as 1.0 does.
         kinds: The kinds of labels that came, see `fuzzytree.tables.coded_classes`.
         unlabelled: Rows that were left out as they have no class.
         parts: The digests of the states that were merged.
+        rows_per_class: How many rows of a class the sample keeps.
+        dropped: Rows that were left out as a value is missing.
+        missing: Cells without a value.
+        model: The fingerprint of the tree whose leaves are counted; empty for none.
+        ties: Rows that more than one leaf claims.
         digest: Of everything else.
     """
 
     magic: str
     target: str
+    columns: list[str]
     classes: list[str]
     floats: list[bool]
     kinds: list[str]
     unlabelled: int
     parts: list[str]
+    rows_per_class: int = 0
+    dropped: int = 0
+    missing: int = 0
+    model: str = ""
+    ties: int = 0
     digest: str = ""
 
     def labels(self) -> ClassLabels:
         """Return the classes.
 
         Raises:
-            ValueError: If one stands twice.
+            ValueError: If one of them, or a column, stands twice.
         """
         labels = ClassLabels(zip(self.classes, self.floats, strict=True), self.kinds)
-        if len(labels.keys) < len(self.classes):
+        if len(labels.keys) + len(set(self.columns)) < len(self.classes + self.columns):
             raise ValueError("names a column or a class twice")
         return labels
-
-
-class LearnerHeader(StateHeader, forbid_unknown_fields=True, kw_only=True):
-    """What the state of a learner says beside; see `Learner` for the meanings.
-
-    Attributes:
-        columns: The columns of numbers.
-        rows_per_class: How many rows of a class the sample keeps.
-        dropped: Rows that were left out as a value is missing.
-        missing: Cells without a value.
-    """
-
-    columns: list[str]
-    rows_per_class: int
-    dropped: int
-    missing: int
-
-
-Header = TypeVar("Header", bound=StateHeader)
 
 
 class Learner:
@@ -341,13 +334,7 @@ class Learner:
         name: str = "tree",
         settings: LearningSettings | None = None,
     ) -> Learner:
-        """Return the learner that a file holds.
-
-        Args:
-            path: The file.
-            units: As in `Learner`.
-            name: As in `Learner`.
-            settings: As in `Learner`; `rows_per_class` is that of the file.
+        """Return the learner that a file holds, with its `rows_per_class`.
 
         Raises:
             ReadError: If the file is none, is broken, or is of another version.
@@ -375,20 +362,13 @@ class Learner:
         name: str = "tree",
         settings: LearningSettings | None = None,
     ) -> Learner:
-        """Return the learner whose `to_bytes` these are.
-
-        Args:
-            content: The bytes.
-            title: What messages call them.
-            units: As in `Learner`.
-            name: As in `Learner`.
-            settings: As in `load`.
+        """Return the learner whose `to_bytes` these are; messages call them `title`.
 
         Raises:
             ReadError: If they are none, are broken, or are of another version.
         """
         try:
-            header, arrays = open_state(content, LearnerHeader, MAGIC)
+            header, arrays = open_state(content, MAGIC)
             learner = cls._of_state(header, arrays)
         except ValueError as error:
             raise ReadError(f"{title}: {error}") from error
@@ -474,11 +454,9 @@ class Learner:
 
     @classmethod
     def _of_state(
-        cls, header: LearnerHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
+        cls, header: StateHeader, arrays: Mapping[str, npt.NDArray[np.generic]]
     ) -> Learner:
         labels = header.labels()
-        if len(set(header.columns)) < len(header.columns):
-            raise ValueError("names a column or a class twice")
         settings = LearningSettings(rows_per_class=header.rows_per_class)
         learner = cls(header.target, columns=header.columns, settings=settings)
         learner.unlabelled, learner.missing = header.unlabelled, header.missing
@@ -500,7 +478,7 @@ class Learner:
         if statistics is None or self.columns is None:
             raise LearningError("cannot save a state before a part was taken")
         arrays = statistics.arrays()
-        header = LearnerHeader(
+        header = StateHeader(
             magic=MAGIC,
             target=self.target,
             columns=[*self.columns],
@@ -622,8 +600,8 @@ def state_digest(
 
 
 def open_state(
-    content: bytes, kind: type[Header], magic: str
-) -> tuple[Header, dict[str, npt.NDArray[np.generic]]]:
+    content: bytes, magic: str
+) -> tuple[StateHeader, dict[str, npt.NDArray[np.generic]]]:
     """Return the header and the arrays of a state of a kind.
 
     Raises:
@@ -641,7 +619,7 @@ def open_state(
         found = msgspec.json.decode(text, type=_Magic).magic
         if found != magic:
             raise ValueError(_otherwise(found, magic))
-        header = msgspec.json.decode(text, type=kind)
+        header = msgspec.json.decode(text, type=StateHeader)
         arrays: dict[str, npt.NDArray[np.generic]] = {
             name: np.from_dlpack(column.flatten())
             for name, column in zip(batch.schema.names, batch.columns, strict=True)

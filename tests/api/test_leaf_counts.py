@@ -99,7 +99,6 @@ def test_files_are_counted_piece_by_piece(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("fuzzytree.tables.PIECE", 100)
-    monkeypatch.setattr(leaf_counts, "_WAITING", 3)
     table.to_csv(tmp_path / "t.csv", index=False)
     table.to_parquet(tmp_path / "t.parquet", index=False)
     expected = counts_of(tree, table)
@@ -167,9 +166,7 @@ def test_a_file_that_is_cut_or_changed_is_refused(
     path, whole = tmp_path / "a.state", counts_of(tree, table)
     whole.save(path)
     content = path.read_bytes()
-    header, arrays = open_state(
-        content, leaf_counts.LeafCountsHeader, leaf_counts.MAGIC
-    )
+    header, arrays = open_state(content, leaf_counts.MAGIC)
     ends, codes, counts = (
         arrays[name].astype(np.int64) for name in ("ends", "codes", "counts")
     )

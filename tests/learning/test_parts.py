@@ -251,9 +251,7 @@ def test_a_file_that_is_cut_or_changed_is_refused(tmp_path: Path) -> None:
 
 def rewritten(path: Path, change: dict[str, object], drop: str = "") -> None:
     """Write a state again with another header, and with a digest that fits."""
-    header, arrays = parts.open_state(
-        path.read_bytes(), parts.LearnerHeader, parts.MAGIC
-    )
+    header, arrays = parts.open_state(path.read_bytes(), parts.MAGIC)
     arrays = {name: array for name, array in arrays.items() if name != drop}
     header = msgspec.structs.replace(header, **change)
     path.write_bytes(parts.state_content(header, arrays)[0])
