@@ -11,7 +11,7 @@ from fuzzytree.errors import MissingExtraError, install_hint
 
 
 class Engine(msgspec.Struct, frozen=True):
-    """An engine whose lazy frames are taken.
+    """An engine whose lazy frames `learn` and `predict` take.
 
     Attributes:
         package: The package that the type of the frames comes from.

@@ -120,15 +120,15 @@ class Fold:
 
 def merge_states(states: Iterable[bytes]) -> bytes:
     """Return one state of several; the first error among them, if there is any."""
-    merged: Learner | None = None
+    total: Learner | None = None
     for state in states:
         if state and not state.startswith(_STATE):
             return state
         if state:
             learner = Learner.from_bytes(state)
             # partitions of equal rows have equal digests, and all of them count
-            merged = merged.merge(learner, repeated=True) if merged else learner
-    return merged.to_bytes() if merged else b""
+            total = total.merge(learner, repeated=True) if total else learner
+    return total.to_bytes() if total else b""
 
 
 def collect_frame(
@@ -214,11 +214,11 @@ class Predictor:
             return result
 
         result = joined([*self._ready(rows, only_predictions, name="a batch")])
-        places, fired = np.flatnonzero(result.rule), result.strengths
+        places, all_strengths = np.flatnonzero(result.rule), result.strengths
         # of a tree's relative rules the winner has a strength of exactly 1
         strengths = np.ones(len(result))
-        if fired is not None:
-            strengths[places] = fired[result.rule[places] - 1, places]
+        if all_strengths is not None:
+            strengths[places] = all_strengths[result.rule[places] - 1, places]
         columns = [
             self._labels.take(pa.array(result.codes, mask=result.codes < 0)),
             pa.array(result.rule, pa.int32()),
@@ -236,8 +236,8 @@ def predict_frame(frame: object, predictor: Predictor) -> object:
         eager = nw.from_native(cast("Any", frame), eager_only=True)
     names = _names_of(frame)
     is_blind = engine is not None and engine.ignores_case
-    taken = {name.lower() if is_blind else name: name for name in names}
-    clashes = [taken[name] for name in predictor.schema.names if name in taken]
+    own = {name.lower() if is_blind else name: name for name in names}
+    clashes = [own[name] for name in predictor.schema.names if name in own]
     if clashes:
         raise TableError(
             f"the table has a column {clashes[0]!r} of its own, and predict adds one "

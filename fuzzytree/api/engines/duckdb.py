@@ -36,9 +36,9 @@ _STATUS: Final = (
 
 def states(frame: DuckDBPyRelation, fold: Fold) -> list[bytes]:
     """Return the state of all rows; few batches of them are in memory at a time."""
-    chosen = frame.project(", ".join(map(_quoted, fold.selected)))
+    selection = frame.project(", ".join(map(_quoted, fold.selected)))
     # DuckDB 1.4 has the old name alone, and DuckDB 2 warns of it
-    read = getattr(chosen, "to_arrow_reader", None) or chosen.fetch_record_batch
+    read = getattr(selection, "to_arrow_reader", None) or selection.fetch_record_batch
     return [fold(read(_ROWS), "the table")]
 
 
@@ -92,7 +92,7 @@ def prediction_query(
         columns.append(f"CAST({text} AS DOUBLE) AS {_quoted(title)}")
     model = predictor.model
     rules = () if isinstance(model, FuzzyTree) else range(1, len(model.rules) + 1)
-    written = export(
+    sql = export(
         model,
         "sql",
         dialect="duckdb",
@@ -101,14 +101,14 @@ def prediction_query(
         strengths=bool(rules),
     ).content.decode()
     # a step that is materialized is in memory whole
-    steps = re.sub(r"(?m)^(\w+ AS) MATERIALIZED \($", r"\1 (", written)
+    steps = re.sub(r"(?m)^(\w+ AS) MATERIALIZED \($", r"\1 (", sql)
     strengths = ", ".join(f"strength_{rule}" for rule in rules)
     kind = str(schema.field("class").type).upper()
-    kept = [f'"kept {k}" AS {_quoted(name)}' for k, name in enumerate(numbers, 1)]
+    before = [f'"kept {k}" AS {_quoted(name)}' for k, name in enumerate(numbers, 1)]
     return (
         f"WITH numbers AS (SELECT {', '.join(columns)} FROM {table}),\n"
         f"predictions AS (\n{steps})\n"
-        f'SELECT {", ".join(kept)}, CAST("class" AS {kind}) AS "class",\n'
+        f'SELECT {", ".join(before)}, CAST("class" AS {kind}) AS "class",\n'
         f'CAST("rule" AS INTEGER) AS "rule", {_STATUS} AS "status",\n'
         f'CASE WHEN "rule" > 0 THEN {f"GREATEST({strengths})" if strengths else "1e0"} '
         'END AS "strength" FROM predictions'

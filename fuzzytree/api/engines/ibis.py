@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 def states(frame: Table, fold: Fold) -> list[bytes]:
     """Return the state of all rows; few batches of them are in memory at a time."""
-    chosen = frame.select(*fold.selected)
-    backend: Any = ibis.get_backend(chosen)
+    selection = frame.select(*fold.selected)
+    backend: Any = ibis.get_backend(selection)
     if backend.name != "duckdb":
-        return [fold(chosen.to_pyarrow_batches(), "the table")]
+        return [fold(selection.to_pyarrow_batches(), "the table")]
     # to_pyarrow_batches calls what DuckDB 2 has under another name only
-    chosen.limit(0).to_pyarrow()  # registers tables in memory
-    return duckdb.states(backend.con.sql(str(ibis.to_sql(chosen))), fold)
+    selection.limit(0).to_pyarrow()  # registers tables in memory
+    return duckdb.states(backend.con.sql(str(ibis.to_sql(selection))), fold)
 
 
 def predictions(frame: Table, predictor: Predictor, schema: pa.Schema) -> Table:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 def states(frame: pl.LazyFrame, fold: Fold) -> list[bytes]:
     """Return the state of all rows; few batches of them are in memory at a time."""
-    chosen = frame.select(fold.selected)
-    parts = chosen.collect_batches(engine="streaming")
+    selection = frame.select(fold.selected)
+    parts = selection.collect_batches(engine="streaming")
 
     def rows() -> Iterator[pa.RecordBatch]:
         for part in parts:
@@ -30,7 +30,7 @@ def predictions(
     frame: pl.LazyFrame, predictor: Predictor, schema: pa.Schema
 ) -> pl.LazyFrame:
     """Return the frame with the predictions beside its columns."""
-    added = pl.DataFrame(schema.empty_table()).schema
+    fields = pl.DataFrame(schema.empty_table()).schema
 
     def predict(rows: pl.Series) -> pl.Series:
         table = rows.struct.unnest().to_arrow()
@@ -38,5 +38,7 @@ def predictions(
 
     names = frame.collect_schema().names()
     inputs = [name for name in names if name.strip() in predictor.inputs] or names[:1]
-    rows = pl.struct(inputs).map_batches(predict, pl.Struct(added), is_elementwise=True)
+    rows = pl.struct(inputs).map_batches(
+        predict, pl.Struct(fields), is_elementwise=True
+    )
     return frame.with_columns(rows.alias("class")).unnest("class")

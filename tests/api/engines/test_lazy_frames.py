@@ -48,6 +48,7 @@ def engine(request: pytest.FixtureRequest) -> str:
 @pytest.fixture
 def frame_of(engine: str, tmp_path: Path) -> Frame:
     """Return a function from the parts of a table to a lazy frame of their files."""
+    connections: list[Any] = []  # DuckDB 1 closes one that nothing refers to
 
     def frame(*parts: pa.Table) -> Any:
         files = [tmp_path / f"{number}.parquet" for number in range(len(parts))]
@@ -59,7 +60,8 @@ def frame_of(engine: str, tmp_path: Path) -> Frame:
             return polars.concat([*map(polars.scan_parquet, paths)])
         if engine == "ibis":
             return importlib.import_module("ibis").duckdb.connect().read_parquet(paths)
-        return importlib.import_module("duckdb").connect().read_parquet(paths)
+        connections.append(importlib.import_module("duckdb").connect())
+        return connections[-1].read_parquet(paths)
 
     return frame
 
