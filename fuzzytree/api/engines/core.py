@@ -233,7 +233,11 @@ def predict_frame(frame: object, predictor: Predictor) -> object:
     engine = engine_of(frame)
     eager: Any = None
     if engine is None:
-        eager = nw.from_native(cast("Any", frame), eager_only=True)
+        try:
+            eager = nw.from_native(cast("Any", frame), eager_only=True)
+        except TypeError as error:
+            text = f"{type(frame).__name__} is no frame; `run` takes paths and arrays"
+            raise TypeError(text) from error
     names = _names_of(frame)
     is_blind = engine is not None and engine.ignores_case
     own = {name.lower() if is_blind else name: name for name in names}

@@ -14,7 +14,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.api.engines.core import Fold, Predictor, merge_states
-from fuzzytree.errors import TableError
+from fuzzytree.errors import ReadError, TableError
 from fuzzytree.learning import Learner
 from fuzzytree.model import fingerprint
 
@@ -147,3 +147,23 @@ def test_an_absent_column_is_reported_before_anything_runs() -> None:
     name = tree.inputs[0]
     with pytest.raises(TableError, match=f"no column {name!r}, which the model needs"):
         ft.predict(wine().drop(columns=name), tree)
+
+
+@pytest.mark.parametrize("table", [WINE, np.ones((2, 13))], ids=["path", "array"])
+def test_what_is_no_frame_is_refused(table: object) -> None:
+    tree = ft.learn(wine(), target="cultivar")
+    name = type(table).__name__
+    with pytest.raises(TypeError) as caught:
+        ft.predict(table, tree)
+    assert str(caught.value) == f"{name} is no frame; `run` takes paths and arrays"
+
+
+def test_a_fuzzy_system_predicts_no_class() -> None:
+    with pytest.raises(ReadError, match="predict takes a tree or a rule base"):
+        ft.predict(wine(), "examples/tipper.fll")
+
+
+def test_integer_names_of_columns_are_those_of_run() -> None:
+    table = pd.DataFrame({0: [1.0, 1.5, 7.0, 7.5], 1: ["s", "s", "b", "b"]})
+    tree = ft.learn(table, target="1")
+    assert ft.predict(table, tree)["class"].tolist() == ["s", "s", "b", "b"]
