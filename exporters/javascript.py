@@ -1,30 +1,28 @@
 """JavaScript: a model as one file that needs nothing but JavaScript.
 
-A tree or rule base is written as tables of numbers, and the functions of the reference,
-which read them; a fuzzy system as its program, step by step. Numbers of JavaScript are
-IEEE doubles, and `smaller` and `larger` stand where `Math.min` and `Math.max` would see
--0 and NaN otherwise than the reference: so predictions have the reference's bits. Text
+A rule base or fuzzy system is written as its program, step by step; a tree as a table
+of its nodes, and the function that descends it. Numbers of JavaScript are IEEE doubles,
+and `minimum` and `maximum` stand where `Math.min` and `Math.max` would see -0 and NaN
+otherwise than the reference: so predictions have the reference's bits. Text
 of the model enters only as ASCII string literals without `<` and `>`, also in comments,
 so that nothing in it can be mistaken for code, in a file or in a page of HTML.
 """
 
 from __future__ import annotations
 
-import math
-import struct
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
-from fuzzytree.exporters.js_system import entry_of, system_parts
+from fuzzytree.exporters.js_steps import HELPERS, JsSteps
 from fuzzytree.exporters.js_text import (
     AS_MODULE,
     AS_SCRIPT,
-    AXES,
-    DIGEST,
+    DECIDE,
+    INFER,
     MAIN,
     ROWS,
-    RULES,
     START,
+    STRENGTHS,
     TEST,
     TREE,
     filled,
@@ -33,12 +31,10 @@ from fuzzytree.exporters.js_text import (
     text_of,
 )
 from fuzzytree.exporters.program_text import (
-    RuleRows,
     answer_of,
-    combination_row,
-    digest_of,
     node_rows,
     places_of,
+    system_examples,
     title_of,
 )
 from fuzzytree.model import (
@@ -48,12 +44,25 @@ from fuzzytree.model import (
     FuzzyTree,
     Model,
     RuleBase,
+    SystemInput,
+    SystemOutput,
+    Variable,
     Written,
     fingerprint,
     sentence,
 )
-from fuzzytree.semantics import few_probes
+from fuzzytree.semantics import (
+    Program,
+    ResultKind,
+    few_probes,
+    from_axes,
+    from_rules,
+    from_system,
+    system_probes,
+)
 
+_DECISION: tuple[ResultKind, ...] = ("class", "rule", "status", "strength")
+_INFERENCE: tuple[ResultKind, ...] = ("output", "status", "activation")
 _MOST_EXAMPLES = 64
 _FEWEST_EXAMPLES = 8
 _STRENGTHS = 20_000  # of all examples together
@@ -112,38 +121,46 @@ def _doors(model: Document) -> tuple[str, ...]:
 
 def _body(model: Document) -> Iterator[str]:
     yield START
-    if isinstance(model, FuzzySystem):
-        yield from system_parts(model, ROWS)
-        return
-    inputs = [variable for variable in model.variables if not variable.parts]
-    places = places_of(model.variables)
-    mixes = (
-        f"{literal(combination_row(v, places))}, // {text_of(v.name)}"
-        for v in model.variables
-        if v.parts
-    )
-    yield from table("INPUTS", map(entry_of, inputs))
-    yield from table("CLASSES", (f"{text_of(label)}," for label in model.classes))
-    yield f"const WHEN_MISSING = {literal(model.semantics.missing)};\n"
-    yield "\n/* Place of an input, weight and centre of each part. */"
-    yield from table("COMBINATIONS", mixes)
-    if isinstance(model, RuleBase):
-        yield from _rule_tables(model, places)
-    else:
-        yield from _tree_tables(model, places)
+    inputs = model.inputs if isinstance(model, FuzzySystem) else model.variables
+    yield from table("INPUTS", (_entry_of(one) for one in inputs if not one.parts))
+    match model:
+        case FuzzyTree():
+            yield from _classes(model)
+            yield from _tree(model)
+            yield filled(DECIDE, what="class, leaf number and status", strengths="")
+            examples = _examples(model)
+        case RuleBase():
+            yield from _classes(model)
+            comments = [*_DECISION[:3], *map(sentence, model.rules)]
+            yield from _numbers(from_rules(model), _DECISION, comments)
+            what = "class, rule number, status and strengths"
+            yield filled(DECIDE, what=what, strengths=", strengths")
+            yield STRENGTHS
+            examples = _examples(model)
+        case FuzzySystem():
+            yield from table("OUTPUTS", map(_entry_of, model.outputs))
+            yield from _numbers(from_system(model, activations=True), _INFERENCE)
+            yield INFER
+            examples = _system_examples(model)
     yield ROWS
-    yield AXES
-    yield RULES if isinstance(model, RuleBase) else TREE
-    what = "class, rule and status"
-    if isinstance(model, RuleBase):
-        what += ", and a digest of the strengths,"
-        yield DIGEST
-    yield f"\n/* Inputs, and the {what} that they lead to. */"
-    yield from table("EXAMPLES", _examples(model))
+    yield "\n/* Inputs, numbers, and how far these may be off: only where functions"
+    yield "\n * such as exp have last digits of their own. */"
+    yield from table("EXAMPLES", examples)
     yield TEST
 
 
-def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:
+def _entry_of(one: Variable | SystemInput | SystemOutput) -> str:
+    """Return the entry of a variable in a table of names."""
+    unit = f" // {text_of(one.unit)}" if one.unit else ""
+    return f"{text_of(one.name)},{unit}"
+
+
+def _classes(model: Model) -> Iterator[str]:
+    return table("CLASSES", (f"{text_of(label)}," for label in model.classes))
+
+
+def _tree(tree: FuzzyTree) -> Iterator[str]:
+    places = places_of(tree.variables)
     yield "\n/* Line of the variable, cuts, and for each interval the next node's place"
     yield "\n * or -k for leaf k. A value on a cut belongs to the interval below it. */"
     yield from table(
@@ -156,32 +173,38 @@ def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:
     )
     yield "\n/* Places of the leaves' classes. */"
     yield from table("LEAVES", (f"{tree.classes.index(x.label)}," for x in tree.leaves))
+    program = from_axes(tree)
+    steps = JsSteps(program)
+    yield "\n/* Return the class's place, leaf number and status. */"
+    yield "\nfunction numbers(x) {\n"
+    yield from steps.body()
+    axes = ", ".join(map(steps.value, program.of("output")))
+    label = tree.semantics.missing
+    missing = -1 if label is None else tree.classes.index(label)
+    yield filled(TREE.removeprefix("\n"), axes=axes, missing=str(missing))
+    yield HELPERS["below"]
 
 
-def _rule_tables(rules: RuleBase, places: dict[str, int]) -> Iterator[str]:
-    rows = RuleRows(rules, places)
-    label = {name: place for place, name in enumerate(rules.classes)}
-    yield "\n/* Line of the variable, places of terms in TERMS, if it is negated. */"
-    yield from table("CLAUSES", (f"{literal(row)}," for row in rows.clauses))
-    yield "\n/* Places of the clauses in CLAUSES, and of the class. */"
-    pairs = zip(rules.rules, rows.rules, strict=True)
-    yield from table(
-        "RULES",
-        (
-            f"{literal((row, label[rule.then]))}, // {n}. {text_of(sentence(rule))}"
-            for n, (rule, row) in enumerate(pairs, 1)
-        ),
-    )
-    yield f"const WHEN_UNCOVERED = {literal(rules.semantics.uncovered)};\n"
-    yield f"const IS_PRODUCT = {literal(rules.semantics.conjunction == 'product')};\n"
-    yield "\n/* The kind of each term, and its numbers. */"
-    yield from table(
-        "TERMS",
-        (
-            f"{literal(row)}, // {text_of(variable)} is {text_of(name)}"
-            for variable, name, row in rows.terms
-        ),
-    )
+def _numbers(
+    program: Program, kinds: Sequence[ResultKind], comments: Sequence[str] = ()
+) -> Iterator[str]:
+    """Yield the function `numbers`, and the tables and functions that it needs."""
+    steps = JsSteps(program)
+    body = list(steps.body())
+    results = [one for kind in kinds for one in program.results if one.kind == kind]
+    comments = comments or [one.title for one in results]
+    pairs = zip(results, comments, strict=True)
+    lines = [f"    {steps.value(a.step)}, // {text_of(b)}\n" for a, b in pairs]
+    for numbers, name in steps.tables.items():
+        yield f"\nconst {name} = {numbers};\n"
+    *others, last = kinds
+    yield f"\n/* Return {', '.join(others)} and {last} as numbers. */"
+    yield "\nfunction numbers(x) {\n"
+    yield from body
+    yield "  return [\n"
+    yield from lines
+    yield "  ];\n}\n"
+    yield from steps.helpers()
 
 
 def _examples(model: Model) -> Iterator[str]:
@@ -190,18 +213,16 @@ def _examples(model: Model) -> Iterator[str]:
     most = min(_MOST_EXAMPLES, _STRENGTHS // rules)
     for row in few_probes(model, max(most, _FEWEST_EXAMPLES)):
         values = [row[name] for name in model.inputs]
-        prediction = answer_of(model, row)
-        expected = [prediction.label, prediction.rule, int(prediction.status)]
-        if isinstance(model, RuleBase):
-            expected.append(digest_of(words_of(prediction.strengths)))
-        yield f"{literal([values, *expected])},"
+        one = answer_of(model, row)
+        place = -1 if one.label is None else model.classes.index(one.label)
+        expected = [place, one.rule, int(one.status), *one.strengths]
+        yield f"{literal([values, expected, []])},"
 
 
-def words_of(strengths: Sequence[float]) -> tuple[int, ...]:
-    """Return the words of 32 bits of strengths; NaN counts as -1."""
-    numbers = [-1.0 if math.isnan(value) else value for value in strengths]
-    content = struct.pack(f"<{len(numbers)}d", *numbers)
-    return struct.unpack(f"<{2 * len(numbers)}I", content)
+def _system_examples(system: FuzzySystem) -> Iterator[str]:
+    rows = system_probes(system, limit=_MOST_EXAMPLES)
+    for values, outputs, bounds, status in system_examples(system, rows):
+        yield f"{literal([values, [*outputs, status], bounds])},"
 
 
 FORMAT = Format(

@@ -1,7 +1,6 @@
 """Pieces of JavaScript: literals and tables, and the functions of generated files.
 
-Literals are safe for any text of a model. The functions are those of the reference, in
-its order.
+Literals are safe for any text of a model.
 """
 
 from __future__ import annotations
@@ -111,71 +110,23 @@ function checked(values) {
 }
 """
 
-AXES = """
-/* Return the value of every variable: the inputs, then the combinations. */
-function axes(values) {
-  const found = checked(values);
-  for (const parts of COMBINATIONS) {
-    let total = null;
-    for (const [line, weight, centre] of parts) {
-      const part = weight * (found[line] - centre);
-      total = total === null ? part : total + part;
-    }
-    found.push(total);
-  }
-  return found;
-}
-
-/* Return how many numbers of a rising table are below x, by bisection. */
-function below(numbers, x) {
-  let low = 0, high = numbers.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (x > numbers[middle]) low = middle + 1;
-    else high = middle;
-  }
-  return low;
-}
-"""
-
 TREE = """
-/* Return class, leaf number and status for the inputs in order. */
-function answer(values) {
-  const found = axes(values);
-  if (!found.every(Number.isFinite)) {
-    return { label: WHEN_MISSING, rule: 0, status: MISSING };
-  }
+  const axes = [@axes@];
+  if (!axes.every(Number.isFinite)) return [@missing@, 0, MISSING];
   let place = NODES.length > 0 ? 0 : -1;
   while (place >= 0) {
     const [line, cuts, targets] = NODES[place];
-    place = targets[below(cuts, found[line])];
+    place = targets[below(cuts, axes[line])];
   }
-  return { label: CLASSES[LEAVES[-place - 1]], rule: -place, status: DECIDED };
-}
-
-/* Return class, leaf number and status; the inputs are given by name. */
-function decide(row) {
-  return answer(ordered(row));
+  return [LEAVES[-place - 1], -place, DECIDED];
 }
 """
 
-RULES = """
-/* Return class, rule number, status and strengths for the inputs in order. */
+DECIDE = """
+/* Return @what@ for the inputs in order. */
 function answer(values) {
-  const found = axes(values);
-  if (!found.every(Number.isFinite)) {
-    const strengths = RULES.map(() => NaN);
-    return { label: WHEN_MISSING, rule: 0, status: MISSING, strengths };
-  }
-  const degrees = CLAUSES.map((clause) => clauseDegree(found[clause[0]], clause));
-  const strengths = RULES.map(([when]) => strength(when, degrees));
-  const best = strengths.reduce(larger);
-  if (best === 0.0) {
-    return { label: WHEN_UNCOVERED, rule: 0, status: UNCOVERED, strengths };
-  }
-  const winner = strengths.indexOf(best);
-  const status = winner < strengths.lastIndexOf(best) ? TIE : DECIDED;
-  return { label: CLASSES[RULES[winner][1]], rule: winner + 1, status, strengths };
+  const [place, rule, status, ...strengths] = numbers(checked(values));
+  return { label: CLASSES[place] ?? null, rule, status@strengths@ };
 }
 
 /* Return class, rule number and status; the inputs are given by name. */
@@ -183,128 +134,41 @@ function decide(row) {
   const { label, rule, status } = answer(ordered(row));
   return { label, rule, status };
 }
+"""
 
+STRENGTHS = """
 /* Return the strength of every rule; the inputs are given by name. */
 function strengths(row) {
   return answer(ordered(row)).strengths;
 }
+"""
 
-/* The smaller or larger of two numbers, the first if they are equal. */
-function smaller(a, b) {
-  return b < a ? b : a;
+INFER = """
+/* Return outputs, status and the rules' activations for the inputs in order. */
+function answer(values) {
+  const found = numbers(checked(values)), count = OUTPUTS.length;
+  const [outputs, activations] = [found.slice(0, count), found.slice(count + 1)];
+  return { outputs, status: found[count], activations };
 }
 
-function larger(a, b) {
-  return b > a ? b : a;
-}
-
-/* Return how true a rule is, of the degrees of its clauses. */
-function strength(when, degrees) {
-  if (when.length === 0) return 1.0;
-  let total = degrees[when[0]];
-  for (const clause of when.slice(1)) {
-    const degree = degrees[clause];
-    total = IS_PRODUCT ? total * degree : smaller(total, degree);
-  }
-  return total;
-}
-
-/* Return the largest degree of some terms, or 1 minus it. */
-function clauseDegree(x, [, terms, isNegated]) {
-  const highest = terms
-    .map((term) => SHAPES[TERMS[term][0]](x, ...TERMS[term].slice(1)))
-    .reduce(larger);
-  return isNegated ? 1.0 - highest : highest;
-}
-
-const SHAPES = { band, lr, points };
-
-/* Return 1 for low < x <= high, and the degree of a flank elsewhere. */
-function band(x, low, high, left, right) {
-  if (low !== null && x <= low) return left === null ? 0.0 : flank(x, ...left);
-  if (high !== null && x > high) return right === null ? 0.0 : flank(x, ...right);
-  return 1.0;
-}
-
-/* Return a degree that falls from start to end, always below 1. */
-function flank(x, start, end, curve) {
-  const q = clip((x - end) / (start - end), 1.0);
-  return clip(horner(curve, q) * q, 0.9999999999999999);
-}
-
-/* Return the degree of a set with a left and a right side. */
-function lr(x, mean, left, right) {
-  const d = x - mean;
-  return smaller(side(-d, ...left), side(d, ...right));
-}
-
-/* Return a degree that falls with the distance from the mean. */
-function side(distance, spread, reach, curve) {
-  const u = clip(distance / spread, reach);
-  const t = smaller(u, 1.0);
-  const body = clip(1.0 - t * horner(curve, 2.0 * t - 1.0), 1.0);
-  const w = clip((reach - u) / (reach - 1.0), 1.0);
-  const square = w * w;
-  return body * (square * square);
-}
-
-/* Return the degree on the line between the points beside x. */
-function points(x, values, degrees) {
-  const place = below(values, x);
-  if (place === 0) return degrees[0];
-  if (place === values.length) return degrees[place - 1];
-  let anchor = values[place], other = values[place - 1];
-  let near = degrees[place], far = degrees[place - 1];
-  if (far === 0.0) {
-    [anchor, other, near, far] = [other, anchor, far, near];
-  }
-  const line = near + ((x - anchor) / (other - anchor)) * (far - near);
-  return smaller(larger(line, smaller(near, far)), larger(near, far));
-}
-
-/* Return c0 + x (c1 + x (c2 + ...)), from the inside out. */
-function horner(coefficients, x) {
-  let total = coefficients[coefficients.length - 1];
-  for (let place = coefficients.length - 2; place >= 0; place -= 1) {
-    total = total * x + coefficients[place];
-  }
-  return total;
-}
-
-/* Return a value clamped to 0 and high; 0.0 of -0.0. */
-function clip(value, high) {
-  return smaller(larger(0.0, value), high);
+/* Return outputs, status and the rules' activations; inputs are given by name. */
+function infer(row) {
+  return answer(ordered(row));
 }
 """
 
 TEST = """
-/* Answer the examples, and return a sentence for each that is not as expected. */
+/* Compare numbers for the examples, and return a sentence for each that is wrong. */
 function selfTest() {
+  const isNear = (a, b, most) => Object.is(a, b) || a === b || Math.abs(a - b) <= most;
   const wrong = [];
-  for (const [given, ...expected] of EXAMPLES) {
-    const { label, rule, status, strengths } = answer(given);
-    const got = [label, rule, status];
-    if (strengths) got.push(digest(strengths));
-    if (!got.every((one, place) => one === expected[place])) {
-      wrong.push(`[${given}]: ${got} instead of ${expected}`);
+  for (const [given, expected, bounds] of EXAMPLES) {
+    const found = numbers(given);
+    if (!expected.every((y, k) => isNear(found[k], y, bounds[k] ?? 0))) {
+      wrong.push(`[${given}]: [${found}] instead of [${expected}]`);
     }
   }
   return wrong;
-}
-"""
-
-DIGEST = """
-/* Return 32 bits that change if any bit of any strength does. */
-function digest(strengths) {
-  const view = new DataView(new ArrayBuffer(8));
-  let found = 2166136261;
-  for (const strength of strengths) {
-    view.setFloat64(0, Number.isNaN(strength) ? -1.0 : strength);
-    for (const place of [4, 0]) {
-      found = Math.imul(found ^ view.getUint32(place), 16777619) >>> 0;
-    }
-  }
-  return found;
 }
 """
 

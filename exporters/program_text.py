@@ -9,21 +9,14 @@ from typing import ClassVar
 import numpy as np
 
 from fuzzytree.model import (
-    LR,
-    Band,
     Document,
-    Flank,
     FuzzySystem,
     FuzzyTree,
     Model,
     Node,
-    Points,
     RuleBase,
-    Shape,
-    Side,
     Variable,
     intervals,
-    shapes_of,
 )
 from fuzzytree.numerics import rounded
 from fuzzytree.semantics import (
@@ -101,6 +94,8 @@ class StepText:
         "equal": "==",
         "and": "&&",
         "or": "||",
+        "not": "!",
+        "where": "{} ? {} : {}",
     }
 
     def __init__(self, program: Program) -> None:
@@ -117,19 +112,78 @@ class StepText:
         raise NotImplementedError
 
     def expression(self, step: Step) -> str:
-        """Return a step as an expression of C or JavaScript."""
+        """Return a step as an expression."""
         operands = [self.value(argument) for argument in step.arguments]
         match step.operation:
             case "input":
                 return f"x[{self.program.inputs.index(step.name)}]"
             case "where":
-                return f"{operands[0]} ? {operands[1]} : {operands[2]}"
-            case "not" | "negate":
-                return f"{'!' if step.operation == 'not' else '-'}{operands[0]}"
+                return self.signs["where"].format(*operands)
+            case "not":
+                return f"{self.signs['not']}{operands[0]}"
+            case "negate":
+                return f"-{operands[0]}"
             case operation if operation in self.signs:
                 return f"{operands[0]} {self.signs[operation]} {operands[1]}"
             case _:
                 return self.call(step, operands)
+
+
+class ScriptSteps(StepText):
+    """The steps as statements of a language without types: first `body`, then the rest.
+
+    Attributes:
+        variable: The name of a step's result, for its place.
+        statement: What sets it to an expression.
+        comment: What begins a comment.
+        functions: The text of each function that a program may need.
+        tables: The name of each table, by its numbers as text.
+    """
+
+    variable = "v{}"
+    statement: str
+    comment: ClassVar[str]
+    functions: ClassVar[Mapping[str, str]]
+
+    def __init__(self, program: Program) -> None:
+        super().__init__(program)
+        self.tables: dict[str, str] = {}
+
+    def literal(self, value: object) -> str:
+        """Return a number, a text or a tuple as source."""
+        raise NotImplementedError
+
+    def body(self) -> Iterator[str]:
+        """Yield a statement for each step that an input enters."""
+        for place, step in enumerate(self.steps):
+            if self.still[place] is None:
+                name, text = self.variable.format(place), self.expression(step)
+                title = self.program.titles[place]
+                is_part = title.endswith(f" {step.operation.replace('_', ' ')}")
+                is_named = title and not is_part
+                comment = f" {self.comment} {self.literal(title)}" if is_named else ""
+                yield f"{self.statement.format(name, text)}{comment}\n"
+
+    def value(self, place: int) -> str:
+        """Return a step's result as an expression; of samples, the i-th."""
+        result = self.still[place]
+        if result is None:
+            name = self.variable.format(place)
+        elif isinstance(result, list):
+            name = self.table([float(one) for one in result])
+        else:
+            return self.literal(result)
+        return f"{name}[i]" if self.steps[place].samples else name
+
+    def table(self, numbers: Sequence[float]) -> str:
+        """Return the name of a table."""
+        return self.tables.setdefault(
+            self.literal(tuple(numbers)), f"TABLE_{len(self.tables)}"
+        )
+
+    def helpers(self) -> Iterator[str]:
+        """Yield the functions that the body needs."""
+        yield from (text for name, text in self.functions.items() if name in self.needs)
 
 
 def answer_of(model: Model, row: Row) -> Answer:
@@ -174,11 +228,6 @@ def places_of(variables: Sequence[Variable]) -> dict[str, int]:
     return {name: place for place, name in enumerate([*inputs, *mixed])}
 
 
-def combination_row(variable: Variable, places: dict[str, int]) -> TableRow:
-    """Return the place of an input, weight and centre of each part."""
-    return tuple((places[p.input], p.weight, p.centre) for p in variable.parts)
-
-
 def targets_of(node: Node) -> tuple[int, ...]:
     """Return, for each interval, the place of the next node or -k for leaf k."""
     ends = [
@@ -199,48 +248,3 @@ def node_rows(
             names.append(node.branches[owner].terms[counts[owner]])
             counts[owner] += 1
         yield (places[node.variable], node.cuts, targets_of(node)), node, names
-
-
-class RuleRows:
-    """A rule base as rows.
-
-    Attributes:
-        clauses: The place of the value, the places of terms, and if it is negated.
-        rules: The places of each rule's clauses.
-        terms: Variable and name of each term, and its kind and numbers.
-    """
-
-    def __init__(self, rules: RuleBase, places: dict[str, int]) -> None:
-        shapes = shapes_of(rules.variables)
-        clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
-        keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
-        term = {key: place for place, key in enumerate(keys)}
-        clause = {one: place for place, one in enumerate(clauses)}
-        self.clauses: list[TableRow] = [
-            (
-                places[one.variable],
-                tuple(term[one.variable, name] for name in one.terms),
-                one.negated,
-            )
-            for one in clauses
-        ]
-        self.rules = [tuple(clause[one] for one in rule.when) for rule in rules.rules]
-        self.terms = [(*key, _shape_row(shapes[key])) for key in keys]
-
-
-def _shape_row(shape: Shape) -> TableRow:
-    match shape:
-        case Band(low=low, high=high, left=left, right=right):
-            return "band", low, high, _flank(left), _flank(right)
-        case LR(mean=mean, left=left, right=right):
-            return "lr", mean, _side(left), _side(right)
-        case Points(values=values, degrees=degrees):
-            return "points", values, degrees
-
-
-def _flank(flank: Flank | None) -> TableRow | None:
-    return None if flank is None else (flank.start, flank.end, flank.curve)
-
-
-def _side(side: Side) -> TableRow:
-    return side.spread, side.reach, side.curve

@@ -1,9 +1,9 @@
 """Python: a tree or rule base as one file that needs nothing but Python.
 
-The file holds the model as tables of numbers, and the functions of the reference, which
-read them: so its predictions have the reference's bits, it may be of any depth, and
-a person can follow it. Text of the model enters only through `repr`, in tables and in
-comments, where nothing can be mistaken for code.
+A rule base is written as its program, step by step; a tree as a table of its nodes,
+which a loop descends, so that it may be of any depth. Predictions have the reference's
+bits. Text of the model enters only through `repr`, in tables and in comments, where
+nothing can be mistaken for code.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import ClassVar
 
 from fuzzytree.exporters.program_text import (
-    RuleRows,
+    ScriptSteps,
     answer_of,
-    combination_row,
     node_rows,
     places_of,
     title_of,
@@ -31,49 +31,26 @@ from fuzzytree.model import (
     fingerprint,
     sentence,
 )
-from fuzzytree.semantics import probes
+from fuzzytree.semantics import ResultKind, Step, from_axes, from_rules, probes
 
 _EXAMPLES = 6
+_FIRST: tuple[ResultKind, ...] = ("class", "rule", "status")
 
 _START = """\
 import math
+from bisect import bisect_left
 
 # Status of an answer.
 DECIDED, TIE, UNCOVERED, MISSING = 0, 1, 2, 3
 """
 
-_AXES = """
-
-def axes(values):
-    \"\"\"Return the value of every variable: the inputs, then the combinations.\"\"\"
-    found = [float(value) for value in values]
-    for (line, weight, centre), *others in COMBINATIONS:
-        total = weight * (found[line] - centre)
-        for line, weight, centre in others:
-            total = total + weight * (found[line] - centre)
-        found.append(total)
-    return found
-"""
-
-_TREE = """
-
-def answer(values):
-    \"\"\"Return class, leaf number and status for the inputs in order.\"\"\"
-    found = axes(values)
-    if not all(map(math.isfinite, found)):
-        return WHEN_MISSING, 0, MISSING
+_TREE = """\
+    if not all(map(math.isfinite, axes)):
+        return @missing@, 0, MISSING
     place = 0 if NODES else -1
     while place >= 0:
         line, cuts, targets = NODES[place]
-        x = found[line]
-        low, high = 0, len(cuts)
-        while low < high:  # cuts[low - 1] < x <= cuts[low], by bisection
-            middle = (low + high) // 2
-            if x > cuts[middle]:
-                low = middle + 1
-            else:
-                high = middle
-        place = targets[low]
+        place = targets[bisect_left(cuts, axes[line])]
     return LEAVES[-place - 1], -place, DECIDED
 """
 
@@ -81,99 +58,9 @@ _RULES = """
 
 def answer(values):
     \"\"\"Return class, rule number, status and strengths for the inputs in order.\"\"\"
-    found = axes(values)
-    if not all(map(math.isfinite, found)):
-        return WHEN_MISSING, 0, MISSING, [math.nan] * len(RULES)
-    degrees = [clause_degree(found[line], *rest) for line, *rest in CLAUSES]
-    strengths = [strength([degrees[c] for c in when]) for when, _ in RULES]
-    best = max(strengths)
-    if best == 0.0:
-        return WHEN_UNCOVERED, 0, UNCOVERED, strengths
-    winner = strengths.index(best)
-    status = TIE if strengths.count(best) > 1 else DECIDED
-    return RULES[winner][1], winner + 1, status, strengths
-
-
-def strength(degrees):
-    \"\"\"Return how true a rule is.\"\"\"
-    if not IS_PRODUCT:
-        return min(degrees, default=1.0)
-    total = 1.0
-    for degree in degrees:
-        total = total * degree
-    return total
-
-
-def clause_degree(x, terms, negated):
-    \"\"\"Return the largest degree of some terms, or 1 minus it.\"\"\"
-    highest = max(SHAPES[TERMS[t][0]](x, *TERMS[t][1:]) for t in terms)
-    return 1.0 - highest if negated else highest
-
-
-def band(x, low, high, left, right):
-    \"\"\"Return 1 for low < x <= high, and the degree of a flank elsewhere.\"\"\"
-    if low is not None and x <= low:
-        return 0.0 if left is None else flank(x, *left)
-    if high is not None and x > high:
-        return 0.0 if right is None else flank(x, *right)
-    return 1.0
-
-
-def flank(x, start, end, curve):
-    \"\"\"Return a degree that falls from start to end, always below 1.\"\"\"
-    q = clip((x - end) / (start - end), 1.0)
-    return min(max(0.0, horner(curve, q) * q), 1.0 - 2.0**-53)
-
-
-def lr(x, mean, left, right):
-    \"\"\"Return the degree of a set with a left and a right side.\"\"\"
-    d = x - mean
-    return min(side(-d, *left), side(d, *right))
-
-
-def side(distance, spread, reach, curve):
-    \"\"\"Return a degree that falls with the distance from the mean.\"\"\"
-    u = clip(distance / spread, reach)
-    t = min(u, 1.0)
-    body = clip(1.0 - t * horner(curve, 2.0 * t - 1.0), 1.0)
-    w = clip((reach - u) / (reach - 1.0), 1.0)
-    square = w * w
-    return body * (square * square)
-
-
-def points(x, values, degrees):
-    \"\"\"Return the degree on the line between the points beside x.\"\"\"
-    low, high = 0, len(values)
-    while low < high:  # values[low - 1] < x <= values[low], by bisection
-        middle = (low + high) // 2
-        if x > values[middle]:
-            low = middle + 1
-        else:
-            high = middle
-    if low in (0, len(values)):
-        return degrees[low and -1]
-    anchor, other = values[low], values[low - 1]
-    near, far = degrees[low], degrees[low - 1]
-    if far == 0.0:
-        anchor, other, near, far = other, anchor, far, near
-    line = near + (x - anchor) / (other - anchor) * (far - near)
-    return min(max(line, min(near, far)), max(near, far))
-
-
-def horner(coefficients, x):
-    \"\"\"Return c0 + x (c1 + x (c2 + ...)), from the inside out.\"\"\"
-    total = coefficients[-1]
-    for coefficient in reversed(coefficients[:-1]):
-        total = total * x + coefficient
-    return total
-
-
-def clip(value, high):
-    \"\"\"Return a value clamped to 0 and high.\"\"\"
-    return min(max(0.0, value), high)
-
-
-SHAPES = {"band": band, "lr": lr, "points": points}
+    place, rule, status, *strengths = numbers([float(value) for value in values])
+    label = None if place < 0.0 else CLASSES[int(place)]
+    return label, int(rule), int(status), strengths
 """
 
 _TEST = """
@@ -208,26 +95,12 @@ def write_python(model: Model, /, *, allow_loss: bool = False) -> Written:
     """
     del allow_loss
     inputs = [variable for variable in model.variables if not variable.parts]
-    places = places_of(model.variables)
-    mixes = (
-        f"{_literal(combination_row(v, places))},  # {v.name!r}"
-        for v in model.variables
-        if v.parts
-    )
-    if isinstance(model, RuleBase):
-        tables, functions = _rule_tables(model, places), _RULES
-    else:
-        tables, functions = _tree_tables(model, places), _TREE
     text = "".join(
         [
             *_heading(model),
             _START,
             *_lines("INPUTS", (_literal(v.name) + f",  # {v.unit!r}" for v in inputs)),
-            *_lines("COMBINATIONS", mixes),
-            *tables,
-            f"WHEN_MISSING = {model.semantics.missing!r}\n",
-            _AXES,
-            functions,
+            *(_tree(model) if isinstance(model, FuzzyTree) else _rules(model)),
             *_doors(inputs, has_strengths=isinstance(model, RuleBase)),
             *_lines("EXAMPLES", _examples(model), gap="\n\n"),
             _TEST,
@@ -267,7 +140,8 @@ def _literal(value: object) -> str:
             return repr(value)
 
 
-def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:
+def _tree(tree: FuzzyTree) -> Iterator[str]:
+    places = places_of(tree.variables)
     yield "\n# Line of the variable, cuts, and for each interval the next node's place"
     yield "\n# or -k for leaf k. A value on a cut belongs to the interval below it."
     yield from _lines(
@@ -278,31 +152,88 @@ def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:
         ),
     )
     yield from _lines("LEAVES", (f"{leaf.label!r}," for leaf in tree.leaves))
+    program = from_axes(tree)
+    steps = _Steps(program)
+    yield "\n\ndef answer(values):\n"
+    yield '    """Return class, leaf number and status for the inputs in order."""\n'
+    yield "    x = [float(value) for value in values]\n"
+    yield from steps.body()
+    yield f"    axes = [{', '.join(map(steps.value, program.of('output')))}]\n"
+    yield _TREE.replace("@missing@", repr(tree.semantics.missing))
 
 
-def _rule_tables(rules: RuleBase, places: dict[str, int]) -> Iterator[str]:
-    rows = RuleRows(rules, places)
-    yield "\n# Line of the variable, places of the terms in TERMS, if it is negated."
-    yield from _lines("CLAUSES", (f"{_literal(row)}," for row in rows.clauses))
-    yield "\n# Places of the clauses in CLAUSES, and the class."
-    pairs = zip(rules.rules, rows.rules, strict=True)
-    yield from _lines(
-        "RULES",
-        (
-            f"{_literal((row, rule.then))},  # {n}. {sentence(rule)!r}"
-            for n, (rule, row) in enumerate(pairs, 1)
-        ),
-    )
-    yield f"WHEN_UNCOVERED = {rules.semantics.uncovered!r}\n"
-    yield f"IS_PRODUCT = {rules.semantics.conjunction == 'product'}\n"
-    yield "\n# The kind of each term, and its numbers."
-    yield from _lines(
-        "TERMS",
-        (
-            f"{_literal(row)},  # {variable!r} is {name!r}"
-            for variable, name, row in rows.terms
-        ),
-    )
+def _rules(rules: RuleBase) -> Iterator[str]:
+    program = from_rules(rules)
+    steps = _Steps(program)
+    body = list(steps.body())
+    first = [place for kind in _FIRST for place in program.of(kind)]
+    yield from _lines("CLASSES", (f"{label!r}," for label in rules.classes))
+    for numbers, name in steps.tables.items():
+        yield f"\n{name} = {numbers}\n"
+    yield "\n\ndef numbers(x):\n"
+    yield '    """Return class, rule, status and strengths as numbers."""\n'
+    yield from body
+    yield "    return [\n"
+    yield from (f"        {steps.value(place)},\n" for place in first)
+    for rule, place in zip(rules.rules, program.of("strength"), strict=True):
+        yield f"        {steps.value(place)},  # {sentence(rule)!r}\n"
+    yield "    ]\n"
+    yield from steps.helpers()
+    yield _RULES
+
+
+class _Steps(ScriptSteps):
+    """A program as text."""
+
+    statement = "    {} = {}"
+    comment = " #"
+    functions: ClassVar[Mapping[str, str]] = {
+        "minimum": """
+
+def minimum(a, b):
+    return a if a < b or a != a else b
+""",
+        "maximum": """
+
+def maximum(a, b):
+    return a if a > b or a != a else b
+""",
+        "divide": """
+
+def divide(a, b):
+    \"\"\"Return a / b; of a division by 0, which no prediction uses, NaN.\"\"\"
+    return a / b if b else math.nan
+""",
+        "pick": """
+
+def pick(table, place):
+    \"\"\"Return the number of a table at a place, its first one if there is none.\"\"\"
+    return table[int(place) if 0 <= place < len(table) else 0]
+""",
+    }
+    signs: ClassVar[Mapping[str, str]] = {
+        **{name: sign for name, sign in ScriptSteps.signs.items() if name != "divide"},
+        "and": "and",
+        "or": "or",
+        "not": "not ",
+        "where": "{1} if {0} else {2}",
+    }
+
+    def literal(self, value: object) -> str:
+        """Return a value as Python source."""
+        return _literal(value)
+
+    def call(self, step: Step, operands: Sequence[str]) -> str:
+        """Return a step as the call of a function."""
+        if step.operation == "is_finite":
+            return f"math.isfinite({operands[0]})"
+        if step.operation == "below":
+            return f"bisect_left({self.table(step.table)}, {operands[0]})"
+        if step.operation == "divide" and self.still[step.arguments[1]]:
+            return f"{operands[0]} / {operands[1]}"
+        self.needs.add(step.operation)
+        tables = [self.table(step.table)] if step.table else []
+        return f"{step.operation}({', '.join([*tables, *operands])})"
 
 
 def parameters(names: Sequence[str]) -> tuple[str, ...]:

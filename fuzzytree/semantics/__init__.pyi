@@ -56,10 +56,12 @@ from .programs.operations import LOGICAL as LOGICAL
 from .programs.operations import NUMERIC as NUMERIC
 from .programs.operations import OPERATIONS as OPERATIONS
 from .programs.operations import OVER_SAMPLES as OVER_SAMPLES
+from .programs.rule_program import from_axes as from_axes
 from .programs.rule_program import from_rules as from_rules
 from .programs.steps import Maker as Maker
 from .programs.steps import Program as Program
 from .programs.steps import Result as Result
+from .programs.steps import ResultKind as ResultKind
 from .programs.steps import Step as Step
 from .programs.system_program import from_system as from_system
 from .random_systems import random_rows as random_rows

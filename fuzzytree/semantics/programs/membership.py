@@ -386,9 +386,11 @@ def _piece(
     anchor, other, near, far = places
     if make.number(near) != 0.0:
         return _line(make, places, x)
-    width = make("subtract", other, anchor)
-    share = make("divide", make("subtract", x, anchor), width)
-    return make("multiply", share, far)
+    rise = ((x, anchor), (other, anchor))
+    if right == make.number(anchor):  # the other way round, for 0 and never -0
+        rise = ((anchor, x), (anchor, other))
+    offset, width = (make("subtract", *pair) for pair in rise)
+    return make("multiply", make("divide", offset, width), far)
 
 
 def _slopes(make: Maker, points: Points, x: int) -> list[int]:

@@ -1,8 +1,11 @@
-"""A rule base as a program: every rule is fired, the first of the strongest wins."""
+"""A rule base as a program: every rule is fired, the first of the strongest wins.
+
+A tree is no program, for a row passes few of its nodes; the values of its nodes are.
+"""
 
 from __future__ import annotations
 
-from fuzzytree.model import Clause, Rule, RuleBase, shapes_of
+from fuzzytree.model import Clause, FuzzyTree, Rule, RuleBase, shapes_of
 from fuzzytree.semantics.programs.membership import axis, shape_degree
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
 
@@ -56,6 +59,14 @@ def from_rules(rules: RuleBase) -> Program:
     return make.program(rules.name, rules.inputs, tuple(results))
 
 
+def from_axes(tree: FuzzyTree) -> Program:
+    """Return a program with the value of each variable: inputs, then combinations."""
+    make = Maker()
+    order = sorted(tree.variables, key=lambda variable: bool(variable.parts))
+    results = [Result("output", one.name, axis(make, one)) for one in order]
+    return make.program(tree.name, tree.inputs, tuple(results))
+
+
 def known_row(make: Maker, axes: list[int]) -> int:
     """Return whether all of some values are finite; always if there are none."""
     if not axes:
@@ -71,9 +82,10 @@ def _strengths(make: Maker, rules: RuleBase, axes: dict[str, int]) -> list[int]:
     def clause_degree(clause: Clause) -> int:
         if clause not in degrees:
             x = axes[clause.variable]
-            terms = [
-                shape_degree(make, shapes[clause.variable, t], x) for t in clause.terms
-            ]
+            terms: list[int] = []
+            for term in clause.terms:
+                degree = shape_degree(make, shapes[clause.variable, term], x)
+                terms.append(make.titled(degree, f"{clause.variable} is {term}"))
             highest = make.chain("maximum", terms)
             if clause.negated:
                 highest = make("subtract", make.constant(1.0), highest)
