@@ -383,14 +383,16 @@ def test_few_items_are_taken_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 PEAK = """
-import resource, sys
+import re, sys
 from fuzzytree.cli import main
 code = main(sys.argv[1:])
-print(code, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+with open("/proc/self/status") as file:  # ru_maxrss counts the parent's memory too
+    print(code, re.search(r"VmHWM:\\s*(\\d+) kB", file.read())[1])
 """
 
 
 @pytest.mark.heavy
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("name", ["t.csv", "t.parquet", "t.arrow"])
 @pytest.mark.parametrize("output", ["out.csv", "out.parquet"])
 def test_memory_is_bounded_for_one_huge_batch(name: str, output: str) -> None:
@@ -417,7 +419,7 @@ def test_memory_is_bounded_for_one_huge_batch(name: str, output: str) -> None:
     )  # fmt: skip
     code, peak_kb = map(int, done.stdout.split())
     assert code == 0
-    assert peak_kb < (500_000 if keep else 280_000) < size + 280_000
+    assert peak_kb < (400_000 if keep else 200_000) < size + 200_000
 
 
 @pytest.mark.heavy
