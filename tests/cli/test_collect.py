@@ -201,7 +201,10 @@ def test_a_second_pass_gives_the_supports_and_the_accuracy_on_all_rows(
     [
         ["collect", "-", "-o", "out.state"],
         ["learn", "-", "-o", "out.yaml"],
-        ["collect", "-", "--for", "m.yaml", "-o", "out.state"],
+        pytest.param(
+            ["collect", "-", "--for", "m.yaml", "-o", "out.state"],
+            marks=pytest.mark.heavy,
+        ),
     ],
     ids=" ".join,
 )
