@@ -26,11 +26,7 @@ class Engine(msgspec.Struct, frozen=True):
     ignores_case: bool = False
 
     def load(self) -> Any:
-        """Return the adapter.
-
-        Raises:
-            MissingExtraError: If a package that it needs is not installed.
-        """
+        """Return the adapter, or raise MissingExtraError if it cannot be imported."""
         try:
             return importlib.import_module(f"{__package__}.{self.adapter}")
         except ImportError as error:
@@ -51,10 +47,10 @@ ENGINES: Final = (
 
 def engine_of(frame: object) -> Engine | None:
     """Return the engine of a lazy frame, None for any other table; imports nothing."""
-    kinds = {(kind.__module__, kind.__name__) for kind in type(frame).__mro__}
-    for engine in ENGINES:
-        for module, name in kinds:
-            is_inside = f"{module.lstrip('_')}.".startswith(f"{engine.package}.")
-            if is_inside and name == engine.type_name:
+    for kind in type(frame).__mro__:
+        module = f"{kind.__module__.lstrip('_')}."
+        for engine in ENGINES:
+            is_inside = module.startswith(f"{engine.package}.")
+            if is_inside and kind.__name__ == engine.type_name:
                 return engine
     return None

@@ -93,14 +93,10 @@ class Fold:
     def __call__(
         self, rows: Iterable[pa.RecordBatch] | pd.DataFrame, name: str
     ) -> bytes:
-        """Return the state of a partition, empty if it has no row.
+        """Return the state of a partition that messages call so, empty without rows.
 
         An error of ours comes back as bytes as well, for the driver to raise: an engine
         would try again and bury its sentence.
-
-        Args:
-            rows: The rows, with the selected columns.
-            name: What messages call the partition, such as `partition 17`.
         """
         learner = Learner(self.target, columns=self.columns, settings=self.settings)
         try:
@@ -158,9 +154,6 @@ def collect_frame(
 
 class Predictor:
     """Predicts batches of rows; workers call it.
-
-    Args:
-        model: The model.
 
     Attributes:
         inputs: The columns that it needs, without blanks around them.

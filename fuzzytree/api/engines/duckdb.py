@@ -65,12 +65,8 @@ def prediction_query(
 ) -> str:
     """Return the query that adds the predictions to the columns of a table.
 
-    Args:
-        table: The name of the table.
-        numbers: Its columns: whether a number may have more digits than a double; None
-            for a column of anything else.
-        predictor: The model.
-        schema: The columns that are added.
+    `numbers` are its columns, each with whether its numbers may have more digits than
+    a double; None for a column of anything else.
 
     Raises:
         TableError: If an input is no column of numbers.
