@@ -119,25 +119,8 @@ function running(numbers) {
   return sums;
 }
 """,
-    "last": """
-function last(numbers) {
-  return numbers[numbers.length - 1];
-}
-""",
-    "highest": """
-function highest(numbers) {
-  return numbers.reduce((a, b) => maximum(a, b));
-}
-""",
-    "lowest": """
-function lowest(numbers) {
-  return numbers.reduce((a, b) => minimum(a, b));
-}
-""",
 }
 """Functions that a program may need, by name."""
-
-_USES = {"highest": "maximum", "lowest": "minimum"}
 
 
 class JsSteps(ScriptSteps):
@@ -166,9 +149,14 @@ class JsSteps(ScriptSteps):
     def expression(self, step: Step) -> str:
         """Return a step as an expression; of samples, as an array of them."""
         if step.operation in OVER_SAMPLES or step.operation == "running":
-            (argument,) = step.arguments
-            self.needs |= {step.operation, _USES.get(step.operation, step.operation)}
-            return f"{step.operation}({self.variable.format(argument)})"
+            name = self.variable.format(step.arguments[0])
+            if step.operation == "last":
+                return f"{name}.at(-1)"
+            reducer = {"highest": "maximum", "lowest": "minimum"}.get(step.operation)
+            self.needs.add(reducer or step.operation)
+            return (
+                f"{name}.reduce({reducer})" if reducer else f"{step.operation}({name})"
+            )
         text = super().expression(step)
         if not step.samples:
             return text
