@@ -54,17 +54,17 @@ def needs(module: str, program: str = "") -> None:
 
 def processes_of(mark: str) -> list[int]:
     """Return the processes, other than this one, that inherited a mark."""
-    wanted, found = f"{_MARK}={mark}".encode(), list[int]()
+    wanted, numbers = f"{_MARK}={mark}".encode(), list[int]()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             if wanted in (folder / "environ").read_bytes().split(b"\0"):
-                found.append(int(folder.name))
-    return [number for number in found if number != os.getpid()]
+                numbers.append(int(folder.name))
+    return [number for number in numbers if number != os.getpid()]
 
 
 @contextlib.contextmanager
 def no_survivors() -> Iterator[pytest.MonkeyPatch]:
-    """Mark all processes that start inside; none of them may be left in the end.
+    """Mark all processes that start inside; none of them may survive.
 
     Yields:
         What sets variables of the environment until then.
@@ -77,11 +77,13 @@ def no_survivors() -> Iterator[pytest.MonkeyPatch]:
             yield patch
         finally:
             deadline = time.monotonic() + 30
-            while (left := processes_of(mark)) and time.monotonic() < deadline:
+            while (survivors := processes_of(mark)) and time.monotonic() < deadline:
                 time.sleep(0.05)
-            for number in left:
+            for number in survivors:
                 os.kill(number, signal.SIGKILL)
-    assert not left, f"processes {left} of the cluster were left, and are killed now"
+    assert not survivors, (
+        f"processes {survivors} of the cluster survived, and are killed now"
+    )
 
 
 @contextlib.contextmanager
@@ -90,7 +92,8 @@ def _spark_home(folder: Path) -> Iterator[pytest.MonkeyPatch]:
     import pyspark
 
     for part in Path(pyspark.__file__).parent.iterdir():
-        (folder / part.name).symlink_to(part)
+        if part.name not in ("conf", "work"):
+            (folder / part.name).symlink_to(part)
     (folder / "conf").mkdir()
     (folder / "conf" / "spark-defaults.conf").write_text(_SETTINGS)
     (folder / "conf" / "log4j2.properties").write_text(_LOG)

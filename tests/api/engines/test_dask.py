@@ -60,9 +60,9 @@ def test_frames_of_arrow_types_are_taken() -> None:
     frame = parts_of(table, 3)
     learnt = ft.learn(frame, target="kind", ignore=["row"])
     assert rows.same_tree(learnt, rows.random_tree())
-    found = ft.predict(frame, rows.random_tree()).compute().sort_values("row")
+    predictions = ft.predict(frame, rows.random_tree()).compute().sort_values("row")
     expected = rows.random_predictions()
-    assert rows.arrow_of(found).to_pylist() == rows.arrow_of(expected).to_pylist()
+    assert rows.arrow_of(predictions).to_pylist() == rows.arrow_of(expected).to_pylist()
 
 
 def test_the_client_receives_at_most_eight_states() -> None:
@@ -85,12 +85,12 @@ def test_predictions_are_lazy_and_have_the_bits_of_run(tmp_path: Path) -> None:
     frame = parts_of(table, 7).map_partitions(mark, meta=table.head(0))
     result = ft.predict(frame, rows.random_tree())
     assert not path.exists()
-    found = result.compute()
+    predictions = result.compute()
     assert path.exists()
-    assert [*found.dtypes] == [*result.dtypes]
-    assert found.index.equals(parts_of(table, 7).compute().index)
+    assert [*predictions.dtypes] == [*result.dtypes]
+    assert predictions.index.equals(parts_of(table, 7).compute().index)
     expected = rows.arrow_of(rows.random_predictions()).to_pylist()
-    assert rows.arrow_of(found.sort_values("row")).to_pylist() == expected
+    assert rows.arrow_of(predictions.sort_values("row")).to_pylist() == expected
 
 
 @pytest.mark.parametrize("labels", [[1, 2, 3], [True, False], ["1", "2"], [0.5, 1.0]])
@@ -100,10 +100,10 @@ def test_types_of_columns_and_labels_are_those_of_pandas(labels: list[object]) -
     frame = parts_of(table, 3)
     assert rows.same_tree(ft.learn(frame, target="size"), tree)
     result = ft.predict(frame, tree)
-    found = result.compute().sort_index()
-    assert [*found.dtypes] == [*result.dtypes]
+    predictions = result.compute().sort_index()
+    assert [*predictions.dtypes] == [*result.dtypes]
     expected = rows.arrow_of(ft.predict(table, tree))
-    assert rows.arrow_of(found).to_pylist() == expected.to_pylist()
+    assert rows.arrow_of(predictions).to_pylist() == expected.to_pylist()
 
 
 def test_columns_may_have_numbers_for_names() -> None:
@@ -111,9 +111,9 @@ def test_columns_may_have_numbers_for_names() -> None:
     table.columns = pd.Index([0, 1, 2, 3, "kind"], dtype=object)
     tree = ft.learn(table, target="kind")
     assert rows.same_tree(ft.learn(parts_of(table, 3), target="kind"), tree)
-    found = ft.predict(parts_of(table, 3), tree).compute().sort_index()
+    predictions = ft.predict(parts_of(table, 3), tree).compute().sort_index()
     expected = ft.predict(table, tree)
-    assert found["class"].to_list() == expected["class"].to_list()
+    assert predictions["class"].to_list() == expected["class"].to_list()
 
 
 def test_text_in_a_column_of_numbers_is_reported_with_its_partition() -> None:

@@ -97,8 +97,8 @@ def test_predictions_are_lazy_and_have_the_bits_of_run(
     frame = frame.repartition(7).mapInArrow(mark, frame.schema)
     result = ft.predict(frame, rows.random_tree())
     assert not Path(path).exists()
-    found = result.toArrow().sort_by("row").to_pylist()
-    assert found == rows.arrow_of(rows.random_predictions()).to_pylist()
+    predictions = result.toArrow().sort_by("row").to_pylist()
+    assert predictions == rows.arrow_of(rows.random_predictions()).to_pylist()
 
 
 @classic
@@ -110,13 +110,13 @@ def test_types_of_columns_and_labels_are_those_of_pandas(
     tree = ft.learn(table, target="size")
     frame = session.createDataFrame(rows.arrow_of(table)).repartition(3)
     assert rows.same_tree(ft.learn(frame, target="size"), tree)
-    found = ft.predict(frame, tree).toArrow()
+    predictions = ft.predict(frame, tree).toArrow()
     names = [*table.columns]
     expected = rows.arrow_of(ft.predict(table, tree)).sort_by(
         [(n, "ascending") for n in names]
     )
-    found = found.sort_by([(n, "ascending") for n in names])
-    assert found.to_pylist() == expected.to_pylist()
+    predictions = predictions.sort_by([(n, "ascending") for n in names])
+    assert predictions.to_pylist() == expected.to_pylist()
 
 
 @classic
@@ -127,8 +127,8 @@ def test_columns_are_named_as_people_name_them(session: Any) -> None:
     frame = session.createDataFrame(rows.arrow_of(table)).repartition(3)
     tree = ft.learn(table, target="kind", ignore=["row"])
     assert rows.same_tree(ft.learn(frame, target="kind", ignore=["row"]), tree)
-    found = ft.predict(frame, tree).toArrow().sort_by("row").to_pylist()
-    assert found == rows.arrow_of(ft.predict(table, tree)).to_pylist()
+    predictions = ft.predict(frame, tree).toArrow().sort_by("row").to_pylist()
+    assert predictions == rows.arrow_of(ft.predict(table, tree)).to_pylist()
 
 
 def test_text_in_a_column_of_numbers_is_reported_with_its_partition(
