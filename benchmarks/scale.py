@@ -28,8 +28,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
 from scale_steps import CLASSES, COLUMNS, KIND, WORKERS, place
 
 from fuzzytree.files import write_atomically
