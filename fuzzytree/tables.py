@@ -178,13 +178,7 @@ class Batch(msgspec.Struct, frozen=True, eq=False):
 
 
 class TableSource(msgspec.Struct, frozen=True, eq=False):
-    """A table, with what cannot be seen from it; `table` makes one.
-
-    Attributes:
-        source: The table itself, or its path.
-        columns: The names of an array's columns; x1, x2, ... if None.
-        delimiter: Of a CSV file; found in its first line if None.
-    """
+    """A table, with what cannot be seen from it; `table` makes one."""
 
     source: object
     columns: Sequence[str] | None = None
@@ -202,8 +196,9 @@ def table(
     Args:
         source: A path, an open file, a pandas, polars or arrow table, or an array of
             shape (rows, columns).
-        columns: The names of an array's columns.
-        delimiter: Of a CSV file: `,`, `;` or a tab.
+        columns: The names of an array's columns; x1, x2, ... unless given.
+        delimiter: Of a CSV file; the only one of `,` `;` and tab in its first line
+            unless given.
 
     Example:
         >>> table(np.array([[1.5], [2.5]]), columns=["force"]).columns
@@ -229,8 +224,6 @@ def read_table(
     *,
     target: str | Sequence[object] | npt.NDArray[np.generic],
     ignore: Sequence[str] = (),
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     name: str | None = None,
 ) -> Table:
     """Read a whole table with a class for each row.
@@ -242,9 +235,6 @@ def read_table(
         source: The table; see the module.
         target: The column of the classes, or the classes themselves.
         ignore: Columns to leave out.
-        columns: The names of an array's columns; x1, x2, ... unless given.
-        delimiter: Of a CSV file; the only one of `,` `;` and tab in its first line
-            unless given.
         name: What messages call the table; its path unless given.
 
     Raises:
@@ -257,14 +247,7 @@ def read_table(
         >>> table.columns, table.values.tolist(), table.classes, table.codes.tolist()
         (('x1',), [[1.5, 2.5]], ('firm', 'soft'), [1, 0])
     """
-    rows = LearningRows(
-        source,
-        target=target,
-        ignore=ignore,
-        columns=columns,
-        delimiter=delimiter,
-        name=name,
-    )
+    rows = LearningRows(source, target=target, ignore=ignore, name=name)
     return rows.table([*rows])
 
 
@@ -311,8 +294,6 @@ class LearningRows:
         *,
         target: str | Sequence[object] | npt.NDArray[np.generic],
         ignore: Sequence[str] = (),
-        columns: Sequence[str] | None = None,
-        delimiter: str | None = None,
         name: str | None = None,
         chosen: Sequence[str] | None = None,
         chosen_by: str = "other parts have",
@@ -338,7 +319,7 @@ class LearningRows:
             self._codes = self.labels.add(*coded_classes(cells))
         self._counts: dict[int, frozenset[int]] = {}
         self._progress = progress
-        self._pieces = pieces(source, columns=columns, delimiter=delimiter, name=name)
+        self._pieces = pieces(source, name=name)
 
     def __iter__(self) -> Iterator[LearningPiece]:
         """Yield the rows piece by piece.
@@ -473,8 +454,6 @@ def batches(
     inputs: Sequence[str],
     *,
     trained: Sequence[str] = (),
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
     name: str | None = None,
     with_others: bool = False,
 ) -> Iterator[Batch]:
@@ -489,8 +468,6 @@ def batches(
         source: The table; see the module.
         inputs: The names of the columns that the model needs, in its order.
         trained: The names of all columns that it was learnt from.
-        columns: The names of an array's columns.
-        delimiter: As in `read_table`.
         name: As in `read_table`.
         with_others: Whether the pieces hold the other columns' cells as well; unless
             they do, a Parquet file's are not read and a frame's not converted.
@@ -504,9 +481,7 @@ def batches(
     _refuse_repeated("the model", inputs)
     only = None if with_others else frozenset(inputs)
     chosen: list[int] | None = None
-    for piece in pieces(
-        source, columns=columns, delimiter=delimiter, name=name, only=only
-    ):
+    for piece in pieces(source, name=name, only=only):
         if chosen is None:
             chosen = _needed_columns(piece, inputs, trained)
         numbers = _Numbers(piece.name, list(inputs))
@@ -566,19 +541,12 @@ def _steps(function: Callable[[S], T], items: Iterable[S]) -> Iterator[Callable[
 
 
 def pieces(
-    source: object,
-    *,
-    columns: Sequence[str] | None = None,
-    delimiter: str | None = None,
-    name: str | None = None,
-    only: Only = None,
+    source: object, *, name: str | None = None, only: Only = None
 ) -> Iterator[TablePiece]:
     """Yield a table in pieces; at least one, of no rows if the table has none.
 
     Args:
         source: The table; see the module.
-        columns: The names of an array's columns.
-        delimiter: As in `read_table`.
         name: As in `read_table`.
         only: The columns whose cells are wanted, as numbers where they all are;
             all columns if None.
@@ -587,17 +555,12 @@ def pieces(
         TableError: If columns have no names of their own, or rows no equal length.
         TypeError: If the source is no table.
     """
+    columns: Sequence[str] | None = None
+    delimiter: str | None = None
+    while isinstance(source, TableSource):
+        columns = source.columns if columns is None else columns
+        delimiter, source = delimiter or source.delimiter, source.source
     match source:
-        case TableSource():
-            columns = source.columns if columns is None else columns
-            delimiter = delimiter or source.delimiter
-            return pieces(
-                source.source,
-                columns=columns,
-                delimiter=delimiter,
-                name=name,
-                only=only,
-            )
         case str() | os.PathLike():
             path = cast("str | os.PathLike[str]", source)
             return _file_pieces(path, delimiter, name, only)

@@ -19,7 +19,14 @@ import pytest
 
 from fuzzytree import tables
 from fuzzytree.errors import TableError
-from fuzzytree.tables import Table, batches, class_names, plain, read_table
+from fuzzytree.tables import (
+    Table,
+    TableSource,
+    batches,
+    class_names,
+    plain,
+    read_table,
+)
 
 GRASPS = "force,slip,grip\n1.5,0,soft\n2.5,1,firm\n3.5,0,firm\n"
 COLUMNS = {
@@ -54,7 +61,8 @@ def _values(
     columns: list[str] | None = None,
     trained: tuple[str, ...] = (),
 ) -> list[list[float]]:
-    found = batches(source, inputs, name="grasps.csv", columns=columns, trained=trained)
+    source = TableSource(source, columns=columns)
+    found = batches(source, inputs, name="grasps.csv", trained=trained)
     values: list[list[float]] = np.hstack([batch.values for batch in found]).tolist()
     return values
 
@@ -209,7 +217,8 @@ def test_two_possible_delimiters_are_refused_unless_one_is_given() -> None:
         "grasps.csv:1: both ',' and ';' stand between names; say which one is the "
         "delimiter (--delimiter)"
     )
-    table = read_table(_csv("a;b,grip\n1,soft\n"), target="grip", delimiter=",")
+    source = TableSource(_csv("a;b,grip\n1,soft\n"), delimiter=",")
+    table = read_table(source, target="grip")
     assert table.columns == ("a;b",)
 
 
@@ -490,7 +499,7 @@ def test_a_model_that_needs_no_column_answers_every_row(
 @pytest.mark.parametrize("mark", [";;", '"', "\n", "\\t"])
 def test_a_delimiter_that_is_none_is_refused(mark: str) -> None:
     with pytest.raises(TableError) as caught:
-        read_table(io.StringIO("a;b\n1;x\n"), target="b", delimiter=mark)
+        read_table(TableSource(io.StringIO("a;b\n1;x\n"), delimiter=mark), target="b")
     assert str(caught.value) == (
         f"the table: a delimiter is one character such as ';', and not {mark!r}"
     )
@@ -510,7 +519,7 @@ class _Name(str):
 def test_the_names_of_many_columns_are_looked_up_and_not_searched() -> None:
     names: list[str] = [_Name(f"c{k}") for k in range(1_000)]
     array = np.ones((2, 1_000))
-    read_table(array, target=["soft", "firm"], columns=names)
+    read_table(TableSource(array, columns=names), target=["soft", "firm"])
     assert len(_values(array, ["c999", "c3"], columns=names)) == 2
     assert _Name.compared < 10 * len(names)
 
@@ -580,7 +589,7 @@ def test_times_are_classes_by_their_text() -> None:
 def test_a_text_is_one_name_and_no_letters() -> None:
     table = read_table(_csv("a,bc,grip\n1,2,x\n"), target="grip", ignore="bc")
     assert table.columns == ("a",)
-    named = read_table(np.zeros((2, 1)), target=[0, 1], columns="force")
+    named = read_table(TableSource(np.zeros((2, 1)), columns="force"), target=[0, 1])
     assert named.columns == ("force",)
 
 

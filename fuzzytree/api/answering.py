@@ -40,7 +40,7 @@ from fuzzytree.runtimes import (
     open_onnx,
     predictions_of,
 )
-from fuzzytree.tables import Batch, batches, in_order
+from fuzzytree.tables import Batch, TableSource, batches, in_order
 
 T = TypeVar("T")
 
@@ -137,7 +137,8 @@ def run(
     """
     result = opened(model, allow_loss=allow_loss)
     ready = prepare_answering(result, runtime, with_strengths=with_strengths)
-    return joined([*ready(table, lambda _, one: one, columns=columns)])
+    source = TableSource(table, columns)
+    return joined([*ready(source, lambda _, one: one)])
 
 
 class Answering(msgspec.Struct, frozen=True):
@@ -160,7 +161,6 @@ class Answering(msgspec.Struct, frozen=True):
         table: object,
         finish: Callable[[Batch, Predictions | Outputs], T],
         *,
-        columns: Sequence[str] | None = None,
         name: str | None = None,
         with_others: bool = False,
     ) -> Generator[T]:
@@ -188,7 +188,6 @@ class Answering(msgspec.Struct, frozen=True):
             table,
             self.inputs,
             trained=self.trained,
-            columns=columns,
             name=name,
             with_others=with_others,
         )

@@ -8,7 +8,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.errors import LearningError
 from fuzzytree.learning.findings import remarks
-from fuzzytree.tables import read_table
+from fuzzytree.tables import TableSource, read_table
 
 CHANCE = np.random.default_rng(0)
 MEASURED = CHANCE.normal(size=60).round(2).tolist()
@@ -21,7 +21,7 @@ def _remarks(
     columns = list(values)
     rows = np.array([values[name] for name in columns]).T
     classes = target or [k % 2 for k in range(len(rows))]
-    table = read_table(rows, target=classes, columns=columns)
+    table = read_table(TableSource(rows, columns=columns), target=classes)
     return dict(remarks(table, lambda column: f"--ignore {column}"))
 
 
