@@ -140,8 +140,8 @@ class CsvRows(msgspec.Struct, frozen=True, eq=False):
         cells = 1 + np.searchsorted(outside, stops) - np.searchsorted(outside, starts)
         for row in np.flatnonzero(cells != width)[:1].tolist():
             text = (
-                f"{_counted(int(cells[row]), 'cell')}, and line 1 names "
-                f"{_counted(width, 'column')}"
+                f"{counted(int(cells[row]), 'cell')}, and line 1 names "
+                f"{counted(width, 'column')}"
             )
             return self._error(int(starts[row]), text)
         if "UTF8" in str(error):
@@ -305,5 +305,6 @@ def number_array(column: pa.ChunkedArray) -> npt.NDArray[np.generic]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty(0)])
 
 
-def _counted(count: int, what: str) -> str:
+def counted(count: int, what: str) -> str:
+    """Return a number of things: `1 cell`, `2 cells`."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"

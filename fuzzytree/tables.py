@@ -33,7 +33,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, number_array
+from fuzzytree.csv_rows import BLOCK, CsvRows, blocks, counted, number_array
 from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
 from fuzzytree.model import LabelType, as_names, is_label, label_type_of
@@ -51,6 +51,7 @@ Only = frozenset[str] | None
 S = TypeVar("S")
 T = TypeVar("T")
 _Coded: TypeAlias = tuple[IntArray, list[tuple[str, bool]], str]
+_Faults = dict[str, tuple[str, str, int]]  # where the first is, its text, how many
 
 MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 """The texts, in small letters, that stand for a missing number."""
@@ -332,20 +333,22 @@ class LearningRows:
         self.name = first.name
         chosen = self._chosen(first)
         is_kept = np.array([k not in self._counts for k in chosen], bool)
-        total = _Numbers(first.name, [first.columns[k] for k in chosen])
+        names, total = [first.columns[k] for k in chosen], _Faults()
 
-        def read(piece: TablePiece) -> tuple[TablePiece, _Numbers, _Coded | None]:
-            numbers = _Numbers(piece.name, total.names)
-            numbers.add(piece, chosen)
+        def read(
+            piece: TablePiece,
+        ) -> tuple[TablePiece, FloatArray, _Faults, _Coded | None]:
+            numbers = _numbers_of(piece, chosen, names)
             if self._codes is not None:
-                return piece, numbers, None
+                return piece, *numbers, None
             cells = piece.cells[piece.columns.index(self.target)]
-            return piece, numbers, coded_classes(cells)
+            return piece, *numbers, coded_classes(cells)
 
         later = in_order(read, self._pieces)
-        for piece, numbers, coded in itertools.chain([read(first)], later):
-            total.join_faults(numbers.faults)
-            values = numbers.joined()
+        for piece, values, faults, coded in itertools.chain([read(first)], later):
+            for name, (where, text, count) in faults.items():
+                where, text, before = total.get(name, (where, text, 0))
+                total[name] = (where, text, before + count)
             if coded is not None:
                 codes = self.labels.add(*coded)
             else:
@@ -357,7 +360,7 @@ class LearningRows:
                 rate = self.rows / max(time.monotonic() - begin, 1e-3)
                 text = f"{piece.name}: {self.rows:,} rows, {rate:,.0f} rows/s"
                 self._progress(text, 0.0)
-            if total.faults or len(codes) != piece.rows:
+            if total or len(codes) != piece.rows:
                 continue
             has_class = codes >= 0
             if not is_kept.all():
@@ -367,10 +370,10 @@ class LearningRows:
             self.unlabelled += piece.rows - len(codes)
             self.missing += _missing_cells(values)
             yield LearningPiece(piece.name, piece.rows, values, codes)
-        if total.faults:
-            hint = " ".join(f"--ignore {_quoted(k)}" for k in _some(total.faults))
+        if total:
+            hint = " ".join(f"--ignore {_quoted(k)}" for k in _some(total))
             raise TableError(
-                f"{total.fault_text()}\n  leave columns out with ignore ({hint})"
+                f"{_fault_text(total)}\n  leave columns out with ignore ({hint})"
             )
 
     def refuse_empty(self) -> None:
@@ -484,12 +487,11 @@ def batches(
     for piece in pieces(source, name=name, only=only):
         if chosen is None:
             chosen = _needed_columns(piece, inputs, trained)
-        numbers = _Numbers(piece.name, list(inputs))
-        numbers.add(piece, chosen)
-        if numbers.faults:
-            raise TableError(numbers.fault_text())
+        values, faults = _numbers_of(piece, chosen, inputs)
+        if faults:
+            raise TableError(_fault_text(faults))
         extras = len(piece.columns) - len(chosen)
-        yield Batch(numbers.joined(), numbers.missing, extras, piece)
+        yield Batch(values, _missing_cells(values), extras, piece)
 
 
 def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:
@@ -757,75 +759,44 @@ def _distinct(cells: Cells) -> tuple[IntArray, Sequence[object]]:
     return np.fromiter(map(places.__getitem__, values), np.int64), [*places]
 
 
-class _Numbers:
-    """Collects columns of numbers piece by piece, and what is wrong with them."""
+def _numbers_of(
+    piece: TablePiece, chosen: Sequence[int], names: Sequence[str]
+) -> tuple[FloatArray, _Faults]:
+    """Return columns of a piece as numbers by their names, and the cells of text."""
+    if piece.whole is not None:
+        is_all = list(chosen) == list(range(len(piece.columns)))
+        return piece.whole if is_all else piece.whole[list(chosen)], {}
+    columns = [piece.cells[index] for index in chosen]
+    is_csv = not any(isinstance(cells, np.ndarray | Sequence) for cells in columns)
+    if columns and piece.rows and is_csv:
+        parsed = _parsed(columns)
+        if parsed is not None:
+            return parsed.reshape(len(columns), piece.rows), {}
+    values, faults = np.empty((len(columns), piece.rows)), _Faults()
+    for row, (cells, name) in enumerate(zip(columns, names, strict=True)):
+        if isinstance(cells, np.ndarray):
+            cells = numbers_only(cells, f"{piece.name}: column {name!r}")
+        values[row], bad = _numbers(cells)
+        if bad:
+            faults[name] = piece.where(bad[0]), str(cells[bad[0]]), len(bad)
+    return values, faults
 
-    def __init__(self, name: str, names: list[str]) -> None:
-        self.name, self.names = name, names
-        self.faults: dict[str, tuple[str, str, int]] = {}
-        self.missing = 0
-        self._parts: list[FloatArray] = []
 
-    def add(self, piece: TablePiece, chosen: Sequence[int]) -> None:
-        """Take the chosen columns of a piece."""
-        if piece.whole is not None:
-            is_all = list(chosen) == list(range(len(piece.columns)))
-            self._take(piece.whole if is_all else piece.whole[list(chosen)])
-            return
-        texts = [piece.cells[index] for index in chosen]
-        if (
-            texts
-            and piece.rows
-            and not any(isinstance(c, np.ndarray | Sequence) for c in texts)
-        ):
-            parsed = _parsed(texts)
-            if parsed is not None:
-                self._take(parsed.reshape(len(texts), piece.rows))
-                return
-        values = np.empty((len(chosen), piece.rows))
-        for row, index in enumerate(chosen):
-            cells, name = piece.cells[index], self.names[row]
-            if isinstance(cells, np.ndarray):
-                cells = numbers_only(cells, f"{self.name}: column {name!r}")
-            values[row], bad = _numbers(cells)
-            if bad:
-                first = piece.where(bad[0]), str(cells[bad[0]]), len(bad)
-                self.join_faults({name: first})
-        self._take(values)
-
-    def _take(self, values: FloatArray) -> None:
-        self.missing += _missing_cells(values)
-        self._parts.append(values)
-
-    def join_faults(self, faults: Mapping[str, tuple[str, str, int]]) -> None:
-        """Add what is wrong with later rows."""
-        for name, (where, text, count) in faults.items():
-            where, text, before = self.faults.get(name, (where, text, 0))
-            self.faults[name] = (where, text, before + count)
-
-    def fault_text(self) -> str:
-        """Return a sentence for each column that holds text."""
-        shown = [
-            f"{where}: column {column!r} holds text where a number is needed: "
-            f"{_shortened(text)!r}{_decimal_hint(text)}{_more(count)}"
-            for column, (where, text, count) in self.faults.items()
-        ]
-        others = len(shown) - _MOST_NAMES
-        if others > 0:
-            shown[_MOST_NAMES:] = [f"and {_counted(others, 'column')} more hold text"]
-        return "\n".join(shown)
-
-    def joined(self) -> FloatArray:
-        """Return all pieces as one array of shape (columns, rows)."""
-        return self._parts[0] if len(self._parts) == 1 else np.hstack(self._parts)
+def _fault_text(faults: _Faults) -> str:
+    """Return a sentence for each column that holds text."""
+    shown = [
+        f"{where}: column {column!r} holds text where a number is needed: "
+        f"{_shortened(text)!r}{_decimal_hint(text)}{_more(count)}"
+        for column, (where, text, count) in faults.items()
+    ]
+    others = len(shown) - _MOST_NAMES
+    if others > 0:
+        shown[_MOST_NAMES:] = [f"and {counted(others, 'column')} more hold text"]
+    return "\n".join(shown)
 
 
 def _missing_cells(values: FloatArray) -> int:
     return sum(int(np.count_nonzero(np.isnan(row))) for row in values)
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _shortened(text: str) -> str:
