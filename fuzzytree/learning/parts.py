@@ -462,13 +462,9 @@ class Learner:
         learner.unlabelled, learner.missing = header.unlabelled, header.missing
         learner._labels = labels
         learner._parts = frozenset([*header.parts, header.digest])
-        learner._statistics = Statistics.of_arrays(
-            arrays,
-            classes=len(labels.keys),
-            features=len(header.columns),
-            rows_per_class=header.rows_per_class,
-            dropped=header.dropped,
-        )
+        sizes = len(labels.keys), len(header.columns), header.rows_per_class
+        learner._statistics = Statistics(*sizes, header.dropped)
+        learner._statistics.fill(arrays)
         return learner
 
     def _content(self) -> tuple[bytes, str]:

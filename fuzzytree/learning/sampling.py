@@ -123,21 +123,24 @@ class DistinctRows:
         )
         self._kept += len(chosen)
         if self._kept > self._settled + self._settled // 2 + _BUFFER:
-            self._settle()
+            self.settle()
 
-    def merge(self, other: DistinctRows) -> DistinctRows:
-        """Return the distinct rows of both tables."""
-        joined = DistinctRows(self.classes, self.features, self.most)
-        joined._limits = np.minimum(self._limits, other._limits)
-        joined._refused = np.minimum(self._refused, other._refused)
-        joined._parts = [*self._parts, *other._parts]
-        joined._kept = self._kept + other._kept
-        joined._settle()
-        return joined
+    def take(self, other: DistinctRows, positions: IntArray) -> None:
+        """Add the rows of another table; two classes may become one.
+
+        Args:
+            other: The rows kept of that table.
+            positions: The number that each of its classes has here.
+        """
+        np.minimum.at(self._limits, positions, other._limits)
+        np.minimum.at(self._refused, positions, other._refused)
+        for part in other._parts:
+            self._parts.append(replace(part, codes=positions[part.codes]))
+        self._kept += other._kept
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """Return the rows kept and the limits of what may be kept, as arrays."""
-        found = self._settle()
+        found = self.settle()
         nothing = np.empty(0, np.int64)
         return {
             "rows": np.empty((0, self.features)) if found is None else found.values,
@@ -147,36 +150,27 @@ class DistinctRows:
             "refused": self._refused,
         }
 
-    @classmethod
-    def of_arrays(
-        cls,
-        arrays: Mapping[str, npt.NDArray[np.generic]],
-        classes: int,
-        features: int,
-        most: int,
-    ) -> DistinctRows:
-        """Return the rows that `arrays` gave; their hashes are computed again.
+    def fill(self, arrays: Mapping[str, npt.NDArray[np.generic]]) -> None:
+        """Take the rows that `arrays` gave; their hashes are computed again.
 
         Raises:
             ValueError: If an array has another type or size than it must have, or holds
                 a row that cannot have been kept.
         """
-        found = cls(classes, features, most)
         kept = len(arrays.get("codes", ()))
         codes: IntArray = sized(arrays, "codes", np.int64, (kept,))
-        values = sized(arrays, "rows", np.float64, (kept, features))
+        values = sized(arrays, "rows", np.float64, (kept, self.features)) + 0.0
         copies = sized(arrays, "copies", np.int64, (kept,))
-        found._limits = sized(arrays, "limits", np.uint64, (classes,))
-        found._refused = sized(arrays, "refused", np.uint64, (classes,))
-        is_class = (codes >= 0) & (codes < classes)
+        self._limits = sized(arrays, "limits", np.uint64, (self.classes,))
+        self._refused = sized(arrays, "refused", np.uint64, (self.classes,))
+        is_class = (codes >= 0) & (codes < self.classes)
         if not (is_class.all() and (copies > 0).all() and np.isfinite(values).all()):
             raise ValueError("keeps a row that cannot have been kept")
         if kept:
-            digits = hashed_digits(values)
-            part = _Rows(values + 0.0, codes, digits, hashed_rows(values + 0.0), copies)
-            found._parts, found._kept = [part], kept
-            found._settle()
-        return found
+            digits, hashes = hashed_digits(values), hashed_rows(values)
+            self._parts = [_Rows(values, codes, digits, hashes, copies)]
+            self._kept = kept
+            self.settle()
 
     def grow(self, classes: int) -> None:
         """Make room for classes without rows."""
@@ -184,18 +178,6 @@ class DistinctRows:
         self._limits = padded(self._limits, more, all_hashes)
         self._refused = padded(self._refused, more, all_hashes)
         self.classes = classes
-
-    def placed(self, positions: IntArray, classes: int) -> DistinctRows:
-        """Return the rows with other numbers of classes; two may become one."""
-        found = DistinctRows(classes, self.features, self.most)
-        np.minimum.at(found._limits, positions, self._limits)
-        np.minimum.at(found._refused, positions, self._refused)
-        found._parts = [
-            replace(part, codes=positions[part.codes]) for part in self._parts
-        ]
-        found._kept = self._kept
-        found._settle()
-        return found
 
     def sample(self, lows: FloatArray, highs: FloatArray) -> Sample:
         """Return `most` rows of each class at most, in a canonical order.
@@ -207,7 +189,7 @@ class DistinctRows:
             lows: The smallest value of each column, over the whole table.
             highs: The largest.
         """
-        found = self._settle()
+        found = self.settle()
         if found is None:
             nothing = np.empty((0, self.features))
             units = units_of(np.zeros((1, self.features)), lows, lows)
@@ -221,7 +203,7 @@ class DistinctRows:
         rows = found.values[chosen]
         return Sample(rows, units.moved(rows), found.codes[chosen], units)
 
-    def _settle(self) -> _Rows | None:
+    def settle(self) -> _Rows | None:
         """Join equal rows, and leave out all but the smallest hashes of each class."""
         if not self._parts:
             return None

@@ -134,15 +134,10 @@ class Statistics:
 
     def merge(self, other: Statistics) -> Statistics:
         """Return the statistics of both tables: the bits of one pass over both."""
-        self._absorb()
-        other._absorb()
         joined = Statistics(self.classes, self.features, self.rows_per_class)
-        joined.dropped = self.dropped + other.dropped
-        joined._counts = self._counts + other._counts
-        joined._lows = np.minimum(self._lows, other._lows)
-        joined._highs = np.maximum(self._highs, other._highs)
-        joined._sums = self._sums.merge(other._sums)
-        joined._rows = self._rows.merge(other._rows)
+        for part in (self, other):
+            joined._take(part, np.arange(self.classes))
+        joined._rows.settle()
         return joined
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
@@ -156,37 +151,26 @@ class Statistics:
         arrays = {**counted, **self._sums.arrays(), **rows}
         return {name: array.reshape(-1) for name, array in arrays.items()}
 
-    @classmethod
-    def of_arrays(
-        cls,
-        arrays: Mapping[str, npt.NDArray[np.generic]],
-        *,
-        classes: int,
-        features: int,
-        rows_per_class: int,
-        dropped: int,
-    ) -> Statistics:
-        """Return the statistics that `arrays` gave.
+    def fill(self, arrays: Mapping[str, npt.NDArray[np.generic]]) -> None:
+        """Take what `arrays` gave; nothing was taken before.
 
         Raises:
             ValueError: If an array has another type or size than it must have, or holds
                 what cannot be counted.
         """
-        found = cls(classes, features, rows_per_class, dropped)
-        shape = (classes, features)
-        found._counts = sized(arrays, "counts", np.int64, (classes,))
-        found._lows = sized(arrays, "lows", np.float64, shape)
-        found._highs = sized(arrays, "highs", np.float64, shape)
-        is_empty = (found._counts == 0)[:, None]
-        if (found._counts < 0).any() or dropped < 0:
+        shape = (self.classes, self.features)
+        self._counts = sized(arrays, "counts", np.int64, (self.classes,))
+        self._lows = sized(arrays, "lows", np.float64, shape)
+        self._highs = sized(arrays, "highs", np.float64, shape)
+        if (self._counts < 0).any() or self.dropped < 0:
             raise ValueError("counts a negative number of rows")
+        is_low = self._lows <= self._highs
         if not np.where(
-            is_empty, found._lows > found._highs, found._lows <= found._highs
+            (self._counts == 0)[:, None], self._lows > self._highs, is_low
         ).all():
             raise ValueError("has smallest values above the largest")
-        found._sums = Sums.of_arrays(arrays, classes, features)
-        found._rows = DistinctRows.of_arrays(arrays, classes, features, rows_per_class)
-        return found
+        self._sums.fill(arrays)
+        self._rows.fill(arrays)
 
     def grow(self, classes: int) -> None:
         """Make room for classes without rows."""
@@ -205,15 +189,20 @@ class Statistics:
             positions: The new number of each class; two may become one.
             classes: How many classes there are then.
         """
-        self._absorb()
         found = Statistics(classes, self.features, self.rows_per_class)
-        found.dropped = self.dropped
-        np.add.at(found._counts, positions, self._counts)
-        np.minimum.at(found._lows, positions, self._lows)
-        np.maximum.at(found._highs, positions, self._highs)
-        found._sums.take(self._sums, positions, np.arange(self.features))
-        found._rows = self._rows.placed(positions, classes)
+        found._take(self, positions)
+        found._rows.settle()
         return found
+
+    def _take(self, other: Statistics, positions: IntArray) -> None:
+        """Add what was counted of other rows, by the numbers of their classes here."""
+        other._absorb()
+        self.dropped += other.dropped
+        np.add.at(self._counts, positions, other._counts)
+        np.minimum.at(self._lows, positions, other._lows)
+        np.maximum.at(self._highs, positions, other._highs)
+        self._sums.take(other._sums, positions, np.arange(self.features))
+        self._rows.take(other._rows, positions)
 
     def moments(self, units: ColumnUnits | None = None) -> Moments:
         """Return the moments of all rows taken so far, each number rounded once.

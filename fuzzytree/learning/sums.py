@@ -298,33 +298,17 @@ class Sums:
             "squares": _bytes_of(self._squares),
         }
 
-    @classmethod
-    def of_arrays(
-        cls,
-        arrays: Mapping[str, npt.NDArray[np.generic]],
-        groups: int,
-        features: int,
-    ) -> Sums:
-        """Return the sums that `arrays` gave.
+    def fill(self, arrays: Mapping[str, npt.NDArray[np.generic]]) -> None:
+        """Take the totals that `arrays` gave; nothing was added before.
 
         Raises:
             ValueError: If an array has another type or size than it must have.
         """
-        found = cls(groups, features)
-        found._unit = sized(arrays, "units", np.int64, (features,))
-        if not ((found._unit >= _LOWEST) & (found._unit <= _HIGHEST)).all():
+        self._unit = sized(arrays, "units", np.int64, (self.features,))
+        if not ((self._unit >= _LOWEST) & (self._unit <= _HIGHEST)).all():
             raise ValueError("has a unit that no double has")
-        found._sums = _wholes_of(arrays, "sums", groups, features)
-        found._squares = _wholes_of(arrays, "squares", groups, features)
-        return found
-
-    def merge(self, other: Sums) -> Sums:
-        """Return the sums of both."""
-        joined = Sums(self.groups, self.features)
-        everything = np.arange(self.groups), np.arange(self.features)
-        for part in (self, other):
-            joined.take(part, *everything)
-        return joined
+        self._sums = _wholes_of(arrays, "sums", self.groups, self.features)
+        self._squares = _wholes_of(arrays, "squares", self.groups, self.features)
 
     def moments(
         self,

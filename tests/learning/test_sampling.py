@@ -73,7 +73,8 @@ def test_the_sample_depends_neither_on_order_nor_chunks_nor_merging(
         assert bits(sample_of(chunked, values)) == base
         left = offered(values[order[:300]], codes[order[:300]], most, [9, 50])
         right = offered(values[order[300:]], codes[order[300:]], most, [99])
-        assert bits(sample_of(right.merge(left), values)) == base
+        right.take(left, np.arange(right.classes))
+        assert bits(sample_of(right, values)) == base
 
 
 @pytest.mark.usefixtures("_no_buffer")
@@ -116,7 +117,7 @@ def test_a_kept_row_is_counted_from_the_first_time_on() -> None:
     rng = np.random.default_rng(0)
     values, codes = np.round(rng.normal(size=(4000, 2)), 1), np.zeros(4000, np.int64)
     rows = offered(values, codes, 60, list(range(50, 4000, 50)))
-    kept = rows._settle()
+    kept = rows.settle()
     assert kept is not None
     for row, copies in zip(kept.values, kept.copies.tolist(), strict=True):
         assert copies == np.count_nonzero((values == row).all(axis=1))
