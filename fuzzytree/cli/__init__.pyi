@@ -2,6 +2,7 @@ from .console import answer as answer
 from .console import answer_bytes as answer_bytes
 from .console import answer_json as answer_json
 from .console import argument as argument
+from .console import flag as flag
 from .console import json_option as json_option
 from .console import option as option
 from .console import quiet_option as quiet_option
@@ -9,6 +10,7 @@ from .console import rows_only_option as rows_only_option
 from .console import say as say
 from .console import say_rows as say_rows
 from .console import setting as setting
+from .console import several as several
 from .console import takes as takes
 from .console import wrong_options as wrong_options
 from .program import main as main

@@ -23,11 +23,13 @@ from fuzzytree.cli.console import (
     answer_styled,
     argument,
     delimiter_option,
+    flag,
     json_option,
     option,
     progress_bar,
     quiet_option,
     say,
+    several,
     takes,
     verbose_option,
     wrong_options,
@@ -78,10 +80,9 @@ class AuditOptions:
         metavar="K",
         help="Extend the domain by K spreads around the fitted sets.",
     )
-    limits: tuple[str, ...] = option(
+    limits: tuple[str, ...] = several(
         "--limits",
-        metavar="NAME=LOW:HIGH",
-        multiple=True,
+        "NAME=LOW:HIGH",
         help="Range of values of a variable in the audit (repeat).",
     )
     row: str | None = option(
@@ -89,17 +90,11 @@ class AuditOptions:
         metavar="NAME=VALUE,...",
         help="Row for which to find the nearest row of another class.",
     )
-    select: tuple[str, ...] = option(
-        "--select",
-        metavar="CODES",
-        multiple=True,
-        help="Codes to examine, such as FT1,FT301; all by default.",
+    select: tuple[str, ...] = several(
+        "--select", "CODES", help="Codes to examine, such as FT1,FT301; all by default."
     )
-    ignore: tuple[str, ...] = option(
-        "--ignore",
-        metavar="CODES",
-        multiple=True,
-        help="Codes to leave out, such as FT5.",
+    ignore: tuple[str, ...] = several(
+        "--ignore", "CODES", help="Codes to leave out, such as FT5."
     )
     budget: float | None = option(
         "--budget",
@@ -107,10 +102,9 @@ class AuditOptions:
         metavar="SECONDS",
         help="Time limit of the audit in seconds; 60 by default.",
     )
-    settings: tuple[str, ...] = option(
+    settings: tuple[str, ...] = several(
         "--set",
-        metavar="NAME=VALUE",
-        multiple=True,
+        "NAME=VALUE",
         help="Threshold (epsilon, margin, lead, level, overlap), or rows, seed.",
     )
     config: str | None = option(
@@ -140,10 +134,8 @@ class AuditOptions:
         show_default=True,
         help="Format of the result: for people, programs or code hosts.",
     )
-    is_whole: bool = option(
-        "--all",
-        is_flag=True,
-        help="List every answer, also those that are no findings.",
+    is_whole: bool = flag(
+        "--all", help="List every answer, also those that are no findings."
     )
     output: str | None = option(
         "-o",
@@ -154,10 +146,9 @@ class AuditOptions:
     page: str | None = option(
         "--page", metavar="FILE", help="HTML file to write the audit to, in addition."
     )
-    results: tuple[str, ...] = option(
+    results: tuple[str, ...] = several(
         "--results",
-        metavar="FILE",
-        multiple=True,
+        "FILE",
         help="Result of `check --json` or `stability --json` to include (repeat).",
     )
     delimiter: str | None = delimiter_option

@@ -16,11 +16,13 @@ from fuzzytree.cli.console import (
     answer_json,
     argument,
     delimiter_option,
+    flag,
     json_option,
     option,
     progress_bar,
     quiet_option,
     say,
+    several,
     table_source,
     takes,
     verbose_option,
@@ -62,17 +64,13 @@ class BenchOptions:
         show_default=True,
         help="Threads that a candidate may use (repeat).",
     )
-    only: Sequence[str] = option(
+    only: Sequence[str] = several(
         "--only",
-        metavar="NAME",
-        multiple=True,
+        "NAME",
         help="Candidates to measure, such as native, 'raw rules', variant (repeat).",
     )
-    skip: Sequence[str] = option(
-        "--skip",
-        metavar="NAME",
-        multiple=True,
-        help="Candidates to leave out (repeat).",
+    skip: Sequence[str] = several(
+        "--skip", "NAME", help="Candidates to leave out (repeat)."
     )
     budget: float = option(
         "--budget",
@@ -104,16 +102,11 @@ class BenchOptions:
     output: str | None = option(
         "-o", "--output", metavar="FILE", help="JSON file to write the study to."
     )
-    plots: Sequence[str] = option(
-        "--plot",
-        metavar="FILE",
-        multiple=True,
-        help="Picture of the study, as .svg or .png (repeat).",
+    plots: Sequence[str] = several(
+        "--plot", "FILE", help="Picture of the study, as .svg or .png (repeat)."
     )
-    is_full: bool = option(
-        "--full",
-        is_flag=True,
-        help="List variants that are slower and less exact, too.",
+    is_full: bool = flag(
+        "--full", help="List variants that are slower and less exact, too."
     )
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option

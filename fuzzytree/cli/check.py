@@ -12,6 +12,7 @@ from fuzzytree.cli.console import (
     argument,
     data_option,
     delimiter_option,
+    flag,
     json_option,
     option,
     progress_bar,
@@ -37,14 +38,13 @@ class CheckOptions:
         type=click.IntRange(min=1),
         help="Largest number of probes; 20000 by default, 2000 for a fuzzy system.",
     )
-    is_full: bool = option(
-        "--rows", is_flag=True, help="List rows that differ by an allowed amount, too."
+    is_full: bool = flag(
+        "--rows", help="List rows that differ by an allowed amount, too."
     )
     delimiter: str | None = delimiter_option
     rows_only: bool = rows_only_option
-    run_code: bool = option(
+    run_code: bool = flag(
         "--run-code",
-        is_flag=True,
         help="Run a program file although its text differs from a new one.",
     )
     allow_loss: bool = allow_loss_option

@@ -19,6 +19,7 @@ from fuzzytree.cli.console import (
     progress_bar,
     quiet_option,
     say_rows,
+    several,
     table_source,
     takes,
     wrong_options,
@@ -57,11 +58,8 @@ class CollectOptions:
         help="Columns to learn from, separated by commas; all of the first PART by "
         "default.",
     )
-    ignore: Sequence[str] = option(
-        "--ignore",
-        metavar="COLUMN",
-        multiple=True,
-        help="Column that is no input (repeat).",
+    ignore: Sequence[str] = several(
+        "--ignore", "COLUMN", help="Column that is no input (repeat)."
     )
     rows_per_class: int | None = option(
         "--rows-per-class",
@@ -127,11 +125,10 @@ def command(options: CollectOptions) -> None:
     ]
     mode = "" if options.model is None else f" --for {options.model}"
     after = f"next: fuzzytree learn {options.output} ...{mode} -o FILE"
-    after = f"sha256 {digest[:16]}; {after}"
     say_rows(
         ("collected", rows, said),
         *lost,
-        ("wrote", options.output, after),
+        ("wrote", options.output, f"sha256 {digest[:16]}; {after}"),
         quiet=options.quiet,
     )
     if options.as_json:

@@ -31,6 +31,16 @@ def option(*flags: str, **about: Any) -> Any:
     return functools.partial(click.option, *flags, **about)
 
 
+def flag(*flags: str, **about: Any) -> Any:
+    """Return an option of a verb that is on where it is named."""
+    return option(*flags, is_flag=True, **about)
+
+
+def several(name: str, metavar: str, **about: Any) -> Any:
+    """Return an option of a verb that may be named more than once."""
+    return option(name, metavar=metavar, multiple=True, **about)
+
+
 def argument(**about: Any) -> Any:
     """Return an argument of a verb, to be the attribute of a class of options."""
     return functools.partial(click.argument, **about)
@@ -73,12 +83,10 @@ def takes(
     return decorate
 
 
-quiet_option = option("--quiet", is_flag=True, help="Print errors only.")
-json_option = option(
-    "--json", is_flag=True, help="Print the whole result as JSON to stdout."
-)
-verbose_option = option(
-    "--verbose", is_flag=True, help="Print every part of the result, not only counts."
+quiet_option = flag("--quiet", help="Print errors only.")
+json_option = flag("--json", help="Print the whole result as JSON to stdout.")
+verbose_option = flag(
+    "--verbose", help="Print every part of the result, not only counts."
 )
 delimiter_option = option(
     "--delimiter",
@@ -86,15 +94,13 @@ delimiter_option = option(
     help="Character between the cells of a CSV file; by default from its first line.",
 )
 
-allow_loss_option = option(
+allow_loss_option = flag(
     "--allow-loss",
-    is_flag=True,
     help="Read a file that a model cannot represent exactly, with the nearest values.",
 )
 
-rows_only_option = option(
+rows_only_option = flag(
     "--rows-only",
-    is_flag=True,
     help="Accept a file that predicts the same although its content differs.",
 )
 
@@ -103,10 +109,9 @@ data_option = option(
     metavar="TABLE",
     help="Table of rows to use in addition to the generated probes.",
 )
-runtimes_option = option(
+runtimes_option = several(
     "--runtime",
-    metavar="NAME",
-    multiple=True,
+    "NAME",
     help="Runtime to use (repeat); all installed runtimes by default.",
 )
 

@@ -15,6 +15,7 @@ from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
     argument,
+    flag,
     json_option,
     option,
     progress_bar,
@@ -23,6 +24,7 @@ from fuzzytree.cli.console import (
     say_first,
     say_rows,
     setting,
+    several,
     standard_input,
     takes,
     verbose_option,
@@ -75,17 +77,14 @@ class ConvertOptions:
         metavar="NUMBER",
         help="Largest error of a degree where a curve becomes points.",
     )
-    settings: Sequence[str] = option(
+    settings: Sequence[str] = several(
         "--set",
-        metavar="NAME=VALUE",
-        multiple=True,
+        "NAME=VALUE",
         help="Option of the writer (repeat); "
         "`fuzzytree formats --format NAME` lists them.",
     )
-    allow_loss: bool = option(
-        "--allow-loss",
-        is_flag=True,
-        help="Write the file although the conversion loses information.",
+    allow_loss: bool = flag(
+        "--allow-loss", help="Write the file although the conversion loses information."
     )
     verbose: bool = verbose_option
     as_json: bool = json_option

@@ -16,6 +16,7 @@ from fuzzytree.cli.console import (
     option,
     progress_bar,
     quiet_option,
+    several,
     table_source,
     takes,
     verbose_option,
@@ -31,10 +32,9 @@ class DiffOptions:
     data: str | None = option(
         "--data", metavar="TABLE", help="Table of rows that both models classify."
     )
-    limits: Sequence[str] = option(
+    limits: Sequence[str] = several(
         "--limits",
-        metavar="NAME=LOW:HIGH",
-        multiple=True,
+        "NAME=LOW:HIGH",
         help="Range of values of an input to compare on (repeat).",
     )
     budget: float = option(

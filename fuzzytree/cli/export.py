@@ -6,6 +6,7 @@ import click
 
 from fuzzytree.cli.console import (
     argument,
+    flag,
     json_option,
     option,
     quiet_option,
@@ -61,18 +62,14 @@ class ExportOptions:
         metavar="NAMES",
         help="onnx: outputs of the graph, of label,rule,status,strengths.",
     )
-    readable: bool = option(
-        "--readable", is_flag=True, help="onnx: write functions with readable names."
+    readable: bool = flag(
+        "--readable", help="onnx: write functions with readable names."
     )
-    plain: bool = option(
-        "--plain",
-        is_flag=True,
-        help="onnx: write a tree without operators of ai.onnx.ml.",
+    plain: bool = flag(
+        "--plain", help="onnx: write a tree without operators of ai.onnx.ml."
     )
-    allow_loss: bool = option(
-        "--allow-loss",
-        is_flag=True,
-        help="Write the file although the format loses information.",
+    allow_loss: bool = flag(
+        "--allow-loss", help="Write the file although the format loses information."
     )
     verbose: bool = verbose_option
     as_json: bool = json_option

@@ -18,11 +18,13 @@ from fuzzytree.cli.console import (
     answer_json,
     argument,
     delimiter_option,
+    flag,
     json_option,
     option,
     progress_bar,
     quiet_option,
     say_rows,
+    several,
     table_source,
     takes,
     verbose_option,
@@ -70,35 +72,25 @@ class LearnOptions:
     name: str | None = option(
         "--name", metavar="TEXT", help="Name of the tree; the name of TABLE by default."
     )
-    ignore: Sequence[str] = option(
-        "--ignore",
-        metavar="COLUMN",
-        multiple=True,
-        help="Column that is no input (repeat).",
+    ignore: Sequence[str] = several(
+        "--ignore", "COLUMN", help="Column that is no input (repeat)."
     )
-    units: Sequence[str] = option(
-        "--unit",
-        metavar="COLUMN=UNIT",
-        multiple=True,
-        help="Unit of a column (repeat).",
+    units: Sequence[str] = several(
+        "--unit", "COLUMN=UNIT", help="Unit of a column (repeat)."
     )
     representation: ModelKind | None = as_option
     kind: Kind | None = terms_option
     conjunction: Conjunction | None = conjunction_option
-    no_test: bool = option(
-        "--no-test",
-        is_flag=True,
-        help="Learn without measuring the cross-validated accuracy.",
+    no_test: bool = flag(
+        "--no-test", help="Learn without measuring the cross-validated accuracy."
     )
     model: str | None = option(
         "--for",
         metavar="MODEL",
         help="Write this tree with the supports that states of `collect --for` count.",
     )
-    repeated: bool = option(
-        "--repeated",
-        is_flag=True,
-        help="Count the rows of a state twice that is part of two others.",
+    repeated: bool = flag(
+        "--repeated", help="Count the rows of a state twice that is part of two others."
     )
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option
@@ -126,11 +118,8 @@ class LearnOptions:
         type=int,
         help="Number n of the 2n + 1 points on a fitted set, 1 to 8.",
     )
-    separate_sides: Any = option(
-        "--separate-sides",
-        is_flag=True,
-        default=None,
-        help="Fit the two sides of a set separately.",
+    separate_sides: Any = flag(
+        "--separate-sides", default=None, help="Fit the two sides of a set separately."
     )
     patterns_per_class: str | None = option(
         "--patterns",
@@ -143,11 +132,8 @@ class LearnOptions:
     entry: Any = option(
         "--entry", type=float, help="Gain that a further input must bring."
     )
-    costs: Sequence[str] = option(
-        "--cost",
-        metavar="COLUMN=COST",
-        multiple=True,
-        help="Cost of computing a column (repeat).",
+    costs: Sequence[str] = several(
+        "--cost", "COLUMN=COST", help="Cost of computing a column (repeat)."
     )
     choices: Any = option(
         "--validate",
@@ -167,9 +153,8 @@ class LearnOptions:
         show_default=True,
         help="Random seed for the cross-validation folds.",
     )
-    keep_reversals: Any = option(
+    keep_reversals: Any = flag(
         "--keep-reversals",
-        is_flag=True,
         default=None,
         help="Let a wide set take back the far tails of others.",
     )
@@ -216,15 +201,14 @@ def _learnt(
     """Return a tree of all rows, what to say about it, and the facts."""
     from fuzzytree.api import accuracy, learn_table
     from fuzzytree.learning import remarks
+    from fuzzytree.report import counted, depth
     from fuzzytree.tables import Table
 
     settings, units_of = _settings(options), dict(_pairs("--unit", options.units))
     begin = time.perf_counter()
     is_silent = options.quiet or options.output == "-"
     with progress_bar(quiet=is_silent) as show:
-        result = (
-            _states(options, settings) if is_state else _read(options, settings, show)
-        )
+        result = _read(options, settings, show, is_state=is_state)
     found = result if isinstance(result, Table) else result.table()
     read = ("read", found.name, _timed(_read_text(found), begin))
     noticed = dict(remarks(found, lambda column: f"--ignore {shlex.quote(column)}"))
@@ -237,7 +221,10 @@ def _learnt(
             settings=settings,
             progress=show,
         )
-    rows = [_tree_row(learnt, begin), read]
+    tree = learnt.tree
+    size = f"depth {depth(tree)}, {len(tree.inputs)} of {len(tree.columns)} columns"
+    leaves = counted(len(tree.leaves), "leaf", "leaves")
+    rows = [("learnt", leaves, _timed(size, begin)), read]
     rows += [("remark", column, f"has {text}") for column, text in noticed.items()]
     rows += _report_rows(learnt.report, is_verbose=options.verbose)
     if found.weights is not None and learnt.report.rows_sampled < learnt.report.rows:
@@ -253,7 +240,7 @@ def _learnt(
         said = _timed(_accuracy_text(tested, found), begin)
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
     facts = _summary(found, noticed, learnt, tested, settings.seed, options.output)
-    return learnt.tree, rows, facts
+    return tree, rows, facts
 
 
 def _counted(
@@ -343,10 +330,17 @@ def _read(
     options: LearnOptions,
     settings: LearningSettings,
     progress: Progress,
+    *,
+    is_state: bool,
 ) -> Table | Learner:
-    """Return the one table, or a learner of a table that is too large for memory."""
-    from fuzzytree.learning import read_or_collect
+    """Return the one table, or a learner of all states or of a large table."""
+    from fuzzytree.learning import Learner, read_or_collect
 
+    if is_state:
+        name = _title(options)
+        return _merged(
+            options, lambda path: Learner.load(path, name=name, settings=settings)
+        )
     if options.target is None:
         raise click.UsageError("name the column of the classes with --target")
     return read_or_collect(
@@ -356,16 +350,6 @@ def _read(
         settings=settings,
         name="standard input" if options.tables[0] == "-" else None,
         progress=progress,
-    )
-
-
-def _states(options: LearnOptions, settings: LearningSettings) -> Learner:
-    """Return the learner of all states."""
-    from fuzzytree.learning import Learner
-
-    name = _title(options)
-    return _merged(
-        options, lambda path: Learner.load(path, name=name, settings=settings)
     )
 
 
@@ -505,14 +489,10 @@ def _read_text(table: Table) -> str:
         f"{counted(table.rows, 'row')}, {counted(len(table.columns), 'column')}, "
         f"{counted(len(table.classes), 'class', 'classes')}"
     )
-    odd = [
-        counted(table.missing, "missing cell") if table.missing else "",
-        counted(table.unlabelled, "row") + " without a class left out"
-        if table.unlabelled
-        else "",
-    ]
-    shown = ", ".join(filter(None, odd))
-    return f"{text} ({shown})" if shown else text
+    odd = [counted(table.missing, "missing cell")] if table.missing else []
+    if table.unlabelled:
+        odd.append(counted(table.unlabelled, "row") + " without a class left out")
+    return f"{text} ({', '.join(odd)})" if odd else text
 
 
 def _accuracy_text(tested: Accuracy | None, table: Table) -> str:
@@ -533,14 +513,6 @@ def _accuracy_text(tested: Accuracy | None, table: Table) -> str:
 
 def _timed(text: str, begin: float) -> str:
     return f"{text}, {time.perf_counter() - begin:.2f} s"
-
-
-def _tree_row(learnt: Learnt, begin: float) -> tuple[str, str, str]:
-    from fuzzytree.report import counted, depth
-
-    tree = learnt.tree
-    size = f"depth {depth(tree)}, {len(tree.inputs)} of {len(tree.columns)} columns"
-    return "learnt", counted(len(tree.leaves), "leaf", "leaves"), _timed(size, begin)
 
 
 def _report_rows(

@@ -7,6 +7,7 @@ import csv
 import json
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
@@ -18,6 +19,7 @@ from fuzzytree.cli.console import (
     allow_loss_option,
     argument,
     delimiter_option,
+    flag,
     option,
     progress_bar,
     quiet_option,
@@ -72,28 +74,21 @@ class RunOptions:
         type=click.Choice(["class", "rule"]),
         help="Add a column with the firing strength of each class or rule.",
     )
-    why: bool = option(
-        "--why",
-        is_flag=True,
-        help="Add the winning rule, with its degrees of membership.",
+    why: bool = flag(
+        "--why", help="Add the winning rule, with its degrees of membership."
     )
-    keep: bool = option(
-        "--keep", is_flag=True, help="Add the columns of TABLE before the others."
-    )
+    keep: bool = flag("--keep", help="Add the columns of TABLE before the others.")
     runtime: str | None = option(
         "--runtime",
         metavar="NAME",
         help="Runtime that executes the model; native by default.",
     )
     delimiter: str | None = delimiter_option
-    as_json: bool = option(
-        "--json",
-        is_flag=True,
-        help="Write JSON lines in place of CSV; null for an empty cell.",
+    as_json: bool = flag(
+        "--json", help="Write JSON lines in place of CSV; null for an empty cell."
     )
-    safe_csv: bool = option(
+    safe_csv: bool = flag(
         "--safe-csv",
-        is_flag=True,
         help="Put an apostrophe before text that a spreadsheet reads as a formula.",
     )
     allow_loss: bool = allow_loss_option
@@ -408,9 +403,9 @@ class _Tally:
         self.rows = self.cells = self.extras = 0
         self.is_numeric = False
         self.remarks: list[tuple[str, str]] = []
-        self.classes: dict[str, int] = {}
+        self.classes: Counter[str] = Counter()
         self.spans: dict[str, tuple[float, float]] = {}
-        self.statuses: dict[int, int] = {}
+        self.statuses: Counter[int] = Counter()
 
     def add(self, batch: Batch, answers: Predictions | Outputs) -> None:
         """Take the answers to a piece."""
@@ -427,10 +422,8 @@ class _Tally:
                 known = self.spans.get(name, (low, high))
                 self.spans[name] = (min(low, known[0]), max(high, known[1]))
         else:
-            for name, count in answers.class_counts().items():
-                self.classes[name] = self.classes.get(name, 0) + count
-        for status in range(4):
-            self.statuses[status] = self.statuses.get(status, 0) + answers.count(status)
+            self.classes.update(answers.class_counts())
+        self.statuses.update({status: answers.count(status) for status in range(4)})
 
     def report(self, output: str, *, quiet: bool) -> None:
         """Report on stderr what was predicted and what was unusual."""
@@ -441,7 +434,7 @@ class _Tally:
             f"{name} {number(low)} to {number(high)}"
             for name, (low, high) in self.spans.items()
         ]
-        _, ties, uncovered, missing = (self.statuses.get(k, 0) for k in range(4))
+        _, ties, uncovered, missing = (self.statuses[k] for k in range(4))
         status = [
             f"{counted(uncovered, 'row')} with no rule fired",
             f"{counted(missing, 'row')} with a missing input",

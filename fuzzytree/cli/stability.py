@@ -11,11 +11,12 @@ from fuzzytree.cli.console import (
     argument,
     data_option,
     delimiter_option,
+    flag,
     json_option,
-    option,
     progress_bar,
     quiet_option,
     runtimes_option,
+    several,
     table_source,
     takes,
     verbose_option,
@@ -28,14 +29,11 @@ class StabilityOptions:
 
     model: str = argument(metavar="MODEL")
     data: str | None = data_option
-    only: Sequence[str] = option(
-        "--only",
-        metavar="CODE",
-        multiple=True,
-        help="Check to apply, such as N3 (repeat); all by default.",
+    only: Sequence[str] = several(
+        "--only", "CODE", help="Check to apply, such as N3 (repeat); all by default."
     )
     runtimes: Sequence[str] = runtimes_option
-    is_full: bool = option("--rows", is_flag=True, help="The same as --verbose.")
+    is_full: bool = flag("--rows", help="The same as --verbose.")
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option
     as_json: bool = json_option

@@ -20,6 +20,7 @@ from fuzzytree.cli import (
     say,
     say_rows,
     setting,
+    several,
     takes,
     wrong_options,
 )
@@ -51,10 +52,9 @@ class TactileExportOptions(SensorOptions):
         help="Format; default by the suffix of OUT.",
     )
     data: str | None = data_option
-    settings: Sequence[str] = option(
+    settings: Sequence[str] = several(
         "--set",
-        metavar="NAME=VALUE",
-        multiple=True,
+        "NAME=VALUE",
         help="Option (repeat): outputs, reject, opset, ir, plain of graphs; "
         "name, reject of C.",
     )

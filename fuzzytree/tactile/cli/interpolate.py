@@ -12,6 +12,7 @@ import click
 from fuzzytree.cli import (
     answer_json,
     argument,
+    flag,
     json_option,
     option,
     quiet_option,
@@ -54,10 +55,8 @@ class TactileInterpolateOptions(FramesOptions):
         help="Number of the frame, from 0; "
         "a picture shows the first pressed one if none.",
     )
-    is_marked: bool = option(
-        "--axis",
-        is_flag=True,
-        help="Mark the centre of pressure and the principal axis.",
+    is_marked: bool = flag(
+        "--axis", help="Mark the centre of pressure and the principal axis."
     )
     output: str = option(
         "-o",

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from fuzzytree.cli import argument, option, quiet_option, say_rows, takes, wrong_options
+from fuzzytree.cli import (
+    argument,
+    flag,
+    option,
+    quiet_option,
+    say_rows,
+    takes,
+    wrong_options,
+)
 from fuzzytree.tactile.cli.sensors import frames_model
 
 if TYPE_CHECKING:
@@ -57,10 +65,8 @@ class TactileLiveOptions:
         metavar="N",
         help="Frames that a result must last before its line is printed.",
     )
-    lines: bool = option(
-        "--lines", is_flag=True, help="Print lines, also on a terminal."
-    )
-    as_json: bool = option("--json", is_flag=True, help="Print each line as JSON.")
+    lines: bool = flag("--lines", help="Print lines, also on a terminal.")
+    as_json: bool = flag("--json", help="Print each line as JSON.")
     page: int | None = option(
         "--page",
         is_flag=False,

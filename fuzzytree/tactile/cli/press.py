@@ -21,6 +21,7 @@ from fuzzytree.cli import (
     quiet_option,
     say_rows,
     setting,
+    several,
     takes,
     wrong_options,
 )
@@ -55,10 +56,9 @@ class TactilePressOptions:
         required=True,
         help="Archive to write (.npz); `-` is stdout.",
     )
-    changes: Sequence[str] = option(
+    changes: Sequence[str] = several(
         "--set",
-        metavar="NAME=VALUE",
-        multiple=True,
+        "NAME=VALUE",
         help="Number of the simulator (repeat); see docs/explanation/simulator.md.",
     )
     as_json: bool = json_option

@@ -17,6 +17,7 @@ import click
 from fuzzytree.cli import (
     answer_json,
     argument,
+    flag,
     json_option,
     option,
     quiet_option,
@@ -66,10 +67,8 @@ class TactileRecordOptions:
         metavar="S",
         help="Seconds to record.",
     )
-    force: bool = option("--force", is_flag=True, help="Replace FILE if it exists.")
-    no_wait: bool = option(
-        "--no-wait", is_flag=True, help="End when the port goes away."
-    )
+    force: bool = flag("--force", help="Replace FILE if it exists.")
+    no_wait: bool = flag("--no-wait", help="End when the port goes away.")
     as_json: bool = json_option
     quiet: bool = quiet_option
 

@@ -15,6 +15,7 @@ from fuzzytree.cli import (
     answer,
     answer_json,
     argument,
+    flag,
     json_option,
     option,
     quiet_option,
@@ -42,10 +43,8 @@ class TactileReplayOptions:
         metavar="FILE",
         help="File for the frames (.csv, .npz) or for the board (.yaml).",
     )
-    to_port: bool = option(
-        "--to-port",
-        is_flag=True,
-        help="Send the frames through a new port, as the board did.",
+    to_port: bool = flag(
+        "--to-port", help="Send the frames through a new port, as the board did."
     )
     speed: float | None = option(
         "--speed",

@@ -13,10 +13,12 @@ from fuzzytree.cli import (
     answer,
     answer_json,
     argument,
+    flag,
     json_option,
     option,
     quiet_option,
     say_rows,
+    several,
     takes,
     wrong_options,
 )
@@ -42,10 +44,9 @@ class TactileSimulateOptions:
     recording: str | None = option(
         "--recording", metavar="FILE", help="Recording whose frames are repeated."
     )
-    faults: Sequence[str] = option(
+    faults: Sequence[str] = several(
         "--fault",
-        metavar="NAME=VALUE",
-        multiple=True,
+        "NAME=VALUE",
         help="Fault to simulate, `stall=SECONDS` or `unplug=SECONDS` (repeat).",
     )
     link: str | None = option(
@@ -59,7 +60,7 @@ class TactileSimulateOptions:
         default=0,
         help="Random seed of the simulated object; default 0.",
     )
-    fast: bool = option("--fast", is_flag=True, help="Send as fast as the host reads.")
+    fast: bool = flag("--fast", help="Send as fast as the host reads.")
     frames: int | None = option(
         "--frames",
         type=click.IntRange(1),
