@@ -505,41 +505,34 @@ def in_order(function: Callable[[S], T], items: Iterable[S]) -> Generator[T]:
         >>> list(in_order(abs, [-1, 2, -3]))
         [1, 2, 3]
     """
-    steps = _steps(function, items)
-    ahead = [*itertools.islice(steps, 2)]
+    failures: list[Exception] = []
+    rest = _until_failure(items, failures)
+    ahead = [*itertools.islice(rest, 2)]
     is_inside = threading.current_thread().name.startswith(_THREAD_NAME)
     if len(ahead) < 2 or THREADS < 2 or is_inside:
-        yield from (step() for step in itertools.chain(ahead, steps))
-        return
-    pool = ThreadPoolExecutor(THREADS, _THREAD_NAME)
-    running: deque[Future[T]] = deque()
-    try:
-        for step in itertools.chain(ahead, steps):
-            running.append(pool.submit(step))
-            if len(running) > 2 * THREADS:
-                yield running.popleft().result()
-        while running:
-            yield running.popleft().result()
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _steps(function: Callable[[S], T], items: Iterable[S]) -> Iterator[Callable[[], T]]:
-    """Yield calls of a function; the last one raises the error of the iterator."""
-
-    def fail(error: Exception) -> T:
-        raise error
-
-    rest = iter(items)
-    while True:
+        yield from map(function, itertools.chain(ahead, rest))
+    else:
+        pool = ThreadPoolExecutor(THREADS, _THREAD_NAME)
+        running: deque[Future[T]] = deque()
         try:
-            item = next(rest)
-        except StopIteration:
-            return
-        except Exception as error:  # raised again, in its turn
-            yield functools.partial(fail, error)
-            return
-        yield functools.partial(function, item)
+            for item in itertools.chain(ahead, rest):
+                running.append(pool.submit(function, item))
+                if len(running) > 2 * THREADS:
+                    yield running.popleft().result()
+            while running:
+                yield running.popleft().result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+    if failures:
+        raise failures[0]
+
+
+def _until_failure(items: Iterable[S], failures: list[Exception]) -> Iterator[S]:
+    """Yield items; the error of their iterator is put in a list."""
+    try:
+        yield from items
+    except Exception as error:  # raised in its turn
+        failures.append(error)
 
 
 def pieces(
@@ -1359,9 +1352,9 @@ def pandas_frame(columns: Mapping[str, Sequence[object]]) -> pd.DataFrame:
     except ImportError as error:
         raise MissingExtraError("to_pandas needs pandas: pip install pandas") from error
 
-    cells = {name: [_or_none(one) for one in row] for name, row in columns.items()}
-    return pd.DataFrame(cells)
-
-
-def _or_none(cell: object) -> object:
-    return None if cell == "" else cell
+    return pd.DataFrame(
+        {
+            name: [one if one != "" else None for one in row]
+            for name, row in columns.items()
+        }
+    )

@@ -309,10 +309,14 @@ def _rows(
             with_others=with_others,
         )
     ]
-    values = np.hstack([batch.values for batch in result])
+    return _values(result), result
+
+
+def _values(parts: Sequence[Batch]) -> FloatArray:
+    values = np.hstack([batch.values for batch in parts])
     if not values.shape[1]:
-        raise TableError(f"{result[0].piece.name} has no rows")
-    return values, result
+        raise TableError(f"{parts[0].piece.name} has no rows")
+    return values
 
 
 def check(
@@ -738,18 +742,8 @@ def diff(
     source = _source_of(data, name)
     rows = None
     if data is not None:
-        result = [
-            *batches(
-                data,
-                auditing.all_inputs(first, second),
-                name=name,
-            )
-        ]
-        rows = auditing.AuditRows(
-            result[0].piece.name, np.hstack([batch.values for batch in result])
-        )
-        if not rows.values.shape[1]:
-            raise TableError(f"{rows.name} has no rows")
+        result = [*batches(data, auditing.all_inputs(first, second), name=name)]
+        rows = auditing.AuditRows(result[0].piece.name, _values(result))
     return auditing.difference(
         first,
         second,
