@@ -16,7 +16,7 @@ import hashlib
 import itertools
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Final, cast
 
@@ -67,8 +67,6 @@ class StateHeader(msgspec.Struct, forbid_unknown_fields=True):
 
     Attributes:
         magic: The kind and the version of the file.
-        target: The column of the classes.
-        columns: The columns of numbers.
         classes: The names of the classes, as they came.
         floats: Which of them came as numbers with a fraction, as 1.0 does.
         kinds: The kinds of labels that came, see `fuzzytree.tables.coded_classes`.
@@ -243,9 +241,7 @@ class Learner:
         ]
         filled = [part for part in parts if part is not None]
         if filled:
-            result._statistics = (
-                filled[0] if len(filled) < 2 else filled[0].merge(filled[1])
-            )
+            result._statistics = functools.reduce(Statistics.merge, filled)
         return result
 
     def learn(self, *, progress: Progress | None = None) -> FuzzyTree:
@@ -532,16 +528,10 @@ def read_or_collect(
     codes = np.concatenate([piece.codes for piece in whole])
     refuse_measurements(rows.name, rows.target, classes, positions[codes])
     learner = Learner(rows.target, name=rows.name, settings=settings)
-    learner.collect(rows, itertools.chain(_emptied(whole), pieces), THREADS)
+    taken = (whole.pop(0) for _ in range(len(whole)))  # not kept in memory
+    learner.collect(rows, itertools.chain(taken, pieces), THREADS)
     rows.refuse_empty()
     return learner
-
-
-def _emptied(pieces: list[LearningPiece]) -> Iterator[LearningPiece]:
-    """Yield the pieces of a list and drop each of them."""
-    pieces.reverse()
-    while pieces:
-        yield pieces.pop()
 
 
 def _difference(what: str, mine: Sequence[str], others: Sequence[str]) -> str:
