@@ -349,9 +349,10 @@ def _largest(results: dict[str, Facts]) -> str:
     parts = results.get(f"shares parquet {max(sizes, default=0)}", {})
     peak, size = facts["peak"] / 2**30, max(facts["bytes"]) / 1e6
     text = f"""{rows:,} rows, made in {WORKERS} processes by blocks of a million that
-are forgotten once they are taken: {facts["seconds"]:.0f} s. Of {facts["cpu"]:.0f} s of
-processor time {facts["making"]:.0f} s were for making the rows, so taking them took
-{own * 1e6:.2f} us a row; at most {peak:.2f} GiB; {WORKERS} states of {size:.1f} MB."""
+are forgotten once they are taken: {facts["seconds"]:.0f} s, with a load of
+{facts["load"]:.1f} before. Of {facts["cpu"]:.0f} s of processor time
+{facts["making"]:.0f} s were for making the rows, so taking them took {own * 1e6:.2f} us
+a row; at most {peak:.2f} GiB; {WORKERS} states of {size:.1f} MB."""
     if "read and update" in parts:
         each = parts["read and update"] / max(sizes)
         cores = MACHINES * WORKERS
