@@ -311,7 +311,8 @@ class LearningRows:
         self.names = None if chosen is None else tuple(chosen)
         self._chosen_by = chosen_by
         self.labels = labels or ClassLabels()
-        self.name, self.rows, self.unlabelled, self.missing = "", 0, 0, 0
+        self.name = name or path_of(source) or ""
+        self.rows = self.unlabelled = self.missing = 0
         self.remarks: list[tuple[str, str]] = []
         self._ignore = [column.strip() for column in as_names(ignore)]
         self._codes: IntArray | None = None
@@ -330,7 +331,7 @@ class LearningRows:
         """
         begin = time.monotonic()
         first = next(self._pieces)
-        self.name = first.name
+        self.name = self.name or first.name
         chosen = self._chosen(first)
         is_kept = np.array([k not in self._counts for k in chosen], bool)
         names, total = [first.columns[k] for k in chosen], _Faults()

@@ -688,6 +688,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_the_files_of_a_folder_are_one_table(folder: Path) -> None:
     table = read_table(folder, target="kind")
+    assert table.name == str(folder)
     assert table.columns == ("x", "y")
     assert table.values.tolist() == [[1.0, 3.0, 5.0, 7.0], [2.0, 4.0, 6.0, 8.0]]
     assert table.codes.tolist() == [1, 0, 0, 1]
