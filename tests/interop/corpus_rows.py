@@ -296,7 +296,7 @@ def _onnx_difference(case: Case, ours: Outputs) -> tuple[float | None, list[str]
         return None, [str(error)]
     rows = np.array(case.rows, np.float64)
     (found,) = open_bare(content)(["outputs"], {"inputs": rows})
-    return relative(ours, [tuple(map(float, row)) for row in found]), []
+    return relative(ours, [tuple(map(float, row)) for row in np.asarray(found)]), []
 
 
 def _written(model: FuzzySystem, name: str) -> str:

@@ -45,7 +45,8 @@ def _predicted(
     model: Document | OnnxModel, runtime: str | None, table: object
 ) -> Predictions | Outputs:
     ready = prepare_answering(model, runtime)
-    return joined([*ready(table, lambda _, one: one, columns=ready.inputs)])
+    source = tables.table(table, columns=ready.inputs)
+    return joined([*ready(source, lambda _, one: one)])
 
 
 def _refuse(count: int, _: str) -> None:
