@@ -247,7 +247,8 @@ Measured on {known.get("cores")} cores with {memory:.0f} GiB, Python
 {known.get("python")}, {packages}.
 
 The load before a step was {min(loads, default=0):.1f} to {max(loads, default=0):.1f};
-so processor seconds count here, and wall seconds stand beside them. *us* is
+so processor seconds count here, and wall seconds stand beside them; *busy* is where a
+step got less than half a core, as others had the machine. *us* is
 microseconds of processor time a row, that of engines' own processes included (a JVM,
 workers), without their start. *GiB* is the largest resident memory of all these
 processes together. The exponent is that of the growth of processor time over the last
@@ -276,7 +277,9 @@ def _costs(
     for name in names:
         found = [results.get(f"{kind} {name} {rows}", {}) for rows in sizes]
         shown = [_cost(facts, rows) for facts, rows in zip(found, sizes, strict=True)]
-        cells.append([name.replace("-", ": "), *shown, _exponent(found, sizes)])
+        cells.append(
+            [name.replace("files-", "files: "), *shown, _exponent(found, sizes)]
+        )
     return _rows(cells)
 
 
@@ -284,7 +287,9 @@ def _cost(facts: Facts, rows: int) -> str:
     if "cpu" not in facts:
         return str(facts.get("failed", "-"))
     each = facts["cpu"] / rows * 1e6
-    return f"{facts['seconds']:.1f}, {each:.2f}, {facts['peak'] / 2**30:.2f}"
+    is_free = facts["cpu"] > facts["seconds"] / 2
+    seconds = f"{facts['seconds']:.1f}" if is_free else "busy"
+    return f"{seconds}, {each:.2f}, {facts['peak'] / 2**30:.2f}"
 
 
 def _exponent(found: Sequence[Facts], sizes: Sequence[int]) -> str:

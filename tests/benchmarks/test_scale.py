@@ -45,9 +45,10 @@ def test_a_step_that_fails_is_kept_with_its_reason(tmp_path: Path) -> None:
 def test_the_page_states_costs_growth_and_what_is_calculated() -> None:
     cost = {"seconds": 2.0, "peak": 1 << 30, "load": 0.1}
     results: dict[str, scale.Facts] = {
-        "learn files-parquet 1000000": {**cost, "cpu": 1.0, "fingerprint": "a"},
+        "learn files-parquet 1000000": {**cost, "cpu": 1.0 + 1e-9, "fingerprint": "a"},
         "learn files-parquet 10000000": {**cost, "cpu": 10.0, "fingerprint": "b"},
         "learn duckdb 1000000": {**cost, "cpu": 3.0, "fingerprint": "a"},
+        "learn ibis 1000000": {**cost, "cpu": 0.9, "fingerprint": "a"},
         "shares parquet 10000000": {
             "read and update": 10.0,
             "read and merge a state": 0.5,
@@ -65,6 +66,7 @@ def test_the_page_states_costs_growth_and_what_is_calculated() -> None:
     assert "gave 1 fingerprint(s)" in text
     assert "| files: parquet | 2.0, 1.00, 1.00 | 2.0, 1.00, 1.00 | 1.00 |" in text
     assert "| duckdb | 2.0, 3.00, 1.00 | - | - |" in text
+    assert "| ibis | busy, 0.90, 1.00 | - | - |" in text
     flowed = " ".join(text.split())
     assert "so taking them took 1.00 us a row" in flowed
     assert "1e+11 x 1.00 us / 200 = 500 s" in flowed
