@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Mapping
-from typing import Final
 
 import msgspec
 import numpy as np
@@ -20,17 +19,18 @@ import numpy.typing as npt
 from fuzzytree.checking import as_model
 from fuzzytree.errors import ReadError
 from fuzzytree.files import read_bounded, write_atomically
-from fuzzytree.learning import StateHeader, open_state, refuse_repeated, state_content
+from fuzzytree.learning import (
+    COUNTS_MAGIC,
+    STATE_LIMIT,
+    StateHeader,
+    open_state,
+    refuse_repeated,
+    state_content,
+)
 from fuzzytree.model import FuzzyTree, IntArray, ModelSource, Progress, fingerprint
 from fuzzytree.runtimes import baseline
 from fuzzytree.semantics import Status
 from fuzzytree.tables import ClassLabels, LearningPiece, LearningRows, in_order
-
-MAGIC: Final = "fuzzytree leaf counts 1"
-"""The kind and the version of the file of such a state."""
-
-LIMIT: Final = 1 << 33
-"""The largest file that is read, in bytes."""
 
 
 class LeafCounts:
@@ -198,7 +198,7 @@ class LeafCounts:
             WriteError: If the file cannot be written.
         """
         header = StateHeader(
-            magic=MAGIC,
+            magic=COUNTS_MAGIC,
             target=self.target,
             columns=[*self.tree.inputs],
             classes=[name for name, _ in self._labels.keys],
@@ -231,7 +231,7 @@ class LeafCounts:
                 another tree.
         """
         try:
-            header, arrays = open_state(read_bounded(path, LIMIT), MAGIC)
+            header, arrays = open_state(read_bounded(path, STATE_LIMIT), COUNTS_MAGIC)
             result = cls(model, header.target)
             _refuse_another(header.model, result.tree)
             result._take(header, arrays)

@@ -3,6 +3,8 @@ from .findings import remarks as remarks
 from .learner import ArrayLearner as ArrayLearner
 from .learner import Learnt as Learnt
 from .learner import learn_arrays as learn_arrays
+from .parts import COUNTS_MAGIC as COUNTS_MAGIC
+from .parts import STATE_LIMIT as STATE_LIMIT
 from .parts import Learner as Learner
 from .parts import StateHeader as StateHeader
 from .parts import open_state as open_state

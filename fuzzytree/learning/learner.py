@@ -106,7 +106,7 @@ class ArrayLearner:
 
     def __post_init__(self) -> None:
         """Check the names and start with an empty table."""
-        check_names(self.columns, self.classes, self.settings)
+        _check_names(self.columns, self.classes, self.settings)
         for text in (self.name, *self.units.values()):
             if fault := text_fault(text):
                 raise ValueError(f"the name or unit {text!r} {fault}")
@@ -217,14 +217,9 @@ def _features_per_node(grown: GrownTree) -> tuple[int, ...]:
     return tuple(len(split.axis.features) for split in grown.sketch.splits)
 
 
-def check_names(
+def _check_names(
     columns: Sequence[str], classes: Sequence[str], settings: LearningSettings
 ) -> None:
-    """Refuse names that stand twice or cannot be written, and unknown ones.
-
-    Raises:
-        ValueError: One sentence for the first fault.
-    """
     for kind, found in (("column", columns), ("class", classes)):
         seen: set[str] = set()
         for name in found:

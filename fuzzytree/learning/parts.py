@@ -46,19 +46,22 @@ Progress = Callable[[str, float], None]
 MAGIC: Final = "fuzzytree state 1"
 """The kind and the version of a state's file."""
 
+COUNTS_MAGIC: Final = "fuzzytree leaf counts 1"
+"""Those of a state of the second pass."""
+
 MOST_CELLS: Final = 1 << 25
 """The most numbers of a table that is read whole."""
 
 _LARGE: Final = 1 << 24
 """The most numbers of a sample for each thread to have its own."""
 
-LIMIT: Final = 1 << 33
+STATE_LIMIT: Final = 1 << 33
 """The largest file of a state that is read, in bytes."""
 
 
 _WRITERS: Final = {
     MAGIC: "`fuzzytree collect`",
-    "fuzzytree leaf counts 1": "`fuzzytree collect --for`",
+    COUNTS_MAGIC: "`fuzzytree collect --for`",
 }
 
 
@@ -335,7 +338,7 @@ class Learner:
         Raises:
             ReadError: If the file is none, is broken, or is of another version.
         """
-        content = read_bounded(path, LIMIT)
+        content = read_bounded(path, STATE_LIMIT)
         return cls.from_bytes(
             content, os.fspath(path), units=units, name=name, settings=settings
         )

@@ -10,9 +10,8 @@ import pyarrow as pa
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.api import leaf_counts
 from fuzzytree.errors import ReadError, TableError
-from fuzzytree.learning import open_state, state_content
+from fuzzytree.learning import COUNTS_MAGIC, open_state, state_content
 from fuzzytree.model import FuzzyTree, fingerprint
 
 ROWS = 1_500
@@ -166,7 +165,7 @@ def test_a_file_that_is_cut_or_changed_is_refused(
     path, whole = tmp_path / "a.state", counts_of(tree, table)
     whole.save(path)
     content = path.read_bytes()
-    header, arrays = open_state(content, leaf_counts.MAGIC)
+    header, arrays = open_state(content, COUNTS_MAGIC)
     ends, codes, counts = (
         arrays[name].astype(np.int64) for name in ("ends", "codes", "counts")
     )
