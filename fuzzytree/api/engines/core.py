@@ -25,7 +25,6 @@ from fuzzytree.errors import FuzzyTreeError, TableError
 from fuzzytree.learning import Learner, LearningSettings
 from fuzzytree.model import FuzzyTree, Model, label_of
 from fuzzytree.runtimes import Predictions, joined
-from fuzzytree.semantics import Status
 from fuzzytree.tables import Batch
 
 if TYPE_CHECKING:
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
 
 _STATE: Final = b"ARROW1"
 """How a state begins; the sentence of an error begins otherwise."""
-
-_STATUSES: Final = pa.array([status.name.lower() for status in Status])
 
 
 def _names_of(frame: Any) -> list[str]:
@@ -165,10 +162,10 @@ class Predictor:
         self.model = model
         self.inputs = frozenset(name.strip() for name in model.inputs)
         label_type = model.semantics.label_type
-        self._labels = pa.array([label_of(name, label_type) for name in model.classes])
+        labels = pa.array([label_of(name, label_type) for name in model.classes])
         self.schema = pa.schema(
             [
-                ("class", self._labels.type),
+                ("class", labels.type),
                 ("rule", pa.int32()),
                 ("status", pa.string()),
                 ("strength", pa.float64()),
@@ -212,12 +209,9 @@ class Predictor:
         strengths = np.ones(len(result))
         if all_strengths is not None:
             strengths[places] = all_strengths[result.rule[places] - 1, places]
-        columns = [
-            self._labels.take(pa.array(result.codes, mask=result.codes < 0)),
-            pa.array(result.rule, pa.int32()),
-            _STATUSES.take(pa.array(result.status)),
-            pa.array(strengths, mask=result.rule < 1),
-        ]
+        column = pa.array(strengths, mask=result.rule < 1)
+        table = result.to_arrow().append_column("strength", column).cast(self.schema)
+        columns = [one.combine_chunks() for one in table.columns]
         return pa.RecordBatch.from_arrays(columns, schema=self.schema)
 
 
