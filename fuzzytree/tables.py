@@ -358,9 +358,7 @@ class LearningRows:
                 self._count(chosen[row], values[row])
             self.rows += piece.rows
             if self._progress is not None:
-                rate = self.rows / max(time.monotonic() - begin, 1e-3)
-                text = f"{piece.name}: {self.rows:,} rows, {rate:,.0f} rows/s"
-                self._progress(text, 0.0)
+                self._progress(f"{piece.name}: {rate_text(self.rows, begin)}", 0.0)
             if total or len(codes) != piece.rows:
                 continue
             has_class = codes >= 0
@@ -451,6 +449,12 @@ class LearningRows:
         starts = self._counts[column]
         fitting = {start for start in starts if np.array_equal(values, count + start)}
         self._counts[column] = frozenset(fitting)
+
+
+def rate_text(rows: int, begin: float) -> str:
+    """Return how many rows were read since a `time.monotonic`, and how fast."""
+    rate = rows / max(time.monotonic() - begin, 1e-3)
+    return f"{rows:,} rows, {rate:,.0f} rows/s"
 
 
 def batches(

@@ -106,6 +106,7 @@ def command(options: RunOptions) -> None:
     from 1; 0 is no rule.
     """
     from fuzzytree import api
+    from fuzzytree.tables import rate_text
 
     suffix = Path(options.output).suffix.lower()
     is_binary = suffix in _BINARY
@@ -152,8 +153,7 @@ def command(options: RunOptions) -> None:
             else:
                 write(rows, batch.piece.name)
             tally.add(batch, answers)
-            rate = tally.rows / max(time.monotonic() - begin, 1e-3)
-            show(f"{tally.rows:,} rows, {rate:,.0f} rows/s", None)
+            show(rate_text(tally.rows, begin), None)
     tally.report(options.output, quiet=options.quiet)
 
 
