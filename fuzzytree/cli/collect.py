@@ -14,12 +14,12 @@ from fuzzytree.cli.console import (
     answer_json,
     argument,
     delimiter_option,
+    ignore_option,
     json_option,
     option,
     progress_bar,
     quiet_option,
     say_rows,
-    several,
     table_source,
     takes,
     wrong_options,
@@ -58,9 +58,7 @@ class CollectOptions:
         help="Columns to learn from, separated by commas; all of the first PART by "
         "default.",
     )
-    ignore: Sequence[str] = several(
-        "--ignore", "COLUMN", help="Column that is no input (repeat)."
-    )
+    ignore: Sequence[str] = ignore_option
     rows_per_class: int | None = option(
         "--rows-per-class",
         type=click.IntRange(min=1),

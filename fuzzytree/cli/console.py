@@ -94,6 +94,8 @@ delimiter_option = option(
     help="Character between the cells of a CSV file; by default from its first line.",
 )
 
+ignore_option = several("--ignore", "COLUMN", help="Column that is no input (repeat).")
+
 allow_loss_option = flag(
     "--allow-loss",
     help="Read a file that a model cannot represent exactly, with the nearest values.",

@@ -19,6 +19,7 @@ from fuzzytree.cli.console import (
     argument,
     delimiter_option,
     flag,
+    ignore_option,
     json_option,
     option,
     progress_bar,
@@ -72,9 +73,7 @@ class LearnOptions:
     name: str | None = option(
         "--name", metavar="TEXT", help="Name of the tree; the name of TABLE by default."
     )
-    ignore: Sequence[str] = several(
-        "--ignore", "COLUMN", help="Column that is no input (repeat)."
-    )
+    ignore: Sequence[str] = ignore_option
     units: Sequence[str] = several(
         "--unit", "COLUMN=UNIT", help="Unit of a column (repeat)."
     )
