@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, cast
 from fuzzytree.checking import export
 from fuzzytree.errors import TableError
 from fuzzytree.model import FuzzyTree
+from fuzzytree.semantics import Status
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -28,9 +29,8 @@ TABLES = map("fuzzytree_rows_{}".format, itertools.count(1))
 """Names for tables in queries, each of its own."""
 
 _NUMBER = re.compile(r"\w*INT(EGER)?|FLOAT|DOUBLE|BOOLEAN|DECIMAL.*")
-_STATUS: Final = (
-    "CASE \"status\" WHEN 0 THEN 'decided' WHEN 1 THEN 'tie' "
-    "WHEN 2 THEN 'uncovered' ELSE 'missing' END"
+_STATUS: Final = 'CASE "status"{} END'.format(
+    "".join(f" WHEN {status:d} THEN '{status.name.lower()}'" for status in Status)
 )
 
 
