@@ -64,6 +64,8 @@ EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
 )
 """The packages of each extra and their modules; a test compares it with the project."""
 
+ABSENT = "not installed"
+
 FOR_TESTS = ("witnesses", "peers")
 """The extras that only the test suite and the benchmarks use."""
 
@@ -90,7 +92,7 @@ def command(options: DoctorOptions) -> int:
     """Report versions and extras; learn, write, read and run a small model.
 
     Exit 1 if the small model fails. The packages that only the test suite and the
-    benchmarks use are listed by `--verbose`.
+    benchmarks use, and those that are not installed, are listed by `--verbose`.
     """
     from fuzzytree import report
 
@@ -109,8 +111,9 @@ def command(options: DoctorOptions) -> int:
         answer(f"self-test failed: {fault}")
     if not faults:
         answer("self-test passed: learning, writing, reading and running agree")
-    hidden = {n for extra in FOR_TESTS for n in EXTRAS[extra] if not options.verbose}
-    shown = [item for item in versions.items() if item[0] not in hidden]
+    hidden = {name for extra in FOR_TESTS for name in EXTRAS[extra]}
+    hidden |= {name for name, version in versions.items() if version == ABSENT}
+    shown = [one for one in versions.items() if options.verbose or one[0] not in hidden]
     answer("\n".join(report.aligned(shown)))
     for extra in missing:
         if options.verbose or extra not in FOR_TESTS:
@@ -122,7 +125,7 @@ def _version(name: str) -> str:
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
-        return "not installed"
+        return ABSENT
 
 
 def self_test(has_onnx: bool) -> list[str]:

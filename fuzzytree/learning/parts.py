@@ -58,7 +58,6 @@ _LARGE: Final = 1 << 24
 STATE_LIMIT: Final = 1 << 33
 """The largest file of a state that is read, in bytes."""
 
-
 _WRITERS: Final = {
     MAGIC: "`fuzzytree collect`",
     COUNTS_MAGIC: "`fuzzytree collect --for`",
