@@ -572,6 +572,9 @@ def pieces(
             array = cast("npt.NDArray[np.generic]", source)
             names = None if columns is None else as_names(columns)
             return iter([_array_piece(array, names, name or "the array")])
+        case _ if type(source).__name__ == "RecordBatch":
+            batch = cast("pa.RecordBatch", source)
+            return _batch_pieces([batch], name or "the table", only)
         case _ if hasattr(source, "read_next_batch"):
             reader = cast("pa.RecordBatchReader", source)
             parts = itertools.chain([reader.schema.empty_table()], reader)

@@ -217,6 +217,14 @@ def test_missing_values_are_refused_where_they_may_not_be() -> None:
     assert learner.rows == 0
 
 
+def test_a_record_batch_is_a_part() -> None:
+    table = rows_of()
+    learner = Learner("kind")
+    for batch in pa.Table.from_pandas(table).to_batches(max_chunksize=700):
+        learner.update(batch)
+    assert fingerprint(learner.learn()) == fingerprint(learner_of(table).learn())
+
+
 def test_what_was_not_collected_is_not_learnt() -> None:
     with pytest.raises(LearningError, match="before a part of the table was taken"):
         Learner("kind").learn()

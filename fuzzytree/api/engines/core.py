@@ -19,13 +19,12 @@ import numpy as np
 import pyarrow as pa
 
 from fuzzytree import errors
-from fuzzytree.api.answering import prepare_answering
+from fuzzytree.api.answering import Answering, prepare_answering
 from fuzzytree.api.engines import Engine, engine_of
 from fuzzytree.errors import FuzzyTreeError, TableError
 from fuzzytree.learning import Learner, LearningSettings
 from fuzzytree.model import FuzzyTree, Model, label_of
 from fuzzytree.runtimes import Predictions, joined
-from fuzzytree.tables import Batch
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -177,7 +176,7 @@ class Predictor:
         return Predictor, (self.model,)
 
     @cached_property
-    def _ready(self) -> Any:
+    def _ready(self) -> Answering:
         is_tree = isinstance(self.model, FuzzyTree)
         return prepare_answering(self.model, with_strengths=not is_tree)
 
@@ -197,13 +196,8 @@ class Predictor:
         Raises:
             TableError: If a column is absent or holds text.
         """
-        if isinstance(rows, pa.RecordBatch):
-            rows = pa.Table.from_batches([rows])
-
-        def only_predictions(batch: Batch, result: Predictions) -> Predictions:
-            return result
-
-        result = joined([*self._ready(rows, only_predictions, name="a batch")])
+        parts = self._ready(rows, lambda _, one: one, name="a batch")
+        result = cast("Predictions", joined([*parts]))
         places, all_strengths = np.flatnonzero(result.rule), result.strengths
         # of a tree's relative rules the winner has a strength of exactly 1
         strengths = np.ones(len(result))
