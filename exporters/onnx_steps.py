@@ -76,9 +76,9 @@ def missing_functions(program: Program) -> tuple[str, ...]:
     """Return the functions of a program that no operator computes in double.
 
     Example:
-        >>> from fuzzytree.semantics.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, result_of
         >>> make = Maker()
-        >>> angle = Result("output", "y", make("arc_tangent", make.input("x")))
+        >>> angle = result_of("output", "y", make("arc_tangent", make.input("x")))
         >>> missing_functions(make.program("angle", ("x",), (angle,)))
         ('atan',)
     """

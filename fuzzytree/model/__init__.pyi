@@ -9,6 +9,11 @@ from .agreement import Count as Count
 from .agreement import Coverage as Coverage
 from .agreement import Verdict as Verdict
 from .agreement import version as version
+from .algebra import N as N
+from .algebra import Numbers as Numbers
+from .algebra import Real as Real
+from .algebra import as_number as as_number
+from .algebra import square as square
 from .contracts import BoolArray as BoolArray
 from .contracts import Document as Document
 from .contracts import Dtype as Dtype
@@ -112,6 +117,7 @@ from .system.curves import Expression as Expression
 from .system.curves import Formula as Formula
 from .system.curves import Gaussian as Gaussian
 from .system.curves import Linear as Linear
+from .system.curves import MembershipFunction as MembershipFunction
 from .system.curves import Name as Name
 from .system.curves import Number as Number
 from .system.curves import PiCurve as PiCurve
@@ -126,7 +132,10 @@ from .system.curves import SystemCurve as SystemCurve
 from .system.curves import Trapezoid as Trapezoid
 from .system.curves import TwoGaussians as TwoGaussians
 from .system.curves import curve_mistakes as curve_mistakes
+from .system.curves import is_nan as is_nan
 from .system.curves import names_in as names_in
+from .system.curves import smaller_slope as smaller_slope
+from .system.curves import value_of as value_of
 from .system.rules import Activation as Activation
 from .system.rules import ActivationMethod as ActivationMethod
 from .system.rules import And as And

@@ -28,10 +28,10 @@ def row_runner(program: Program) -> RunRow | None:
         library's own.
 
     Example:
-        >>> from fuzzytree.semantics.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, result_of
         >>> make = Maker()
         >>> x = make.input("x")
-        >>> twice = Result("output", "y", make("add", x, x))
+        >>> twice = result_of("output", "y", make("add", x, x))
         >>> run = row_runner(make.program("twice", ("x",), (twice,)))
         >>> run([2.5]) if run else None
         [5.0]

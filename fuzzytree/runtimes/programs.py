@@ -180,10 +180,10 @@ def run_program(plan: ProgramPlan, values: FloatArray) -> FloatArray:
     `values` has shape (inputs, rows), in the order of the program's inputs.
 
     Example:
-        >>> from fuzzytree.semantics.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, result_of
         >>> make = Maker()
         >>> x = make.input("x")
-        >>> twice = Result("output", "y", make("add", x, x))
+        >>> twice = result_of("output", "y", make("add", x, x))
         >>> program = make.program("twice", ("x",), (twice,))
         >>> run_program(plan_program(program), np.array([[1.0, 2.5]]))
         array([[2., 5.]])

@@ -59,10 +59,12 @@ from .programs.operations import OVER_SAMPLES as OVER_SAMPLES
 from .programs.rule_program import from_axes as from_axes
 from .programs.rule_program import from_rules as from_rules
 from .programs.steps import Maker as Maker
+from .programs.steps import Place as Place
 from .programs.steps import Program as Program
 from .programs.steps import Result as Result
 from .programs.steps import ResultKind as ResultKind
 from .programs.steps import Step as Step
+from .programs.steps import result_of as result_of
 from .programs.system_program import from_system as from_system
 from .random_systems import random_rows as random_rows
 from .random_systems import random_system as random_system

@@ -9,14 +9,14 @@ import pytest
 
 from fuzzytree.runtimes.one_row import load, row_runner
 from fuzzytree.semantics.lowering import rules_from_tree
-from fuzzytree.semantics.programs.steps import Maker, Program, Result
+from fuzzytree.semantics.programs.steps import Maker, Program, result_of
 from fuzzytree.testing import random_tree
 
 
 def program(operation: str) -> Program:
     make = Maker()
     result = make(operation, make.input("x"))
-    return make.program("p", ("x",), (Result("output", "y", result),))
+    return make.program("p", ("x",), (result_of("output", "y", result),))
 
 
 def test_functions_that_round_in_their_own_way_are_left_to_numpy() -> None:

@@ -1,26 +1,29 @@
 """Membership functions, norms, hedges and formulas in plain floats; none of them fails.
 
-What they are stands in `fuzzytree.semantics.programs`; here each of its operations is
-performed at once. Where an operation has no value the result is what IEEE 754 and the C
-library say: NaN, or an infinity.
+What they are stands with the functions, and in `fuzzytree.semantics.programs.norms`;
+here each operation is performed at once. Where it has no value the result is what IEEE
+754 and the C library say: NaN, or an infinity.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
 
-from fuzzytree.model import LR, Band, Curve, Expression, Hedge, Points, SNorm, TNorm
-from fuzzytree.semantics.programs import formulas, membership, norms
-from fuzzytree.semantics.programs.operations import DOUBLES
+from fuzzytree.model import (
+    Curve,
+    Expression,
+    Hedge,
+    Shape,
+    SNorm,
+    TNorm,
+)
+from fuzzytree.model import value_of as value_in
+from fuzzytree.semantics.programs import membership, norms
+from fuzzytree.semantics.programs.operations import DOUBLES, NOTHING, Doubles
 from fuzzytree.semantics.reference import degree as shape_degree
 
-_NOTHING: Final[Mapping[str, float]] = {}
 
-
-def curve_degree(
-    curve: Curve, x: float, names: Mapping[str, float] = _NOTHING
-) -> float:
+def curve_degree(curve: Curve, x: float, names: Mapping[str, float] = NOTHING) -> float:
     """Return the degree of a finite value, without the term's height.
 
     Args:
@@ -42,11 +45,9 @@ def curve_degree(
         >>> curve_degree(Arc(0.0, 1.0), 0.0), curve_degree(Arc(0.0, 1.0), 2.0)
         (0.0, 1.0)
     """
-    match curve:
-        case Band() | LR() | Points():
-            return shape_degree(curve, x)
-        case _:
-            return membership.system_degree(DOUBLES, curve, x, names)
+    if isinstance(curve, Shape):
+        return shape_degree(curve, x)
+    return curve.degree(Doubles(names), x)
 
 
 def value_at(curve: Curve, degree: float) -> float | None:
@@ -82,7 +83,7 @@ def value_of(expression: Expression, names: Mapping[str, float]) -> float:
         >>> value_of(Call("+", (twice, Number(1.0))), {"dirt": 0.25})
         1.5
     """
-    return formulas.value_of(DOUBLES, expression, names)
+    return value_in(DOUBLES, expression, names)
 
 
 def hedged(hedges: Sequence[Hedge], degree: float) -> float:

@@ -110,10 +110,10 @@ def error_bounds(
         Bounds of shape (results, rows): 0 demands equal bits, infinity nothing.
 
     Example:
-        >>> from fuzzytree.semantics.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, result_of
         >>> make = Maker()
         >>> x = make.input("x")
-        >>> results = Result("output", "sum", make("add", x, x)), Result(
+        >>> results = result_of("output", "sum", make("add", x, x)), result_of(
         ...     "output", "power", make("exponential", x))
         >>> error_bounds(make.program("p", ("x",), results), np.ones((1, 1))).tolist()
         [[0.0], [1.7763568394002505e-15]]

@@ -71,11 +71,11 @@ def still_results(program: Program) -> tuple[StepValue | None, ...]:
     Runners compute these once, here, and so with Python's own functions.
 
     Example:
-        >>> from fuzzytree.semantics.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, result_of
         >>> make = Maker()
         >>> grid = make("multiply", make.index(3), make.constant(0.5))
         >>> scaled = make("total", make("multiply", make.input("x"), grid))
-        >>> program = make.program("p", ("x",), (Result("output", "y", scaled),))
+        >>> program = make.program("p", ("x",), (result_of("output", "y", scaled),))
         >>> still_results(program)
         ([0.0, 1.0, 2.0], 0.5, [0.0, 0.5, 1.0], None, None, None)
     """

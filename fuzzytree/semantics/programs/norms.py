@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from fuzzytree.model import Activation, Hedge, SNorm, TNorm
-from fuzzytree.semantics.programs.operations import N, Numbers
-from fuzzytree.semantics.programs.steps import Maker
+from fuzzytree.model import Activation, Hedge, N, Numbers, SNorm, TNorm, square
+from fuzzytree.semantics.programs.steps import Maker, Place
 
 
 class Norm(Protocol):
     """An AND or an OR of two degrees."""
 
-    def __call__(self, make: Numbers[N], a: N, b: N, /) -> N:
+    def __call__(self, n: Numbers[N], a: N, b: N, /) -> N:
         """Return what it makes of two degrees."""
         ...
 
 
 class _Hedging(Protocol):
-    def __call__(self, make: Numbers[N], degree: N, /) -> N: ...
+    def __call__(self, n: Numbers[N], degree: N, /) -> N: ...
 
 
 KEEPS_UNIT: frozenset[str] = frozenset(
@@ -39,210 +38,140 @@ KEEPS_UNIT: frozenset[str] = frozenset(
 """Norms whose result lies in [0, 1] if both degrees do, in rounded numbers too."""
 
 
-def hedged(make: Numbers[N], hedges: Sequence[Hedge], degree: N) -> N:
+def hedged(n: Numbers[N], hedges: Sequence[Hedge], degree: N) -> N:
     """Return what hedges make of a degree, the last first."""
     for hedge in reversed(hedges):
-        degree = _HEDGES[hedge](make, degree)
+        degree = _HEDGES[hedge](n, degree)
     return degree
 
 
-def _one_minus(make: Numbers[N], a: N) -> N:
-    return make("subtract", make.constant(1.0), a)
+def _extremely(n: Numbers[N], d: N) -> N:
+    high = 1.0 - 2.0 * square(1.0 - d)
+    return n.where(n.at_most(d, 0.5), 2.0 * square(d), high)
 
 
-def _twice(make: Numbers[N], a: N) -> N:
-    return make("multiply", make.constant(2.0), a)
-
-
-def _half(make: Numbers[N], a: N) -> N:
-    return make("multiply", make.constant(0.5), a)
-
-
-def _square(make: Numbers[N], a: N) -> N:
-    return make("multiply", a, a)
-
-
-def _cubed(make: Numbers[N], a: N) -> N:
-    return make("multiply", _square(make, a), a)
-
-
-def _fourth(make: Numbers[N], a: N) -> N:
-    return _square(make, _square(make, a))
-
-
-def _in_halves(make: Numbers[N], d: N, low: N, high: N) -> N:
-    return make("where", make("at_most", d, make.constant(0.5)), low, high)
-
-
-def _extremely(make: Numbers[N], d: N) -> N:
-    low = _twice(make, _square(make, d))
-    high = _one_minus(make, _twice(make, _square(make, _one_minus(make, d))))
-    return _in_halves(make, d, low, high)
-
-
-def _seldom(make: Numbers[N], d: N) -> N:
-    low = make("square_root", _half(make, d))
-    root = make("square_root", _half(make, _one_minus(make, d)))
-    return _in_halves(make, d, low, _one_minus(make, root))
+def _seldom(n: Numbers[N], d: N) -> N:
+    high = 1.0 - n.root(0.5 * (1.0 - d))
+    return n.where(n.at_most(d, 0.5), n.root(0.5 * d), high)
 
 
 _HEDGES: Mapping[Hedge, _Hedging] = {
-    "any": lambda make, d: make.constant(1.0),
-    "not": _one_minus,
-    "very": _square,
-    "somewhat": lambda make, d: make("square_root", d),
+    "any": lambda n, d: n.constant(1.0),
+    "not": lambda n, d: 1.0 - d,
+    "very": lambda n, d: square(d),
+    "somewhat": lambda n, d: n.root(d),
     "extremely": _extremely,
     "seldom": _seldom,
-    "cubed": _cubed,
-    "very very": _fourth,
-    "plus": lambda make, d: make("power", d, make.constant(1.25)),
-    "minus": lambda make, d: make("power", d, make.constant(0.75)),
-    "cube root": lambda make, d: make("power", d, make.constant(1.0 / 3.0)),
+    "cubed": lambda n, d: square(d) * d,
+    "very very": lambda n, d: square(square(d)),
+    "plus": lambda n, d: n.power(d, 1.25),
+    "minus": lambda n, d: n.power(d, 0.75),
+    "cube root": lambda n, d: n.power(d, 1.0 / 3.0),
 }
 
 
-def _sum_less_product(make: Numbers[N], a: N, b: N) -> N:
-    return make("subtract", make("add", a, b), make("multiply", a, b))
+def _drastic_product(n: Numbers[N], a: N, b: N) -> N:
+    is_one = n.equal(n.maximum(a, b), 1.0)
+    return n.where(is_one, n.minimum(a, b), 0.0)
 
 
-def _bounded_difference(make: Numbers[N], a: N, b: N) -> N:
-    rest = make("subtract", make("add", a, b), make.constant(1.0))
-    return make("maximum", make.constant(0.0), rest)
+def _hamacher_product(n: Numbers[N], a: N, b: N) -> N:
+    share = n.divide(a * b, a + b - a * b)
+    return n.where(n.equal(a + b, 0.0), 0.0, share)
 
 
-def _drastic_product(make: Numbers[N], a: N, b: N) -> N:
-    is_one = make("equal", make("maximum", a, b), make.constant(1.0))
-    return make("where", is_one, make("minimum", a, b), make.constant(0.0))
+def _drastic_sum(n: Numbers[N], a: N, b: N) -> N:
+    is_zero = n.equal(n.minimum(a, b), 0.0)
+    return n.where(is_zero, n.maximum(a, b), 1.0)
 
 
-def _einstein_product(make: Numbers[N], a: N, b: N) -> N:
-    below = make("subtract", make.constant(2.0), _sum_less_product(make, a, b))
-    return make("divide", make("multiply", a, b), below)
-
-
-def _hamacher_product(make: Numbers[N], a: N, b: N) -> N:
-    zero = make.constant(0.0)
-    share = make("divide", make("multiply", a, b), _sum_less_product(make, a, b))
-    return make("where", make("equal", make("add", a, b), zero), zero, share)
-
-
-def _nilpotent_minimum(make: Numbers[N], a: N, b: N) -> N:
-    is_above = make("less", make.constant(1.0), make("add", a, b))
-    return make("where", is_above, make("minimum", a, b), make.constant(0.0))
-
-
-def _drastic_sum(make: Numbers[N], a: N, b: N) -> N:
-    is_zero = make("equal", make("minimum", a, b), make.constant(0.0))
-    return make("where", is_zero, make("maximum", a, b), make.constant(1.0))
-
-
-def _einstein_sum(make: Numbers[N], a: N, b: N) -> N:
-    below = make("add", make.constant(1.0), make("multiply", a, b))
-    return make("divide", make("add", a, b), below)
-
-
-def _hamacher_sum(make: Numbers[N], a: N, b: N) -> N:
-    one, product = make.constant(1.0), make("multiply", a, b)
-    above = make("subtract", make("add", a, b), _twice(make, product))
-    share = make("divide", above, make("subtract", one, product))
-    return make("where", make("equal", product, one), one, share)
-
-
-def _nilpotent_maximum(make: Numbers[N], a: N, b: N) -> N:
-    one = make.constant(1.0)
-    is_below = make("less", make("add", a, b), one)
-    return make("where", is_below, make("maximum", a, b), one)
-
-
-def _normalized_sum(make: Numbers[N], a: N, b: N) -> N:
-    both = make("add", a, b)
-    return make("divide", both, make("maximum", make.constant(1.0), both))
+def _hamacher_sum(n: Numbers[N], a: N, b: N) -> N:
+    share = n.divide(a + b - 2.0 * (a * b), 1.0 - a * b)
+    return n.where(n.equal(a * b, 1.0), 1.0, share)
 
 
 T_NORMS: Mapping[TNorm, Norm] = {
-    "minimum": lambda make, a, b: make("minimum", a, b),
-    "product": lambda make, a, b: make("multiply", a, b),
-    "bounded difference": _bounded_difference,
+    "minimum": lambda n, a, b: n.minimum(a, b),
+    "product": lambda n, a, b: a * b,
+    "bounded difference": lambda n, a, b: n.maximum(n.constant(0.0), a + b - 1.0),
     "drastic product": _drastic_product,
-    "einstein product": _einstein_product,
+    "einstein product": lambda n, a, b: n.divide(a * b, 2.0 - (a + b - a * b)),
     "hamacher product": _hamacher_product,
-    "nilpotent minimum": _nilpotent_minimum,
+    "nilpotent minimum": lambda n, a, b: n.where(
+        n.less(1.0, a + b), n.minimum(a, b), 0.0
+    ),
 }
 
 S_NORMS: Mapping[SNorm, Norm] = {
-    "maximum": lambda make, a, b: make("maximum", a, b),
-    "algebraic sum": _sum_less_product,
-    "bounded sum": lambda make, a, b: make(
-        "minimum", make.constant(1.0), make("add", a, b)
-    ),
+    "maximum": lambda n, a, b: n.maximum(a, b),
+    "algebraic sum": lambda n, a, b: a + b - a * b,
+    "bounded sum": lambda n, a, b: n.minimum(n.constant(1.0), a + b),
     "drastic sum": _drastic_sum,
-    "einstein sum": _einstein_sum,
+    "einstein sum": lambda n, a, b: n.divide(a + b, 1.0 + a * b),
     "hamacher sum": _hamacher_sum,
-    "nilpotent maximum": _nilpotent_maximum,
-    "normalized sum": _normalized_sum,
-    "sum": lambda make, a, b: make("add", a, b),
+    "nilpotent maximum": lambda n, a, b: n.where(
+        n.less(a + b, 1.0), n.maximum(a, b), 1.0
+    ),
+    "normalized sum": lambda n, a, b: n.divide(a + b, n.maximum(1.0, a + b)),
+    "sum": lambda n, a, b: a + b,
 }
 
 
-def positive(make: Maker, degree: int) -> int:
+def positive(make: Maker, degree: Place) -> Place:
     """Return a degree where it is above 0, else 0."""
-    zero = make.constant(0.0)
-    return make("where", make("less", zero, degree), degree, zero)
+    return make.where(make.less(0.0, degree), degree, 0.0)
 
 
-def passes(make: Numbers[N], how: Activation, degree: N) -> N | None:
+def passes(n: Numbers[N], how: Activation, degree: N) -> N | None:
     """Return whether a degree stands the block's threshold; None if there is none."""
-    limit = make.constant(how.threshold)
+    limit = how.threshold
     match how.method:
         case "first" | "last":
-            return make("at_most", limit, degree)
+            return n.at_most(limit, degree)
         case "threshold":
             match how.relation:
                 case "<":
-                    return make("less", degree, limit)
+                    return n.less(degree, limit)
                 case "<=":
-                    return make("at_most", degree, limit)
+                    return n.at_most(degree, limit)
                 case "==":
-                    return make("equal", degree, limit)
+                    return n.equal(degree, limit)
                 case "!=":
-                    return make("not", make("equal", degree, limit))
+                    return n("not", n.equal(degree, limit))
                 case ">=":
-                    return make("at_most", limit, degree)
+                    return n.at_most(limit, degree)
                 case ">":
-                    return make("less", limit, degree)
+                    return n.less(limit, degree)
         case _:
             return None
 
 
-def proportional(make: Maker, degrees: Sequence[int]) -> list[int]:
+def proportional(make: Maker, degrees: Sequence[Place]) -> list[Place]:
     """Return each positive degree divided by their sum."""
-    zero = make.constant(0.0)
     total = make.chain("add", [positive(make, degree) for degree in degrees])
     return [
-        make("where", make("less", zero, degree), make("divide", degree, total), zero)
-        for degree in degrees
+        make.where(make.less(0.0, degree), degree / total, 0.0) for degree in degrees
     ]
 
 
-def ranked(make: Maker, how: Activation, degrees: Sequence[int]) -> list[int]:
+def ranked(make: Maker, how: Activation, degrees: Sequence[Place]) -> list[Place]:
     """Return the `count` highest or lowest of the positive degrees, 0 for the others.
 
     One after another is chosen; of equal ones the first.
     """
-    zero = make.constant(0.0)
     if how.count >= len(degrees):
         return [positive(make, degree) for degree in degrees]
     is_highest = how.method == "highest"
-    outside = make.constant(-1.0 if is_highest else float("inf"))
-    left = [make("less", zero, degree) for degree in degrees]
-    chosen: list[int | None] = [None] * len(degrees)
+    outside = -1.0 if is_highest else float("inf")
+    left = [make.less(0.0, degree) for degree in degrees]
+    chosen: list[Place | None] = [None] * len(degrees)
     for _ in range(how.count):
         pairs = list(zip(left, degrees, strict=True))
-        values = [make("where", free, degree, outside) for free, degree in pairs]
+        values = [make.where(free, degree, outside) for free, degree in pairs]
         best = make.chain("maximum" if is_highest else "minimum", values)
-        earlier: int | None = None
+        earlier: Place | None = None
         for index, (free, degree) in enumerate(pairs):
-            hit = make("and", free, make("equal", degree, best))
+            hit = make("and", free, make.equal(degree, best))
             is_first = (
                 hit if earlier is None else make("and", hit, make("not", earlier))
             )
@@ -251,6 +180,6 @@ def ranked(make: Maker, how: Activation, degrees: Sequence[int]) -> list[int]:
             chosen[index] = is_first if before is None else make("or", before, is_first)
             left[index] = make("and", free, make("not", is_first))
     return [
-        degree if one is None else make("where", one, degree, zero)
+        degree if one is None else make.where(one, degree, 0.0)
         for one, degree in zip(chosen, degrees, strict=True)
     ]

@@ -12,10 +12,13 @@ from __future__ import annotations
 import math
 import operator
 from bisect import bisect_left
-from collections.abc import Callable, Mapping, Sequence
-from typing import Literal, Protocol, TypeVar
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, Final, Literal
 
 import msgspec
+
+from fuzzytree.model import Numbers
 
 Kind = Literal["number", "truth"]
 
@@ -246,40 +249,31 @@ LOGICAL: Mapping[str, Callable[..., bool]] = {
 """What each operation that gives a truth makes of its arguments."""
 
 
-N = TypeVar("N")
+NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
+"""The values of no variable."""
 
 
-class Numbers(Protocol[N]):
-    """What formulas are computed with: doubles, or the steps of a program."""
+class Doubles(Numbers[float]):
+    """Computes each operation at once; truths are 0 and 1.
 
-    def constant(self, number: float, /) -> N:
-        """Return a constant."""
-        ...
+    Attributes:
+        names: The values of variables, for formulas.
+    """
 
-    def __call__(self, operation: str, /, *arguments: N) -> N:
-        """Return what an operation of `OPERATIONS` makes of numbers or truths."""
-        ...
-
-    def chain(self, operation: str, numbers: Sequence[N], /) -> N:
-        """Return an operation carried along from left to right."""
-        total = numbers[0]
-        for number in numbers[1:]:
-            total = self(operation, total, number)
-        return total
-
-
-class _Doubles(Numbers[float]):
-    """Computes each operation at once; truths are 0 and 1."""
+    def __init__(self, names: Mapping[str, float] = NOTHING) -> None:
+        self.names = names
 
     def constant(self, number: float, /) -> float:
+        """Return the number."""
         return number
 
-    def __call__(self, operation: str, /, *arguments: float) -> float:
-        return _MEANINGS[operation](*arguments)
+    def __call__(self, operation: str, /, *operands: float) -> float:
+        """Return what an operation of `OPERATIONS` makes of numbers or truths."""
+        return _MEANINGS[operation](*operands)
 
 
 _MEANINGS: Mapping[str, Callable[..., float]] = {**NUMERIC, **LOGICAL}
-DOUBLES = _Doubles()
+DOUBLES: Final = Doubles()
 
 
 def of_table(operation: str, table: tuple[float, ...], a: float) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from fuzzytree.model import Clause, FuzzyTree, Rule, RuleBase, shapes_of
 from fuzzytree.semantics.programs.membership import axis, shape_degree
-from fuzzytree.semantics.programs.steps import Maker, Program, Result
+from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
 
 DECIDED, TIE, UNCOVERED, MISSING = 0.0, 1.0, 2.0, 3.0
 
@@ -36,25 +36,25 @@ def from_rules(rules: RuleBase) -> Program:
     known = known_row(make, list(axes.values()))
     strengths = _strengths(make, rules, axes)
     best = make.chain("maximum", strengths)
-    hits = [make("equal", strength, best) for strength in strengths]
+    hits = [make.equal(strength, best) for strength in strengths]
     rule = _first(make, hits, list(range(1, len(hits) + 1)))
     last = _first(make, hits[::-1], list(range(len(hits), 0, -1)))
     zero = make.constant(0.0)
-    is_none = make("equal", best, zero)
-    rule = make("where", is_none, zero, rule)
+    is_none = make.equal(best, zero)
+    rule = make.where(is_none, zero, rule)
     tie, decided = make.constant(TIE), make.constant(DECIDED)
-    status = make("where", make("equal", rule, last), decided, tie)
-    status = make("where", is_none, make.constant(UNCOVERED), status)
-    rule = make("where", known, rule, zero)
-    status = make("where", known, status, make.constant(MISSING))
-    answer = make("where", known, _answer(make, rules, rule), _code(make, rules))
+    status = make.where(make.equal(rule, last), decided, tie)
+    status = make.where(is_none, UNCOVERED, status)
+    rule = make.where(known, rule, zero)
+    status = make.where(known, status, MISSING)
+    answer = make.where(known, _answer(make, rules, rule), _code(make, rules))
     nothing = make.constant(float("nan"))
-    shown = [make("where", known, strength, nothing) for strength in strengths]
-    results = [Result("strength", str(n), s) for n, s in enumerate(shown, 1)]
+    shown = [make.where(known, strength, nothing) for strength in strengths]
+    results = [result_of("strength", str(n), s) for n, s in enumerate(shown, 1)]
     results += [
-        Result("rule", "rule", rule),
-        Result("status", "status", status),
-        Result("class", "class", answer),
+        result_of("rule", "rule", rule),
+        result_of("status", "status", status),
+        result_of("class", "class", answer),
     ]
     return make.program(rules.name, rules.inputs, tuple(results))
 
@@ -63,55 +63,55 @@ def from_axes(tree: FuzzyTree) -> Program:
     """Return a program with the value of each variable: inputs, then combinations."""
     make = Maker()
     order = sorted(tree.variables, key=lambda variable: bool(variable.parts))
-    results = [Result("output", one.name, axis(make, one)) for one in order]
+    results = [result_of("output", one.name, axis(make, one)) for one in order]
     return make.program(tree.name, tree.inputs, tuple(results))
 
 
-def known_row(make: Maker, axes: list[int]) -> int:
+def known_row(make: Maker, axes: list[Place]) -> Place:
     """Return whether all of some values are finite; always if there are none."""
     if not axes:
         zero = make.constant(0.0)
-        return make("at_most", zero, zero)
+        return make.at_most(zero, zero)
     return make.chain("and", [make("is_finite", value) for value in axes])
 
 
-def _strengths(make: Maker, rules: RuleBase, axes: dict[str, int]) -> list[int]:
+def _strengths(make: Maker, rules: RuleBase, axes: dict[str, Place]) -> list[Place]:
     shapes = shapes_of(rules.variables)
-    degrees: dict[Clause, int] = {}
+    degrees: dict[Clause, Place] = {}
 
-    def clause_degree(clause: Clause) -> int:
+    def clause_degree(clause: Clause) -> Place:
         if clause not in degrees:
             x = axes[clause.variable]
-            terms: list[int] = []
+            terms: list[Place] = []
             for term in clause.terms:
                 degree = shape_degree(make, shapes[clause.variable, term], x)
                 terms.append(make.titled(degree, f"{clause.variable} is {term}"))
             highest = make.chain("maximum", terms)
             if clause.negated:
-                highest = make("subtract", make.constant(1.0), highest)
+                highest = 1.0 - highest
             degrees[clause] = highest
         return degrees[clause]
 
     is_product = rules.semantics.conjunction == "product"
     join = "multiply" if is_product else "minimum"
 
-    def strength(rule: Rule) -> int:
+    def strength(rule: Rule) -> Place:
         parts = [clause_degree(clause) for clause in rule.when]
         return make.chain(join, parts) if parts else make.constant(1.0)
 
     return [strength(rule) for rule in rules.rules]
 
 
-def _first(make: Maker, hits: list[int], numbers: list[int]) -> int:
+def _first(make: Maker, hits: list[Place], numbers: list[int]) -> Place:
     """Return the number of the first hit, 0 without one."""
-    result = make.constant(float(numbers[-1]))
+    chosen = make.constant(float(numbers[-1]))
     pairs = list(zip(hits, numbers, strict=True))
     for hit, number in reversed(pairs[:-1]):
-        result = make("where", hit, make.constant(float(number)), result)
-    return result
+        chosen = make.where(hit, float(number), chosen)
+    return chosen
 
 
-def _answer(make: Maker, rules: RuleBase, rule: int) -> int:
+def _answer(make: Maker, rules: RuleBase, rule: Place) -> Place:
     """Return the class of the winning rule, or the answer where none fires."""
     place = {label: float(number) for number, label in enumerate(rules.classes)}
     uncovered = rules.semantics.uncovered
@@ -119,7 +119,7 @@ def _answer(make: Maker, rules: RuleBase, rule: int) -> int:
     return make.table("pick", rule, [none, *(place[r.then] for r in rules.rules)])
 
 
-def _code(make: Maker, rules: RuleBase) -> int:
+def _code(make: Maker, rules: RuleBase) -> Place:
     missing = rules.semantics.missing
     code = -1 if missing is None else rules.classes.index(missing)
     return make.constant(float(code))

@@ -26,8 +26,8 @@ Example:
     ...         yield f"{result.kind} {result.name}: v{result.step}"
     >>> make = Maker()
     >>> x = make.input("x")
-    >>> tripled = make("multiply", x, make.constant(3.0))
-    >>> made = make.program("triple", ("x",), (Result("output", "y", tripled),))
+    >>> tripled = x * 3.0
+    >>> made = make.program("triple", ("x",), (result_of("output", "y", tripled),))
     >>> print("\n".join(written(made)))
     v0 = x
     v1 = 3.0
@@ -40,16 +40,16 @@ from __future__ import annotations
 import contextlib
 import math
 import struct
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
-from fuzzytree.model import Value
+from fuzzytree.model import Numbers, Value
 from fuzzytree.semantics.programs.operations import (
+    NOTHING,
     NUMERIC,
     OPERATIONS,
     OVER_SAMPLES,
     Kind,
-    Numbers,
     of_table,
 )
 
@@ -142,59 +142,126 @@ class Program(Value, frozen=True):
         return sum(step.samples or 1 for step in self.steps)
 
 
-class Maker(Numbers[int]):
+class Place:
+    """The place of a step in a program that is being made; operators add steps."""
+
+    __slots__ = ("index", "make")
+
+    def __init__(self, make: Maker, index: int) -> None:
+        self.make, self.index = make, index
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Place) and self.index == other.index
+
+    def __hash__(self) -> int:
+        return hash(self.index)
+
+    def __neg__(self) -> Place:
+        return self.make("negate", self)
+
+    def __abs__(self) -> Place:
+        return self.make("absolute", self)
+
+    def __add__(self, other: Place | float, /) -> Place:
+        return self.make("add", self, other)
+
+    def __radd__(self, other: float, /) -> Place:
+        return self.make("add", other, self)
+
+    def __sub__(self, other: Place | float, /) -> Place:
+        return self.make("subtract", self, other)
+
+    def __rsub__(self, other: float, /) -> Place:
+        return self.make("subtract", other, self)
+
+    def __mul__(self, other: Place | float, /) -> Place:
+        return self.make("multiply", self, other)
+
+    def __rmul__(self, other: float, /) -> Place:
+        return self.make("multiply", other, self)
+
+    def __truediv__(self, other: Place | float, /) -> Place:
+        return self.make("divide", self, other)
+
+    def __rtruediv__(self, other: float, /) -> Place:
+        return self.make("divide", other, self)
+
+
+def result_of(kind: ResultKind, name: str, place: Place) -> Result:
+    """Return what a program is run for, by its place while it is made."""
+    return Result(kind, name, place.index)
+
+
+class Maker(Numbers[Place]):
     """Collects steps; a step that stands there already is not added again.
 
     Steps on constants alone are computed at once. `x * 1`, `x / 1`, `x - 0` and the
     smaller of x and x are x.
+
+    Attributes:
+        names: The values of variables, for formulas.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, names: Mapping[str, Place] = NOTHING) -> None:
+        self.names = names
         self._steps: list[Step] = []
         self._titles: list[str] = []
         self._topic = ""
         self._known: dict[tuple[object, ...], int] = {}
 
-    def constant(self, number: float, /) -> int:
+    def chain(self, operation: str, numbers: Sequence[Place], /) -> Place:
+        """Return an operation carried along from left to right."""
+        total = numbers[0]
+        for number in numbers[1:]:
+            total = self(operation, total, number)
+        return total
+
+    def constant(self, number: float, /) -> Place:
         """Return the place of a constant."""
         return self._added(Step("constant", number=float(number)))
 
-    def input(self, name: str) -> int:
+    def input(self, name: str) -> Place:
         """Return the place of an input's value."""
         return self._added(Step("input", name=name))
 
-    def index(self, samples: int) -> int:
+    def index(self, samples: int) -> Place:
         """Return the place of the numbers 0, 1, ... of as many samples."""
         return self._added(Step("index", samples=samples))
 
-    def table(self, operation: str, argument: int, table: Iterable[float]) -> int:
+    def table(self, operation: str, argument: Place, table: Iterable[float]) -> Place:
         """Return the place of `below` or `pick`."""
         numbers = tuple(table)
-        operands = self._steps[argument]
+        operands = self._steps[argument.index]
         if operands.operation == "constant":
             return self.constant(of_table(operation, numbers, operands.number))
-        step = Step(operation, (argument,), table=numbers, samples=operands.samples)
+        step = Step(
+            operation, (argument.index,), table=numbers, samples=operands.samples
+        )
         return self._added(step)
 
-    def __call__(self, operation: str, /, *arguments: int) -> int:
-        """Return the place of an operation on earlier steps."""
-        operands = [self._steps[argument] for argument in arguments]
+    def __call__(self, operation: str, /, *arguments: Place | float) -> Place:
+        """Return the place of an operation on earlier steps and numbers."""
+        places = tuple(
+            one if isinstance(one, Place) else self.constant(one) for one in arguments
+        )
+        operands = [self._steps[place.index] for place in places]
         if all(step.operation == "constant" for step in operands):
             numbers = [step.number for step in operands]
             if operation in NUMERIC:
                 return self.constant(NUMERIC[operation](*numbers))
         if _is_neutral(operation, operands):
-            return arguments[0]
+            return places[0]
         if operation == "multiply" and _is_neutral(operation, operands[::-1]):
-            return arguments[1]
+            return places[1]
         if operation in ("minimum", "maximum", "where"):
-            *_, one, two = arguments
+            *_, one, two = places
             if one == two:
                 return one
         samples = 0
         if operation not in OVER_SAMPLES:
             samples = max((step.samples for step in operands), default=0)
-        return self._added(Step(operation, arguments, samples=samples))
+        taken = tuple(place.index for place in places)
+        return self._added(Step(operation, taken, samples=samples))
 
     @contextlib.contextmanager
     def topic(self, title: str) -> Generator[None]:
@@ -203,8 +270,8 @@ class Maker(Numbers[int]):
         Example:
             >>> make = Maker()
             >>> with make.topic("force is low"):
-            ...     low = make("negate", make.input("force"))
-            >>> strength = Result("output", "strength", make("absolute", low))
+            ...     low = -make.input("force")
+            >>> strength = result_of("output", "strength", abs(low))
             >>> make.program("p", ("force",), (strength,)).titles
             ('force', 'force is low negate', 'strength')
         """
@@ -212,21 +279,21 @@ class Maker(Numbers[int]):
         yield
         self._topic = before
 
-    def titled(self, place: int, title: str) -> int:
+    def titled(self, place: Place, title: str) -> Place:
         """Title a step, unless it has a title from elsewhere, and return its place."""
-        step = self._steps[place]
-        if step.operation not in _LEAVES and self._titles[place] == self._part(step):
-            self._titles[place] = title
+        step, index = self._steps[place.index], place.index
+        if step.operation not in _LEAVES and self._titles[index] == self._part(step):
+            self._titles[index] = title
         return place
 
-    def number(self, place: int) -> float | None:
+    def number(self, place: Place) -> float | None:
         """Return the number of a constant, None if the step is none."""
-        step = self._steps[place]
+        step = self._steps[place.index]
         return step.number if step.operation == "constant" else None
 
-    def samples(self, place: int) -> int:
+    def samples(self, place: Place) -> int:
         """Return how many samples a step has results for."""
-        return self._steps[place].samples
+        return self._steps[place.index].samples
 
     def program(
         self, name: str, inputs: tuple[str, ...], results: tuple[Result, ...]
@@ -247,7 +314,7 @@ class Maker(Numbers[int]):
             titles[one.step] = titles[one.step] or one.title
         return Program(name, inputs, steps, moved, tuple(titles))
 
-    def _added(self, step: Step) -> int:
+    def _added(self, step: Step) -> Place:
         key = (
             step.operation,
             step.arguments,
@@ -262,7 +329,7 @@ class Maker(Numbers[int]):
             self._known[key] = len(self._steps)
             self._steps.append(step)
             self._titles.append(self._part(step))
-        return self._known[key]
+        return Place(self, self._known[key])
 
     def _part(self, step: Step) -> str:
         """Return the title of a step that is part of the topic."""

@@ -32,12 +32,14 @@ from fuzzytree.model import (
     SystemRule,
     SystemTerm,
     TNorm,
+    as_number,
     checkpoint,
     is_drawn_by_lines,
+    is_nan,
     sampled_values,
+    value_of,
 )
 from fuzzytree.semantics.inference import Lines, line_tables
-from fuzzytree.semantics.programs.formulas import as_number, is_nan, value_of
 from fuzzytree.semantics.programs.membership import curve_degree, is_unit, value_at
 from fuzzytree.semantics.programs.norms import (
     KEEPS_UNIT,
@@ -56,7 +58,7 @@ from fuzzytree.semantics.programs.rule_program import (
     UNCOVERED,
     known_row,
 )
-from fuzzytree.semantics.programs.steps import Maker, Program, Result
+from fuzzytree.semantics.programs.steps import Maker, Place, Program, Result, result_of
 
 
 @functools.lru_cache(maxsize=4)
@@ -94,7 +96,7 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
     run = _Run(make, system, values)
     for block in system.blocks:
         run.activate(block)
-    numbers: list[int] = []
+    numbers: list[Place] = []
     for output in system.outputs:
         with make.topic(output.name):
             numbers.append(run.number(output))
@@ -103,21 +105,21 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
     results: list[Result] = []
     for one in system.outputs:
         with make.topic(one.name):
-            number = make("where", known, values[one.name], nothing)
+            number = make.where(known, values[one.name], nothing)
             make.titled(number, one.name)
-        results.append(Result("output", one.name, number))
+        results.append(result_of("output", one.name, number))
     if activations:
         for rule, degree in enumerate(run.activations, 1):
-            shown = make("where", known, degree, nothing)
-            results.append(Result("activation", str(rule), shown))
-    results.append(Result("status", "status", _status(make, known, numbers)))
+            shown = make.where(known, degree, nothing)
+            results.append(result_of("activation", str(rule), shown))
+    results.append(result_of("status", "status", _status(make, known, numbers)))
     return make.program(system.name, system.columns, tuple(results))
 
 
-def _values(make: Maker, system: FuzzySystem) -> tuple[int, dict[str, int]]:
+def _values(make: Maker, system: FuzzySystem) -> tuple[Place, dict[str, Place]]:
     """Return whether all values are finite, and each input's value in its range."""
-    results: list[int] = []
-    values: dict[str, int] = {}
+    results: list[Place] = []
+    values: dict[str, Place] = {}
     for one in system.inputs:
         with make.topic(one.name):
             value = _combined(make, one, values) if one.parts else make.input(one.name)
@@ -129,46 +131,46 @@ def _values(make: Maker, system: FuzzySystem) -> tuple[int, dict[str, int]]:
         return known_row(make, results), values
 
 
-def _combined(make: Maker, one: SystemInput, values: dict[str, int]) -> int:
-    terms: list[int] = []
+def _combined(make: Maker, one: SystemInput, values: dict[str, Place]) -> Place:
+    terms: list[Place] = []
     for part in one.parts:
-        offset = make("subtract", values[part.input], make.constant(part.centre))
-        terms.append(make("multiply", make.constant(part.weight), offset))
+        offset = values[part.input] - part.centre
+        terms.append(part.weight * offset)
     return make.chain("add", terms)
 
 
-def _clamped(make: Maker, one: SystemInput | SystemOutput, value: int) -> int:
+def _clamped(make: Maker, one: SystemInput | SystemOutput, value: Place) -> Place:
     """Return a value moved into a range; NaN stays NaN."""
     clamped = value
     if one.high is not None:
         high = make.constant(one.high)
-        clamped = make("where", make("less", high, value), high, clamped)
+        clamped = make.where(make.less(high, value), high, clamped)
     if one.low is not None:
         low = make.constant(one.low)
-        clamped = make("where", make("less", value, low), low, clamped)
+        clamped = make.where(make.less(value, low), low, clamped)
     return clamped
 
 
-def _answer(make: Maker, output: SystemOutput, number: int) -> int:
+def _answer(make: Maker, output: SystemOutput, number: Place) -> Place:
     if output.default is not None:
         default = make.constant(output.default)
-        number = make("where", is_nan(make, number), default, number)
+        number = make.where(is_nan(make, number), default, number)
     return _clamped(make, output, number) if output.clips else number
 
 
-def _status(make: Maker, known: int, numbers: Sequence[int]) -> int:
+def _status(make: Maker, known: Place, numbers: Sequence[Place]) -> Place:
     with make.topic("status"):
         is_none = make.chain("or", [is_nan(make, number) for number in numbers])
         uncovered, decided = make.constant(UNCOVERED), make.constant(DECIDED)
-        status = make("where", is_none, uncovered, decided)
-        return make("where", known, status, make.constant(MISSING))
+        status = make.where(is_none, uncovered, decided)
+        return make.where(known, status, MISSING)
 
 
 class _Concluded(msgspec.Struct):
     """A conclusion with its degree, 0 where its rule is not activated."""
 
     label: str
-    degree: int
+    degree: Place
     implication: TNorm
 
 
@@ -176,10 +178,10 @@ class _Run:
     """The blocks of a system on their way to steps."""
 
     def __init__(
-        self, make: Maker, system: FuzzySystem, values: dict[str, int]
+        self, make: Maker, system: FuzzySystem, values: dict[str, Place]
     ) -> None:
         self.make = make
-        self.values = values
+        self.values = make.names = values
         self.columns = system.columns
         self.outputs = {one.name: one for one in system.outputs}
         self.labels = {
@@ -187,13 +189,13 @@ class _Run:
             for variable in system.variables
             for label in variable.labels
         }
-        self.activations: list[int] = []
+        self.activations: list[Place] = []
         self.concluded: dict[str, dict[tuple[int, int], _Concluded]] = {
             name: {} for name in self.outputs
         }
-        self.units: set[int] = {make.constant(0.0), make.constant(1.0)}
-        self.propositions: dict[Is, int] = {}
-        self.degrees: dict[tuple[str, str, int], int] = {}
+        self.units: set[Place] = {make.constant(0.0), make.constant(1.0)}
+        self.propositions: dict[Is, Place] = {}
+        self.degrees: dict[tuple[str, str, Place], Place] = {}
 
     def activate(self, block: RuleBlock) -> None:
         """Add the rules of a block, and note what each concludes."""
@@ -212,7 +214,7 @@ class _Run:
                     self._conclude(block, index, first + index, degrees[index])
         else:
             # Each rule sees what those before it concluded.
-            degrees = [0] * len(block.rules)
+            degrees = [self.make.constant(0.0)] * len(block.rules)
             count = self.make.constant(0.0)
             for index in reversed(order) if how.method == "last" else order:
                 rule = block.rules[index]
@@ -222,7 +224,7 @@ class _Run:
                     self._conclude(block, index, first + index, degrees[index])
         self.activations += degrees
 
-    def _chosen(self, how: Activation, result: Sequence[int]) -> list[int]:
+    def _chosen(self, how: Activation, result: Sequence[Place]) -> list[Place]:
         if not result:
             return []
         if how.method == "proportional":
@@ -233,41 +235,43 @@ class _Run:
             self._unit(degree, if_all=result)
         return degrees
 
-    def _passed(self, how: Activation, degree: int, count: int) -> tuple[int, int]:
+    def _passed(
+        self, how: Activation, degree: Place, count: Place
+    ) -> tuple[Place, Place]:
         """Return a rule's degree of activation, and how many are activated now."""
         make, zero = self.make, self.make.constant(0.0)
         test = passes(make, how, degree)
         if test is None:
             return self._positive(degree), count
-        active = make("and", make("less", zero, degree), test)
+        active = make("and", make.less(zero, degree), test)
         if how.method != "threshold":
             limit = make.constant(float(how.count))
-            active = make("and", active, make("less", count, limit))
-            count = make("add", count, as_number(make, active))
-        result = make("where", active, degree, zero)
+            active = make("and", active, make.less(count, limit))
+            count = count + as_number(make, active)
+        result = make.where(active, degree, zero)
         return self._unit(result, if_all=[degree]), count
 
-    def _positive(self, degree: int) -> int:
+    def _positive(self, degree: Place) -> Place:
         """Return a degree where it is above 0, else 0."""
         return degree if degree in self.units else positive(self.make, degree)
 
-    def _unit(self, place: int, *, if_all: Sequence[int]) -> int:
+    def _unit(self, place: Place, *, if_all: Sequence[Place]) -> Place:
         """Note that a step lies in [0, 1] if some others do."""
         if self.units.issuperset(if_all):
             self.units.add(place)
         return place
 
-    def _rule_degree(self, block: RuleBlock, rule: SystemRule, number: int) -> int:
+    def _rule_degree(self, block: RuleBlock, rule: SystemRule, number: int) -> Place:
         checkpoint()
         make = self.make
         when = rule.when
         with make.topic(f"rule {number}"):
             degree = make.constant(1.0) if when is None else self._degree(when, block)
-            result = make("multiply", make.constant(rule.weight), degree)
+            result = rule.weight * degree
             make.titled(result, f"rule {number} strength")
         return self._unit(result, if_all=[degree])
 
-    def _degree(self, condition: Condition, block: RuleBlock) -> int:
+    def _degree(self, condition: Condition, block: RuleBlock) -> Place:
         match condition:
             case Is():
                 return self._proposition(condition)
@@ -281,10 +285,10 @@ class _Run:
                 return self._joined(either, S_NORMS[either], degrees)
             case Not(part=part):
                 degree = self._degree(part, block)
-                result = self.make("subtract", self.make.constant(1.0), degree)
+                result = 1.0 - degree
                 return self._unit(result, if_all=[degree])
 
-    def _joined(self, name: str, norm: Norm, degrees: Sequence[int]) -> int:
+    def _joined(self, name: str, norm: Norm, degrees: Sequence[Place]) -> Place:
         total = degrees[0]
         for degree in degrees[1:]:
             joined = norm(self.make, total, degree)
@@ -293,7 +297,7 @@ class _Run:
             total = joined
         return total
 
-    def _proposition(self, proposition: Is) -> int:
+    def _proposition(self, proposition: Is) -> Place:
         if proposition in self.propositions:
             return self.propositions[proposition]
         if proposition.label is None:
@@ -317,25 +321,25 @@ class _Run:
             self.propositions[proposition] = result
         return self._unit(result, if_all=[degree])
 
-    def _label_degree(self, variable: str, label: SystemTerm, x: int) -> int:
+    def _label_degree(self, variable: str, label: SystemTerm, x: Place) -> Place:
         key = variable, label.name, x
         if key not in self.degrees:
             with self.make.topic(f"{variable} is {label.name}"):
-                degree = curve_degree(self.make, label.curve, x, self.values)
+                degree = curve_degree(self.make, label.curve, x)
                 height = self.make.constant(label.height)
-                result = self.make("multiply", height, degree)
+                result = height * degree
                 self.make.titled(result, f"{variable} is {label.name}")
             if is_unit(label.curve):
                 self.units.add(result)
             self.degrees[key] = result
         return self.degrees[key]
 
-    def _so_far(self, output: SystemOutput, label: str) -> int:
+    def _so_far(self, output: SystemOutput, label: str) -> Place:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
         results = [one for one in self._of(output) if one.label == label]
         return self._aggregate(output, results)
 
-    def _aggregate(self, output: SystemOutput, result: Sequence[_Concluded]) -> int:
+    def _aggregate(self, output: SystemOutput, result: Sequence[_Concluded]) -> Place:
         name = output.aggregation or "sum"
         degrees = [one.degree for one in result]
         if not degrees or degrees[0] not in self.units:
@@ -349,7 +353,7 @@ class _Run:
         return [concluded[place] for place in sorted(concluded)]
 
     def _conclude(
-        self, block: RuleBlock, index: int, rule: int, activation: int
+        self, block: RuleBlock, index: int, rule: int, activation: Place
     ) -> None:
         """Note what a rule concludes; hedges act on the conclusions behind them too."""
         make, zero = self.make, self.make.constant(0.0)
@@ -364,13 +368,13 @@ class _Run:
             self._unit(degree, if_all=[before])
             noted = degree
             if is_hedged:  # such as `not`: only of a rule that is activated
-                is_active = make("less", zero, activation)
-                noted = make("where", is_active, self._positive(degree), zero)
+                is_active = make.less(zero, activation)
+                noted = make.where(is_active, self._positive(degree), zero)
                 self._unit(noted, if_all=[degree])
             how = block.implication or "minimum"
             self.concluded[one.output][rule, offset] = _Concluded(one.label, noted, how)
 
-    def number(self, output: SystemOutput) -> int:
+    def number(self, output: SystemOutput) -> Place:
         """Return what an output's conclusions amount to; NaN if to nothing."""
         if not self._of(output):
             return self.make.constant(math.nan)
@@ -387,7 +391,7 @@ class _Run:
         xs = samples_of(self.make, output)
         return defuzzified(self.make, output, xs, self._aggregated(output, xs))
 
-    def _aggregated(self, output: SystemOutput, xs: int) -> int:
+    def _aggregated(self, output: SystemOutput, xs: Place) -> Place:
         """Return the degree of the joined conclusions at each sample, from 0 on."""
         make = self.make
         join = S_NORMS[output.aggregation or "maximum"]
@@ -405,11 +409,11 @@ class _Run:
                 continue
             joined = join(make, total, cut)
             if not is_safe:
-                joined = make("where", make("less", zero, one.degree), joined, total)
+                joined = make.where(make.less(zero, one.degree), joined, total)
             total = joined
         if not make.samples(total):  # curves that are the same everywhere
             index = make.index(len(values))
-            total = make("add", total, make("multiply", zero, index))
+            total = total + (zero * index)
         return total
 
     def _gathered(self, output: SystemOutput) -> list[_Concluded]:
@@ -437,32 +441,32 @@ class _Run:
             gathered[key] = one
         return list(gathered.values())
 
-    def _weighted(self, output: SystemOutput) -> int:
+    def _weighted(self, output: SystemOutput) -> Place:
         """Return the weighted sum or average of numbers, from left to right."""
         make, zero = self.make, self.make.constant(0.0)
-        weights: list[int] = []
-        products: list[int] = []
+        weights: list[Place] = []
+        products: list[Place] = []
         for label, degree, concluded in self._weights(output):
             with make.topic(label.name):
                 number = self._number_of(output, label, degree)
-            product = make("multiply", degree, number)
+            product = degree * number
             known = make.number(number)
             is_finite = known is not None and math.isfinite(known)
             if not is_finite or degree not in self.units:
                 there = self._is_there(concluded)
-                product = make("where", there, product, zero)
-                degree = make("where", there, degree, zero)
+                product = make.where(there, product, zero)
+                degree = make.where(there, degree, zero)
             weights.append(degree)
             products.append(product)
         total = make.chain("add", products)
         if output.defuzzifier.method == "weighted average":
-            return make("divide", total, make.chain("add", weights))
+            return total / make.chain("add", weights)
         is_any = self._is_there(self._of(output))
-        return make("where", is_any, total, make.constant(math.nan))
+        return make.where(is_any, total, math.nan)
 
     def _weights(
         self, output: SystemOutput
-    ) -> Iterator[tuple[SystemTerm, int, list[_Concluded]]]:
+    ) -> Iterator[tuple[SystemTerm, Place, list[_Concluded]]]:
         """Yield labels and degrees, and the conclusions that they come from."""
         result = self._of(output)
         if output.aggregation is None:
@@ -476,13 +480,15 @@ class _Run:
             if own := owners.get(label.name):
                 yield label, self._aggregate(output, own), own
 
-    def _is_there(self, concluded: Sequence[_Concluded]) -> int:
+    def _is_there(self, concluded: Sequence[_Concluded]) -> Place:
         """Return whether a row has any of some conclusions."""
         zero = self.make.constant(0.0)
-        tests = [self.make("less", zero, one.degree) for one in concluded]
+        tests = [self.make.less(zero, one.degree) for one in concluded]
         return self.make.chain("or", tests)
 
-    def _number_of(self, output: SystemOutput, label: SystemTerm, degree: int) -> int:
+    def _number_of(
+        self, output: SystemOutput, label: SystemTerm, degree: Place
+    ) -> Place:
         make = self.make
         match label.curve:
             case Singleton(value=value):
@@ -490,20 +496,20 @@ class _Run:
             case Linear(weights=weights, offset=offset):
                 values = [self.values[name] for name in self.columns]
                 pairs = zip(weights, values, strict=True)
-                parts = [make("multiply", make.constant(w), x) for w, x in pairs]
+                parts = [w * x for w, x in pairs]
                 total = make.chain("add", parts) if parts else make.constant(0.0)
-                return make("add", total, make.constant(offset))
+                return total + offset
             case Formula(expression=expression):
                 return value_of(make, expression, {**self.values, "x": degree})
             case curve:
                 height = make.constant(label.height)
-                result = value_at(make, curve, make("divide", degree, height))
+                result = value_at(make, curve, degree / height)
                 if result is not None:
                     return result
                 return self._label_degree(output.name, label, degree)
 
 
-def samples_of(make: Maker, output: SystemOutput) -> int:
+def samples_of(make: Maker, output: SystemOutput) -> Place:
     """Return the values at which an output's curve is sampled."""
     if any(isinstance(label.curve, Singleton) for label in output.labels):
         values = sampled_values(output)
@@ -513,75 +519,73 @@ def samples_of(make: Maker, output: SystemOutput) -> int:
     index, start = make.index(count), make.constant(low)
     if output.defuzzifier.grid == "middle":
         step = make.constant((high - low) / count)
-        middle = make("add", index, make.constant(0.5))
-        return make("add", start, make("multiply", middle, step))
+        middle = index + 0.5
+        return start + (middle * step)
     step = make.constant((high - low) / (count - 1))
-    value = make("add", start, make("multiply", index, step))
-    is_last = make("equal", index, make.constant(float(count - 1)))
-    return make("where", is_last, make.constant(high), value)
+    value = start + (index * step)
+    is_last = make.equal(index, float(count - 1))
+    return make.where(is_last, high, value)
 
 
-def defuzzified(make: Maker, output: SystemOutput, xs: int, degrees: int) -> int:
+def defuzzified(make: Maker, output: SystemOutput, xs: Place, degrees: Place) -> Place:
     """Return an output's number; NaN if the curve is 0 everywhere."""
     method = output.defuzzifier.method
     if method in ("centroid", "bisector"):
         areas = _areas(make, output, degrees)
         if method == "bisector":
             return _bisector(make, xs, areas)
-        moments = make("total", make("multiply", xs, areas))
-        return make("divide", moments, make("total", areas))
+        moments = make("total", xs * areas)
+        return moments / make("total", areas)
     highest = make("highest", degrees)
-    chosen = make("equal", degrees, highest)
+    chosen = make.equal(degrees, highest)
     if method == "mean of maximum":
         result = _mean(make, xs, chosen)
     else:
         result = _end(make, output, xs, chosen, is_first=method.startswith("smallest"))
-    is_any = make("less", make.constant(0.0), highest)
-    return make("where", is_any, result, make.constant(math.nan))
+    is_any = make.less(0.0, highest)
+    return make.where(is_any, result, math.nan)
 
 
 def centroid_of_lines(
-    make: Maker, output: SystemOutput, cuts: Sequence[tuple[int, Lines]]
-) -> int:
+    make: Maker, output: SystemOutput, cuts: Sequence[tuple[Place, Lines]]
+) -> Place:
     """Return an output's centroid on the grid `lines`, of its labels' degrees."""
     xs = sampled_values(output)
     index = make.index(len(xs) - 1)
 
-    def row(numbers: Iterable[float]) -> int:
+    def row(numbers: Iterable[float]) -> Place:
         return make.table("pick", index, [*numbers])
 
     zero, one = make.constant(0.0), make.constant(1.0)
     sides = [(degree, row(line.left), row(line.rise)) for degree, line in cuts]
-    shares: list[int] = []
+    shares: list[Place] = []
     for degree, line in cuts:
-        above = make("subtract", degree, row(line.level))
-        share = make("add", row(line.start), make("multiply", above, row(line.slope)))
-        shares.append(make("minimum", make("maximum", share, zero), one))
+        above = degree - row(line.level)
+        share = row(line.start) + (above * row(line.slope))
+        shares.append(make.minimum(make.maximum(share, zero), one))
     shares = [zero, *_sorted(make, shares), one]
-    heights: list[int] = []
+    heights: list[Place] = []
     for share in shares:
-        lines = [
-            (cut, make("add", y, make("multiply", share, r))) for cut, y, r in sides
-        ]
+        lines = [(cut, y + (share * r)) for cut, y, r in sides]
         heights.append(make.chain("maximum", [make("minimum", *one) for one in lines]))
-    areas: list[int] = []
-    moments: list[int] = []
+    areas: list[Place] = []
+    moments: list[Place] = []
     points = itertools.pairwise(zip(shares, heights, strict=True))
     for (share, low), (after, high) in points:
-        width, both = make("subtract", after, share), make("add", low, high)
-        areas.append(make("multiply", width, both))
-        first = make("multiply", share, make("add", low, both))
-        second = make("multiply", after, make("add", high, both))
-        moments.append(make("multiply", width, make("add", first, second)))
+        width, both = after - share, low + high
+        areas.append(width * both)
+        first = share * (low + both)
+        second = after * (high + both)
+        moments.append(width * (first + second))
     area, moment = make.chain("add", areas), make.chain("add", moments)
     width = row(right - left for left, right in itertools.pairwise(xs))
-    inside = make("divide", make("multiply", width, moment), make.constant(3.0))
-    around = make("add", make("multiply", row(xs[:-1]), area), inside)
-    total = make("total", make("multiply", width, around))
-    return make("divide", total, make("total", make("multiply", width, area)))
+    inside = (width * moment) / 3.0
+    around = (row(xs[:-1]) * area) + inside
+    total = make("total", width * around)
+    return total / make("total", width * area)
 
 
-def _sorted(make: Maker, numbers: Sequence[int]) -> list[int]:
+def _sorted(make: Maker, numbers: Sequence[Place]) -> list[Place]:
     """Return numbers in rising order, by exchanging neighbours."""
     results = [*numbers]
     for last in range(len(results) - 1, 0, -1):
@@ -591,45 +595,43 @@ def _sorted(make: Maker, numbers: Sequence[int]) -> list[int]:
     return results
 
 
-def _areas(make: Maker, output: SystemOutput, degrees: int) -> int:
+def _areas(make: Maker, output: SystemOutput, degrees: Place) -> Place:
     """Return how much each sample counts: its degree, half of it at `half ends`."""
     if output.defuzzifier.grid != "half ends":
         return degrees
     count = output.defuzzifier.samples
     index, last = make.index(count), make.constant(float(count - 1))
-    is_end = make("equal", index, make.constant(0.0))
-    is_end = make("or", is_end, make("equal", index, last))
-    share = make("where", is_end, make.constant(0.5), make.constant(1.0))
-    return make("multiply", share, degrees)
+    is_end = make.equal(index, 0.0)
+    is_end = make("or", is_end, make.equal(index, last))
+    share = make.where(is_end, 0.5, 1.0)
+    return share * degrees
 
 
-def _bisector(make: Maker, xs: int, areas: int) -> int:
+def _bisector(make: Maker, xs: Place, areas: Place) -> Place:
     """Return the mean of the samples that part the area most evenly.
 
     Where a share is NaN so is the lowest miss, which no miss equals: 0 / 0 then.
     """
     sums = make("running", areas)
-    share = make("divide", sums, make("last", sums))
-    misses = make("absolute", make("subtract", share, make.constant(0.5)))
-    return _mean(make, xs, make("equal", misses, make("lowest", misses)))
+    share = sums / make("last", sums)
+    misses = abs(share - 0.5)
+    return _mean(make, xs, make.equal(misses, make("lowest", misses)))
 
 
-def _mean(make: Maker, xs: int, chosen: int) -> int:
-    kept = make("where", chosen, xs, make.constant(0.0))
-    return make("divide", make("total", kept), make("total", as_number(make, chosen)))
+def _mean(make: Maker, xs: Place, chosen: Place) -> Place:
+    kept = make.where(chosen, xs, 0.0)
+    return make("total", kept) / make("total", as_number(make, chosen))
 
 
 def _end(
-    make: Maker, output: SystemOutput, xs: int, chosen: int, *, is_first: bool
-) -> int:
+    make: Maker, output: SystemOutput, xs: Place, chosen: Place, *, is_first: bool
+) -> Place:
     """Return the first or the last of the chosen samples."""
     outside = make.constant(math.inf if is_first else -math.inf)
     find = "lowest" if is_first else "highest"
     numbers = sampled_values(output)
     if all(one <= two for one, two in itertools.pairwise(numbers)):
-        return make(find, make("where", chosen, xs, outside))
+        return make(find, make.where(chosen, xs, outside))
     # A range of a few neighbouring doubles: its samples need not rise.
     index = make.index(len(numbers))
-    return make.table(
-        "pick", make(find, make("where", chosen, index, outside)), numbers
-    )
+    return make.table("pick", make(find, make.where(chosen, index, outside)), numbers)

@@ -13,7 +13,7 @@ from typing import Literal
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import Value
-from fuzzytree.semantics import Maker, Program, Result
+from fuzzytree.semantics import Maker, Place, Program, Result, result_of
 from fuzzytree.tactile.features.moments import (
     ORDER,
     Centred,
@@ -125,8 +125,8 @@ def _program(
     results: list[Result] = []
     for feature in features:
         with make.steps.topic(feature.name):
-            results.append(Result("output", feature.name, make.feature(feature)))
-    results.append(Result("output", PRESSED, pressed))
+            results.append(result_of("output", feature.name, make.feature(feature)))
+    results.append(result_of("output", PRESSED, pressed))
     whole = make.steps.program("features", tuple(inputs), tuple(results))
     used = {step.name for step in whole.steps if step.operation == "input"}
     needed = tuple(name for name in inputs if name in used)
@@ -142,14 +142,14 @@ class _Maker:
         self.zero, self.one = self.steps.constant(0.0), self.steps.constant(1.0)
         self._parts: dict[tuple[int, int], tuple[Noisy, Noisy]] = {}
 
-    def feature(self, feature: Feature) -> int:
+    def feature(self, feature: Feature) -> Place:
         """Return the value of a feature, 0 where nothing presses."""
         value = self._value(feature)
         if feature.is_log:
             value = signed_log(self.steps, value)
         return self.steps("where", self.moments.is_pressed, value, self.zero)
 
-    def _value(self, feature: Feature) -> int:
+    def _value(self, feature: Feature) -> Place:
         make, base = self.steps, feature.base
         if feature.kind != "moment":
             count = math.prod(map(len, _cells_of(self.sensor, feature)))
@@ -181,7 +181,7 @@ class _Maker:
                 self._parts[p, q] = complex_moment(self.moments, p, q)
         return self._parts[p, q]
 
-    def _scaled(self, value: int, degree: int, feature: Feature) -> int:
+    def _scaled(self, value: Place, degree: int, feature: Feature) -> Place:
         """Return a value of some degree in g, for g in [0, 1] or divided by its sum."""
         make = self.steps
         if feature.per_force:
@@ -190,7 +190,7 @@ class _Maker:
             unit = make.constant(float(self.sensor.full**degree))
         return make("divide", value, unit)
 
-    def _centre(self, base: str) -> int:
+    def _centre(self, base: str) -> Place:
         x, y = self.moments.centre()
         side = self.sensor.columns if base == "x" else self.sensor.rows
         offset = 0.0 if side % 2 else 0.5
@@ -199,7 +199,7 @@ class _Maker:
         middle = self.steps.constant(offset)
         return self.steps("add", x if base == "x" else y, middle)
 
-    def _direction(self, base: str) -> int:
+    def _direction(self, base: str) -> Place:
         make = self.steps
         real, imaginary = (self.noise.settled(part) for part in self.parts(2, 0))
         if base == "angle":
@@ -211,7 +211,7 @@ class _Maker:
         length = make("where", is_none, self.one, length)
         return make("divide", real if base == "cos2" else imaginary, length)
 
-    def _invariant(self, number: int) -> tuple[int, int]:
+    def _invariant(self, number: int) -> tuple[Place, int]:
         """Return S_number (paper, 2.1) without the unit, and its degree in g."""
         noise, parts = self.noise, self.parts
         match number:
@@ -247,7 +247,7 @@ class _Maker:
         imaginary = self.noise.sum(product(one[0], two[1]), product(one[1], two[0]))
         return real, imaginary
 
-    def _twice_real(self, one: tuple[Noisy, Noisy], two: tuple[Noisy, Noisy]) -> int:
+    def _twice_real(self, one: tuple[Noisy, Noisy], two: tuple[Noisy, Noisy]) -> Place:
         """Return 2 Re(one conj(two))."""
         product = self.noise.product
         real = self.noise.sum(product(one[0], two[0]), product(one[1], two[1]))

@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fuzzytree.semantics import Maker
+from fuzzytree.semantics import Maker, Place
 
 UNIT = 2.0**-53
 """The largest relative error of one rounding."""
@@ -29,8 +29,8 @@ _SAFETY = 1.0 + 2.0**-40
 class Noisy:
     """A step and the step of its error's bound; without one it is exact."""
 
-    value: int
-    error: int | None = None
+    value: Place
+    error: Place | None = None
 
 
 class Noise:
@@ -56,7 +56,7 @@ class Noise:
         """Return a number times a small whole number or power of two."""
         constant = self._make.constant(factor)
         value = self._make("multiply", one.value, constant)
-        errors: list[int | None] = []
+        errors: list[Place | None] = []
         if one.error is not None:
             size = self._make.constant(abs(factor))
             errors.append(self._make("multiply", one.error, size))
@@ -66,7 +66,7 @@ class Noise:
         """Return one * two."""
         make = self._make
         value = make("multiply", one.value, two.value)
-        errors: list[int | None] = []
+        errors: list[Place | None] = []
         if two.error is not None:
             size = make("absolute", one.value)
             if one.error is not None:
@@ -77,7 +77,7 @@ class Noise:
             errors.append(make("multiply", size, one.error))
         return self.rounded(value, errors)
 
-    def settled(self, one: Noisy) -> int:
+    def settled(self, one: Noisy) -> Place:
         """Return the value, exactly 0 where it is not beyond its bound."""
         if one.error is None:
             return one.value
@@ -86,7 +86,7 @@ class Noise:
         is_noise = make("at_most", make("absolute", one.value), floor)
         return make("where", is_noise, make.constant(0.0), one.value)
 
-    def rounded(self, value: int, errors: list[int | None]) -> Noisy:
+    def rounded(self, value: Place, errors: list[Place | None]) -> Noisy:
         """Return a rounded number, from the errors of what it was made of."""
         make = self._make
         own = make("multiply", make("absolute", value), make.constant(UNIT))
@@ -100,7 +100,7 @@ _ROOTS = 10  # of the logarithm's argument: exp(x / 1024) is then close to 1
 _LOG_TERMS = 6
 
 
-def angle(make: Maker, y: int, x: int) -> int:
+def angle(make: Maker, y: Place, x: Place) -> Place:
     """Return the angle of the point (x, y) in degrees, above -180 and up to 180.
 
     It is exact on the axes, 0 for (0, 0), and within 6e-14 degrees elsewhere.
@@ -125,7 +125,7 @@ def angle(make: Maker, y: int, x: int) -> int:
     return make("where", make("less", y, zero), make("negate", degrees), degrees)
 
 
-def signed_log(make: Maker, x: int) -> int:
+def signed_log(make: Maker, x: Place) -> Place:
     """Return sign(x) log(1 + |x|), within 1e-12 up to |x| = 1e60."""
     zero, one = make.constant(0.0), make.constant(1.0)
     root = make("add", one, make("absolute", x))
@@ -138,7 +138,7 @@ def signed_log(make: Maker, x: int) -> int:
     return make("where", make("less", x, zero), below, found)
 
 
-def _odd(make: Maker, x: int, signs: list[float]) -> int:
+def _odd(make: Maker, x: Place, signs: list[float]) -> Place:
     """Return x (s0 + x^2 (s1 / 3 + x^2 (s2 / 5 + ...)))."""
     square = make("multiply", x, x)
     terms = [sign / (2 * k + 1) for k, sign in enumerate(signs)]
@@ -172,10 +172,10 @@ class Centred:
 
     make: Maker
     noise: Noise = field(init=False)
-    total: int = field(init=False)
-    is_pressed: int = field(init=False)
-    near: tuple[int, int] = field(init=False)
-    rest: tuple[int, int] = field(init=False)
+    total: Place = field(init=False)
+    is_pressed: Place = field(init=False)
+    near: tuple[Place, Place] = field(init=False)
+    rest: tuple[Place, Place] = field(init=False)
 
     def __post_init__(self) -> None:
         """Find the centre."""
@@ -192,7 +192,7 @@ class Centred:
         ]
         self.rest = (left[0], left[1])
 
-    def centre(self) -> tuple[int, int]:
+    def centre(self) -> tuple[Place, Place]:
         """Return x and y of the centre, from the cell that the sums are about."""
         x, y = (self.make("add", self.near[k], self.rest[k]) for k in (0, 1))
         return x, y
@@ -201,10 +201,10 @@ class Centred:
         """Return the moment about the centre; that of order 1 is 0."""
         return self._centred(p, q, p, q)
 
-    def _raw(self, p: int, q: int) -> int:
+    def _raw(self, p: int, q: int) -> Place:
         return self.make.input(sum_name(p, q))
 
-    def _shifted(self, p: int, q: int, by_x: int, by_y: int) -> int:
+    def _shifted(self, p: int, q: int, by_x: int, by_y: int) -> Place:
         """Return a sum after some of its p moves in x and q moves in y.
 
         After all of them it is about the cell next to the centre. One move takes the
@@ -235,7 +235,7 @@ class Centred:
             return Noisy(self._shifted(p, q, p, q))
         return self._settle(one, other, self.rest[1 if by_y else 0])
 
-    def _settle(self, one: Noisy, other: Noisy, rest: int) -> Noisy:
+    def _settle(self, one: Noisy, other: Noisy, rest: Place) -> Noisy:
         """Return one - rest * other; the rest itself is rounded once."""
         make = self.make
         if make.number(other.value) == 0.0 and other.error is None:

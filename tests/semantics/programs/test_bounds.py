@@ -27,7 +27,7 @@ from fuzzytree.semantics import probing
 from fuzzytree.semantics.programs import evaluate
 from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.operations import INEXACT, NUMERIC
-from fuzzytree.semantics.programs.steps import Maker, Program, Result
+from fuzzytree.semantics.programs.steps import Maker, Program, result_of
 from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.semantics.random_systems import random_rows
 from fuzzytree.testing import random_system
@@ -154,7 +154,7 @@ def test_a_row_on_an_edge_has_no_bound() -> None:
     x = make("exponential", make.input("x"))
     is_above = make("less", make.constant(math.exp(1.0)), x)
     jump = make("where", is_above, make.constant(math.inf), make.constant(0.0))
-    program = make.program("p", ("x",), (Result("output", "y", jump),))
+    program = make.program("p", ("x",), (result_of("output", "y", jump),))
     assert error_bounds(program, np.array([[1.0, 1.1]])).tolist() == [[math.inf, 0.0]]
 
 
@@ -164,9 +164,13 @@ def test_a_copy_is_equal_and_a_number_computed_twice_is_not() -> None:
     root, power = make("exponential", x), make("power", make.constant(math.e), x)
     smaller = make("minimum", root, make.constant(100.0))
     results = (
-        Result("output", "copy", make("where", make("equal", root, smaller), x, root)),
-        Result("output", "twice", make("where", make("equal", root, power), x, root)),
-        Result(
+        result_of(
+            "output", "copy", make("where", make("equal", root, smaller), x, root)
+        ),
+        result_of(
+            "output", "twice", make("where", make("equal", root, power), x, root)
+        ),
+        result_of(
             "output",
             "sums",
             make(

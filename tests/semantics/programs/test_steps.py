@@ -15,7 +15,7 @@ from fuzzytree.semantics.programs.operations import (
     power,
     total,
 )
-from fuzzytree.semantics.programs.steps import Maker, Program, Result, Step
+from fuzzytree.semantics.programs.steps import Maker, Program, Result, Step, result_of
 
 
 def test_equal_steps_stand_there_once() -> None:
@@ -56,7 +56,7 @@ def test_what_no_result_needs_is_not_there() -> None:
     make = Maker()
     x, y = make.input("x"), make.input("y")
     make("add", x, y)
-    program = make.program("p", ("x", "y"), (Result("output", "z", y),))
+    program = make.program("p", ("x", "y"), (result_of("output", "z", y),))
     assert program.steps == (Step("input", name="y"),)
     assert program.results == (Result("output", "z", 0),)
 
@@ -66,7 +66,7 @@ def test_samples_spread_over_the_steps_that_use_them() -> None:
     scaled = make("multiply", make.index(3), make.input("x"))
     total_ = make("total", scaled)
     running = make("highest", make("running", scaled))
-    results = (Result("output", "a", total_), Result("output", "b", running))
+    results = (result_of("output", "a", total_), result_of("output", "b", running))
     program = make.program("p", ("x",), results)
     assert [step.samples for step in program.steps] == [3, 0, 3, 0, 3, 0]
     assert evaluate_program(program, {"x": 2.0}).values == (6.0, 6.0)

@@ -10,20 +10,20 @@ import pytest
 from fuzzytree.runtimes.programs import plan_program, run_program
 from fuzzytree.semantics.programs.evaluate import evaluate_program
 from fuzzytree.semantics.programs.operations import INEXACT
-from fuzzytree.semantics.programs.steps import Maker, Program, Result
+from fuzzytree.semantics.programs.steps import Maker, Program, result_of
 from fuzzytree.tactile.features.moments import angle, signed_log
 
 
 def log_program() -> Program:
     make = Maker()
     found = signed_log(make, make.input("x"))
-    return make.program("log", ("x",), (Result("output", "y", found),))
+    return make.program("log", ("x",), (result_of("output", "y", found),))
 
 
 def angle_program() -> Program:
     make = Maker()
     found = angle(make, make.input("y"), make.input("x"))
-    return make.program("angle", ("x", "y"), (Result("output", "a", found),))
+    return make.program("angle", ("x", "y"), (result_of("output", "a", found),))
 
 
 @pytest.mark.parametrize("program", [log_program(), angle_program()], ids=str)
@@ -71,6 +71,6 @@ def test_an_angle_is_exact_on_the_axes(x: float, y: float, degrees: float) -> No
 
 def test_the_logarithm_of_less_than_nothing_is_no_negative_zero() -> None:
     make = Maker()
-    results = (Result("output", "v", signed_log(make, make.input("x"))),)
+    results = (result_of("output", "v", signed_log(make, make.input("x"))),)
     program = make.program("log", ("x",), results)
     assert [str(v) for v in evaluate_program(program, {"x": -1e-18}).values] == ["0.0"]

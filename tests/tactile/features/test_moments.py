@@ -11,7 +11,7 @@ import pytest
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.runtimes.programs import plan_program, run_program
-from fuzzytree.semantics.programs.steps import Maker, Program, Result
+from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
 from fuzzytree.tactile.features import frame_program, moments
 from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.moments import Centred, Noisy, complex_moment, sum_name
@@ -44,8 +44,8 @@ def bounded(sensor: Sensor) -> tuple[Program, FramePlan]:
     for p, q in ORDERS:
         for part, found in zip("ri", complex_moment(centred, p, q), strict=True):
             error = make.constant(0.0) if found.error is None else found.error
-            results.append(Result("output", f"{part}{p}{q}", found.value))
-            results.append(Result("output", f"error {part}{p}{q}", error))
+            results.append(result_of("output", f"{part}{p}{q}", found.value))
+            results.append(result_of("output", f"error {part}{p}{q}", error))
     plan = FramePlan(sensor, PAPER)
     inputs = tuple(one.name for one in plan.made.sums)
     return make.program("moments", inputs, tuple(results)), plan
@@ -85,7 +85,7 @@ def test_a_bound_without_the_error_of_what_is_moved_would_not_hold(
 ) -> None:
     honest = Centred._settle
 
-    def careless(self: Centred, one: Noisy, other: Noisy, rest: int) -> Noisy:
+    def careless(self: Centred, one: Noisy, other: Noisy, rest: Place) -> Noisy:
         return Noisy(honest(self, one, other, rest).value, self.make.constant(0.0))
 
     monkeypatch.setattr(moments.Centred, "_settle", careless)

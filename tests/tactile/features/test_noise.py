@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.semantics.programs.evaluate import evaluate_program
-from fuzzytree.semantics.programs.steps import Maker, Result
+from fuzzytree.semantics.programs.steps import Maker, result_of
 from fuzzytree.tactile.features.moments import Noise, Noisy
 
 Operation = Callable[[Noise, Noisy, Noisy], Noisy]
@@ -32,7 +32,10 @@ def test_the_true_result_lies_within_the_bound_wherever_its_arguments_do(
     operation, exact = OPERATIONS[name]
     found = operation(Noise(make), one, two)
     assert found.error is not None
-    results = [Result("output", "v", found.value), Result("output", "e", found.error)]
+    results = [
+        result_of("output", "v", found.value),
+        result_of("output", "e", found.error),
+    ]
     inputs = ("a", "error a", "b", "error b")
     program = make.program(name, inputs, tuple(results))
     draw = np.random.default_rng(5)
@@ -55,7 +58,7 @@ def test_what_is_within_its_bound_is_exactly_0_and_the_rest_is_untouched() -> No
     make = Maker()
     noise = Noise(make)
     settled = noise.settled(Noisy(make.input("a"), make.input("e")))
-    program = make.program("s", ("a", "e"), (Result("output", "v", settled),))
+    program = make.program("s", ("a", "e"), (result_of("output", "v", settled),))
     for value, error, wanted in (
         (1e-9, 1e-9, 0.0),
         (-1e-9, 2e-9, 0.0),
