@@ -28,6 +28,10 @@ from .crisp_regions import grid as grid
 from .crisp_regions import grid_size as grid_size
 from .crisp_regions import node_faults as node_faults
 from .crisp_regions import node_points as node_points
+from .enclosing import Interval as Interval
+from .enclosing import Jet as Jet
+from .enclosing import degree_bounds as degree_bounds
+from .enclosing import jet as jet
 from .inference import infer as infer
 from .inference import unsampled_terms as unsampled_terms
 from .inference.degrees import curve_degree as curve_degree

@@ -99,9 +99,10 @@ def smaller_slope(n: Numbers[N], slopes: Sequence[N], *, is_peak: bool) -> N:
     return n.maximum(degree, 0.0)
 
 
-def around(exact: float) -> tuple[float, float]:
-    """Return two doubles between which a rounded number lies before rounding."""
-    return math.nextafter(exact, -math.inf), math.nextafter(exact, math.inf)
+def around(place: float, *others: float) -> tuple[float, float]:
+    """Return numbers below and above one that was computed from others and rounded."""
+    near = 8.0 * math.ulp(max(map(abs, (place, *others))))
+    return place - near, place + near
 
 
 class Trapezoid(MembershipFunction, frozen=True, tag="trapezoid"):
@@ -173,7 +174,7 @@ class Gaussian(MembershipFunction, frozen=True, tag="gaussian"):
     def knots(self) -> tuple[float, ...]:
         """Return the mean, and where it bends the other way."""
         low, high = self.mean - self.deviation, self.mean + self.deviation
-        return (*around(low), self.mean, *around(high))
+        return (*around(low, high), self.mean, *around(high, low))
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -247,8 +248,7 @@ class Bell(MembershipFunction, frozen=True, tag="bell"):
             return (self.center,)
         reach = self.width * math.pow((power - 1.0) / (power + 1.0), 1.0 / power)
         low, high = self.center - reach, self.center + reach
-        near = 4 * math.ulp(max(abs(low), abs(high)))  # of a power that is rounded
-        return (low - near, low + near, self.center, high - near, high + near)
+        return (*around(low, high), self.center, *around(high, low))
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -314,11 +314,10 @@ class SigmoidDifference(MembershipFunction, frozen=True, tag="sigmoid difference
         if one.slope != two.slope:
             rise = one.slope * one.inflection - two.slope * two.inflection
             place = rise / (one.slope - two.slope)
-            if math.isfinite(place):  # a rounded number, and how far it can be off
-                sizes = abs(one.slope * one.inflection), abs(two.slope * two.inflection)
-                near = 8 * math.ulp(max(sizes)) / abs(one.slope - two.slope)
-                near += 8 * math.ulp(place)
-                inner |= {place - near, place + near}
+            sizes = (one.slope * one.inflection, two.slope * two.inflection)
+            off = math.ulp(max(map(abs, sizes))) / abs(one.slope - two.slope)
+            if math.isfinite(place) and math.isfinite(off):
+                inner |= {place - 8.0 * off, place + 8.0 * off, *around(place)}
         return tuple(sorted(inner))
 
     @property
@@ -457,14 +456,11 @@ class Cosine(MembershipFunction, frozen=True, tag="cosine"):
 
     def knots(self) -> tuple[float, ...]:
         """Return the ends, the center, and where it bends the other way."""
-        quarter = self.width / 4.0
-        return (
-            *around(self.center - 2.0 * quarter),
-            *around(self.center - quarter),
-            self.center,
-            *around(self.center + quarter),
-            *around(self.center + 2.0 * quarter),
-        )
+        low, high = self.center - self.width / 2.0, self.center + self.width / 2.0
+        knots = {self.center, *around(low, high), *around(high, low)}
+        for share in (-0.25, 0.25):
+            knots |= {*around(self.center + share * self.width, low, high)}
+        return tuple(sorted(knots))
 
 
 class Concave(MembershipFunction, frozen=True, tag="concave"):
@@ -596,7 +592,7 @@ class SemiEllipse(MembershipFunction, frozen=True, tag="semi ellipse"):
     def knots(self) -> tuple[float, ...]:
         """Return the ends and the middle."""
         middle = self.start + (self.end - self.start) / 2.0
-        return (self.start, *around(middle), self.end)
+        return (self.start, *around(middle, self.start, self.end), self.end)
 
     @property
     def is_unit(self) -> bool:
@@ -691,16 +687,17 @@ def _s(n: Numbers[N], x: N, start: float, end: float) -> N:
         return n.where(n.at_most(x, start), 0.0, 1.0)
     t = scaled(n, x, start, end)
     rest = (x - end) / (n.constant(end) - start)
-    degree = n.where(n.at_most(1.0, t), 1.0, 1.0 - 2.0 * square(rest))
-    degree = n.where(n.at_most(t, 0.5), 2.0 * square(t), degree)
-    return n.where(n.at_most(t, 0.0), 0.0, degree)
+    ends = ((end, x), (x, start)) if start < end else ((x, end), (start, x))
+    degree = n.where(n.at_most(t, 0.5), 2.0 * square(t), 1.0 - 2.0 * square(rest))
+    degree = n.where(n.at_most(*ends[0]), 1.0, degree)
+    return n.where(n.at_most(*ends[1]), 0.0, degree)
 
 
 def _s_knots(start: float, end: float) -> tuple[float, ...]:
     if start == end:
         return (start,)
     low, high = min(start, end), max(start, end)
-    return (low, *around(start + (end - start) / 2.0), high)
+    return (low, *around(start + (end - start) / 2.0, low, high, high - low), high)
 
 
 class Number(Value, frozen=True, tag="number"):
@@ -732,27 +729,58 @@ class Call(Value, frozen=True, tag="call"):
 Expression = Number | Name | Call
 
 
-def _truth(name: str) -> _Meaning:
-    return lambda n, a, b: as_number(n, n(name, _is_true(n, a), _is_true(n, b)))
-
-
 def _same(operation: str) -> _Meaning:
-    return lambda n, *operands: n(operation, *operands)
+    def meaning(n: Numbers[N], *operands: N) -> N:
+        return n(operation, *operands)
+
+    return meaning
 
 
-def _is_true(n: Numbers[Any], a: Any) -> Any:
-    return n("not", n.equal(a, 0.0))
+def _truth(test: _Meaning) -> _Meaning:
+    def meaning(n: Numbers[N], *operands: N) -> N:
+        truth: N = test(n, *operands)
+        return as_number(n, truth)
+
+    return meaning
 
 
-def _is_same(n: Numbers[Any], a: Any, b: Any) -> Any:
-    return n("or", n.equal(a, b), n("and", is_nan(n, a), is_nan(n, b)))
+def _both(n: Numbers[N], a: N, b: N) -> N:
+    return n("and", n("not", _is_false(n, a)), n("not", _is_false(n, b)))
 
 
-def _is_up_to(n: Numbers[Any], a: Any, b: Any) -> Any:
+def _either(n: Numbers[N], a: N, b: N) -> N:
+    return n("or", n("not", _is_false(n, a)), n("not", _is_false(n, b)))
+
+
+def _is_false(n: Numbers[N], a: N) -> N:
+    return n.equal(a, 0.0)
+
+
+def _is_less(n: Numbers[N], a: N, b: N) -> N:
+    return n.less(a, b)
+
+
+def _is_more(n: Numbers[N], a: N, b: N) -> N:
+    return n.less(b, a)
+
+
+def _is_up_to(n: Numbers[N], a: N, b: N) -> N:
     return n("or", n.at_most(a, b), _is_same(n, a, b))
 
 
-def _modulo(n: Numbers[Any], a: Any, b: Any) -> Any:
+def _is_from(n: Numbers[N], a: N, b: N) -> N:
+    return _is_up_to(n, b, a)
+
+
+def _is_same(n: Numbers[N], a: N, b: N) -> N:
+    return n("or", n.equal(a, b), n("and", is_nan(n, a), is_nan(n, b)))
+
+
+def _is_other(n: Numbers[N], a: N, b: N) -> N:
+    return n("not", _is_same(n, a, b))
+
+
+def _modulo(n: Numbers[N], a: N, b: N) -> N:
     """Return what is left of a, with the sign of b."""
     rest = n("remainder", a, b)
     one = n("and", n.less(rest, 0.0), n.less(0.0, b))
@@ -778,19 +806,19 @@ _CALLS: Final[Mapping[str, tuple[int, _Meaning]]] = MappingProxyType(
         "/": (2, _same("divide")),
         "%": (2, _modulo),
         "^": (2, _same("power")),
-        "and": (2, _truth("and")),
-        "or": (2, _truth("or")),
-        "lt": (2, lambda n, a, b: as_number(n, n.less(a, b))),
-        "le": (2, lambda n, a, b: as_number(n, _is_up_to(n, a, b))),
-        "gt": (2, lambda n, a, b: as_number(n, n.less(b, a))),
-        "ge": (2, lambda n, a, b: as_number(n, _is_up_to(n, b, a))),
-        "eq": (2, lambda n, a, b: as_number(n, _is_same(n, a, b))),
-        "neq": (2, lambda n, a, b: as_number(n, n("not", _is_same(n, a, b)))),
+        "and": (2, _truth(_both)),
+        "or": (2, _truth(_either)),
+        "lt": (2, _truth(_is_less)),
+        "le": (2, _truth(_is_up_to)),
+        "gt": (2, _truth(_is_more)),
+        "ge": (2, _truth(_is_from)),
+        "eq": (2, _truth(_is_same)),
+        "neq": (2, _truth(_is_other)),
         "min": (2, _same("minimum")),
         "max": (2, _same("maximum")),
         "atan2": (2, _same("arc_tangent_2")),
         "fmod": (2, _same("remainder")),
-        "not": (1, lambda n, a: as_number(n, n.equal(a, 0.0))),
+        "not": (1, _truth(_is_false)),
         **{name: (1, _same(operation)) for name, operation in _OPERATIONS.items()},
     }
 )

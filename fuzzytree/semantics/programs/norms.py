@@ -55,15 +55,30 @@ def _seldom(n: Numbers[N], d: N) -> N:
     return n.where(n.at_most(d, 0.5), n.root(0.5 * d), high)
 
 
+def _not(n: Numbers[N], d: N) -> N:
+    del n
+    return 1.0 - d
+
+
+def _cubed(n: Numbers[N], d: N) -> N:
+    del n
+    return square(d) * d
+
+
+def _fourth(n: Numbers[N], d: N) -> N:
+    del n
+    return square(square(d))
+
+
 _HEDGES: Mapping[Hedge, _Hedging] = {
     "any": lambda n, d: n.constant(1.0),
-    "not": lambda n, d: 1.0 - d,
+    "not": _not,
     "very": lambda n, d: square(d),
     "somewhat": lambda n, d: n.root(d),
     "extremely": _extremely,
     "seldom": _seldom,
-    "cubed": lambda n, d: square(d) * d,
-    "very very": lambda n, d: square(square(d)),
+    "cubed": _cubed,
+    "very very": _fourth,
     "plus": lambda n, d: n.power(d, 1.25),
     "minus": lambda n, d: n.power(d, 0.75),
     "cube root": lambda n, d: n.power(d, 1.0 / 3.0),
