@@ -51,7 +51,7 @@ from fuzzytree.model import (
     SystemTerm,
     Trapezoid,
 )
-from fuzzytree.model.rulebase import Band, Flank, RuleBase, Term
+from fuzzytree.model.rulebase import Band, RuleBase
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -175,23 +175,9 @@ def _seed() -> int:
 
 
 def _straight(seed: int) -> RuleBase:
-    """Return the rules of a random tree whose flanks are straight lines."""
+    """Return the rules of a random tree without its origin."""
     rules = rules_from_tree(random_tree(seed, leaves=7, combinations=0.0))
-
-    def flank(one: Flank | None) -> Flank | None:
-        return None if one is None else Flank(one.start, one.end)
-
-    def straight(term: Term) -> Term:
-        band = term.shape
-        if not isinstance(band, Band):
-            raise TypeError("relative rules have bands")
-        made = Band(band.low, band.high, flank(band.left), flank(band.right))
-        return Term(term.name, made)
-
-    variables = tuple(
-        replace(v, terms=tuple(map(straight, v.terms))) for v in rules.variables
-    )
-    return replace(rules, variables=variables, kind=None)
+    return replace(rules, kind=None)
 
 
 def _is_plain(rules: RuleBase) -> bool:
@@ -204,8 +190,8 @@ def _trapezoid(shape: object) -> Trapezoid:
     if not isinstance(shape, Band):
         raise TypeError("relative rules have bands")
     low, high = shape.low, shape.high
-    a = None if low is None else shape.left.end if shape.left else low
-    d = None if high is None else shape.right.end if shape.right else high
+    a = low if shape.left is None else shape.left
+    d = high if shape.right is None else shape.right
     inner = [one for one in (low, high) if one is not None]
     return Trapezoid(
         a, inner[0] if low is None else low, inner[-1] if high is None else high, d

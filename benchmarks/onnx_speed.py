@@ -22,7 +22,7 @@ from fuzzytree.exporters.onnx import write_onnx
 from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.model.contracts import Dtype
-from fuzzytree.model.rulebase import Band, Flank, Term, Variable
+from fuzzytree.model.rulebase import Band, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
 
@@ -79,9 +79,8 @@ def multiway_tree(leaves: int, seed: int = 0) -> FuzzyTree:
 
 
 def _band(low: float | None, high: float | None) -> Band:
-    curve = (0.0, 3.0, -2.0)
-    left = None if low is None else Flank(low, low - 0.5, curve)
-    right = None if high is None else Flank(high, high + 0.5, curve)
+    left = None if low is None else low - 0.5
+    right = None if high is None else high + 0.5
     return Band(low, high, left, right)
 
 

@@ -13,7 +13,7 @@ from statistics import NormalDist
 import numpy as np
 from sklearn.tree import DecisionTreeClassifier
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Side, Term, Variable
+from fuzzytree.model.rulebase import LR, Band, Side, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets, intervals
 
 FEATURES = 11
@@ -107,11 +107,10 @@ class _Plan:
     def _add_terms(
         self, number: int, name: str, cuts: tuple[float, ...], spread: float
     ) -> None:
-        curve = (0.3, 1.4, -0.7)  # rises all the way, from 0 to 1
         known = self.terms.setdefault(name, [])
         for place, (low, high) in enumerate(intervals(Node(name, cuts, (), ()))):
-            left = None if low is None else Flank(low, low - spread, curve)
-            right = None if high is None else Flank(high, high + spread, curve)
+            left = None if low is None else low - spread
+            right = None if high is None else high + spread
             band = Band(low, high, left, right)
             known.append(Term(f"{number}, {place + 1}", band))
 
@@ -200,8 +199,8 @@ def tree_of(grown: DecisionTreeClassifier) -> FuzzyTree:
         cut = float(grown.tree_.threshold[place])
         low, high = f"below {cut!r}", f"above {cut!r}"
         known = terms.setdefault(name, {})
-        known[low] = Term(low, Band(high=cut, right=Flank(cut, cut + 1.0)))
-        known[high] = Term(high, Band(low=cut, left=Flank(cut, cut - 1.0)))
+        known[low] = Term(low, Band(high=cut, right=cut + 1.0))
+        known[high] = Term(high, Band(low=cut, left=cut - 1.0))
         children = (grown.tree_.children_left[place], grown.tree_.children_right[place])
         branches = tuple(
             Branch(

@@ -119,9 +119,7 @@ def _terms(tree: FuzzyTree, variable: Variable, top: float) -> Iterator[str]:
         end
         for term in variable.terms
         if isinstance(term.shape, Band)
-        for flank in (term.shape.left, term.shape.right)
-        if flank is not None
-        for end in (flank.start, flank.end)
+        for _, end in term.shape.flanks
     ]
     low, high = min([*cuts, *ends]), max([*cuts, *ends])
     margin = (high - low) * 0.12 or 1.0

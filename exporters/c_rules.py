@@ -47,14 +47,12 @@ static name_real name_curve(const name_real *c, unsigned count, name_real x)
 """
 
 _FLANK = """
-/* Off a plateau: falls from start to end, always below 1. */
+/* Off a plateau: falls to 0 at n[1], always below 1. */
 static name_real name_flank(const name_real *n, unsigned count, name_real x)
 {
-    name_real q;
-    if (count == 0)
+    if (count == 1)
         return 0;
-    q = name_held((x - n[1]) / n[2], 0, 1);
-    return name_held(name_curve(n + 3, count, q) * q, 0, NAME_BELOW_ONE);
+    return name_held((x - n[1]) / n[2], 0, NAME_BELOW_ONE);
 }
 """
 
@@ -326,7 +324,7 @@ def _functions(tables: Tables, numbers: CNumbers) -> Iterator[str]:
     if POINTS in kinds:
         yield f"\n#define NAME_LARGEST {numbers.text(numbers.largest)}\n"
     yield _HELPERS if kinds else ""
-    yield _HORNER if has_flank or has_side else ""
+    yield _HORNER if has_side else ""
     yield _FLANK if has_flank else ""
     yield _SIDE if has_side else ""
     yield _LINES if POINTS in kinds else ""

@@ -247,10 +247,9 @@ def _atom(tables: Tables, atom: int, x: Real, numbers: CNumbers) -> Real:
     if kind in (LOW_END, HIGH_END):
         if (x > n[0]) == (kind == LOW_END):
             return one
-        if count == 0:
+        if count == 1:
             return zero
-        q = _clamped((x - n[1]) / n[2], zero, one)
-        return _clamped(_curve(n[3:], q) * q, zero, numbers.kind(numbers.below_one))
+        return _clamped((x - n[1]) / n[2], zero, numbers.kind(numbers.below_one))
     if kind == POINTS:
         return _line(n[:count], n[count:], x, numbers)
     u = _clamped((x - n[0]) / n[1], zero, n[2])

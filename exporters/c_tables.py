@@ -11,7 +11,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Clause,
-    Flank,
     FuzzyTree,
     Model,
     Node,
@@ -52,7 +51,7 @@ class Tables:
     Attributes:
         number: The numbers of all atoms.
         kind: The kind of each atom.
-        count: How many coefficients or points it has.
+        count: How many numbers, coefficients or points it has.
         first: Where its numbers begin.
         term_first: Where the atoms of each term begin; one more entry than terms.
         clause_line: The value that each clause tests.
@@ -152,10 +151,10 @@ def _add_term(result: Tables, shape: Shape, numbers: CNumbers) -> None:
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             ends = ((LOW_END, low, left), (HIGH_END, high, right))
-            for kind, bound, flank in ends:
+            for kind, bound, end in ends:
                 if bound is not None:
-                    curve = flank.curve if flank else ()
-                    _add(result, kind, len(curve), _edge(bound, flank, numbers))
+                    own = _edge(bound, end, numbers)
+                    _add(result, kind, len(own), own)
         case LR(mean=mean, left=below, right=above):
             for kind, sign, side in (
                 (LEFT_SIDE, -1.0, below),
@@ -174,14 +173,13 @@ def _add(result: Tables, kind: int, count: int, own: list[float]) -> None:
     result.number += own
 
 
-def _edge(bound: float, flank: Flank | None, numbers: CNumbers) -> list[float]:
-    """Return the bound; with a flank also its end, its width and its curve."""
-    if flank is None:
+def _edge(bound: float, end: float | None, numbers: CNumbers) -> list[float]:
+    """Return the bound; with a flank also its end and its width."""
+    if end is None:
         return numbers.rounded([bound])
     return [
-        *numbers.rounded([bound, flank.end]),
-        *numbers.rounded([flank.start - flank.end], is_divisor=True),
-        *numbers.rounded(flank.curve),
+        *numbers.rounded([bound, end]),
+        *numbers.rounded([bound - end], is_divisor=True),
     ]
 
 

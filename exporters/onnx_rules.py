@@ -30,7 +30,7 @@ from fuzzytree.exporters.onnx_ends import (
     is_known,
 )
 from fuzzytree.exporters.onnx_graph import DegreeRows, OnnxGraph, np_to_onnx
-from fuzzytree.model import LR, Clause, Flank, Points, RuleBase, Shape, Side, shapes_of
+from fuzzytree.model import LR, Clause, Points, RuleBase, Shape, Side, shapes_of
 from fuzzytree.numerics import RealArray, RealKind, Segments, rounded, segments_of
 
 if TYPE_CHECKING:
@@ -48,13 +48,13 @@ class EdgePart(msgspec.Struct, frozen=True):
         variable: The variable of the value.
         sign: 1 for a left end; -1 for a right one, which lies left of it in `-x`.
         bound: The band's `low` or `high`.
-        flank: The degree beyond the bound; None is 0.
+        end: Where the degree has fallen to 0; None is a step.
     """
 
     variable: str
     sign: int
     bound: float
-    flank: Flank | None
+    end: float | None
 
 
 class SlopePart(msgspec.Struct, frozen=True):
@@ -224,37 +224,27 @@ def _edges(graph: OnnxGraph, values: str, edges: Sequence[EdgePart]) -> str:
     bounds = graph.column(_bounds(edges, numbers.axis), "bounds")
     beyond = graph.node("Less", values, bounds)
     one = graph.number(1.0, numbers.degree)
-    flanks = [(edge.sign, edge.flank) for edge in edges]
-    if all(flank is None for _, flank in flanks):
+    if all(edge.end is None for edge in edges):
         return graph.node("Where", beyond, graph.number(0.0, numbers.degree), one)
-    ends = rounded([s * f.end if f else 0.0 for s, f in flanks], numbers.axis)
-    widths = rounded(
-        [s * (f.start - f.end) if f else 1.0 for s, f in flanks],
-        numbers.axis,
-        is_divisor=True,
-    )
+    flanks = [(e.sign, e.bound, e.bound if e.end is None else e.end) for e in edges]
+    # A step's position is at most 0 beyond the bound: its width may be anything.
+    ends = rounded([sign * end for sign, _, end in flanks], numbers.axis)
+    spans = [sign * (bound - end) or 1.0 for sign, bound, end in flanks]
+    widths = rounded(spans, numbers.axis, is_divisor=True)
     distance = graph.node("Sub", values, graph.column(ends, "ends"))
     position = graph.node("Div", distance, graph.column(widths, "widths"))
-    curves = [flank.curve if flank else (0.0,) for _, flank in flanks]
-    coefficients = _coefficients(graph, curves)
 
     def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
-        beyond, position, *curve = inputs
+        beyond, position = inputs
         zero, one, below_one = (
             inner.number(value, numbers.degree)
             for value in (0.0, 1.0, numbers.below_one)
         )
-        position = inner.node("Clip", position, zero, one)
-        degree = position
-        if curve:
-            degree = inner.node("Mul", _horner(inner, curve, position), position)
-        degree = inner.node("Clip", degree, zero, below_one)
+        degree = inner.node("Clip", position, zero, below_one)
         return inner.node("Where", beyond, degree, one, named=named)
 
     arguments = {"beyond": beyond, "position": _cast(graph, position)}
-    if any(curve != (1.0,) for curve in curves):  # 1 * q is q
-        arguments |= coefficients
-    return graph.block(f"Edges{len(arguments) - 2}", body, arguments)
+    return graph.block("Edges", body, arguments)
 
 
 def _bounds(edges: Sequence[EdgePart], kind: type[RealKind]) -> RealArray:

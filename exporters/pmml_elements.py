@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from fuzzytree.exporters.xml_text import XmlElement, element
-from fuzzytree.model import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.model import LR, Band, Points, Shape, Side
 from fuzzytree.semantics import BELOW_ONE
 
 NUMBER = {"optype": "continuous", "dataType": "double"}
@@ -109,11 +109,11 @@ class Functions:
             case Band(low=low, high=high, left=left, right=right):
                 result = constant(1.0)
                 if high is not None:
-                    beyond = self._flank(right, x)
+                    beyond = self._flank(high, right, x)
                     is_above = apply("greaterThan", x, constant(high))
                     result = apply("if", is_above, beyond, result)
                 if low is not None:
-                    below = self._flank(left, x)
+                    below = self._flank(low, left, x)
                     result = apply("if", _up_to(x, low), below, result)
                 return result
             case LR(mean=mean, left=left, right=right):
@@ -159,18 +159,11 @@ class Functions:
         body = apply("min", clamped, ref("high"))
         return apply(self._define("clip", ("value", "high"), body), value, high)
 
-    def _flank(self, flank: Flank | None, x: XmlElement) -> XmlElement:
-        if flank is None:
+    def _flank(self, edge: float, end: float | None, x: XmlElement) -> XmlElement:
+        if end is None:
             return constant(0.0)
-        names = _names(len(flank.curve))
-        top = apply("*", _horner(names, ref("q")), ref("q"))
-        clamped = apply("min", apply("max", top, constant(0.0)), constant(BELOW_ONE))
-        curve = self._define(f"flank{len(names)}", ("q", *names), clamped)
-        run = constant(flank.start - flank.end)
-        q = apply("/", apply("-", x, constant(flank.end)), run)
-        return apply(
-            curve, self._clipped(q, constant(1.0)), *map(constant, flank.curve)
-        )
+        q = apply("/", apply("-", x, constant(end)), constant(edge - end))
+        return self._clipped(q, constant(BELOW_ONE))
 
     def _side(self, side: Side, distance: XmlElement) -> XmlElement:
         names = _names(len(side.curve))

@@ -19,7 +19,6 @@ from fuzzytree.exporters.program_text import title_of
 from fuzzytree.model import (
     LR,
     Band,
-    Flank,
     Format,
     FuzzyTree,
     Model,
@@ -455,21 +454,19 @@ class SqlDegrees:
     def _band(self, band: Band, x: str) -> str:
         q = self.query
         cases: list[str] = []
-        for bound, sign, flank in (
+        for bound, sign, end in (
             (band.low, "<=", band.left),
             (band.high, ">", band.right),
         ):
             if bound is not None:
-                degree = "0e0" if flank is None else self._flank(flank, x)
+                degree = "0e0" if end is None else self._flank(bound, end, x)
                 cases.append(f"WHEN {x} {sign} {q.number(bound)} THEN {degree}")
         return f"CASE {' '.join(cases)} ELSE 1e0 END" if cases else "1e0"
 
-    def _flank(self, flank: Flank, x: str) -> str:
+    def _flank(self, edge: float, end: float, x: str) -> str:
         q = self.query
-        span = q.number(flank.start - flank.end)
-        at = self._column(q.clip(f"({x} - {q.number(flank.end)}) / {span}", 1.0))
-        curve = f"({_horner(q, flank.curve, at)}) * {at}"
-        return q.clip(curve, BELOW_ONE)
+        share = f"({x} - {q.number(end)}) / {q.number(edge - end)}"
+        return q.clip(share, BELOW_ONE)
 
     def _side(self, side: Side, distance: str) -> str:
         q = self.query

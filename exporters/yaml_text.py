@@ -14,7 +14,7 @@ import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.formats import LONGEST_NAME, MOST_BYTES, MOST_NODES
-from fuzzytree.model import LR, Band, Flank, Loss, Part, Points, Shape, Side
+from fuzzytree.model import LR, Band, Loss, Part, Points, Shape, Side
 
 _WIDTH: Final = 88
 
@@ -266,24 +266,16 @@ def named_shape(name: str, shape: Shape) -> dict[str, Entry]:
 
 def _band(band: Band) -> dict[str, Entry]:
     entries: dict[str, Entry] = {}
-    if band.low is not None:
-        entries["above"] = float(band.low)
-    if band.high is not None:
-        entries["up to"] = float(band.high)
-    if band.left is not None:
-        entries["left flank"] = _flank(band.left)
-    if band.right is not None:
-        entries["right flank"] = _flank(band.right)
+    values = {
+        "0 up to": band.left,
+        "above": band.low,
+        "up to": band.high,
+        "0 from": band.right,
+    }
+    for key, value in values.items():
+        if value is not None:
+            entries[key] = float(value)
     return entries or {"degree": 1}
-
-
-def _flank(flank: Flank) -> Short:
-    entries: dict[str, Entry] = {"from": float(flank.start), "to": float(flank.end)}
-    if flank.curve != (1.0,):
-        entries["curve"] = numbers(flank.curve)
-    if flank.error is not None:
-        entries["fit error"] = float(flank.error)
-    return Short(entries)
 
 
 def _side(side: Side) -> dict[str, Entry]:

@@ -28,7 +28,6 @@ from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     Document,
-    Flank,
     Format,
     FuzzySystem,
     FuzzyTree,
@@ -445,20 +444,14 @@ def _band(
 ) -> Band:
     unit = max(map(abs, cuts)) or 1.0
 
-    def flank(start: float, sign: int) -> Flank:
-        b1 = chance.uniform(0.3, 1.0)
-        b2 = chance.uniform(0.0, b1)
-        # Bernstein coefficients 0, b2, b1, 1 in q: rising, 0 at q = 0, 1 at q = 1.
-        curve: tuple[float, ...] = (3 * b2, 3 * b1 - 6 * b2, 1 - 3 * b1 + 3 * b2)
-        if chance.random() < 0.3:
-            curve = (1.0,)
-        return Flank(start, start + sign * unit * chance.uniform(0.1, 2.0), curve)
+    def width() -> float:
+        return unit * chance.uniform(0.1, 2.0)
 
     return Band(
         low,
         high,
-        None if low is None else flank(low, -1),
-        None if high is None else flank(high, 1),
+        None if low is None else low - width(),
+        None if high is None else high + width(),
     )
 
 

@@ -27,7 +27,7 @@ from paper.text import three
 from trees import multiway_tree
 
 from fuzzytree.benchmarking.records import Machine
-from fuzzytree.model.rulebase import LR, Band, Flank, Side, Term, Variable
+from fuzzytree.model.rulebase import LR, Band, Side, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
 from fuzzytree.runtimes.native import load
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -157,8 +157,8 @@ def test_answers_are_counted_and_each_row_has_one_vote() -> None:
 def _two_leaves() -> FuzzyTree:
     """Return a tree with a cut at 0 and sets that reach from -3 to 1 and -1 to 3."""
     side = Side(1.0, (0.5,), reach=2.0)
-    low = Term("low", Band(high=0.0, right=Flank(0.0, 2.0)))
-    high = Term("high", Band(low=0.0, left=Flank(0.0, -2.0)))
+    low = Term("low", Band(high=0.0, right=2.0))
+    high = Term("high", Band(low=0.0, left=-2.0))
     left, right = Term("a", LR(-1.0, side, side)), Term("b", LR(1.5, side, side))
     branches = (Branch(("low",), ("a",), leaf=1), Branch(("high",), ("b",), leaf=2))
     return FuzzyTree(

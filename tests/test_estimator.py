@@ -24,7 +24,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from fuzzytree.errors import MissingExtraError
 from fuzzytree.estimator import FuzzyTreeClassifier, Mode
-from fuzzytree.model.rulebase import Band, Flank, Part, Term, Variable
+from fuzzytree.model.rulebase import Band, Part, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import descend, evaluate
@@ -194,8 +194,8 @@ def test_a_table_that_teaches_nothing_is_refused(
 
 def test_a_row_that_overflows_a_combination_is_named() -> None:
     model = FuzzyTreeClassifier().fit(IRIS[:, :2], SPECIES > 0)
-    low = Term("low", Band(high=0.0, right=Flank(0.0, 1.0)))
-    high = Term("high", Band(low=0.0, left=Flank(0.0, -1.0)))
+    low = Term("low", Band(high=0.0, right=1.0))
+    high = Term("high", Band(low=0.0, left=-1.0))
     twice = Variable("twice", (low, high), parts=(Part("x1", 2.0),))
     ways = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
     model.tree_ = FuzzyTree(

@@ -29,7 +29,6 @@ from fuzzytree.benchmarking.records import (
 from fuzzytree.errors import install_hint
 from fuzzytree.model import (
     LR,
-    Band,
     Dtype,
     Model,
     Outcome,
@@ -272,7 +271,7 @@ def variants(model: Model, bounds: Bounds, layouts: Layouts) -> Candidates:
         >>> from fuzzytree.testing import random_tree
         >>> found, _ = variants(random_tree(1), lambda rules, dtype: None, Layouts())
         >>> found[0].name
-        'native, points 1e-01: relative rules'
+        'native, points 1e-01: raw rules'
     """
     candidates: list[Candidate] = []
     omitted: list[Omission] = []
@@ -320,8 +319,6 @@ def _largest_degree(rules: RuleBase) -> int:
     for variable in rules.variables:
         for term in variable.terms:
             match term.shape:
-                case Band(left=left, right=right):
-                    curves = [side.curve for side in (left, right) if side is not None]
                 case LR(left=left, right=right):
                     curves = [left.curve, right.curve]
                 case _:

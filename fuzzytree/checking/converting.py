@@ -503,11 +503,7 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
 
 
 def _decided(model: Document, other: Document) -> str:
-    """Return what a loss did to the decisions of rules, in words; empty for others.
-
-    Relative rules that became points decide alike everywhere, by the proof in
-    `fuzzytree.numerics.approximation`; here it is tried as well.
-    """
+    """Return what a loss did to the decisions of rules, in words; empty for others."""
     if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
         return ""
     if len(model.rules) != len(other.rules) or model.inputs != other.inputs:
@@ -516,8 +512,7 @@ def _decided(model: Document, other: Document) -> str:
     changed = [r for r in rows if evaluate(model, r).rule != evaluate(other, r).rule]
     if changed:
         return f"; another rule wins in {len(changed)} of {len(rows)} probes"
-    proof = ", as it must for relative terms" if model.kind == "relative" else ""
-    return f"; the same rule wins in all of {len(rows)} probes{proof}"
+    return f"; the same rule wins in all of {len(rows)} probes"
 
 
 def _certified(model: Model, form: Format, dtype: object) -> Proof:

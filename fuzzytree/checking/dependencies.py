@@ -251,7 +251,7 @@ def _with_rules(rules: RuleBase, change: Callable[[Clause], Clause]) -> RuleBase
 
 
 def _without_curves(rules: RuleBase) -> RuleBase:
-    """Return a rule base whose flanks are lines and whose sides have one number."""
+    """Return a rule base whose sides have one number."""
     variables = tuple(
         replace(v, terms=tuple(replace(t, shape=_straight(t.shape)) for t in v.terms))
         for v in rules.variables
@@ -261,13 +261,10 @@ def _without_curves(rules: RuleBase) -> RuleBase:
 
 def _straight(shape: Shape) -> Shape:
     match shape:
-        case Band(left=left, right=right):
-            lines = [f and replace(f, curve=(1.0,)) for f in (left, right)]
-            return replace(shape, left=lines[0], right=lines[1])
         case LR(left=below, right=above):
             sides = [replace(side, curve=side.curve[:1]) for side in (below, above)]
             return replace(shape, left=sides[0], right=sides[1])
-        case Points():
+        case Band() | Points():
             return shape
 
 

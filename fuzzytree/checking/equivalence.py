@@ -205,10 +205,7 @@ def _is_same_line(one: Shape, other: Shape) -> bool:
 
 
 def _is_polyline(shape: Shape) -> bool:
-    if isinstance(shape, Band):
-        flanks = (shape.left, shape.right)
-        return all(flank is None or len(flank.curve) == 1 for flank in flanks)
-    return isinstance(shape, Points)
+    return isinstance(shape, Band | Points)
 
 
 def _stand_ins(model: Document) -> Iterator[Document]:
@@ -346,9 +343,6 @@ def _terms(terms: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
 
 
 def _shape(shape: Shape) -> Shape:
-    if isinstance(shape, Band):
-        left, right = (f and replace(f, error=None) for f in (shape.left, shape.right))
-        return replace(shape, left=left, right=right)
     if isinstance(shape, Points):
         return Points(stepped(shape.values), shape.degrees)
     return shape

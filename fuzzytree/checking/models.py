@@ -343,9 +343,9 @@ def first_difference(expected: msgspec.Struct, actual: msgspec.Struct) -> str | 
     """Return where two models differ first, and how; None if they are equal.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Flank
-        >>> first_difference(Flank(1.0, 2.0), Flank(1.0, 3.0))
-        'end: 3.0 where 2.0 is right'
+        >>> from fuzzytree.model.rulebase import Band
+        >>> first_difference(Band(1.0, 2.0), Band(1.0, 3.0))
+        'high: 3.0 where 2.0 is right'
     """
     if expected == actual:
         return None

@@ -21,7 +21,6 @@ from fuzzytree.errors import LossError
 from fuzzytree.model import (
     Band,
     Branch,
-    Flank,
     FuzzyTree,
     LabelType,
     Leaf,
@@ -319,8 +318,8 @@ def _with_terms(
         left = right = None
         width = widths[variable]
         if width is not None:
-            left, right = Flank(cut, cut - width), Flank(cut, cut + width)
-            if not left.end < cut < right.end or math.isinf(right.end - left.end):
+            left, right = cut - width, cut + width
+            if not left < cut < right or math.isinf(right - left):
                 raise ValueError(
                     f"a width of {width!r} beside the cut of {variable!r} at {cut!r} "
                     "is no flank in doubles"

@@ -12,10 +12,8 @@ from fuzzytree.learning.cuts import Sketch, SplitAxis, TreeSplit
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.shapes import (
     REACH,
-    SAMPLES,
     FittedSets,
     SetRepairs,
-    fitted_flanks,
     fitted_sets,
 )
 from fuzzytree.learning.statistics import Statistics
@@ -26,7 +24,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Branch,
-    Flank,
     FuzzyTree,
     Leaf,
     Node,
@@ -42,9 +39,8 @@ ZERO_SPREAD_SHARE = 0.1
 """A set without spread gets this share of the spread within the other patterns."""
 
 _NEAREST = 16
-_ENDS = (0.005, 0.02, 0.05, 0.1, 0.2)
-_SEARCH = 65
-_FALLING = np.linspace(1.0, 0.0, SAMPLES)
+_NOTHING = 0.005  # a ratio that counts as 0 where a flank's end is sought
+_PART = np.linspace(0.0, 1.0, 65)
 
 
 @dataclass(frozen=True)
@@ -264,95 +260,57 @@ def _with_classes(
 
 
 @dataclass(frozen=True)
-class _Flanked:
-    """The flanks at the cuts of one node: right[i] starts at cut i, so does left[i]."""
+class _Flanks:
+    """Where the flanks at the cuts of one node end: `left[i]` and `right[i]` at i."""
 
-    left: tuple[Flank, ...]
-    right: tuple[Flank, ...]
+    left: tuple[float, ...]
+    right: tuple[float, ...]
 
 
 def _all_flanks(
     sketch: Sketch, keys: Sequence[_Key], axes: dict[_Key, _AxisSets]
-) -> tuple[list[_Flanked], float]:
-    """Fit all flanks of all nodes at once; return them and the largest fit error.
-
-    Of several ends that a flank could have, it takes the one with the least error.
-    """
-    starts: list[float] = []
-    ends: list[FloatArray] = []
-    ratios: list[FloatArray] = []
+) -> tuple[list[_Flanks], float]:
+    """Fit the flanks of all nodes; return them and the largest error of a fit."""
+    result: list[_Flanks] = []
+    largest = 0.0
     for key, split in zip(keys, sketch.splits, strict=True):
         field = _Field.of(split, axes[key])
+        ends: dict[int, list[float]] = {-1: [], 1: []}
         for cut in range(len(split.cuts)):
-            for sign in (-1, 1):
-                end, ratio = _sampled_ratios(split, axes[key], field, cut, sign)
-                start = float(split.cuts[cut])
-                starts.append(start)
-                ends.append(_values_beyond(start, end, axes[key].unit, sign))
-                ratios.append(ratio)
-    if not ratios:
-        return [], 0.0
-    curves, errors = fitted_flanks(np.concatenate(ratios))
-    errors = errors.reshape(len(starts), -1)
-    best = errors.argmin(axis=1)
-    chosen = np.arange(len(starts)), best
-    flanks = [
-        Flank(start, end, tuple(curve), error)
-        for start, end, curve, error in zip(
-            starts,
-            np.array(ends)[chosen].tolist(),
-            curves.reshape(*errors.shape, -1)[chosen].tolist(),
-            errors[chosen].tolist(),
-            strict=True,
-        )
-    ]
-    result: list[_Flanked] = []
-    position = 0
-    for split in sketch.splits:
-        own = flanks[position : position + 2 * len(split.cuts)]
-        position += len(own)
-        result.append(_Flanked(tuple(own[0::2]), tuple(own[1::2])))
-    return result, float(errors[chosen].max())
+            for sign, found in ends.items():
+                end, error = _flank_end(split, axes[key], field, cut, sign)
+                found.append(end)
+                largest = max(largest, error)
+        result.append(_Flanks(tuple(ends[-1]), tuple(ends[1])))
+    return result, largest
 
 
-def _values_beyond(
-    start: float, places: FloatArray, unit: _Unit, sign: int
-) -> FloatArray:
-    """Return places as values, at least one float beyond a start."""
-    next_to = math.nextafter(start, sign * math.inf)
-    values = [unit.value(place) for place in places.tolist()]
-    return np.array([v if sign * (v - start) > 0 else next_to for v in values])
-
-
-def _sampled_ratios(
+def _flank_end(
     split: TreeSplit, sets: _AxisSets, field: _Field, cut: int, sign: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return where a flank may end, and for each end its ratio at 33 points.
+) -> tuple[float, float]:
+    """Return where the line from 1 at a cut to 0 is nearest to a ratio, and how near.
 
-    All is reckoned in the axis' unit.
-
-    The flank with sign 1 leaves the interval below the cut upwards, with sign -1 the
-    interval above it downwards. The ratio is the branch's raw degree divided by the
-    largest degree of its siblings, taken as 1 at the cut, where it must be, and never
-    rising away from it. The points go from the end to the cut.
+    All is reckoned in the axis' unit. The flank with sign 1 leaves the interval below
+    the cut upwards, with sign -1 the interval above it downwards. The ratio is the
+    branch's raw degree divided by the largest degree of its siblings, taken as 1 at the
+    cut, where it must be, and never rising away from it.
     """
     start = sets.unit.place(float(split.cuts[cut]))
     owner = int(split.owners[cut if sign > 0 else cut + 1])
     mine, others = field.contestants(owner, start)
     reach = _flank_reach(split, sets, field, mine, cut, sign)
-    part = np.linspace(0.0, 1.0, _SEARCH)
-    ratio = _ratio(sets, mine, others, start + sign * reach * part)
-    low = np.flatnonzero(ratio <= max(_ENDS[0], float(ratio[-1])))
-    reach *= float(part[max(1, int(low[0]))])
-    ratio = _ratio(sets, mine, others, start + sign * reach * part)
-    ends: list[float] = []
-    sampled: list[FloatArray] = []
-    for level in _ENDS:
-        low = np.flatnonzero(ratio <= max(level, float(ratio[-1])))
-        length = float(part[max(1, int(low[0]))])
-        ends.append(start + sign * reach * length)
-        sampled.append(np.interp(_FALLING * length, part, ratio))
-    return np.array(ends), np.array(sampled)
+    ratio = _ratio(sets, mine, others, start + sign * reach * _PART)
+    low = np.flatnonzero(ratio <= max(_NOTHING, float(ratio[-1])))
+    reach *= float(_PART[max(1, int(low[0]))])
+    ratio = _ratio(sets, mine, others, start + sign * reach * _PART)
+    lines = np.maximum(1.0 - _PART / _PART[1:, np.newaxis], 0.0)
+    errors = np.abs(lines - ratio).max(axis=1)
+    best = int(errors.argmin())
+    cut_value = float(split.cuts[cut])
+    end = sets.unit.value(start + sign * reach * float(_PART[best + 1]))
+    if sign * (end - cut_value) <= 0:
+        end = math.nextafter(cut_value, sign * math.inf)
+    return end, float(errors[best])
 
 
 def _ratio(
@@ -481,7 +439,7 @@ def _nodes(
     sketch: Sketch,
     keys: Sequence[_Key],
     called: dict[_Key, str],
-    flanks: Sequence[_Flanked],
+    flanks: Sequence[_Flanks],
     pattern_names: Sequence[str],
 ) -> tuple[tuple[Node, ...], dict[_Key, tuple[Term, ...]]]:
     """Return the nodes, and the relative terms of each axis."""
@@ -518,7 +476,7 @@ def _place_term(made: dict[str, Term], name: str, band: Band) -> str:
     return unique
 
 
-def _bands(split: TreeSplit, flanks: _Flanked) -> list[Band]:
+def _bands(split: TreeSplit, flanks: _Flanks) -> list[Band]:
     cuts = split.cuts.tolist()
     last = len(cuts)
     return [

@@ -91,6 +91,9 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
         lines += [_counted(self, name, text) for name, text in _TABLE.items()]
         lines += self.repairs
         lines = [line for line in lines if line]
+        if self.largest_flank_error:
+            error = f"{self.largest_flank_error:.2g}"
+            lines.append(f"relative terms: lines within {error} of the sets' ratio")
         lines.extend(f"chosen {name}: {value}" for name, value in self.chosen.items())
         return "\n".join(lines)
 

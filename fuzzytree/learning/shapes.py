@@ -1,4 +1,4 @@
-"""Fuzzy sets by curve fitting (paper, 2.2.2), and the flanks of relative terms.
+"""Fuzzy sets by curve fitting (paper, 2.2.2).
 
 A set's polynomial goes through the centre, where the degree is 1, and n points on each
 side. With `t = u` within one spread and `v = 2 t - 1` the degree is `1 - t Q(v)`, so
@@ -18,11 +18,9 @@ from fuzzytree.learning.units import FloatArray, IntArray
 REACH = 5.0
 """Where a set's tail ends, in spreads."""
 
-SAMPLES = 33
-"""How many points of a ratio a flank is fitted to."""
+_SAMPLES = 33  # places at which a polynomial is looked at
 
 _TOLERANCE = 1e-9
-_DIGITS = 32
 
 
 @dataclass(frozen=True)
@@ -162,61 +160,9 @@ def _inverse(n: int) -> FloatArray:
 
 def _flaws(curve: FloatArray) -> tuple[int, int]:
     """Return how many polynomials leave [0, 1], and how many rise."""
-    t = np.linspace(0.0, 1.0, SAMPLES)
+    t = np.linspace(0.0, 1.0, _SAMPLES)
     powers = np.vander(2.0 * t - 1.0, curve.shape[1], increasing=True)
     values = 1.0 - t * (curve @ powers.T)
     out = (values < -_TOLERANCE) | (values > 1.0 + _TOLERANCE)
     up = np.diff(values, axis=1) > _TOLERANCE
     return int(out.any(axis=1).sum()), int(up.any(axis=1).sum())
-
-
-def fitted_flanks(ratios: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fit falling flanks to sampled ratios.
-
-    The flank is a cubic that is 0 at q = 0 and 1 at q = 1 and never falls with q: in
-    Bernstein form 0, b1, b2, 1 with `0 <= b1 <= b2 <= 1`. The least squares solution
-    lies inside that triangle, on one of its sides or in a corner; all are tried. b1 and
-    b2 are rounded to 32 binary digits: then c0 + c1 + c2 is 1 without any rounding, and
-    machines that add in another order agree.
-
-    Args:
-        ratios: At q = 0, 1/32, ..., 1, shape (flanks, 33), not falling with q.
-
-    Returns:
-        The coefficients c0, c1, c2 of `q (c0 + q (c1 + q c2))`, and the largest
-        difference from the ratios, per flank.
-    """
-    q = np.linspace(0.0, 1.0, SAMPLES)
-    first = 3.0 * q * (1.0 - q) ** 2
-    second = 3.0 * q**2 * (1.0 - q)
-    wanted = ratios - q**3
-    aa, ab, bb = first @ first, first @ second, second @ second
-    ya, yb = wanted @ first, wanted @ second
-    zero, one = np.zeros(len(ratios)), np.ones(len(ratios))
-    determinant = aa * bb - ab * ab
-    inner = (ya * bb - yb * ab) / determinant, (yb * aa - ya * ab) / determinant
-    is_inside = (inner[0] >= 0) & (inner[0] <= inner[1]) & (inner[1] <= 1)
-    both = np.clip((ya + yb) / (aa + 2 * ab + bb), 0.0, 1.0)
-    pairs = [
-        (np.where(is_inside, inner[0], 0.0), np.where(is_inside, inner[1], 0.0)),
-        (zero, np.clip(yb / bb, 0.0, 1.0)),
-        (np.clip((ya - ab) / aa, 0.0, 1.0), one),
-        (both, both),
-    ]
-    costs = np.stack(
-        [
-            b1 * b1 * aa + 2 * b1 * b2 * ab + b2 * b2 * bb - 2 * (b1 * ya + b2 * yb)
-            for b1, b2 in pairs
-        ]
-    )
-    best = costs.argmin(axis=0)
-    rows = np.arange(len(ratios))
-    b1 = _short(np.stack([pair[0] for pair in pairs])[best, rows])
-    b2 = _short(np.stack([pair[1] for pair in pairs])[best, rows])
-    curve = np.stack([3 * b1, 3 * b2 - 6 * b1, 3 * b1 - 3 * b2 + 1], axis=1)
-    fit = b1[:, None] * first + b2[:, None] * second + q**3
-    return curve, np.abs(fit - ratios).max(axis=1, initial=0.0)
-
-
-def _short(numbers: FloatArray) -> FloatArray:
-    return np.ldexp(np.rint(np.ldexp(numbers, _DIGITS)), -_DIGITS)

@@ -64,7 +64,6 @@ from .rulebase import MOST_POINTS as MOST_POINTS
 from .rulebase import Band as Band
 from .rulebase import Clause as Clause
 from .rulebase import Conjunction as Conjunction
-from .rulebase import Flank as Flank
 from .rulebase import Kind as Kind
 from .rulebase import Label as Label
 from .rulebase import LabelType as LabelType

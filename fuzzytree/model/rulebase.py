@@ -55,40 +55,30 @@ def summary(name: str, **counts: int) -> str:
     return f"{name}({', '.join(shown)})"
 
 
-class Flank(Value, frozen=True):
-    """How a degree falls from `start` (towards 1) to `end` (exactly 0).
-
-    With `q = clip((x - end) / (start - end), 0, 1)` the degree is
-    `q * (c0 + q * (c1 + ...))`, clamped to [0, largest number below 1]. `end` may lie
-    on either side of `start`.
-
-    Attributes:
-        start: Where q is 1, in the variable's unit.
-        end: Where q and the degree are 0; not equal to `start`.
-        curve: c0, c1, ...: one to eight coefficients.
-        error: The largest difference from the curve that it was fitted to.
-    """
-
-    start: float
-    end: float
-    curve: tuple[float, ...] = (1.0,)
-    error: float | None = None
-
-
 class Band(Value, frozen=True, tag="band"):
-    """A plateau with flanks: degree exactly 1 for `low < x <= high`.
+    """A plateau with straight flanks: degree exactly 1 for `low < x <= high`.
+
+    For `x <= low` the degree is `clip((x - left) / (low - left), 0, 1)`, and for
+    `x > high` it is `clip((x - right) / (high - right), 0, 1)`: 0 at `left` and `right`
+    and beyond. Both are at most the largest number below 1.
 
     Attributes:
         low: The plateau's open lower end; None reaches down without end.
         high: The plateau's closed upper end; None reaches up without end.
-        left: The degree for `x <= low`; None is 0.
-        right: The degree for `x > high`; None is 0.
+        left: Where the degree has fallen to 0, below `low`; None is a step at `low`.
+        right: Where it has fallen to 0, above `high`; None is a step at `high`.
     """
 
     low: float | None = None
     high: float | None = None
-    left: Flank | None = None
-    right: Flank | None = None
+    left: float | None = None
+    right: float | None = None
+
+    @property
+    def flanks(self) -> tuple[tuple[float, float], ...]:
+        """The lines beside the plateau: where each starts, and where it is 0."""
+        sides = (self.low, self.left), (self.high, self.right)
+        return tuple((a, b) for a, b in sides if a is not None and b is not None)
 
 
 class Side(Value, frozen=True):
@@ -563,23 +553,19 @@ def _band_mistakes(band: Band) -> Iterator[str]:
     low, high = band.low, band.high
     if low is not None and high is not None and low >= high:
         yield f"the plateau starts at {low!r} and must end above it, not at {high!r}"
-    for name, bound, flank, sign in (
+    for name, bound, end, sign in (
         ("left", low, band.left, 1),
         ("right", high, band.right, -1),
     ):
-        if flank is None:
+        if end is None:
             continue
         if bound is None:
             yield f"a plateau that is open on the {name} has no {name} flank"
-        ends = (flank.start, flank.end)
-        if not all(map(math.isfinite, ends)) or not math.isfinite(
-            flank.start - flank.end
-        ):
-            yield f"the {name} flank must start and end at finite values"
-        elif (flank.start - flank.end) * sign <= 0:
+        elif not math.isfinite(bound - end):
+            yield f"the {name} flank must end at a finite value, not {end!r}"
+        elif (bound - end) * sign <= 0:
             side = "below" if sign > 0 else "above"
-            yield f"the {name} flank must end {side} its start {flank.start!r}"
-        yield from _curve_mistakes(f"{name} flank", flank.curve)
+            yield f"the {name} flank must end {side} {bound!r}, not at {end!r}"
 
 
 def _side_mistakes(name: str, side: Side) -> Iterator[str]:

@@ -29,7 +29,6 @@ from fuzzytree.errors import LossError
 from fuzzytree.model import (
     LR,
     Band,
-    Flank,
     FloatArray,
     IntArray,
     Points,
@@ -39,11 +38,9 @@ from fuzzytree.model import (
     Term,
 )
 from fuzzytree.numerics.curves import (
-    BELOW_ONE,
     body_coefficients,
     derivative,
     distance,
-    flank_stretch,
     lowest,
     values_at,
 )
@@ -51,7 +48,7 @@ from fuzzytree.numerics.placing import points_of
 
 _GRID = 512  # places at which a fit is looked at
 _EXCHANGES = 200  # of places in a fit, at most
-_MOST = 1e6  # of a fit's coefficients together; see `rulebase.Flank`
+_MOST = 1e6  # of a fit's coefficients together; see `rulebase.Side`
 _OVER = 0.25  # how far a fit first follows a curve beyond its limits
 _REFITS = 6  # of a clipped curve
 
@@ -243,8 +240,8 @@ def by_points(model: RuleBase, tolerance: float) -> ApproximateRules:
     """Return a rule base whose curves are points joined by lines.
 
     Points lie closer where a curve bends more: all lines are nearly as far from it as
-    they may be, on either side. Ends, edges, peaks and clipped stretches are kept: each
-    is a point of its own. Points that are there already stay as they are.
+    they may be, on either side. Ends, peaks and clipped stretches are kept: each is a
+    point of its own. What consists of lines already stays as it is.
 
     Args:
         model: The rule base.
@@ -266,9 +263,7 @@ def by_points(model: RuleBase, tolerance: float) -> ApproximateRules:
         raise ValueError(f"the tolerance must be above 0, not {tolerance!r}")
 
     def change(shape: Shape) -> tuple[Shape, float] | None:
-        if isinstance(shape, Points):
-            return None
-        return points_of(shape, tolerance)
+        return points_of(shape, tolerance) if isinstance(shape, LR) else None
 
     return _approximated(model, change, f"lines within {tolerance!r} of the curves")
 
@@ -276,14 +271,13 @@ def by_points(model: RuleBase, tolerance: float) -> ApproximateRules:
 def by_degree(model: RuleBase, degree: int) -> ApproximateRules:
     """Return a rule base whose curves are polynomials of at most a degree.
 
-    Each flank, and each body of an LR set, is fitted again so that its largest error
+    Each body of an LR set is fitted again so that its largest error
     is least (by exchange), with the same value at its end, and made monotone where it
     was. Curves that are short enough, tails and points stay as they are.
 
     Args:
         model: The rule base.
-        degree: The largest degree of a flank `q * (c0 + ...)` or body
-            `1 - t * (c0 + ...)`, from 1 to 8.
+        degree: The largest degree of a body `1 - t * (c0 + ...)`, from 1 to 8.
 
     Raises:
         ValueError: If the degree is not from 1 to 8.
@@ -291,7 +285,7 @@ def by_degree(model: RuleBase, degree: int) -> ApproximateRules:
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
-        >>> found = by_degree(rules_from_tree(random_tree(0)), 1)
+        >>> found = by_degree(rules_from_tree(random_tree(0), "raw"), 1)
         >>> {term.degree for term in found.terms}
         {1}
     """
@@ -300,34 +294,14 @@ def by_degree(model: RuleBase, degree: int) -> ApproximateRules:
 
     def change(shape: Shape) -> tuple[Shape, float] | None:
         match shape:
-            case Band(low=low, high=high, left=left, right=right):
-                below = _lower_flank(left, low, degree)
-                above = _lower_flank(right, high, degree)
-                found: Shape = Band(low, high, below[0], above[0])
             case LR(mean=mean, left=first, right=second):
                 down, up = _lower_side(first, degree), _lower_side(second, degree)
                 found = LR(mean, down[0], up[0])
-                below, above = (None, down[1]), (None, up[1])
-            case Points():
+                return None if found == shape else (found, max(down[1], up[1]))
+            case Band() | Points():
                 return None
-        return None if found == shape else (found, max(below[1], above[1]))
 
     return _approximated(model, change, f"curves of degree {degree}")
-
-
-def _lower_flank(
-    flank: Flank | None, edge: float | None, degree: int
-) -> tuple[Flank | None, float]:
-    if flank is None or edge is None or len(flank.curve) <= degree:
-        return flank, 0.0
-    stretch = flank_stretch(flank, edge)
-    p = np.array([0.0, *flank.curve])
-    last = float(stretch.last) or 1.0
-    fitted = lower_curve(p, degree, last, BELOW_ONE)
-    curve = tuple(fitted[1:].tolist())
-    bound = curve_error(p, fitted, last, BELOW_ONE)
-    error = None if flank.error is None else flank.error + bound
-    return Flank(flank.start, flank.end, curve, error), bound
 
 
 def _lower_side(side: Side, degree: int) -> tuple[Side, float]:
@@ -382,8 +356,8 @@ def _size(shape: Shape) -> dict[str, int]:
     match shape:
         case Points(values=values):
             return {"points": len(values)}
-        case Band(left=left, right=right):
-            return {"degree": max(len(f.curve) for f in (left, right) if f)}
+        case Band():
+            return {"degree": 1}
         case LR(left=left, right=right):
             return {"degree": max(len(left.curve), len(right.curve))}
 

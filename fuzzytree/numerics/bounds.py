@@ -274,7 +274,7 @@ def certify(
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(0, combinations=0))
         >>> certify(rules, "mixed").sentence
-        'no decision can differ where the margin exceeds 2 x 1.7e-06'
+        'no decision can differ where the margin exceeds 2 x 1.2e-07'
     """
     if isinstance(model, FuzzyTree):
         return _certify_tree(model, dtype, values)

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple, assert_never
 
-from fuzzytree.model import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.model import LR, Band, Points, Shape, Side
 
 Curve = tuple[Fraction, ...]
 """Coefficients of powers of the position, the lowest first."""
@@ -88,30 +88,11 @@ def conduct(shape: Shape) -> tuple[Conduct, ...]:
         []
     """
     match shape:
-        case Band(left=left, right=right):
-            flanks = (("left", left), ("right", right))
-            return tuple(_of_flank(n, f) for n, f in flanks if f is not None)
         case LR(mean=mean, left=below, right=above):
             return (_of_side("left", below, mean), _of_side("right", above, mean))
-        case Points():
+        case Band() | Points():
             return ()
     assert_never(shape)
-
-
-def _of_flank(name: str, flank: Flank) -> Conduct:
-    """Judge p(q) = q (c0 + q (c1 + ...)), which should grow with q, up to 1."""
-    stored = _fractions(flank.curve)
-    curve = (Fraction(0), *stored)
-    sizes = (Fraction(0), *map(abs, stored))
-    start, end = Fraction(flank.start), Fraction(flank.end)
-
-    def place(q: Fraction) -> float:
-        return float(end + q * (start - end))
-
-    found = [
-        Rise(place(b), place(a), _up(height)) for a, b, height in _falls(curve, sign=-1)
-    ]
-    return _conduct(name, curve, [(sizes, curve)], found)
 
 
 def _of_side(name: str, side: Side, mean: float) -> Conduct:

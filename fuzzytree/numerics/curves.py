@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fuzzytree.model import Flank, FloatArray, Side
+from fuzzytree.model import FloatArray, Side
 
 BELOW_ONE = 1.0 - 2.0**-53
 """The largest double below 1: the highest degree off a plateau."""
@@ -59,17 +59,6 @@ class DegreePiece(NamedTuple):
     unit: Fraction
     first: Fraction
     last: Fraction
-
-
-def flank_stretch(flank: Flank, edge: float) -> DegreePiece:
-    """Return a flank from its end, where z = q = 0, to its start or the edge.
-
-    The edge is the plateau's end; beyond `start`, up to it, the degree is constant.
-    """
-    origin, unit = Fraction(flank.end), Fraction(flank.start) - Fraction(flank.end)
-    last = min(max((Fraction(edge) - origin) / unit, Fraction(0)), Fraction(1))
-    curve = (0.0, *flank.curve)
-    return DegreePiece(curve, BELOW_ONE, origin, unit, Fraction(0), last)
 
 
 def side_stretches(

@@ -10,12 +10,10 @@ the exact one, 0 included.
 - **Value of a variable.** An input is exact. A combination of n parts carries at most
   n + 1 roundings in each summand, which makes (n + 1) U S, S the sum of the summands'
   sizes; `slack` is (n + 3) U S, for S is rounded itself.
-- **Flank.** Difference, width and quotient make 3 U of q, and what x is off by, divided
-  by the width, is added. The polynomial's slope on [0, 1] is at most sum k |c_k|, and
-  its evaluation costs 2 n roundings of at most q sum |c_k|, where n counts the
-  coefficients. All of this is a multiple of q but what comes from x: near the end of a
-  flank the interval is as narrow as the degree is small.
-- **Side.** u as q above; t and v = 2 t - 1 pass on 4 U and 9 U. `t Q(v)` costs
+- **Flank.** Difference, width and quotient make 3 U of the degree, and what x is off
+  by, divided by the width, is added: without it the interval is as narrow as the degree
+  is small.
+- **Side.** u as above; t and v = 2 t - 1 pass on 4 U and 9 U. `t Q(v)` costs
   t ((2 n + 6) sum |c_k| + 9 sum k |c_k|) U, and 1 minus it one more. The tail's
   base w is off by 4 U w and by what u is off by over `reach - 1`; its ends are raised
   to the fourth power, in three roundings. It is exactly 1 where u is below 1 for sure.
@@ -43,7 +41,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Clause,
-    Flank,
     FloatArray,
     Points,
     Shape,
@@ -113,7 +110,7 @@ def degree_enclosure(shape: Shape, value: EnclosedValue) -> Enclosure:
     """Return intervals that hold the exact degrees of finite values.
 
     Example:
-        >>> third = Band(0.0, 1.0, right=Flank(1.0, 4.0))
+        >>> third = Band(0.0, 1.0, right=4.0)
         >>> value = EnclosedValue(np.array([1.0, 3.0]), None)
         >>> low, high = degree_enclosure(third, value)
         >>> float(low[0]), float(high[0]), bool(low[1] < 1 / 3 < high[1])
@@ -136,14 +133,14 @@ def degree_enclosure(shape: Shape, value: EnclosedValue) -> Enclosure:
 def _band(band: Band, value: EnclosedValue) -> Enclosure:
     x, slack = value
     low, high = np.ones(x.shape), np.ones(x.shape)
-    for bound, flank, sign in ((band.low, band.left, -1), (band.high, band.right, 1)):
+    for bound, end, sign in ((band.low, band.left, -1), (band.high, band.right, 1)):
         if bound is None:
             continue
         gap = sign * (x - bound)
         surely = maybe = gap > 0.0 if sign > 0 else gap >= 0.0
         if slack is not None:
             surely, maybe = gap > slack, gap >= -slack
-        found = _nothing(x) if flank is None else _flank(flank, value)
+        found = _nothing(x) if end is None else _flank(bound, end, value)
         np.minimum(low, found.low, out=low, where=maybe)
         np.minimum(high, found.high, out=high, where=surely)
     return Enclosure(low, high)
@@ -153,18 +150,15 @@ def _nothing(x: FloatArray) -> Enclosure:
     return Enclosure(np.zeros(x.shape), np.zeros(x.shape))
 
 
-def _flank(flank: Flank, value: EnclosedValue) -> Enclosure:
+def _flank(edge: float, end: float, value: EnclosedValue) -> Enclosure:
     x, slack = value
-    curve, span = flank.curve, flank.start - flank.end
-    slope = sum(power * abs(c) for power, c in enumerate(curve, 1))
-    size = sum(map(abs, curve))
-    away = np.copysign(1.0, span) * (x - flank.end)
-    q = np.clip(away / abs(span), 0.0, 1.0)
-    degree = _horner(curve, q) * q
-    error = q * ((4 * slope + (2 * len(curve) + 2) * size) * U * _MORE) + LEAST
+    span = edge - end
+    away = np.copysign(1.0, span) * (x - end)
+    degree = np.clip(away / abs(span), 0.0, 1.0)
+    error = degree * (4 * U * _MORE) + LEAST
     is_zero = away <= 0.0
     if slack is not None:
-        error += slope * _MORE * np.minimum(slack / abs(span), 1.0)
+        error += _MORE * np.minimum(slack / abs(span), 1.0)
         is_zero = away <= -slack
     high = np.clip(degree + error, 0.0, _CAP)
     high[is_zero] = 0.0

@@ -30,7 +30,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Clause,
-    Flank,
     FuzzyTree,
     Model,
     Points,
@@ -78,7 +77,7 @@ def exact_answer(model: Model, row: Mapping[str, float]) -> Exact:
 
     Example:
         >>> from fuzzytree.model.rulebase import Rule, Term
-        >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 4.0)))
+        >>> low = Term("low", Band(high=1.0, right=4.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
         ...     (Rule((Clause("force", ("low",)),), "soft"),),
@@ -137,16 +136,16 @@ def exact_degree(shape: Shape, value: Fraction) -> Fraction:
     """Return how far a value belongs to a shape, in [0, 1].
 
     Example:
-        >>> exact_degree(Band(0.0, 1.0, right=Flank(1.0, 4.0)), Fraction(3))
+        >>> exact_degree(Band(0.0, 1.0, right=4.0), Fraction(3))
         Fraction(1, 3)
     """
     checkpoint()
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             if low is not None and value <= low:
-                return _ZERO if left is None else exact_flank(left, value)
+                return _ZERO if left is None else exact_flank(low, left, value)
             if high is not None and value > high:
-                return _ZERO if right is None else exact_flank(right, value)
+                return _ZERO if right is None else exact_flank(high, right, value)
             return _ONE
         case LR(mean=mean, left=left, right=right):
             distance = value - Fraction(mean)
@@ -156,11 +155,10 @@ def exact_degree(shape: Shape, value: Fraction) -> Fraction:
     assert_never(shape)
 
 
-def exact_flank(flank: Flank, value: Fraction) -> Fraction:
-    """Return the degree that a flank gives a value, on the plateau's side as well."""
-    end = Fraction(flank.end)
-    position = _clipped((value - end) / (Fraction(flank.start) - end), _ONE)
-    return _clipped(position * _polynomial(flank.curve, position), CAP)
+def exact_flank(edge: float, end: float, value: Fraction) -> Fraction:
+    """Return the degree on the line from a plateau's edge to 0 at `end`, below 1."""
+    zero = Fraction(end)
+    return _clipped((value - zero) / (Fraction(edge) - zero), CAP)
 
 
 def _side_degree(side: Side, distance: Fraction) -> Fraction:

@@ -17,7 +17,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Dtype,
-    Flank,
     FuzzyTree,
     Loss,
     Model,
@@ -88,9 +87,9 @@ def _shape_losses(where: str, shape: Shape) -> Iterator[Loss]:
             given = [(name, value) for name, value in bounds if value is not None]
             yield from _number_losses(where, given)
             yield from _order_losses(where, "ends", [value for _, value in given])
-            for name, flank in (("left", left), ("right", right)):
-                if flank is not None:
-                    yield from _flank_losses(where, name, flank)
+            for name, edge, end in (("left", low, left), ("right", high, right)):
+                if edge is not None and end is not None:
+                    yield from _flank_losses(where, name, edge, end)
         case LR(mean=mean, left=below, right=above):
             yield from _number_losses(where, [("mean", mean)])
             for name, side in (("left", below), ("right", above)):
@@ -124,10 +123,10 @@ def _peak_losses(where: str, points: Points) -> Iterator[Loss]:
             yield Loss(where, text, lost)
 
 
-def _flank_losses(where: str, name: str, flank: Flank) -> Iterator[Loss]:
-    span = flank.start - flank.end
-    end = [(f"{name} flank's end", flank.end), (f"{name} flank's width", span)]
-    yield from _number_losses(where, end)
+def _flank_losses(where: str, name: str, edge: float, end: float) -> Iterator[Loss]:
+    span = edge - end
+    numbers = [(f"{name} flank's end", end), (f"{name} flank's width", span)]
+    yield from _number_losses(where, numbers)
     yield from _zero_losses(where, f"{name} flank's width", span)
 
 

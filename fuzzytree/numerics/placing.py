@@ -19,13 +19,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.model import LR, MOST_POINTS, Band, Flank, FloatArray, Points
+from fuzzytree.model import LR, MOST_POINTS, FloatArray, Points
 from fuzzytree.numerics.curves import (
     BELOW_ONE,
     DegreePiece,
     derivative,
     distance,
-    flank_stretch,
     side_stretches,
     values_at,
 )
@@ -38,21 +37,15 @@ _TOO_COARSE = "doubles around {!r} are too coarse for them"
 _TOO_MANY = f"it would need more than {MOST_POINTS} points"
 
 
-def points_of(shape: Band | LR, tolerance: float) -> tuple[Points, float]:
-    """Return points in the place of a shape, and the largest error of a degree.
+def points_of(shape: LR, tolerance: float) -> tuple[Points, float]:
+    """Return points in the place of an LR set, and the largest error of a degree.
 
     Raises:
         LossError: If there would be too many, or doubles are too far apart for them.
     """
-    if isinstance(shape, Band):
-        left = _band_half(shape.low, shape.left, tolerance)
-        right = _band_half(shape.high, shape.right, tolerance)
-        peak = [] if left.points or right.points else [(0.0, 1.0)]
-    else:
-        left = _side_half(shape, -1, tolerance)
-        right = _side_half(shape, 1, tolerance)
-        peak = [(shape.mean, 1.0)]
-    points = [*left.points, *peak, *reversed(right.points)]
+    left = _side_half(shape, -1, tolerance)
+    right = _side_half(shape, 1, tolerance)
+    points = [*left.points, (shape.mean, 1.0), *reversed(right.points)]
     if len(points) > MOST_POINTS:
         raise LossError(_TOO_MANY)
     values, degrees = zip(*points, strict=True)
@@ -64,24 +57,6 @@ class _Half(NamedTuple):
 
     points: list[tuple[float, float]]
     bound: float
-
-
-def _band_half(edge: float | None, flank: Flank | None, tolerance: float) -> _Half:
-    """Return the points up to one end of a plateau: last off it, then on it."""
-    if edge is None:
-        return _Half([], 0.0)
-    step = [(edge, 0.0), (edge, 1.0)]
-    if flank is None:
-        return _Half(step, 0.0)
-    stretch = flank_stretch(flank, edge)
-    if stretch.last == 0:
-        return _Half(step, 0.0)
-    inner = flank.start if stretch.last == 1 else edge
-    points, bound = _joined(stretch, (flank.end, inner), tolerance)
-    height = points[-1][1]
-    if inner != edge:
-        points.append((edge, height))
-    return _Half([*points, (edge, 1.0)], bound)
 
 
 def _side_half(shape: LR, sign: int, tolerance: float) -> _Half:

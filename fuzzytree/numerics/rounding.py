@@ -10,14 +10,14 @@ place on a curve in double, casts it, and goes on in float32.
 A degree is off by at most `fixed + per_unit * s` where its value is off by s, and where
 s reaches across a step also by the step's height:
 
-- **Flank** q (c0 + q (c1 + ...)). Difference, width, quotient and cast make 3 or 4 u of
-  q; float32 moves the end by u |end|, which the width divides. The curve turns this
-  into at most its steepest slope times it. Coefficient k goes through 2 k + 2 roundings
-  of Horner's rule (and its own, in float32), which makes sum (2 k + 2) |c_k| u. At the
-  plateau's edge the flank ends at 1 or it does not: what is missing is a step.
-- **Side.** The same for 1 - t Q(2 t - 1); the tail w**4 is 4 times as steep as w, whose
-  place is off by (u-relative error) * reach / (reach - 1) at most, and costs 16
-  roundings.
+- **Flank.** Difference, width, quotient and cast make 3 or 4 u of q; float32 moves the
+  end by u |end|, which the width divides, and the largest number below 1 by u. At the
+  plateau's edge what is missing to 1 is a step.
+- **Side.** q as for a flank; 1 - t Q(2 t - 1) turns it into at most its steepest slope
+  times it. Coefficient k goes through 2 k + 2 roundings of Horner's rule (and its own,
+  in float32), which makes sum (2 k + 2) |c_k| u. The tail w**4 is 4 times as steep as
+  w, whose place is off by (u-relative error) * reach / (reach - 1) at most, and costs
+  16 roundings.
 - **Points.** Rounded values move the points and x, which is as if x alone moved twice
   as far; a line turns this into its slope times it. Lines narrower than that are steps.
 
@@ -28,9 +28,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple, assert_never
 
 import numpy as np
@@ -39,7 +37,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Dtype,
-    Flank,
     FloatArray,
     Points,
     Shape,
@@ -48,7 +45,7 @@ from fuzzytree.model import (
     checkpoint,
 )
 from fuzzytree.numerics.enclosures import U
-from fuzzytree.numerics.exact import exact_flank, outwards
+from fuzzytree.numerics.exact import CAP
 
 if TYPE_CHECKING:
     Reals = FloatArray
@@ -138,18 +135,18 @@ def degree_bound(shape: Shape, dtype: Dtype) -> DegreeBound:
         dtype: The number type.
 
     Example:
-        >>> ramp = Band(high=1.0, right=Flank(1.0, 3.0))
+        >>> ramp = Band(high=1.0, right=3.0)
         >>> bound = degree_bound(ramp, "float32")
         >>> f"{bound.fixed:.1e}, and {bound.per_unit:.1g} for each unit of the value"
-        '5.1e-07, and 0.5 for each unit of the value'
+        '3.3e-07, and 0.5 for each unit of the value'
     """
     checkpoint()
     kind = TYPES[dtype]
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             edges = [
-                _edge_bound(edge, flank, kind)
-                for edge, flank in ((low, left), (high, right))
+                _edge_bound(edge, end, kind)
+                for edge, end in ((low, left), (high, right))
                 if edge is not None
             ]
             found = _together(edges)
@@ -178,25 +175,20 @@ def _together(parts: Sequence[DegreeBound]) -> DegreeBound:
     )
 
 
-def _edge_bound(edge: float, flank: Flank | None, kind: Type) -> DegreeBound:
+def _edge_bound(edge: float, end: float | None, kind: Type) -> DegreeBound:
     blur = _stored(edge, kind)
-    if flank is None:
+    if end is None:
         return DegreeBound(0.0, 0.0, Steps((edge,), (1.0,), blur), abs(edge))
-    span = abs(flank.start - flank.end)
-    slope = steepest(flank.curve)
-    moved = _stored(flank.end, kind) + _stored(0.0, kind)  # the end, and the width
+    span = abs(edge - end)
+    moved = _stored(end, kind) + _stored(0.0, kind)  # the end, and the width
     place = 3 * kind.axis + kind.cast + moved / span
-    rounds = sum(
-        ((2 * k + 2) * kind.degree + kind.curve) * abs(c)
-        for k, c in enumerate(flank.curve)
-    )
-    per_unit = _per_unit(slope, span)
-    gap = float(1 - exact_flank(flank, Fraction(edge)))
+    per_unit = _per_unit(1.0, span)
+    gap = float(1 - CAP)
     return DegreeBound(
-        slope * place + rounds + kind.curve + kind.tiny,
+        place + kind.curve + kind.tiny,
         per_unit,
         Steps((edge,), (gap * MORE + per_unit * blur,), blur),
-        max(abs(edge), abs(flank.start), abs(flank.end)),
+        max(abs(edge), abs(end)),
     )
 
 
@@ -264,26 +256,6 @@ def _stored(value: float, kind: Type) -> float:
 def _per_unit(rise: float, width: float) -> float:
     """Return a slope, rounded up: above 0, in doubles too, if the rise is."""
     return min(rise / width * MORE + 2.0**-1074, _MOST) if rise else 0.0
-
-
-@functools.lru_cache(maxsize=1 << 12)
-def steepest(curve: tuple[float, ...]) -> float:
-    """Return a bound of the slope of q (c0 + q (c1 + ...)) on [0, 1].
-
-    The largest Bernstein coefficient of the derivative, in fractions, rounded up.
-
-    Example:
-        >>> steepest((3.0, -3.0, 1.0))  # 1 - (1 - q)**3
-        3.0
-    """
-    slopes = [power * Fraction(c) for power, c in enumerate(curve, 1)]
-    degree = len(slopes) - 1
-    sizes: list[Fraction] = []
-    for i in range(degree + 1):
-        shares = (Fraction(math.comb(i, k), math.comb(degree, k)) for k in range(i + 1))
-        terms = (share * slope for share, slope in zip(shares, slopes, strict=False))
-        sizes.append(abs(sum(terms, start=Fraction(0))))
-    return outwards(max(sizes))[1]
 
 
 # --- values

@@ -238,10 +238,7 @@ def curve_of(name: str, shape: Shape) -> Curve:
 def _corners(shape: Shape) -> Iterator[float | None]:
     match shape:
         case Band(low=low, high=high, left=left, right=right):
-            yield from (low, high)
-            for flank in (left, right):
-                if flank is not None:
-                    yield from (flank.start, flank.end)
+            yield from (low, high, left, right)
         case LR(mean=mean, left=left, right=right):
             yield mean
             for sign, side in ((-1.0, left), (1.0, right)):

@@ -18,7 +18,6 @@ from fuzzytree.model import (
     Branch,
     Certified,
     Comparison,
-    Flank,
     FuzzyTree,
     Leaf,
     Node,
@@ -283,7 +282,7 @@ def shape_text(shape: Shape) -> str:
     """Return a curve in words and numbers.
 
     Example:
-        >>> shape_text(Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> shape_text(Band(high=1.0, right=3.0))
         '1 up to 1, falls to 0 at 3'
     """
     match shape:
@@ -317,10 +316,10 @@ def shape_text(shape: Shape) -> str:
             return f"line through {', '.join(pairs)}"
 
 
-def _flank_text(edge: float, flank: Flank | None, verb: str) -> str:
-    if flank is None:
+def _flank_text(edge: float, end: float | None, verb: str) -> str:
+    if end is None:
         return f"0 beyond {number(edge)}"
-    return f"{verb} 0 at {number(flank.end)}"
+    return f"{verb} 0 at {number(end)}"
 
 
 def _side_text(side: Side) -> str:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import LR, Dtype, Flank, IntArray, Points, Shape, Side, checkpoint
+from fuzzytree.model import LR, Dtype, IntArray, Points, Shape, Side, checkpoint
 from fuzzytree.numerics import segments_of
 
 if TYPE_CHECKING:
@@ -70,12 +70,12 @@ NUMBERS: dict[Dtype, NumberTypes] = {
 
 @dataclass(frozen=True, slots=True)
 class BandEdge:
-    """One end of a band on one variable; `flank` None is a step."""
+    """One end of a band on one variable, and where its flank is 0; None is a step."""
 
     line: int
     bound: float
     is_right: bool
-    flank: Flank | None
+    end: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,10 +163,8 @@ def _block_run(
 
 def _kind(atom: Atom) -> tuple[int, int]:
     match atom:
-        case BandEdge(flank=Flank() as flank):
-            return 1, 0 if flank.curve == (1.0,) else len(flank.curve)
         case BandEdge():
-            return 0, 0
+            return int(atom.end is not None), 0
         case SetSide(sign=0):
             return 2, len(atom.side.curve)
         case SetSide():
@@ -215,26 +213,18 @@ def _flanks(
     edges: Sequence[BandEdge], numbers: NumberTypes
 ) -> Callable[[Reals, Reals, Reals], None]:
     core = _core(edges, numbers)
-    flanks = [edge.flank for edge in edges if edge.flank is not None]
-    end = _column([flank.end for flank in flanks], numbers.axis)
-    span = _column([flank.start - flank.end for flank in flanks], numbers.axis)
-    curve = _curve([flank.curve for flank in flanks], numbers.degree)
-    is_line = all(flank.curve == (1.0,) for flank in flanks)
-    zero, one = (np.array(value, numbers.degree) for value in (0, 1))
+    flanks = [(edge.bound, edge.end) for edge in edges if edge.end is not None]
+    end = _column([end for _, end in flanks], numbers.axis)
+    span = _column([start - end for start, end in flanks], numbers.axis)
+    zero = np.array(0, numbers.degree)
     cap = numbers.cap
 
-    def run(x: Reals, out: Reals, q: Reals) -> None:
+    def run(x: Reals, out: Reals, _: Reals) -> None:
         inside = core(x)
         x -= end
         x /= span
-        q[:] = x
-        np.maximum(q, zero, out=q)
-        np.minimum(q, one, out=q)
-        if is_line:
-            out[:] = q
-        else:
-            _horner(curve, q, out)
-            out *= q
+        out[:] = x
+        np.maximum(out, zero, out=out)
         np.minimum(out, cap, out=out)
         np.maximum(out, inside, out=out)
 
@@ -315,7 +305,7 @@ def shape_degrees(shape: Shape, values: Reals) -> Reals:
 
     Example:
         >>> from fuzzytree.model.rulebase import Band
-        >>> band = Band(0.0, 1.0, right=Flank(1.0, 2.0))
+        >>> band = Band(0.0, 1.0, right=2.0)
         >>> shape_degrees(band, np.array([0.0, 1.0, 1.25])).tolist()
         [0.0, 1.0, 0.75]
     """

@@ -38,7 +38,6 @@ from fuzzytree.model import (
     Band,
     BoolArray,
     Clause,
-    Flank,
     FloatArray,
     IntArray,
     Points,
@@ -91,14 +90,14 @@ class Slopes:
 class Edges:
     """The ends of bands, and their flanks, left and right in turn.
 
-    A flank that is absent has a curve of zeros; an open end is infinite.
+    A flank that is absent has the height 0, others 1; an open end is infinite.
     """
 
     low: FloatArray
     high: FloatArray
     end: FloatArray
     span: FloatArray
-    curve: FloatArray
+    height: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,13 +330,10 @@ def _edge_degrees(edges: Edges, shape: IntArray, x: FloatArray) -> FloatArray:
     q = x - edges.end.take(side)
     q /= edges.span.take(side)
     np.maximum(q, 0.0, out=q)
-    np.minimum(q, 1.0, out=q)
-    p = _horner(edges.curve.take(side, axis=1), q)
-    p *= q
-    np.maximum(p, 0.0, out=p)
-    np.minimum(p, _CAP, out=p)
-    p[~(is_left | is_right)] = 1.0
-    return p
+    np.minimum(q, _CAP, out=q)
+    q *= edges.height.take(side)
+    q[~(is_left | is_right)] = 1.0
+    return q
 
 
 def _slopes(sets: Sequence[LR]) -> Slopes:
@@ -351,17 +347,24 @@ def _slopes(sets: Sequence[LR]) -> Slopes:
 
 
 def _edges(bands: Sequence[Band]) -> Edges:
-    none = Flank(1.0, 0.0, (0.0,))
-    flanks = [flank or none for band in bands for flank in (band.left, band.right)]
+    sides = [
+        (edge, end)
+        for band in bands
+        for edge, end in ((band.low, band.left), (band.high, band.right))
+    ]
     lows = [-np.inf if band.low is None else band.low for band in bands]
     highs = [np.inf if band.high is None else band.high for band in bands]
     return Edges(
         np.array(lows, np.float64),
         np.array(highs, np.float64),
-        np.array([flank.end for flank in flanks], np.float64),
-        np.array([flank.start - flank.end for flank in flanks], np.float64),
-        _curves([flank.curve for flank in flanks]),
+        np.array([end or 0.0 for _, end in sides], np.float64),
+        np.array([_span(edge, end) for edge, end in sides], np.float64),
+        np.array([float(end is not None) for _, end in sides], np.float64),
     )
+
+
+def _span(edge: float | None, end: float | None) -> float:
+    return 1.0 if edge is None or end is None else edge - end
 
 
 def _curves(curves: Sequence[tuple[float, ...]]) -> FloatArray:
@@ -496,15 +499,10 @@ def _band_bounds(
     for which, is_here in enumerate(((start <= low) & (low > -np.inf), stop > high)):
         sides = 2 * bands + which
         end, span = edges.end[sides, np.newaxis], edges.span[sides, np.newaxis]
-        q0, q1 = (np.clip((x - end) / span, 0.0, 1.0) for x in ends)
-        curve = edges.curve.take(sides, axis=1)[:, :, np.newaxis]
-        powers = np.arange(1, len(curve) + 1)[:, np.newaxis, np.newaxis]
-        bend = np.sum(powers * (powers - 1) * np.abs(curve), axis=0)
-        values = _horner(curve, q0) * q0, _horner(curve, q1) * q1
-        least, most = _between(values, bend, np.abs(q1 - q0), curve)
-        least, most = np.clip(least, 0.0, _CAP), np.clip(most, 0.0, _CAP)
-        bottom = np.where(is_here, np.minimum(bottom, least), bottom)
-        top = np.where(is_here, np.maximum(top, most), top)
+        height = edges.height[sides, np.newaxis]
+        q0, q1 = (np.clip((x - end) / span, 0.0, _CAP) * height for x in ends)
+        bottom = np.where(is_here, np.minimum(bottom, np.minimum(q0, q1)), bottom)
+        top = np.where(is_here, np.maximum(top, np.maximum(q0, q1)), top)
     return bottom, top
 
 

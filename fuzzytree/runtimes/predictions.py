@@ -255,9 +255,9 @@ def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> li
     `values` has shape (inputs, rows), in the order of `rules.inputs`.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Band, Clause, Flank, Rule
+        >>> from fuzzytree.model.rulebase import Band, Clause, Rule
         >>> from fuzzytree.model.rulebase import Term, Variable
-        >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> low = Term("low", Band(high=1.0, right=3.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
         ...     (Rule((Clause("force", ("low",)),), "soft"),),

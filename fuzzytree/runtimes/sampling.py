@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.model import LR, Band, Flank, Points, RuleBase, Shape, Side, shapes_of
+from fuzzytree.model import LR, Band, Points, RuleBase, Shape, Side, shapes_of
 from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.semantics import landmarks
 
@@ -70,15 +70,12 @@ def line_error(shape: Shape, values: FloatArray) -> float:
     `values` increase and have every landmark and its neighbours among them.
     """
     match shape:
-        case Band(left=left, right=right):
-            flanks = [flank for flank in (left, right) if flank is not None]
-            errors = [_flank_error(flank, values) for flank in flanks]
         case LR(mean=mean, left=below, right=above):
             errors = [
                 _side_error(side, (values - mean) * sign)
                 for side, sign in ((below, -1.0), (above, 1.0))
             ]
-        case Points():
+        case Band() | Points():
             errors = [_ROUNDING]
     return max(errors, default=0.0)
 
@@ -108,10 +105,8 @@ def _marks(shape: Shape) -> tuple[float, ...]:
 
 def _pieces(shape: Shape) -> Iterator[tuple[float, float]]:
     match shape:
-        case Band(left=left, right=right):
-            for flank in (left, right):
-                if flank is not None:
-                    yield flank.start, flank.end
+        case Band():
+            yield from shape.flanks
         case LR(mean=mean, left=below, right=above):
             for side, sign in ((below, -1.0), (above, 1.0)):
                 ends = [mean + sign * side.spread * u for u in (0.0, 1.0, side.reach)]
@@ -120,12 +115,6 @@ def _pieces(shape: Shape) -> Iterator[tuple[float, float]]:
                         yield start, end
         case Points():
             return
-
-
-def _flank_error(flank: Flank, values: FloatArray) -> float:
-    position = (values - flank.end) / (flank.start - flank.end)
-    curve = np.array([0.0, *flank.curve])
-    return _curve_error(curve, np.clip(position, 0.0, 1.0)) + 2.0**-50
 
 
 def _side_error(side: Side, distance: FloatArray) -> float:

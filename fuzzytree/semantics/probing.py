@@ -367,12 +367,10 @@ def numbers_of(curve: Curve) -> list[float]:
 def landmarks(shape: Shape) -> tuple[float, ...]:
     """Return the values at which a shape changes its formula, and one within each."""
     match shape:
-        case Band(low=low, high=high, left=left, right=right):
+        case Band(low=low, high=high):
             ends = [value for value in (low, high) if value is not None]
-            for flank in (left, right):
-                if flank is not None:
-                    ends += [flank.start, flank.end]
-                    ends.append(flank.start + 0.4 * (flank.end - flank.start))
+            for start, end in shape.flanks:
+                ends += [end, start + 0.4 * (end - start)]
         case LR(mean=mean, left=below, right=above):
             ends = [mean]
             for sign, side in ((-1.0, below), (1.0, above)):
@@ -453,11 +451,8 @@ class _Maker:
         """Return an interval on which a clause holds best."""
         shape = self.shapes[clause.variable, self.chance.choice(clause.terms)]
         match shape:
-            case Band(low=low, high=high, left=left, right=right):
-                width = max(
-                    [abs(f.start - f.end) for f in (left, right) if f is not None],
-                    default=1.0,
-                )
+            case Band(low=low, high=high):
+                width = max((abs(a - b) for a, b in shape.flanks), default=1.0)
                 if low is None:
                     low = -math.inf if high is None else high - width
                 if high is None:

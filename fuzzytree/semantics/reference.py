@@ -18,7 +18,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Clause,
-    Flank,
     FuzzyTree,
     Points,
     RuleBase,
@@ -69,7 +68,7 @@ def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
 
     Example:
         >>> from fuzzytree.model.rulebase import Rule, Term
-        >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> low = Term("low", Band(high=1.0, right=3.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
         ...     (Rule((Clause("force", ("low",)),), "soft"),),
@@ -165,15 +164,15 @@ def degree(shape: Shape, value: float) -> float:
     """Return how far a finite value belongs to a shape, in [0, 1].
 
     Example:
-        >>> degree(Band(0.0, 1.0, right=Flank(1.0, 2.0)), 1.25)
+        >>> degree(Band(0.0, 1.0, right=2.0), 1.25)
         0.75
     """
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             if low is not None and value <= low:
-                return 0.0 if left is None else flank_degree(left, value)
+                return 0.0 if left is None else flank_degree(low, left, value)
             if high is not None and value > high:
-                return 0.0 if right is None else flank_degree(right, value)
+                return 0.0 if right is None else flank_degree(high, right, value)
             return 1.0
         case LR(mean=mean, left=below, right=above):
             distance = value - mean
@@ -182,10 +181,9 @@ def degree(shape: Shape, value: float) -> float:
             return points_degree(shape, value)
 
 
-def flank_degree(flank: Flank, value: float) -> float:
-    """Return the degree off a plateau: 0 at and beyond the flank's end, below 1."""
-    position = _clip((value - flank.end) / (flank.start - flank.end), 1.0)
-    return min(max(0.0, horner(flank.curve, position) * position), BELOW_ONE)
+def flank_degree(edge: float, end: float, value: float) -> float:
+    """Return the degree off a plateau's edge: 0 at `end` and beyond, below 1."""
+    return _clip((value - end) / (edge - end), BELOW_ONE)
 
 
 def side_degree(side: Side, distance: float) -> float:

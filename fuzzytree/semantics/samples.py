@@ -23,7 +23,6 @@ from fuzzytree.model import (
     Curve,
     Defuzzifier,
     Document,
-    Flank,
     Formula,
     FuzzySystem,
     FuzzyTree,
@@ -73,10 +72,10 @@ def all_samples() -> dict[str, Document]:
 
 def _tree() -> FuzzyTree:
     """Return a tree of two nodes: force, then slip."""
-    low = Term("low", Band(high=2.0, right=Flank(2.0, 4.0, (0.5, 0.5))))
-    high = Term("high", Band(low=2.0, left=Flank(2.0, 0.0)))
-    none = Term("none", Band(high=0.5, right=Flank(0.5, 1.5)))
-    much = Term("much", Band(low=0.5, left=Flank(0.5, -0.5)))
+    low = Term("low", Band(high=2.0, right=4.0))
+    high = Term("high", Band(low=2.0, left=0.0))
+    none = Term("none", Band(high=0.5, right=1.5))
+    much = Term("much", Band(low=0.5, left=-0.5))
     first = (Branch(("low",), ("soft",), leaf=1), Branch(("high",), ("firm",), node=2))
     second = (
         Branch(("none",), ("loose",), leaf=2),
@@ -110,8 +109,8 @@ def _mixed_tree() -> FuzzyTree:
     mix = Variable(
         "mix",
         (
-            Term("low", Band(high=1.5, right=Flank(1.5, 2.5))),
-            Term("high", Band(low=1.5, left=Flank(1.5, 0.5))),
+            Term("low", Band(high=1.5, right=2.5)),
+            Term("high", Band(low=1.5, left=0.5)),
         ),
         parts=(Part("force", 0.5, 1.0), Part("slip", -2.0)),
     )

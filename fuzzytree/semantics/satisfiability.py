@@ -93,9 +93,9 @@ def _support(shape: Shape) -> Spans:
             first = -math.inf if low is None else low
             last = math.inf if high is None else high
             if left is not None:
-                first = min(first, left.end)
+                first = min(first, left)
             if right is not None:
-                last = max(last, right.end)
+                last = max(last, right)
             return ((first, last),)
         case LR(mean=mean, left=below, right=above):
             down, up = below.spread * below.reach, above.spread * above.reach

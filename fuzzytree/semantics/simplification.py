@@ -89,7 +89,7 @@ def pruned(
 ) -> Pruned:
     """Leave out of a model what its answers do not need.
 
-    Ranges, units, supports, fit errors and the names of the training table's columns
+    Ranges, units, supports and the names of the training table's columns
     stay: people and other tools read them, and no answer depends on them.
 
     Args:
@@ -342,7 +342,7 @@ def _without_flanks(
         terms: list[Term] = []
         for term in variable.terms:
             shape = term.shape
-            if isinstance(shape, Band) and (shape.left or shape.right):
+            if isinstance(shape, Band) and shape.flanks:
                 where = f"the flanks of term {term.name!r} of {variable.name!r}"
                 removed.append(Removed(where, "only relative rules need them"))
                 shape = Band(shape.low, shape.high)

@@ -27,7 +27,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Points,
     Rule,
     RuleBase,
@@ -229,16 +228,16 @@ def shared() -> FuzzyTree:
     x = Variable(
         "x",
         (
-            Term("a", Band(None, 0.0, None, Flank(0.0, 1.0))),
-            Term("b", Band(0.0, 1.0, Flank(0.0, -1.0), Flank(1.0, 2.0))),
-            Term("c", Band(1.0, None, Flank(1.0, 0.0), None)),
+            Term("a", Band(None, 0.0, None, 1.0)),
+            Term("b", Band(0.0, 1.0, -1.0, 2.0)),
+            Term("c", Band(1.0, None, 0.0, None)),
         ),
     )
     y = Variable(
         "y",
         (
-            Term("low", Band(None, 0.5, None, Flank(0.5, 1.0))),
-            Term("high", Band(0.5, None, Flank(0.5, 0.0), None)),
+            Term("low", Band(None, 0.5, None, 1.0)),
+            Term("high", Band(0.5, None, 0.0, None)),
         ),
     )
     root = Node(
@@ -276,8 +275,8 @@ def chain(count: int) -> FuzzyTree:
     nodes: list[Node] = []
     for k in range(count):
         cut = float(k)
-        terms.append(Term(f"l{k}", Band(None, cut, None, Flank(cut, cut + 1.0))))
-        terms.append(Term(f"h{k}", Band(cut, None, Flank(cut, cut - 1.0), None)))
+        terms.append(Term(f"l{k}", Band(None, cut, None, cut + 1.0)))
+        terms.append(Term(f"h{k}", Band(cut, None, cut - 1.0, None)))
         onward = Branch((f"h{k}",), node=k + 2)
         if k == count - 1:
             onward = Branch((f"h{k}",), leaf=count + 1)

@@ -8,12 +8,11 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.checking.equivalence import equivalence, is_equivalent
-from fuzzytree.model import FuzzySystem, Is, SystemTerm, Trapezoid
+from fuzzytree.model import LR, FuzzySystem, Is, Side, SystemTerm, Trapezoid
 from fuzzytree.model.contracts import Document, Reading, Written
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Points,
     Rule,
     RuleBase,
@@ -35,7 +34,7 @@ def _one(shape: Shape) -> RuleBase:
     return RuleBase("one", ("soft",), (variable,), (rule,))
 
 
-RAMP = _one(Band(high=2.0, right=Flank(2.0, 4.0)))
+RAMP = _one(Band(high=2.0, right=4.0))
 
 
 def _seen(model: Document, other: Document, *remarks: str) -> str:
@@ -120,9 +119,8 @@ def test_a_step_is_like_a_line_to_the_next_double() -> None:
 @pytest.mark.parametrize(
     "shape",
     [
-        Band(high=2.0, right=Flank(2.0, 4.0, (0.5, 0.5))),
-        Band(high=2.0, right=Flank(2.0, math.nextafter(4.0, 5.0) + 1e-12)),
-        Band(high=math.nextafter(2.0, 3.0), right=Flank(2.0, 4.0)),
+        Band(high=2.0, right=math.nextafter(4.0, 5.0) + 1e-12),
+        Band(high=math.nextafter(2.0, 3.0), right=4.0),
         Band(high=2.0),
         Points((2.0, 2.0, 3.0, 4.0), (1.0, 1.0, 0.5 + 1e-12, 0.0)),
         Points((1.9, 4.0), (1.0, 0.0)),
@@ -134,5 +132,5 @@ def test_another_curve_is_another_model(shape: Shape) -> None:
 
 
 def test_a_curve_that_is_no_line_is_not_straightened() -> None:
-    assert straightened(_one(Band(high=2.0, right=Flank(2.0, 4.0, (0.5, 0.5))))) is None
+    assert straightened(_one(LR(2.0, Side(1.0, (0.5,)), Side(1.0, (0.5,))))) is None
     assert straightened(_one(Points((0.0,), (1.0,)))) is None

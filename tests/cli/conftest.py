@@ -13,7 +13,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.cli.program import main
-from fuzzytree.model.rulebase import Band, Flank, Term, Variable
+from fuzzytree.model.rulebase import Band, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 
 GRASPS = "slip,force,note,grip\n0,1.5,a,soft\n1,2.5,b,firm\n0,3,c,loose\n1,,d,firm\n"
@@ -23,10 +23,10 @@ Call = Callable[..., tuple[int, str, str]]
 
 def grip() -> FuzzyTree:
     """Return a tree of two nodes and three leaves."""
-    low = Term("low", Band(high=2.0, right=Flank(2.0, 4.0)))
-    high = Term("high", Band(low=2.0, left=Flank(2.0, 0.0)))
-    none = Term("none", Band(high=0.5, right=Flank(0.5, 1.5)))
-    much = Term("much", Band(low=0.5, left=Flank(0.5, -0.5)))
+    low = Term("low", Band(high=2.0, right=4.0))
+    high = Term("high", Band(low=2.0, left=0.0))
+    none = Term("none", Band(high=0.5, right=1.5))
+    much = Term("much", Band(low=0.5, left=-0.5))
     return FuzzyTree(
         "grip",
         ("firm", "loose", "soft"),

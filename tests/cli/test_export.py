@@ -81,8 +81,8 @@ def test_the_certificate_is_that_of_the_number_type_that_was_written(
     _, _, double = call(*words)
     _, _, single = call(*words, "--dtype", "float32")
     text = "no decision can differ where the margin exceeds 2 x"
-    assert f"bound    float64  {text} 5.6e-16\n" in double
-    assert f"bound    float32  {text} 7.2e-07\n" in single
+    assert f"bound    float64  {text} 3.5e-16\n" in double
+    assert f"bound    float32  {text} 5.4e-07\n" in single
 
 
 @pytest.mark.parametrize("representation", ["tree", "rules"])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side, fingerprint
+from fuzzytree.model.rulebase import LR, Band, Points, Shape, Side, fingerprint
 from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.report.text import model_lines, shape_text
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -115,7 +115,7 @@ def test_every_leaf_and_rule_of_a_tree_is_shown(seed: int) -> None:
         (Band(), "1 everywhere"),
         (Band(low=-1.0, high=1.0), "1 from -1 to 1, 0 beyond -1, 0 beyond 1"),
         (
-            Band(0.0, 1.0, Flank(0.0, -2.0), Flank(1.0, 3.0)),
+            Band(0.0, 1.0, -2.0, 3.0),
             "1 from 0 to 1, rises from 0 at -2, falls to 0 at 3",
         ),
         (

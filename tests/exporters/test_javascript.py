@@ -11,7 +11,6 @@ from fuzzytree.exporters.js_text import literal, number_text, text_of
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Points,
     Rule,
     RuleBase,
@@ -38,7 +37,7 @@ HOSTILE = (
 
 
 def grip() -> RuleBase:
-    low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+    low = Term("low", Band(high=1.0, right=3.0))
     some = Term("some", Points((0.0, 0.1), (0.0, 1.0)))
     rules = (Rule((Clause("force", ("low", "some"), True),), "soft"), Rule((), "hard"))
     inputs = (Variable("force", (low, some), unit="N"),)
@@ -62,39 +61,38 @@ def test_a_small_rule_base_is_written_step_by_step() -> None:
         "  const v4 = v0 - 3.0;\n"
         "  const v6 = v4 / -2.0;\n"
         "  const v8 = maximum(v6, 0.0);\n"
-        "  const v9 = minimum(v8, 1.0);\n"
-        "  const v10 = maximum(v9, 0.0);\n"
-        "  const v12 = minimum(v10, 0.9999999999999999);\n"
-        "  const v13 = 1.0 < v0;\n"
-        '  const v14 = v13 ? v12 : 1.0; // "force is low"\n'
-        "  const v16 = v0 / 0.1;\n"
-        "  const v17 = minimum(v16, 1.0);\n"
-        '  const v18 = maximum(v17, 0.0); // "force is some"\n'
-        "  const v19 = maximum(v14, v18);\n"
-        "  const v20 = 1.0 - v19;\n"
-        "  const v21 = maximum(v20, 1.0);\n"
-        "  const v22 = v20 === v21;\n"
-        "  const v23 = 1.0 === v21;\n"
-        "  const v25 = v22 ? 1.0 : 2.0;\n"
-        "  const v26 = v23 ? 2.0 : 1.0;\n"
-        "  const v27 = v21 === 0.0;\n"
-        "  const v28 = v27 ? 0.0 : v25;\n"
-        "  const v29 = v28 === v26;\n"
-        "  const v30 = v29 ? 0.0 : 1.0;\n"
-        "  const v31 = v27 ? 2.0 : v30;\n"
-        '  const v32 = v1 ? v28 : 0.0; // "rule"\n'
-        '  const v33 = v1 ? v31 : 3.0; // "status"\n'
-        "  const v34 = pick(TABLE_0, v32);\n"
-        '  const v36 = v1 ? v34 : -1.0; // "class"\n'
-        '  const v38 = v1 ? v20 : NaN; // "rule 1 strength"\n'
-        '  const v39 = v1 ? 1.0 : NaN; // "rule 2 strength"\n'
+        "  const v10 = minimum(v8, 0.9999999999999999);\n"
+        "  const v11 = 1.0 < v0;\n"
+        '  const v12 = v11 ? v10 : 1.0; // "force is low"\n'
+        "  const v14 = v0 / 0.1;\n"
+        "  const v15 = minimum(v14, 1.0);\n"
+        '  const v16 = maximum(v15, 0.0); // "force is some"\n'
+        "  const v17 = maximum(v12, v16);\n"
+        "  const v18 = 1.0 - v17;\n"
+        "  const v19 = maximum(v18, 1.0);\n"
+        "  const v20 = v18 === v19;\n"
+        "  const v21 = 1.0 === v19;\n"
+        "  const v23 = v20 ? 1.0 : 2.0;\n"
+        "  const v24 = v21 ? 2.0 : 1.0;\n"
+        "  const v25 = v19 === 0.0;\n"
+        "  const v26 = v25 ? 0.0 : v23;\n"
+        "  const v27 = v26 === v24;\n"
+        "  const v28 = v27 ? 0.0 : 1.0;\n"
+        "  const v29 = v25 ? 2.0 : v28;\n"
+        '  const v30 = v1 ? v26 : 0.0; // "rule"\n'
+        '  const v31 = v1 ? v29 : 3.0; // "status"\n'
+        "  const v32 = pick(TABLE_0, v30);\n"
+        '  const v34 = v1 ? v32 : -1.0; // "class"\n'
+        '  const v36 = v1 ? v18 : NaN; // "rule 1 strength"\n'
+        '  const v37 = v1 ? 1.0 : NaN; // "rule 2 strength"\n'
         "  return [\n"
-        '    v36, // "class"\n'
-        '    v32, // "rule"\n'
-        '    v33, // "status"\n'
-        '    v38, // "IF force is not low or some THEN soft"\n'
-        '    v39, // "ALWAYS hard"\n'
-        "  ];\n}\n"
+        '    v34, // "class"\n'
+        '    v30, // "rule"\n'
+        '    v31, // "status"\n'
+        '    v36, // "IF force is not low or some THEN soft"\n'
+        '    v37, // "ALWAYS hard"\n'
+        "  ];\n"
+        "}\n"
     )
 
 

@@ -10,7 +10,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Part,
     Points,
     Rule,
@@ -30,13 +29,13 @@ NEARLY_ONE = 1.0 + 2.0**-40
 SMALL = 2.0**-200
 
 SHAPES: dict[str, Shape] = {
-    "width": Band(high=0.0, right=Flank(0.0, NEARLY_ONE)),
-    "end": Band(high=-1.0, right=Flank(-1.0, SMALL)),
+    "width": Band(high=0.0, right=NEARLY_ONE),
+    "end": Band(high=-1.0, right=SMALL),
     "spread": LR(0.5, Side(NEARLY_ONE, (0.75,)), Side(NEARLY_ONE, (0.75,))),
     "mean": LR(SMALL, Side(SMALL, (0.75,)), Side(SMALL, (0.75,))),
     "reach": LR(0.0, Side(1.0, (0.5,), 1.0 + NEARLY_ONE), Side(1.0, (0.5,), 2.0)),
     "points": Points((0.0, 1.0), (1e-300, 5e-324)),
-    "curve": Band(high=0.0, right=Flank(0.0, 1.0, (NEARLY_ONE, SMALL, 0.25))),
+    "curve": Band(high=0.0, right=1.0),
 }
 
 
@@ -77,8 +76,8 @@ def test_a_part_that_is_nearly_neutral_counts(
 
 @pytest.mark.parametrize("form", ["float64", "plain"])
 def test_a_tree_turns_at_the_very_value(form: str) -> None:
-    low = Term("low", Band(high=SMALL, right=Flank(SMALL, 1.0)))
-    high = Term("high", Band(low=SMALL, left=Flank(SMALL, -1.0)))
+    low = Term("low", Band(high=SMALL, right=1.0))
+    high = Term("high", Band(low=SMALL, left=-1.0))
     mix = Variable("mix", (low, high), parts=(Part("x", NEARLY_ONE, SMALL),))
     branches = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
     tree = FuzzyTree(

@@ -14,7 +14,6 @@ from fuzzytree.exporters.structured_text import write
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Rule,
     RuleBase,
     Semantics,
@@ -29,7 +28,7 @@ from fuzzytree.testing import random_tree
 
 
 def grip() -> RuleBase:
-    low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+    low = Term("low", Band(high=1.0, right=3.0))
     rules = (Rule((Clause("grip force", ("low",)),), "soft"), Rule((), "hard"))
     inputs = (Variable("grip force", (low,), unit="N"),)
     return RuleBase("grip", ("soft", "hard"), inputs, rules, Semantics("min", "hard"))

@@ -22,7 +22,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Part,
     Rule,
     RuleBase,
@@ -151,7 +150,7 @@ SIDES = st.builds(
     reach=st.floats(min_value=1, exclude_min=True, allow_infinity=False),
 )
 FLANKS = st.builds(
-    lambda curve, error: Flank(0.0, 1.0, curve, error),
+    lambda curve, error: 1.0,
     CURVES,
     st.none() | st.floats(allow_nan=False),
 )

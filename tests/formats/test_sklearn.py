@@ -144,9 +144,8 @@ def test_soft_flanks_change_no_decision_and_fall_over_the_width() -> None:
         width = 0.25 * spreads[ours.columns.index(variable.name)]
         for term in variable.terms:
             assert isinstance(term.shape, Band)
-            flank = term.shape.left or term.shape.right
-            assert flank is not None
-            assert abs(flank.end - flank.start) == pytest.approx(width)
+            ((start, end),) = term.shape.flanks
+            assert abs(end - start) == pytest.approx(width)
 
 
 def test_widths_can_be_given_for_each_column() -> None:

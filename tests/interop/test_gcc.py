@@ -21,7 +21,6 @@ from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Part,
     Rule,
     RuleBase,
@@ -66,7 +65,7 @@ def hostile_rules() -> RuleBase:
         "é ☂",
         "A",
     )
-    terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in names)
+    terms = tuple(Term(name, Band(high=1.0, right=2.0)) for name in names)
     inputs = tuple(Variable(name, terms, unit=name) for name in names)
     mix = Variable("mix */\\", terms, parts=tuple(Part(n, 0.5) for n in names[:3]))
     rules = tuple(
@@ -281,7 +280,7 @@ def ten_thousand_rules() -> RuleBase:
 
 def _ramp(place: int) -> Term:
     low = place - 0.1 * place - 0.5
-    left, right = Flank(low, low - 0.7), Flank(low + 0.3, low + 1.1)
+    left, right = low - 0.7, low + 1.1
     return Term(f"t{place}", Band(low, low + 0.3, left, right))
 
 

@@ -22,7 +22,6 @@ from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Part,
     Rule,
     RuleBase,
@@ -88,7 +87,7 @@ def same_bits(one: Array, other: Array) -> bool:
 
 
 def hostile_rules() -> RuleBase:
-    terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
+    terms = tuple(Term(name, Band(high=1.0, right=2.0)) for name in HOSTILE)
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
     mix = Variable("mix */", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
@@ -275,7 +274,7 @@ WAYS = {
 def test_inputs_are_given_by_name_and_what_is_no_number_is_refused(
     tmp_path: Path, program: Need, way: str
 ) -> None:
-    low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+    low = Term("low", Band(high=1.0, right=3.0))
     inputs = (Variable("force", (low,)), Variable("__proto__", (low,)))
     rule = Rule((Clause("force", ("low",)), Clause("__proto__", ("low",))), "soft")
     rules = RuleBase("grip", ("soft",), inputs, (rule,))

@@ -23,7 +23,6 @@ from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Part,
     Rule,
     RuleBase,
@@ -68,7 +67,7 @@ HOSTILE = (
 
 
 def hostile_rules() -> RuleBase:
-    terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
+    terms = tuple(Term(name, Band(high=1.0, right=2.0)) for name in HOSTILE)
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
     mix = Variable("mix *)", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(

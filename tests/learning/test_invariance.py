@@ -88,11 +88,7 @@ def in_units(tree: FuzzyTree, units: dict[str, Unit]) -> FuzzyTree:
             part["centre"] = own.value(part.get("centre", 0.0))
         _convert(variable, ("low", "high"), unit.value)
         for term in variable["terms"]:
-            _convert(term["shape"], ("low", "high"), unit.value)
-            for side in ("left", "right"):
-                flank = term["shape"].get(side)
-                if flank is not None:
-                    _convert(flank, ("start", "end"), unit.value)
+            _convert(term["shape"], ("low", "high", "left", "right"), unit.value)
     for node in plain["nodes"]:
         unit = units.get(node["variable"], Unit())
         node["cuts"] = [unit.value(cut) for cut in node["cuts"]]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.learning.induction import components, most_powerful, threshold
-from fuzzytree.learning.shapes import fitted_flanks, fitted_sets
+from fuzzytree.learning.shapes import fitted_sets
 from fuzzytree.learning.statistics import Statistics
 from fuzzytree.learning.sums import Totals
 from fuzzytree.learning.windows import window_counts
@@ -147,23 +147,3 @@ def test_every_repair_of_a_set_is_counted() -> None:
     assert found.empty_centre == 1
     assert found.clipped >= 1
     assert found.lowered >= 1
-
-
-def test_a_flank_never_falls_with_q_and_is_zero_and_one_at_its_ends() -> None:
-    chance = np.random.default_rng(0)
-    ratios = np.sort(chance.random((50, 33)), axis=1)
-    ratios[:, -1] = 1.0
-    curves, errors = fitted_flanks(ratios)
-    q = np.linspace(0.0, 1.0, 1001)
-    for (c0, c1, c2), error in zip(curves, errors, strict=True):
-        degrees = q * (c0 + q * (c1 + q * c2))
-        assert (np.diff(degrees) >= -1e-12).all()
-        assert abs(degrees[-1] - 1.0) < 1e-12
-        assert error <= 1.0
-
-
-def test_a_ratio_that_is_a_cubic_is_fitted_exactly() -> None:
-    q = np.linspace(0.0, 1.0, 33)
-    curves, errors = fitted_flanks((q * q * (3.0 - 2.0 * q))[None])
-    assert np.allclose(curves, [[0.0, 3.0, -2.0]], atol=1e-12)
-    assert errors.item() < 1e-12

@@ -5,7 +5,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Part,
     Points,
     Rule,
@@ -20,8 +19,8 @@ from fuzzytree.model.rulebase import (
     sentence,
 )
 
-LOW = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
-HIGH = Term("high", Band(low=1.0, left=Flank(1.0, -1.0)))
+LOW = Term("low", Band(high=1.0, right=3.0))
+HIGH = Term("high", Band(low=1.0, left=-1.0))
 FORCE = Variable("force", (LOW, HIGH), unit="N", low=0.0, high=9.0)
 RULES = (
     Rule((Clause("force", ("low",)),), "soft"),
@@ -72,7 +71,7 @@ def test_equal_models_have_equal_fingerprints() -> None:
 
 
 def test_one_ulp_changes_the_fingerprint() -> None:
-    moved = Term("low", Band(high=1.0000000000000002, right=Flank(1.0, 3.0)))
+    moved = Term("low", Band(high=1.0000000000000002, right=3.0))
     other = rule_base(variables=(Variable("force", (moved, HIGH)),))
     same = rule_base(variables=(Variable("force", (LOW, HIGH)),))
     assert fingerprint(other) != fingerprint(same)
@@ -114,28 +113,20 @@ def test_all_mistakes_of_a_rule_base_are_reported_at_once() -> None:
             "the plateau starts at 2.0 and must end above it, not at 2.0",
         ),
         (
-            Band(high=1.0, right=Flank(1.0, 0.5)),
-            "the right flank must end above its start 1.0",
+            Band(high=1.0, right=0.5),
+            "the right flank must end above 1.0, not at 0.5",
         ),
         (
-            Band(low=1.0, left=Flank(1.0, 1.0)),
-            "the left flank must end below its start 1.0",
+            Band(low=1.0, left=1.0),
+            "the left flank must end below 1.0, not at 1.0",
         ),
         (
-            Band(right=Flank(1.0, 2.0)),
+            Band(right=2.0),
             "a plateau that is open on the right has no right flank",
         ),
         (
-            Band(high=1.0, right=Flank(1.0, float("inf"))),
-            "the right flank must start and end at finite values",
-        ),
-        (
-            Band(high=1.0, right=Flank(1.0, 2.0, ())),
-            "the right flank needs 1 to 8 coefficients, not 0",
-        ),
-        (
-            Band(high=1.0, right=Flank(1.0, 2.0, (2e6,))),
-            "the coefficients of the right flank must lie within +-1e6",
+            Band(high=1.0, right=float("inf")),
+            "the right flank must end at a finite value, not inf",
         ),
         (
             LR(0.0, Side(0.0, (0.4,)), Side(1.0, (0.4,))),
@@ -227,15 +218,6 @@ def test_an_input_must_be_one_of_the_columns() -> None:
         "input 'force' is not among the columns; "
         "there is Force, slip (did you mean 'Force'?)"
     )
-
-
-def test_a_default_that_is_spelt_out_does_not_change_the_fingerprint() -> None:
-    spelt = Flank(1.0, 3.0, tuple(map(float, "1")))
-    term = Term("low", Band(high=1.0, right=spelt))
-    other = rule_base(variables=(Variable("force", (term, HIGH)),))
-    same = rule_base(variables=(Variable("force", (LOW, HIGH)),))
-    assert other == same
-    assert fingerprint(other) == fingerprint(same)
 
 
 def test_a_name_that_no_file_can_hold_is_refused() -> None:

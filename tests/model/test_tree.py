@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.model.rulebase import Band, Flank, Term, Variable
+from fuzzytree.model.rulebase import Band, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, interval_names
 from fuzzytree.testing import random_tree
 
-LOW = Term("low", Band(high=1.0, right=Flank(1.0, 2.0)))
-HIGH = Term("high", Band(low=1.0, left=Flank(1.0, 0.0)))
+LOW = Term("low", Band(high=1.0, right=2.0))
+HIGH = Term("high", Band(low=1.0, left=0.0))
 NODE = Node("x", (1.0,), (0, 1), (Branch(("low",), leaf=1), Branch(("high",), leaf=2)))
 LEAVES = (Leaf("a"), Leaf("b"))
 

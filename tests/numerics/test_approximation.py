@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.model.contracts import Dtype
 from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
     Conjunction,
-    Flank,
     Points,
     Rule,
     RuleBase,
@@ -30,31 +28,11 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.numerics.approximation import by_degree, by_points, lower_curve
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.numerics.placing import points_of
-from fuzzytree.runtimes.native import load
-from fuzzytree.runtimes.table import find_runtime
-from fuzzytree.semantics.crisp_regions import free_axes, grid, grid_size
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree, evaluate
-from fuzzytree.testing import probe_values, probes, random_tree, with_points
+from fuzzytree.testing import probes, random_tree, with_points
 
-SMOOTH = (0.0, 3.0, -2.0)  # q**2 (3 - 2 q): level at both ends
-SHAPES: dict[str, Band | LR] = {
-    "smooth": Band(0.0, 1.0, Flank(0.0, -1.0, SMOOTH), Flank(1.0, 3.0, SMOOTH)),
-    "clipped": Band(
-        0.0, 1.0, Flank(0.0, -1.0, (2.0, -1.5, 0.6)), Flank(1.0, 2.0, (4.0,))
-    ),
-    "waves": Band(
-        0.0, 1.0, Flank(0.0, -1.0, (9.0, -60.0, 80.0)), Flank(1.0, 3.0, (-1.0,))
-    ),
-    "steep": Band(0.0, 1.0, right=Flank(1.0, 3.0, (-1e6, 1e6, 1e6, -1e6))),
-    "short of the edge": Band(
-        0.0, 1.0, Flank(2.0, -1.0, SMOOTH), Flank(0.5, 3.0, SMOOTH)
-    ),
-    "far": Band(0.0, 1.0, Flank(-2.0, -3.0, (0.5,)), Flank(-4.0, 0.5, SMOOTH)),
-    "steps": Band(-2.0, 1.0),
-    "open": Band(high=3.0, right=Flank(3.0, 4.0, (0.0,) * 7 + (1.0,))),
-    "everywhere": Band(),
-    "at 1e12": Band(1e12, 1e12 + 64, Flank(1e12, 1e12 - 64, SMOOTH)),
+SHAPES: dict[str, LR] = {
     "set": LR(0.3, Side(0.1, (0.4, 0.2, -0.1)), Side(0.7, (0.6, 0.1))),
     "set with a roof": LR(0.0, Side(1.0, (-0.2, 0.9)), Side(1.0, (0.0,))),
     "set that ends early": LR(0.0, Side(1.0, (3.0, -8.0, 2.0)), Side(2.0, (1.0,))),
@@ -68,7 +46,6 @@ CASES = [
     pytest.param(shape, tolerance, id=f"{name} {tolerance}")
     for name, shape in SHAPES.items()
     for tolerance in TOLERANCES
-    if not (name.startswith("at") and tolerance < 1e-4)
 ]
 
 
@@ -109,15 +86,13 @@ def model_of(*shapes: Shape, conjunction: Conjunction = "min") -> RuleBase:
 
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(("shape", "tolerance"), CASES)
-def test_no_degree_is_further_off_than_certified(
-    shape: Band | LR, tolerance: float
-) -> None:
+def test_no_degree_is_further_off_than_certified(shape: LR, tolerance: float) -> None:
     found, bound = points_of(shape, tolerance)
     assert largest_error(found, shape, places(found)) <= Fraction(bound)
     assert bound <= tolerance
 
 
-@pytest.mark.parametrize("name", ["smooth", "clipped", "set", "set at 1e9"])
+@pytest.mark.parametrize("name", ["set", "set at 1e9"])
 def test_a_bound_is_close_to_the_error_that_occurs(name: str) -> None:
     shape = SHAPES[name]
     found, bound = points_of(shape, 1e-3)
@@ -126,7 +101,7 @@ def test_a_bound_is_close_to_the_error_that_occurs(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["smooth", "set", "set at 1e9"])
+@pytest.mark.parametrize("name", ["set", "set at 1e9"])
 def test_a_point_that_moved_breaks_the_bound(name: str) -> None:
     shape = SHAPES[name]
     found, bound = points_of(shape, 1e-3)
@@ -142,36 +117,16 @@ def test_a_point_that_moved_breaks_the_bound(name: str) -> None:
 @pytest.mark.parametrize("tolerance", TOLERANCES)
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_doubles_of_degree_zero_and_one_stay(name: str, tolerance: float) -> None:
-    if name == "at 1e12" and tolerance < 1e-4:
-        return
     shape = SHAPES[name]
     found, _ = points_of(shape, tolerance)
-    ends = [found.values[0], found.values[-1]]
-    if isinstance(shape, Band):
-        ends += [end for end in (shape.low, shape.high) if end is not None]
-    else:
-        ends.append(shape.mean)
+    ends = [found.values[0], found.values[-1], shape.mean]
     near = {math.nextafter(end, far) for end in ends for far in (-math.inf, math.inf)}
     for x in map(Fraction, {*ends, *near}):
         kept, given = exact_degree(found, x), exact_degree(shape, x)
-        if isinstance(shape, Band):  # a set may round to 1 beside its mean
-            assert (kept == 1) == (given == 1)
         if given > Fraction(2, 2**53):
             assert kept > 0
         if given == 0:
             assert kept <= Fraction(2, 2**53)
-
-
-def test_a_band_ends_in_two_steps_of_points() -> None:
-    found, bound = points_of(Band(1.0, 2.0, Flank(1.0, 0.0), None), 0.1)
-    below_one = 1.0 - 2.0**-53
-    assert found == Points((0.0, 1.0, 1.0, 2.0, 2.0), (0.0, below_one, 1.0, 1.0, 0.0))
-    assert bound < 1e-14
-
-
-def test_a_straight_flank_short_of_its_edge_stays_level_up_to_it() -> None:
-    found, _ = points_of(Band(3.0, None, Flank(2.0, 0.0, (0.5,))), 0.1)
-    assert found == Points((0.0, 2.0, 3.0, 3.0), (0.0, 0.5, 0.5, 1.0))
 
 
 def test_a_set_is_one_at_its_mean_only() -> None:
@@ -203,47 +158,9 @@ def test_ten_times_the_accuracy_costs_about_three_times_the_points() -> None:
         assert 2.5 < many / few < 3.3
 
 
-@pytest.mark.one_in(4)
-@pytest.mark.parametrize("tolerance", [0.3, 1e-2, 1e-4])
-@pytest.mark.parametrize("seed", range(4))
-def test_relative_rules_of_points_decide_like_their_tree_in_every_cell(
-    seed: int, tolerance: float
-) -> None:
-    whole = random_tree(seed, leaves=6)
-    tree = free_axes(whole)
-    assert grid_size(whole) < 200_000
-    for conjunction in CONJUNCTIONS:
-        rules = rules_from_tree(tree, conjunction=conjunction)
-        found = by_points(rules, tolerance)
-        lower = by_degree(rules, 1)
-        assert found.model.kind == lower.model.kind == "relative"
-        for values in grid(whole):
-            expected = load(tree)(values)
-            for model in (found.model, lower.model):
-                for name in ("native", "native mixed", "best-first"):
-                    answers = find_runtime(name).load(model)(values)
-                    assert np.array_equal(answers.rule, expected.rule)
-
-
-@pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
-@pytest.mark.parametrize("seed", range(3))
-def test_relative_rules_of_points_have_degree_one_where_they_had_it(
-    seed: int, dtype: Dtype
-) -> None:
-    rules = rules_from_tree(random_tree(seed))
-    found = by_points(rules, 1e-2).model
-    values = probe_values(rules, 1000)
-    before, after = load(rules, dtype)(values), load(found, dtype)(values)
-    assert np.array_equal(before.rule, after.rule)
-    assert np.array_equal(before.status, after.status)
-    assert before.strengths is not None
-    assert after.strengths is not None
-    assert np.array_equal(before.strengths == 1.0, after.strengths == 1.0)
-
-
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
 def test_no_strength_is_further_off_than_certified(conjunction: Conjunction) -> None:
-    sets = [SHAPES["set"], SHAPES["set with a roof"], SHAPES["clipped"]]
+    sets = [SHAPES["set"], SHAPES["set with a roof"], SHAPES["set at 1e9"]]
     rules = model_of(*sets, conjunction=conjunction)
     for found in (by_points(rules, 1e-2), by_degree(rules, 1)):
         worst = 0.0
@@ -253,11 +170,11 @@ def test_no_strength_is_further_off_than_certified(conjunction: Conjunction) -> 
             if not math.isnan(one):
                 worst = max(worst, abs(one - other))
         assert worst <= found.bound
-        assert found.bound <= worst * 3.0
+        assert found.bound <= worst * 4.0
 
 
 def test_the_bound_of_a_product_is_the_sum_over_a_rule() -> None:
-    pair = [SHAPES["smooth"], SHAPES["set"]]
+    pair = [SHAPES["set at 1e9"], SHAPES["set"]]
     least = by_points(model_of(*pair), 1e-3)
     summed = by_points(model_of(*pair, conjunction="product"), 1e-3)
     bounds = [term.bound for term in summed.terms]
@@ -279,7 +196,7 @@ def test_points_that_are_there_stay_as_they_are() -> None:
 
 def test_a_model_that_needs_too_many_points_is_refused() -> None:
     with pytest.raises(LossError) as caught:
-        by_points(model_of(SHAPES["smooth"], SHAPES["set"], Band(0.0, 1.0)), 1e-9)
+        by_points(model_of(SHAPES["set at 1e9"], SHAPES["set"], Band(0.0, 1.0)), 1e-9)
     assert str(caught.value) == (
         "cannot approximate one by lines within 1e-09 of the curves:\n"
         "  term 't' of 'x0': it would need more than 4096 points\n"
@@ -303,30 +220,6 @@ def test_a_set_that_is_narrower_than_doubles_at_its_mean_is_refused() -> None:
         by_points(model_of(LR(1e16, level, level)), 0.01)
 
 
-@pytest.mark.parametrize("tolerance", [5e-324, 1e-300])
-def test_a_tolerance_below_all_roundings_needs_too_many_points(
-    tolerance: float,
-) -> None:
-    shape = Band(high=0.0, right=Flank(0.0, 1.0, (0.5, 0.5)))
-    with pytest.raises(LossError, match="it would need more than 4096 points"):
-        by_points(model_of(shape), tolerance)
-
-
-def test_a_last_coefficient_next_to_nothing_does_no_harm() -> None:
-    for curve in ((1.0, 5e-324), (0.0, 5e-324)):
-        shape = Band(high=0.0, right=Flank(0.0, 1.0, curve))
-        found = by_points(model_of(shape), 0.01)
-        (term,) = found.model.variables[0].terms
-        assert isinstance(term.shape, Points)
-        at = places(term.shape)
-        assert largest_error(term.shape, shape, at) <= Fraction(found.bound)
-
-
-def test_a_flank_that_has_hardly_begun_at_its_edge_can_be_lowered() -> None:
-    shape = Band(high=-1e-300, right=Flank(-1.0, 0.0, (1.0, 0.5, 1.0, 2.0)))
-    assert by_degree(model_of(shape), 3).bound < 1e-13
-
-
 def test_a_set_beyond_the_largest_double_is_refused() -> None:
     shape = LR(0.0, Side(1e308, (0.4,)), Side(1.0, (0.4,)))
     with pytest.raises(LossError, match="it reaches beyond the largest double"):
@@ -336,21 +229,17 @@ def test_a_set_beyond_the_largest_double_is_refused() -> None:
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf])
 def test_a_tolerance_must_be_above_zero(tolerance: float) -> None:
     with pytest.raises(ValueError, match="the tolerance must be above 0, not"):
-        by_points(model_of(Band(0.0, 1.0)), tolerance)
+        by_points(model_of(SHAPES["set"]), tolerance)
 
 
 @pytest.mark.parametrize("wanted", [0, 9, -1])
 def test_a_degree_must_be_from_one_to_eight(wanted: int) -> None:
     with pytest.raises(ValueError, match=f"must be from 1 to 8, not {wanted}"):
-        by_degree(model_of(Band(0.0, 1.0)), wanted)
+        by_degree(model_of(SHAPES["set"]), wanted)
 
 
-LONG: dict[str, Band | LR] = {
+LONG: dict[str, LR] = {
     **SHAPES,
-    "seven": Band(
-        0.0, 1.0, Flank(0.0, -1.0, (0.3, 0.1, 0.2, 0.1, 0.05, 0.1, 0.1, 0.05))
-    ),
-    "overshoots": Band(0.0, None, Flank(0.0, -1.0, (0.5, 2.0, 1.5, -1.0, 0.2)), None),
     "sides": LR(
         1.0, Side(1.0, (0.6, 0.2, 0.1, 0.05)), Side(2.0, (0.9, -0.3, 0.2, 0.1))
     ),
@@ -377,7 +266,7 @@ def test_no_lower_curve_is_further_off_than_certified(name: str, wanted: int) ->
         assert error.degree <= wanted
 
 
-@pytest.mark.parametrize("name", ["seven", "overshoots", "sides", "smooth", "clipped"])
+@pytest.mark.parametrize("name", ["sides", "set", "set with a roof"])
 def test_a_higher_degree_is_never_further_off(name: str) -> None:
     bounds = [by_degree(model_of(LONG[name]), wanted).bound for wanted in range(1, 8)]
     for low, high in itertools.pairwise(bounds):
@@ -386,19 +275,13 @@ def test_a_higher_degree_is_never_further_off(name: str) -> None:
 
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("wanted", range(1, 5))
-@pytest.mark.parametrize("name", ["seven", "overshoots", "sides", "smooth"])
+@pytest.mark.parametrize("name", ["sides", "set"])
 def test_a_lower_curve_keeps_its_ends_and_never_falls(name: str, wanted: int) -> None:
     shape = LONG[name]
     (term,) = by_degree(model_of(shape), wanted).model.variables[0].terms
     lowered = term.shape
-    if isinstance(shape, LR):
-        assert degree(lowered, shape.mean) == 1.0
-        left = [shape.mean - shape.left.spread * n / 500 for n in range(2500, 0, -1)]
-    else:
-        assert isinstance(lowered, Band)
-        assert (lowered.low, lowered.high) == (shape.low, shape.high)
-        left = [-n / 1000 for n in range(1000, -1, -1)]
-        assert degree(lowered, -1.0) == 0.0
+    assert degree(lowered, shape.mean) == 1.0
+    left = [shape.mean - shape.left.spread * n / 500 for n in range(2500, 0, -1)]
     heights = [exact_degree(lowered, Fraction(x)) for x in left]
     assert heights == sorted(heights)
     assert all(0 <= height < 1 for height in heights)
@@ -409,24 +292,13 @@ def test_a_square_is_best_followed_by_a_line_of_slope_two_root_two_less_two() ->
     slope = 2.0 * math.sqrt(2.0) - 2.0
     found = lower_curve(np.array([0.0, 0.0, 1.0]), 1, 1.0, 1.0)
     assert found.tolist() == pytest.approx([0.0, slope], abs=1e-4)
-    square = Band(0.0, None, Flank(0.0, -1.0, (0.0, 1.0)))
-    assert by_degree(model_of(square), 1).bound == pytest.approx(1 - slope, rel=0.01)
 
 
 def test_curves_that_are_short_enough_stay_as_they_are() -> None:
-    rules = model_of(SHAPES["smooth"], SHAPES["set"])
+    rules = model_of(SHAPES["set at 1e9"], SHAPES["set"])
     found = by_degree(rules, 3)
     assert (found.model, found.terms, found.bound) == (rules, (), 0.0)
-    assert [term.variable for term in by_degree(rules, 2).terms] == ["x0", "x1"]
-
-
-def test_a_fit_error_that_was_known_grows_by_the_bound() -> None:
-    flank = Flank(0.0, -1.0, SMOOTH, 0.25)
-    found = by_degree(model_of(Band(0.0, None, flank)), 2)
-    lowered = found.model.variables[0].terms[0].shape
-    assert isinstance(lowered, Band)
-    assert lowered.left is not None
-    assert lowered.left.error == 0.25 + found.bound
+    assert [term.variable for term in by_degree(rules, 2).terms] == ["x1"]
 
 
 @pytest.mark.heavy
@@ -442,13 +314,7 @@ def test_no_random_curve_is_further_off_than_certified(seed: int) -> None:
 
     for _ in range(6):
         mean = chance.uniform(-10.0, 10.0)
-        low, high = mean, mean + chance.uniform(0.1, 2.0)
-        left, right = Flank(low, low - 0.7, curve()), Flank(high, high + 1.0, curve())
-        shapes: list[Band | LR] = [
-            LR(mean, side(), side()),
-            Band(low, high, left, right),
-        ]
-        for shape in shapes:
+        for shape in (LR(mean, side(), side()),):
             for tolerance in (0.1, 1e-2, 1e-4):
                 found, bound = points_of(shape, tolerance)
                 error = largest_error(found, shape, places(found, seed))

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Side
+from fuzzytree.model.rulebase import LR, Band, Points, Side
 from fuzzytree.numerics.conditioning import bernstein, conduct, halves, maximum
 
 UNIT_SIDE = Side(1.0, (1.0,))
@@ -66,21 +66,6 @@ def test_what_clipping_hides_is_no_rise() -> None:
     _, right = conduct(LR(0.0, UNIT_SIDE, Side(1.0, (0.25, 0.75))))
     assert right.above.high > 0.04
     assert right.rises == ()
-
-
-def test_a_flank_that_falls_towards_its_start_rises_outwards() -> None:
-    # q (3 - 2 q) is largest, 9 / 8, at 3 / 4 and 1 at the start.
-    (found,) = conduct(Band(high=0.0, right=Flank(0.0, 4.0, (3.0, -2.5))))
-    # q (3 - 2.5 q): 0.9 at q = 0.6, 0.5 at q = 1; q = 1 lies at 0, q = 0.6 at 1.6.
-    (rise,) = found.rises
-    assert rise.start == 0.0
-    assert rise.end == pytest.approx(1.6, abs=1e-5)
-    assert rise.height == pytest.approx(0.4, abs=1e-9)
-
-
-def test_the_size_counts_every_coefficient() -> None:
-    (found,) = conduct(Band(high=0.0, right=Flank(0.0, 1.0, (1.0, 90.0, -90.0))))
-    assert found.size.low <= 181.0 <= found.size.high
 
 
 def test_lines_and_steps_have_no_curve() -> None:

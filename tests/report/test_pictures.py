@@ -15,7 +15,6 @@ from fuzzytree.auditing.engine.states import Span
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import (
     Band,
-    Flank,
     Part,
     Points,
     Rule,
@@ -110,7 +109,7 @@ def test_the_axes_of_a_point_are_exact() -> None:
 
 
 def test_a_drawn_curve_goes_through_the_exact_degrees_and_its_steps() -> None:
-    band = Band(low=1.0, high=2.0, right=Flank(2.0, 4.0, (0.25, 0.75)))
+    band = Band(low=1.0, high=2.0, right=4.0)
     x, y = Scale(0.0, 5.0, 0.0, 500.0), Scale(0.0, 1.0, 100.0, 0.0)
     way = polyline(curve_of("on", band), x, y)
     dots = [tuple(map(float, one.split())) for one in way[1:].split("L")]

@@ -14,7 +14,6 @@ from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Conjunction,
-    Flank,
     Rule,
     RuleBase,
     Semantics,
@@ -62,8 +61,8 @@ def random_shape(chance: random.Random, middle: float, unit: float) -> Shape:
     if chance.random() < 0.7:
         return LR(at, side(), side())
     high = at + unit * chance.uniform(0.1, 1.0)
-    left = Flank(at, at - unit, curve())
-    right = Flank(high, high + 0.1 * unit, curve())
+    left = at - unit
+    right = high + 0.1 * unit
     low, below = chance.choice(((None, None), (at, None), (at, left)))
     return Band(low, high, below, chance.choice((None, right)))
 
@@ -81,7 +80,7 @@ def families() -> dict[str, list[Shape]]:
         "needles": [sided(place * 1e-9, 1e-12) for place in range(20)],
         "far from 0": [sided(1e9 + place / 7.0, 0.2) for place in range(9)],
         "steps": [Band(low, low + 1.0) for low in (-2.0, -1.0, 0.5)],
-        "open": [Band(None, 0.0), Band(0.0, None, Flank(0.0, -1.0)), Band(None, None)],
+        "open": [Band(None, 0.0), Band(0.0, None, -1.0), Band(None, None)],
         "largest": [sided(-1e308, 1e300), sided(1e308, 1e307), sided(1e308, 1e305)],
     }
     for seed, (middle, unit) in enumerate([(0.0, 1.0), (1e6, 3.0), (-5.0, 1e-6)]):
@@ -125,8 +124,7 @@ def marks_of(shapes: list[Shape]) -> list[float]:
                 result += [shape.mean + sign * side.spread * step for step in steps]
             continue
         assert isinstance(shape, Band)
-        for flank in (shape.left, shape.right):
-            result += [] if flank is None else [flank.start, flank.end]
+        result += [end for _, end in shape.flanks]
         result += [end for end in (shape.low, shape.high) if end is not None]
     return result
 

@@ -18,7 +18,6 @@ from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Conjunction,
-    Flank,
     Part,
     Points,
     Rule,
@@ -58,7 +57,7 @@ def random_rules(seed: int) -> RuleBase:
             return LR(low, below, below if chance.random() < 0.5 else above)
         start = low if chance.random() < 0.8 else None
         end = high if chance.random() < 0.8 else None
-        left, right = Flank(low, low - 0.7, curve()), Flank(high, high + 1.0, curve())
+        left, right = low - 0.7, high + 1.0
         return Band(
             start,
             end,
@@ -179,9 +178,9 @@ ENDS = RuleBase(
         Variable(
             "v",
             (
-                Term("falls", Band(high=1.0, right=Flank(1.0, 3.0))),
-                Term("bends", Band(1.0, 2.0, right=Flank(2.0, 5.0, (0.5, 0.5)))),
-                Term("dips", Band(low=0.0, left=Flank(0.0, -4.0, (-0.25, 1.25)))),
+                Term("falls", Band(high=1.0, right=3.0)),
+                Term("bends", Band(1.0, 2.0, right=5.0)),
+                Term("dips", Band(low=0.0, left=-4.0)),
                 Term("points", Points((0.0, 1.0, 2.0), (-0.0, 1.0, -0.0))),
             ),
         ),

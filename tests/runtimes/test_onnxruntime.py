@@ -23,7 +23,6 @@ from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Conjunction,
-    Flank,
     Part,
     Rule,
     RuleBase,
@@ -62,10 +61,10 @@ def random_rules(seed: int) -> RuleBase:
     def curve() -> tuple[float, ...]:
         return tuple(chance.uniform(-1, 2) for _ in range(chance.randint(1, 8)))
 
-    def flank(start: float, sign: int) -> Flank | None:
+    def flank(start: float, sign: int) -> float | None:
         if chance.random() < 0.2:
             return None
-        return Flank(start, start + sign * chance.uniform(0.1, 3), curve())
+        return start + sign * chance.uniform(0.1, 3)
 
     def side() -> Side:
         return Side(chance.uniform(0.1, 2), curve(), chance.choice((5.0, 1.5, 8.0)))

@@ -13,7 +13,6 @@ from fuzzytree.errors import MissingExtraError
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Rule,
     RuleBase,
     Semantics,
@@ -24,7 +23,7 @@ from fuzzytree.runtimes.predictions import Predictions, joined, reasons
 from fuzzytree.semantics.reference import Status, evaluate
 from fuzzytree.testing import random_tree
 
-LOW = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+LOW = Term("low", Band(high=1.0, right=3.0))
 RULES = RuleBase(
     "grip",
     ("soft", "firm", "hard"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.model.rulebase import Band, Flank, Semantics, Term, Variable
+from fuzzytree.model.rulebase import Band, Semantics, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.crisp_regions import (
     axis_points,
@@ -72,8 +72,8 @@ def test_a_node_whose_terms_are_right_has_no_fault() -> None:
 
 def test_a_term_that_stays_one_beyond_its_plateau_is_a_fault() -> None:
     # Such a tree cannot be made, so the check is given a node that was tampered with.
-    low = Term("low", Band(high=1.0, right=Flank(1.0, 2.0)))
-    high = Term("high", Band(low=1.0, left=Flank(1.0, 0.0)))
+    low = Term("low", Band(high=1.0, right=2.0))
+    high = Term("high", Band(low=1.0, left=0.0))
     branches = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
     tree = FuzzyTree(
         "t",
@@ -83,7 +83,7 @@ def test_a_term_that_stays_one_beyond_its_plateau_is_a_fault() -> None:
         (Leaf("a"), Leaf("b")),
         semantics=Semantics(),
     )
-    wide = replace(high, shape=Band(low=0.5, left=Flank(0.5, 0.0)))
+    wide = replace(high, shape=Band(low=0.5, left=0.0))
     faulty = _without_checks(tree, (Variable("x", (low, wide)),))
     assert list(node_faults(faulty)) == [
         "node 1: at x = 0.9999999999999999 branch 2 has degree 1.0, "

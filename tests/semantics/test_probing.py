@@ -1,6 +1,6 @@
 import math
 
-from fuzzytree.model.rulebase import LR, Band, Flank, Side
+from fuzzytree.model.rulebase import LR, Band, Side
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import SPECIAL, landmarks, neighbours, probes
 from fuzzytree.semantics.reference import axis_values
@@ -8,7 +8,7 @@ from fuzzytree.testing import random_tree
 
 
 def test_landmarks_of_a_band_are_its_edges_and_the_ends_of_its_flanks() -> None:
-    band = Band(1.0, 2.0, Flank(1.0, 0.0), Flank(2.0, 4.0))
+    band = Band(1.0, 2.0, 0.0, 4.0)
     assert set(landmarks(band)) == {0.0, 0.6, 1.0, 2.0, 2.8, 4.0}
 
 

@@ -14,7 +14,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Part,
     Points,
     Rule,
@@ -39,8 +38,8 @@ from fuzzytree.semantics.simplification import (
 )
 from fuzzytree.testing import random_tree
 
-SOFT = Term("soft", Band(high=1.0, right=Flank(1.0, 2.0)))
-FIRM = Term("firm", Band(low=1.0, high=4.0, left=Flank(1.0, 0.0)))
+SOFT = Term("soft", Band(high=1.0, right=2.0))
+FIRM = Term("firm", Band(low=1.0, high=4.0, left=0.0))
 HARD = Term("hard", Band(low=4.0))
 ANY = Term("any", Band())
 FORCE = Variable("force", (SOFT, FIRM, HARD))
@@ -194,8 +193,8 @@ SLIM = Side(1.0, (0.5,), 2.0)
     [
         (Band(high=1.0), Band(low=1.0), True),
         (Band(high=1.0), Band(low=math.nextafter(1.0, 0.0)), False),
-        (Band(high=1.0, right=Flank(1.0, 2.0)), Band(low=2.0), True),
-        (Band(high=1.0, right=Flank(1.0, 2.0)), Band(low=1.5), False),
+        (Band(high=1.0, right=2.0), Band(low=2.0), True),
+        (Band(high=1.0, right=2.0), Band(low=1.5), False),
         (LR(0.0, SLIM, SLIM), Band(low=2.1), True),
         (LR(0.0, SLIM, SLIM), Band(low=1.9), False),
         (Points((0.0, 1.0), (1.0, 0.0)), Band(low=1.0), True),
@@ -361,7 +360,7 @@ def test_a_missing_rule_that_may_fire_is_found() -> None:
 def test_a_curve_that_changed_in_its_last_bit_is_found() -> None:
     rules = base((force("soft"),))
     end = math.nextafter(2.0, 3.0)
-    soft = Term("soft", Band(high=1.0, right=Flank(1.0, end)))
+    soft = Term("soft", Band(high=1.0, right=end))
     other = base((force("soft"),), variables=(Variable("force", (soft,)),))
     assert _faults(rules, other) == ["rule 1 is another rule"]
 

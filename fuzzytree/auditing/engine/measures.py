@@ -382,11 +382,11 @@ def excesses(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
     """Yield where a shape's polynomials leave [0, 1] before they are clipped.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Band, Flank
-        >>> bulge = Band(0.0, 1.0, right=Flank(1.0, 2.0, (4.0, -3.0)))
+        >>> from fuzzytree.model.rulebase import LR, Side
+        >>> side = Side(1.0, (0.25, 0.75))
         >>> [(round(float(e.depth), 3), e.is_above)
-        ...  for e in excesses(bulge, Fraction(0), Fraction(3))]
-        [(0.333, True)]
+        ...  for e in excesses(LR(0.0, side, side), Fraction(0), Fraction(3))]
+        [(0.042, True)]
     """
     for piece in pieces(shape):
         if piece.low is None or piece.high is None or len(piece.polynomial) < 2:

@@ -39,7 +39,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Clause,
-    Flank,
     FloatArray,
     Points,
     Shape,
@@ -103,37 +102,28 @@ def _band(band: Band) -> Iterator[PolynomialPiece]:
     low = None if band.low is None else Fraction(band.low)
     high = None if band.high is None else Fraction(band.high)
     if low is not None:
-        yield from _flank(band.left, None, low)
+        yield from _flank(band.left, low, None, low)
     yield _flat(low, high, ONE)
     if high is not None:
-        yield from _flank(band.right, high, None)
+        yield from _flank(band.right, high, high, None)
 
 
 def _flank(
-    flank: Flank | None, low: Fraction | None, high: Fraction | None
+    end: float | None, edge: Fraction, low: Fraction | None, high: Fraction | None
 ) -> Iterator[PolynomialPiece]:
     """Yield a flank's pieces on one side of a plateau."""
-    if flank is None:
+    if end is None:
         yield _flat(low, high, ZERO)
         return
-    start, end = Fraction(flank.start), Fraction(flank.end)
-    width = start - end
-    curve = (ZERO, *map(Fraction, flank.curve))
-    inner = composed(curve, -end / width, ONE / width)
-    first, last = min(start, end), max(start, end)
-    ends = [low, *(x for x in (first, last) if _is_within(x, low, high)), high]
-    level = min(max(sum(curve, ZERO), ZERO), CAP)
-    for a, b in itertools.pairwise(ends):
-        if a is not None and first <= a and b is not None and b <= last:
-            yield PolynomialPiece(a, b, inner, CAP)
-        elif (b is not None and b <= first) is (end < start):
-            yield _flat(a, b, ZERO)
-        else:
-            yield _flat(a, b, level)
-
-
-def _is_within(x: Fraction, low: Fraction | None, high: Fraction | None) -> bool:
-    return (low is None or low < x) and (high is None or x < high)
+    zero = Fraction(end)
+    width = edge - zero
+    line = (-zero / width, ONE / width)
+    if zero < edge:
+        yield _flat(None, zero, ZERO)
+        yield PolynomialPiece(zero, edge, line, CAP)
+    else:
+        yield PolynomialPiece(edge, zero, line, CAP)
+        yield _flat(zero, None, ZERO)
 
 
 def _lr(shape: LR) -> Iterator[PolynomialPiece]:

@@ -247,8 +247,7 @@ def _ends(curve: Curve) -> Iterator[float]:
     """Yield the values between which a curve changes; of formulas, none."""
     match curve:
         case Band(low=low, high=high, left=left, right=right):
-            yield from (one for one in (low, high) if one is not None)
-            yield from (one.end for one in (left, right) if one is not None)
+            yield from (one for one in (low, high, left, right) if one is not None)
         case LR(mean=mean, left=left_side, right=right_side):
             yield mean - left_side.spread * left_side.reach
             yield mean + right_side.spread * right_side.reach

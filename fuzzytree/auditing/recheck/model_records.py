@@ -7,18 +7,11 @@ from __future__ import annotations
 from typing import Any, Literal, NamedTuple
 
 
-class Flank(NamedTuple):
-    start: float
-    end: float
-    curve: tuple[float, ...] = (1.0,)
-    error: float | None = None
-
-
 class Band(NamedTuple):
     low: float | None = None
     high: float | None = None
-    left: Flank | None = None
-    right: Flank | None = None
+    left: float | None = None
+    right: float | None = None
 
 
 class Side(NamedTuple):

@@ -240,10 +240,9 @@ def read_json(content: bytes, name: str) -> dict[str, Any]:
 
 _RANGE = {"low": "range/from", "high": "range/to", "clips": "range/outside"}
 KEYS: dict[Any, dict[str, str]] = {
-    records.Flank: {"start": "from", "end": "to", "error": "fit error"},
     records.Band: {
         **{"low": "above", "high": "up to"},
-        **{"left": "left flank", "right": "right flank"},
+        **{"left": "0 up to", "right": "0 from"},
     },
     records.Variable: {**_RANGE, "parts": "sum of"},
     records.Input: {**_RANGE, "labels": "terms", "parts": "sum of"},

@@ -17,7 +17,6 @@ from fuzzytree.auditing.recheck.model_records import (
     LR,
     Band,
     Curve,
-    Flank,
     Points,
     Scaled,
     Shape,
@@ -281,19 +280,18 @@ def _end(value: float | None) -> Fraction | None:
 
 
 def _flank(
-    cut: float | None, flank: Flank | None, outer: Callable[..., Fraction]
+    cut: float | None, flank: float | None, outer: Callable[..., Fraction]
 ) -> tuple[Piece, ...]:
     """Return the pieces outside of an end of a band: below it, or above."""
     if cut is None:
         return ()
     side, cuts, polys, cap = Fraction(cut), [Fraction(cut)], [Poly()], ONE
     if flank is not None:
-        start, end = Fraction(flank.start), Fraction(flank.end)
-        q = _line((end, ZERO), (start, ONE))
-        fall = times(q, within(flank.curve, q))
+        end = Fraction(flank)
+        fall = _line((end, ZERO), (side, ONE))
         cap = CAP
-        polys = [(), fall, (at(fall, start),)][:: 1 if end < start else -1]
-        cuts = sorted([side, *(outer(one, side) for one in (start, end))])
+        polys = [(), fall, (ONE,)][:: 1 if end < side else -1]
+        cuts = sorted([side, side, outer(end, side)])
     result = _between(cuts, [*polys, ()] if outer is min else [(), *polys], cap)
     return result[:-1] if outer is min else result[1:]
 

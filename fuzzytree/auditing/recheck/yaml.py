@@ -12,7 +12,7 @@ from fuzzytree.auditing.recheck.outcomes import MOST_BYTES, CannotRunError
 MOST_LEVELS = 32
 
 Yaml = str | int | float | list["Yaml"] | dict[str, "Yaml"]
-_KEY = re.compile(r"([a-z][a-z ]*):(?: +|$)")
+_KEY = re.compile(r"((?:0 )?[a-z][a-z ]*):(?: +|$)")
 _QUOTED = re.compile(r"'((?:[^']|'')*)'|\"((?:[^\"\\]|\\.)*)\"")
 _PART = re.compile(
     rf"(?<![^ \[{{,])(?:{_QUOTED.pattern}|(?P<open>['\"]))|(?<![^ ])(?P<comment>#)|."

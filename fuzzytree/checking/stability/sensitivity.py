@@ -181,9 +181,8 @@ def _mixed_cost(shape: Shape) -> float:
 def _width(shape: Shape) -> float:
     """Return the shortest distance over which a degree goes all the way."""
     match shape:
-        case Band(left=left, right=right):
-            flanks = [flank for flank in (left, right) if flank is not None]
-            return min((abs(f.start - f.end) for f in flanks), default=math.inf)
+        case Band():
+            return min((abs(a - b) for a, b in shape.flanks), default=math.inf)
         case LR(left=below, right=above):
             return min(below.spread, above.spread)
         case Points():

@@ -31,7 +31,6 @@ from fuzzytree.model import (
     Band,
     Clause,
     Dtype,
-    Flank,
     FloatArray,
     Model,
     Points,
@@ -143,11 +142,10 @@ def collapsed(shape: Shape) -> Shape:
     assert_never(shape)
 
 
-def _narrow(flank: Flank | None, edge: float | None) -> Flank | None:
-    if flank is None or edge is None:
-        return flank
-    end = math.nextafter(edge, math.copysign(math.inf, flank.end - flank.start))
-    return msgspec.structs.replace(flank, start=edge, end=end)
+def _narrow(end: float | None, edge: float | None) -> float | None:
+    if end is None or edge is None:
+        return end
+    return math.nextafter(edge, math.copysign(math.inf, end - edge))
 
 
 def _thin(side: Side, mean: float) -> Side:
@@ -160,9 +158,9 @@ def demanded(shape: Shape, value: float, dtype: Dtype) -> Demand | None:
     float32 rounds the value and every stored number once; the demand is on those.
 
     Example:
-        >>> demanded(Band(high=1.0, right=Flank(1.0, 2.0)), 1.0, "float64")
+        >>> demanded(Band(high=1.0, right=2.0), 1.0, "float64")
         'one'
-        >>> demanded(Band(high=1.0, right=Flank(1.0, 2.0)), 2.0, "float64")
+        >>> demanded(Band(high=1.0, right=2.0), 2.0, "float64")
         'zero'
     """
     to = _single if dtype == "float32" else _same
@@ -170,9 +168,9 @@ def demanded(shape: Shape, value: float, dtype: Dtype) -> Demand | None:
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             if low is not None and x <= to(low):
-                is_out = left is None or x <= to(left.end)
+                is_out = left is None or x <= to(left)
             elif high is not None and x > to(high):
-                is_out = right is None or x >= to(right.end)
+                is_out = right is None or x >= to(right)
             else:
                 return "one"
             return "zero" if is_out else "below one"
@@ -377,12 +375,8 @@ def _thin_terms(model: Model) -> Iterator[str]:
 def width_in_ulps(shape: Shape) -> float:
     """Return the shortest change of a degree, in units in the last place."""
     match shape:
-        case Band(left=left, right=right):
-            widths = [
-                abs(flank.start - flank.end) / math.ulp(flank.start)
-                for flank in (left, right)
-                if flank is not None
-            ]
+        case Band():
+            widths = [abs(a - b) / math.ulp(a) for a, b in shape.flanks]
         case LR(mean=mean, left=below, right=above):
             widths = [side.spread / math.ulp(mean) for side in (below, above)]
         case Points():

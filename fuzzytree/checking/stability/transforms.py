@@ -14,7 +14,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Dtype,
-    Flank,
     FuzzyTree,
     Model,
     Part,
@@ -165,18 +164,12 @@ def _shape(name: str, shape: Shape, units: UnitChange) -> Shape:
     def place(value: float | None) -> float | None:
         return None if value is None else units.place(name, value)
 
-    def flank(one: Flank | None) -> Flank | None:
-        if one is None:
-            return None
-        start, end = units.place(name, one.start), units.place(name, one.end)
-        return msgspec.structs.replace(one, start=start, end=end)
-
     def side(one: Side) -> Side:
         return msgspec.structs.replace(one, spread=units.length(name, one.spread))
 
     match shape:
         case Band(low=low, high=high, left=left, right=right):
-            return Band(place(low), place(high), flank(left), flank(right))
+            return Band(place(low), place(high), place(left), place(right))
         case LR(mean=mean, left=below, right=above):
             return LR(units.place(name, mean), side(below), side(above))
         case Points(values=values, degrees=degrees):
@@ -214,8 +207,8 @@ def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
 def _lengths(shape: Shape) -> list[float]:
     """Return the lengths of flanks and of the lines between points."""
     match shape:
-        case Band(left=left, right=right):
-            return [flank.start - flank.end for flank in (left, right) if flank]
+        case Band():
+            return [start - end for start, end in shape.flanks]
         case Points(values=values):
             return [b - a for a, b in itertools.pairwise(values)]
         case LR():

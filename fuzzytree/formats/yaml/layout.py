@@ -96,20 +96,6 @@ class PartOfSum(FileRecord, frozen=True, kw_only=True):
     centre: float = 0.0
 
 
-class Fall(FileRecord, frozen=True, kw_only=True):
-    """How the degree falls from 1 at `from` to 0 at `to`.
-
-    With q falling in a straight line from 1 to 0, the degree is
-    `q * (c0 + q * (c1 + ...))`; without a curve it is q.
-    """
-
-    noun: ClassVar[str] = "a flank"
-    from_: float = field(name="from")
-    to: float
-    curve: Curve = (1.0,)
-    fit_error: float | None = field(name="fit error", default=None)
-
-
 class HalfSet(FileRecord, frozen=True, kw_only=True):
     """One side of an LR set; see `TermOfVariable`."""
 
@@ -122,7 +108,8 @@ class HalfSet(FileRecord, frozen=True, kw_only=True):
 class TermOfVariable(FileRecord, frozen=True, kw_only=True):
     """A label of a variable, in one of five shapes.
 
-    A plateau: degree 1 `above` one value and `up to` another, with flanks.
+    A plateau: degree 1 `above` one value and `up to` another, and `0 up to` a value
+    below it and `0 from` a value above it; lines lead from the one to the other.
     An LR set: degree 1 at the mean; u is the distance from it in spreads,
     t = min(u, 1), v = 2 t - 1, w = clip((reach - u) / (reach - 1), 0, 1); the degree is
     `clip(1 - t * (c0 + v * (c1 + ...)), 0, 1) * w**4`.
@@ -134,8 +121,8 @@ class TermOfVariable(FileRecord, frozen=True, kw_only=True):
 
     noun: ClassVar[str] = "a term"
     forms: ClassVar[tuple[KeyForm, ...]] = (
-        KeyForm(("above",), ("up to", "left flank", "right flank")),
-        KeyForm(("up to",), ("above", "left flank", "right flank")),
+        KeyForm(("above",), ("0 up to", "up to", "0 from")),
+        KeyForm(("up to",), ("0 up to", "above", "0 from")),
         KeyForm(("mean", "spread", "curve", "reach")),
         KeyForm(("mean", "left", "right")),
         KeyForm(("points",)),
@@ -144,8 +131,8 @@ class TermOfVariable(FileRecord, frozen=True, kw_only=True):
     name: Name
     above: float | None = None
     up_to: float | None = field(name="up to", default=None)
-    left_flank: Fall | None = field(name="left flank", default=None)
-    right_flank: Fall | None = field(name="right flank", default=None)
+    zero_up_to: float | None = field(name="0 up to", default=None)
+    zero_from: float | None = field(name="0 from", default=None)
     mean: float | None = None
     spread: float | None = None
     curve: Curve | None = None

@@ -9,7 +9,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Branch,
-    Flank,
     Leaf,
     Node,
     Part,
@@ -45,21 +44,13 @@ def shape(one: layout.TermOfVariable) -> Shape:
         pairs = zip(*one.points, strict=True)
         return Points(*map(tuple, pairs))
     if one.mean is None:
-        return Band(
-            one.above, one.up_to, _flank(one.left_flank), _flank(one.right_flank)
-        )
+        return Band(one.above, one.up_to, one.zero_up_to, one.zero_from)
     if one.left is not None and one.right is not None:
         return LR(one.mean, _side(one.left), _side(one.right))
     # The layout's forms demand these three where the sides are not given.
     spread, curve, reach = one.spread or 0.0, one.curve or (), one.reach or 0.0
     side = Side(spread, curve, reach)
     return LR(one.mean, side, side)
-
-
-def _flank(fall: layout.Fall | None) -> Flank | None:
-    if fall is None:
-        return None
-    return Flank(fall.from_, fall.to, fall.curve, fall.fit_error)
 
 
 def _side(side: layout.HalfSet) -> Side:

@@ -21,7 +21,6 @@ another bend change a chord by no more than the curve's steepness times their wi
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple, TypeVar, get_args
@@ -196,52 +195,38 @@ def points_for(curve: Curve, tolerance: float) -> PlacedPoints:
     shape = shape_of(curve)
     if isinstance(shape, Points):
         return PlacedPoints(shape, 0.0)
+    if isinstance(shape, Band):
+        return PlacedPoints(*straight_points(shape))
     if shape is not None:
-        straight = straight_points(shape) if isinstance(shape, Band) else None
-        return PlacedPoints(*(straight or points_of(shape, tolerance)))
+        return PlacedPoints(*points_of(shape, tolerance))
     return _placed(curve, plan_of(curve, tolerance), tolerance)
 
 
-def straight_points(band: Band) -> tuple[Points, float] | None:
-    """Return the points of a band whose flanks are straight, and how far they are off.
+def straight_points(band: Band) -> tuple[Points, float]:
+    """Return the points of a band, and how far they are off.
 
-    A flank `q c0` that starts at the plateau's end or outside of it is a line up to
-    its start and constant from there on. Only where c0 is 1 is it clamped below 1, by
-    2^-53.
+    Where a flank begins it is clamped below 1, by 2^-53.
+
+    Raises:
+        LossError: If its ends are further apart than the largest double.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Flank
-        >>> straight_points(Band(high=1.0, right=Flank(1.0, 2.0)))[0].values
+        >>> straight_points(Band(high=1.0, right=2.0))[0].values
         (1.0, 1.0, 2.0)
     """
     points: list[tuple[float, float]] = []
-    bound = 0.0
-    for edge, flank, sign in ((band.low, band.left, -1), (band.high, band.right, 1)):
+    sides = (band.low, band.left, -1), (band.high, band.right, 1)
+    for edge, end, sign in sides:
         if edge is None:
             continue
         half = [(edge, 0.0), (edge, 1.0)]
-        if flank is not None:
-            height = flank.curve[0]
-            is_outside = (flank.start - edge) * sign >= 0.0
-            if len(flank.curve) > 1 or not 0.0 <= height <= 1.0 or not is_outside:
-                return None
-            bound = max(bound, 2.0**-53 if height == 1.0 else 0.0)
-            height = min(height, BELOW_ONE)
-            half = [
-                (flank.end, 0.0),
-                (flank.start, height),
-                (edge, height),
-                (edge, 1.0),
-            ]
-            if flank.start == edge:
-                del half[2]
+        if end is not None:
+            half = [(end, 0.0), (edge, BELOW_ONE), (edge, 1.0)]
         points += half if sign < 0 else reversed(half)
-    if not points:
-        points = [(0.0, 1.0)]
-    values, degrees = zip(*points, strict=True)
-    if not all(map(math.isfinite, (b - a for a, b in itertools.pairwise(values)))):
-        return None
-    return Points(values, degrees), bound
+    values, degrees = zip(*(points or [(0.0, 1.0)]), strict=True)
+    if math.isinf(values[-1] - values[0]):
+        raise LossError("it reaches beyond the largest double")
+    return Points(values, degrees), 2.0**-53 if band.flanks else 0.0
 
 
 def _placed(curve: Curve, plan: PointPlan, tolerance: float) -> PlacedPoints:
@@ -406,14 +391,14 @@ _COARSE = 0.01  # lines become the same points for every tolerance
 
 
 def straightened(model: D) -> D | None:
-    """Return a model whose straight flanks are points, if that loses nothing.
+    """Return a model whose bands are points, if that loses nothing.
 
     The points are within 2^-52 of the degrees. Where another curve would be lost, or
     there is nothing to change, it is None.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Flank, Rule, Term, Variable
-        >>> ramp = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> from fuzzytree.model.rulebase import Rule, Term, Variable
+        >>> ramp = Term("low", Band(high=1.0, right=3.0))
         >>> rules = RuleBase("a", ("x",), (Variable("p", (ramp,)),), (Rule((), "x"),))
         >>> straightened(rules).variables[0].terms[0].shape.values
         (1.0, 1.0, 3.0)

@@ -41,9 +41,9 @@ def evaluate_program(program: Program, row: Mapping[str, float]) -> ProgramNumbe
     Example:
         >>> from fuzzytree.semantics.programs.rule_program import from_rules
         >>> from fuzzytree.model.rulebase import (
-        ...     Band, Clause, Flank, Rule, RuleBase, Term, Variable
+        ...     Band, Clause, Rule, RuleBase, Term, Variable
         ... )
-        >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> low = Term("low", Band(high=1.0, right=3.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
         ...     (Rule((Clause("force", ("low",)),), "soft"),),

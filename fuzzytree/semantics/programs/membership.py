@@ -14,7 +14,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Curve,
-    Flank,
     N,
     Numbers,
     Points,
@@ -98,22 +97,18 @@ def horner(make: Maker, coefficients: Sequence[float], x: Place) -> Place:
 def _band(make: Maker, band: Band, x: Place) -> Place:
     result = make.constant(1.0)
     if band.high is not None:
-        right = _flank(make, band.right, x)
+        right = _flank(make, band.high, band.right, x)
         result = make.where(make.less(band.high, x), right, result)
     if band.low is not None:
-        left = _flank(make, band.left, x)
+        left = _flank(make, band.low, band.left, x)
         result = make("where", make.at_most(x, band.low), left, result)
     return result
 
 
-def _flank(make: Maker, flank: Flank | None, x: Place) -> Place:
-    if flank is None:
+def _flank(make: Maker, edge: float, end: float | None, x: Place) -> Place:
+    if end is None:
         return make.constant(0.0)
-    offset = x - flank.end
-    slope = offset / (flank.start - flank.end)
-    position = clip(make, slope, 1.0)
-    curve = horner(make, flank.curve, position) * position
-    return clip(make, curve, BELOW_ONE)
+    return clip(make, (x - end) / (edge - end), BELOW_ONE)
 
 
 def _side(make: Maker, side: Side, distance: Place) -> Place:

@@ -33,7 +33,6 @@ from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Points,
     Rule,
     RuleBase,
@@ -49,8 +48,8 @@ FEW = AuditSettings(rows=500)
 
 
 def grip(cut: float = 2.0) -> RuleBase:
-    soft = Term("soft", Band(high=cut, right=Flank(cut, cut + 1.0)))
-    hard = Term("hard", Band(low=cut, left=Flank(cut, cut - 1.0)))
+    soft = Term("soft", Band(high=cut, right=cut + 1.0))
+    hard = Term("hard", Band(low=cut, left=cut - 1.0))
     wet = Term("wet", Points((0.0, 1.0), (0.0, 1.0)))
     return RuleBase(
         "grip",

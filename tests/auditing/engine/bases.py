@@ -15,7 +15,6 @@ from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Conjunction,
-    Flank,
     Part,
     Points,
     Rule,
@@ -152,9 +151,7 @@ def _band(chance: random.Random) -> Band:
     low = chance.uniform(-0.1, 0.9)
     high = low + chance.uniform(0.05, 0.3)
     left, right = (
-        None
-        if chance.random() < 0.1
-        else Flank(start, start + sign * chance.uniform(0.1, 0.8), _curve(chance))
+        None if chance.random() < 0.1 else start + sign * chance.uniform(0.1, 0.8)
         for start, sign in ((low, -1), (high, 1))
     )
     return Band(low, high, left, right)

@@ -6,14 +6,14 @@ import itertools
 from fractions import Fraction
 
 from fuzzytree.auditing.engine.pieces import RuleCurve, places
-from fuzzytree.model.rulebase import LR, Band, Flank
+from fuzzytree.model.rulebase import LR, Band
 from fuzzytree.model.rulebase import Side as Half
 
 
 def test_a_root_that_is_known_exactly_may_stand_beside_the_end_of_a_piece() -> None:
     shapes = (
         LR(1.0, Half(0.5, (-40.0,), 2.0), Half(0.25, (2.0, 2.0), 1.5)),
-        Band(-0.25, 0.25, Flank(0.0, -0.5, (0.5, 0.5))),
+        Band(-0.25, 0.25, -0.5),
         LR(1.0, Half(0.5, (-2.0, -1.0), 1.5), Half(0.5, (-1.0, 0.5), 1.5)),
         LR(0.125, Half(0.25, (0.25, -2.0)), Half(1.0, (-2.0, 0.5))),
     )
@@ -21,24 +21,6 @@ def test_a_root_that_is_known_exactly_may_stand_beside_the_end_of_a_piece() -> N
     assert Fraction(9, 8) in {place.low for place in found}
     for before, after in itertools.pairwise(found):
         assert before.low <= before.high < after.low
-
-
-def test_one_place_met_by_two_pairs_of_curves_beside_a_third_stands_once() -> None:
-    low = (0.515625, 0.796875, -0.3125)
-    left, right = (0.703125, 0.421875, -0.125), (0.28125, 1.59375, -0.875)
-    middle = Band(
-        0.5, 0.703125, Flank(0.5, 0.15625, left), Flank(0.703125, 1.421875, right)
-    )
-    found = places(
-        [
-            RuleCurve(Band(0.734375, 0.96875, Flank(0.734375, 0.21875, low))),
-            RuleCurve(middle, is_complement=True),
-            RuleCurve(middle),
-            RuleCurve(Band(0.03125, 0.265625, None, Flank(0.265625, 0.78125, low))),
-        ]
-    )
-    for before, after in itertools.pairwise(found):
-        assert before.high < after.low
 
 
 def test_curves_that_touch_at_an_irrational_place_touch_at_one_place() -> None:

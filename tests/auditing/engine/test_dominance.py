@@ -19,7 +19,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Part,
     Points,
     Rule,
@@ -197,8 +196,8 @@ def test_curves_whose_leading_coefficients_cancel_are_compared() -> None:
     # Two cubics in x, whose difference is a quadratic with an irrational zero, at
     # which two ramps are seen as well.
     terms = (
-        Term("one", Band(high=0.0, right=Flank(0.0, 1.0, (0.0, 0.0, 1.0)))),
-        Term("two", Band(high=0.5, right=Flank(0.5, 1.5, (-0.5, 0.0, 1.0)))),
+        Term("one", Band(high=0.0, right=1.0)),
+        Term("two", Band(high=0.5, right=1.5)),
         Term("high", Points((0.0, 1.0), (0.5, 1.0))),
         Term("low", Points((0.0, 1.0), (0.25, 0.5))),
     )

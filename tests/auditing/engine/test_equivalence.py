@@ -19,7 +19,6 @@ from fuzzytree.auditing.engine.states import Bracket, Proved, State, Witness, po
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Part,
     Points,
     Rule,
@@ -131,10 +130,10 @@ def test_relative_rules_agree_in_any_order_and_with_any_and(
 
 
 def crisp(cut: float, *, name: str = "x") -> RuleBase:
-    flank = Flank(cut, cut + 1.0)
+    flank = cut + 1.0
     terms = (
         Term("low", Band(high=cut, right=flank)),
-        Term("high", Band(low=cut, left=Flank(cut, cut - 1.0))),
+        Term("high", Band(low=cut, left=cut - 1.0)),
     )
     rules = (
         Rule((Clause(name, ("low",)),), "a"),

@@ -18,7 +18,6 @@ from fuzzytree.auditing.engine.states import Proved, Witness
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
-    Flank,
     Points,
     Rule,
     RuleBase,
@@ -33,9 +32,9 @@ GOLDEN = (-ONE, ONE, ONE)  # x**2 + x = 1
 def _terms(*, is_mirrored: bool, drop: float = 1.0) -> tuple[Term, ...]:
     """Return x**2 and 1 - x, which are equal where x**2 + x = 1; or their mirrors."""
     if is_mirrored:
-        square = Band(None, 0.0, None, Flank(0.0, 1.0, (0.0, 1.0)))
+        square = Band(None, 0.0, None, 1.0)
         return Term("square", square), Term("line", Points((0.0, 1.0), (0.0, drop)))
-    square = Band(1.0, None, Flank(1.0, 0.0, (0.0, 1.0)))
+    square = Band(1.0, None, 0.0)
     return Term("square", square), Term("line", Points((0.0, 1.0), (drop, 0.0)))
 
 

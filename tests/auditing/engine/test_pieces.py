@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.engine.pieces import piece_at, pieces
-from fuzzytree.model.rulebase import Band, Flank, Points, RuleBase
+from fuzzytree.model.rulebase import Band, Points, RuleBase
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import landmarks
@@ -43,7 +43,7 @@ def test_a_step_has_two_degrees() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [(1.0, 4.0), (-1.0, 4.0), (3.0, -2.0)])
 def test_a_flank_of_any_direction_is_laid_out(start: float, end: float) -> None:
-    shape = Band(0.0, 1.0, right=Flank(start, end, (0.5, 0.25)))
+    shape = Band(0.0, 1.0, right=end)
     laid = pieces(shape)
     for x in (Fraction(n, 7) for n in range(-40, 60)):
         assert piece_at(laid, x).degree(x) == exact_degree(shape, x)

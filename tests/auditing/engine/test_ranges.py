@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.auditing.engine.pieces import clause_ranges, shape_ranges
-from fuzzytree.model.rulebase import LR, Band, Clause, Flank, Points, Shape, Side
+from fuzzytree.model.rulebase import LR, Band, Clause, Points, Shape, Side
 from fuzzytree.numerics.exact import exact_degree
 from tests.auditing.engine.bases import random_shape
 
@@ -22,7 +22,7 @@ SHAPES: list[Shape] = [
     Points((0.5,), (0.25,)),
     Points(tuple(i / 9 for i in range(10)), tuple(i * 7 % 11 / 11 for i in range(10))),
     Band(0.3, 0.6),
-    Band(0.3, 0.6, Flank(0.35, 0.1, (3.0, -4.0)), Flank(0.55, 0.9, (0.5, -1.0, 2.0))),
+    Band(0.3, 0.6, 0.1, 0.9),
     Band(),
     *(random_shape(random.Random(seed), "mixed") for seed in range(20)),
 ]

@@ -33,7 +33,7 @@ from fuzzytree.model import (
     Spike,
     TwoGaussians,
 )
-from fuzzytree.model.rulebase import LR, Band, Flank, Points, Side
+from fuzzytree.model.rulebase import LR, Band, Points, Side
 from fuzzytree.numerics.curve_values import degree_between
 from fuzzytree.numerics.exact import exact_degree
 
@@ -60,7 +60,7 @@ CURVES: tuple[Curve, ...] = (
     Arc(-1.0, 2.0),
     Arc(2.0, -1.0),
     SemiEllipse(-1.0, 2.5),
-    Band(0.0, 1.0, right=Flank(1.0, 4.0, (0.5, 0.25))),
+    Band(0.0, 1.0, right=4.0),
     LR(0.0, Side(1.0, (0.5,), 2.0), Side(0.5, (0.5,), 3.0)),
 )
 

@@ -41,7 +41,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Part,
     Points,
     Rule,
@@ -91,7 +90,7 @@ def test_the_declared_range_is_the_domain() -> None:
         ([Points((0.0, 1.0), (1.0, 0.0))], -1.0, 2.0),
         ([Band(high=3.0), Band(low=3.0)], 0.0, 6.0),
         ([Band(high=0.5)], -0.5, 1.5),
-        ([Band(low=1.0, high=2.0, left=Flank(1.0, 0.0))], 0.0, 2.0),
+        ([Band(low=1.0, high=2.0, left=0.0)], 0.0, 2.0),
     ],
     ids=["set", "closed points", "open points", "cut", "small cut", "band"],
 )

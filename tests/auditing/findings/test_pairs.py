@@ -28,10 +28,8 @@ from fuzzytree.auditing.findings.records import (
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model import Conclusion, Is, Or, RuleBlock, SystemRule
 from fuzzytree.model.rulebase import (
-    Band,
     Clause,
     Conjunction,
-    Flank,
     Part,
     Points,
     Rule,
@@ -426,25 +424,6 @@ def test_pairs_that_cross_at_the_level_itself_conflict() -> None:
     assert answer.measures[0].value == 0.5
     above = AuditSettings(level=0.5 + 2.0**-53)
     assert not any(one.is_finding for one in answers_for(rules, "FT201", above))
-
-
-@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
-def test_pairs_that_cross_at_the_level_at_an_irrational_value_are_counted(
-    conjunction: Conjunction,
-) -> None:
-    square = Term("square", Band(1.0, None, Flank(1.0, 0.0, (0.0, 1.0))))
-    rules = base(("force is square", "soft"), more=(square,), conjunction=conjunction)
-    apart = Rule((Clause("force", ("square",), negated=True),), "hard")
-    rules = replace(rules, rules=(*rules.rules, apart))
-    (answer,) = answers_for(rules, "FT201")
-    assert not answer.is_finding
-    assert isinstance(answer.state, Proved)
-    assert answer.sentence == (
-        "1 pair of rules of different classes never reaches 0.5 together; "
-        "1 of them at most touch it, at irrational values"
-    )
-    below = answers_for(rules, "FT201", AuditSettings(level=0.499))
-    assert below[0].is_finding
 
 
 def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:

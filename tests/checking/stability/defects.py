@@ -24,7 +24,6 @@ from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
-    Flank,
     Part,
     Rule,
     RuleBase,
@@ -35,7 +34,7 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
 from fuzzytree.runtimes.rows import checked, winners
 from fuzzytree.runtimes.table import find_runtime
-from fuzzytree.semantics.reference import axis_values, degree, horner
+from fuzzytree.semantics.reference import axis_values, degree
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -45,8 +44,8 @@ NATIVE = find_runtime("native")
 
 def small_rules() -> RuleBase:
     """Return rules with flanks, a step, sets and a combination; nothing is wrong."""
-    low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0, (0.5, 0.25))))
-    high = Term("high", Band(low=1.0, left=Flank(1.0, -2.0)))
+    low = Term("low", Band(high=1.0, right=3.0))
+    high = Term("high", Band(low=1.0, left=-2.0))
     soft = Term("soft", LR(2.0, Side(0.5, (0.75,)), Side(1.5, (0.5, 0.125), 3.0)))
     open_ = Term("open", Band(low=-4.0, high=0.25))
     mix = Variable("mix", (low, high), parts=(Part("a", 0.5, 1.0), Part("b", 2.0)))
@@ -186,30 +185,26 @@ def _soft_zero(shape: Band | LR, value: float) -> float:
 
 
 def _raw_flank(shape: Band | LR, value: float) -> float:
-    """Return a degree from powers of the value itself, as `a + b x + c x**2`."""
+    """Return a degree from powers of the value itself, as `a + b x`."""
     if not isinstance(shape, Band):
         return _plain(shape, value)
     is_left = shape.low is not None and value <= shape.low
     is_right = shape.high is not None and value > shape.high
-    flank = shape.left if is_left else shape.right if is_right else None
-    if flank is None:
+    edge, end = (shape.low, shape.left) if is_left else (shape.high, shape.right)
+    if edge is None or end is None or not (is_left or is_right):
         return _plain(shape, value)
-    slope = 1.0 / (flank.start - flank.end)
-    position = np.poly1d([slope, -flank.end * slope])
-    whole = position * np.poly1d(flank.curve[::-1])(position)
-    return float(min(max(whole(value), 0.0), 1.0 - 2.0**-53))
+    slope = 1.0 / (edge - end)
+    return min(max(slope * value - end * slope, 0.0), 1.0 - 2.0**-53)
 
 
 def _reciprocal(shape: Band | LR, value: float) -> float:
     """Return a degree whose place on a flank is a product instead of a quotient."""
     if not isinstance(shape, Band) or shape.high is None or shape.right is None:
         return _plain(shape, value)
-    flank = shape.right
     if value <= shape.high:
         return _plain(shape, value)
-    place = (value - flank.end) * (1.0 / (flank.start - flank.end))
-    place = min(max(place, 0.0), 1.0)
-    return min(max(horner(flank.curve, place) * place, 0.0), 1.0 - 2.0**-53)
+    place = (value - shape.right) * (1.0 / (shape.high - shape.right))
+    return min(max(place, 0.0), 1.0 - 2.0**-53)
 
 
 def _no_spread(shape: Band | LR, value: float) -> float:
@@ -306,8 +301,8 @@ def tiny_learner(
             * (spreads[order[0]] / (spreads[order[0]] + spreads[order[1]]))
         )
         width = sum(spreads)
-        left = Term("low", Band(high=cut, right=Flank(cut, cut + width)))
-        right = Term("high", Band(low=cut, left=Flank(cut, cut - width)))
+        left = Term("low", Band(high=cut, right=cut + width))
+        right = Term("high", Band(low=cut, left=cut - width))
         sets = tuple(
             Term(name, LR(mean, Side(one, (1.0,)), Side(one, (1.0,))))
             for name, mean, one in zip(names, means, spreads, strict=False)

@@ -14,7 +14,7 @@ from fuzzytree.checking.stability.transforms import (
     scaled,
 )
 from fuzzytree.errors import LossError
-from fuzzytree.model.rulebase import Band, Flank, Points, Term
+from fuzzytree.model.rulebase import Band, Points, Term
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.checking.stability.defects import one_rule, small_rules
@@ -77,7 +77,7 @@ def test_the_ends_of_the_usable_range_can_be_reached(dtype: str) -> None:
 
 
 def test_a_narrow_flank_ends_the_usable_range() -> None:
-    narrow = Term("low", Band(high=2.25, right=Flank(2.25, 2.296875)))
+    narrow = Term("low", Band(high=2.25, right=2.296875))
     low, _ = exponent_range(one_rule(narrow), "float32")
     assert (2.296875 - 2.25) * 2.0**low == 3 * 2.0**-127
     lines = Points((2.25, 2.25, 2.296875), (0.0, 1.0, 0.0))
