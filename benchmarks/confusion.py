@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.report.plots.sheet import (
-    LINE,
-    MARGIN,
-    SIZE,
-    TITLE,
-    WORD,
-    Sheet,
-    short,
-    style,
-)
+from fuzzytree.report.plots.sheet import SIZE, short, style
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     Counts = npt.NDArray[np.integer]
@@ -39,6 +31,70 @@ _RATES = 0.62  # the column of rates
 _WORDS = 0.22  # the words that name a side
 _SLANT_DEG = 38.0  # of the names of columns
 _DARK = 0.55  # above this share of a row, letters are white
+
+
+LINE, FAINT, WORD = "#8c959f", "#57606a", "#24292f"
+"""The colours of lines, of words beside others, and of words."""
+
+MARGIN = 0.16
+"""Around a picture, in inches."""
+
+TITLE = 0.36
+"""Of the words above a picture, in inches."""
+
+
+class Sheet:
+    """A figure whose axes count inches, x to the right and y down, without lines."""
+
+    def __init__(self) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        self.figure: Figure = Figure()
+        canvas: Any = FigureCanvasAgg(self.figure)
+        self._renderer: Any = canvas.get_renderer()
+        self.axes: Axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        self.axes.set_axis_off()
+
+    def width(self, text: str, size: float = SIZE, *, bold: bool = False) -> float:
+        """Return how wide words are, in inches."""
+        drawn = self.figure.text(
+            0,
+            0,
+            text,
+            fontsize=size,
+            fontweight="bold" if bold else "normal",
+            parse_math=False,
+        )
+        wide: float = drawn.get_window_extent(self._renderer).width
+        drawn.remove()
+        return wide / self.figure.dpi
+
+    def resize(self, width: float, height: float) -> None:
+        """Make the sheet this large."""
+        self.figure.set_size_inches(width, height)
+        self.axes.set_xlim(0.0, width)
+        self.axes.set_ylim(height, 0.0)
+
+    def write(self, x: float, y: float, text: str, **style: Any) -> None:
+        """Write words; a name with the signs of a formula is no formula.
+
+        Args:
+            x: In inches from the left.
+            y: In inches from the top.
+            text: The words.
+            style: What matplotlib's `Text` takes, other than small, faint words whose
+                left end stands at x, and whose middle at y.
+        """
+        usual = {"fontsize": SIZE, "color": FAINT, "va": "center_baseline"}
+        fixed = {"rotation_mode": "anchor", "parse_math": False, "zorder": 3}
+        whole: dict[str, Any] = {**usual, **style, **fixed}
+        self.axes.text(x, y, text, **whole)
+
+    def write_title(self, text: str) -> None:
+        """Write words at the top."""
+        style = {"fontsize": SIZE + 3, "fontweight": "bold", "color": "black"}
+        self.write(MARGIN, MARGIN, text, va="top", **style)
 
 
 def draw_confusion(

@@ -301,7 +301,7 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
     from confusion import MOST_CLASSES, draw_confusion
 
     from fuzzytree.report.plots.sheet import drawn
-    from fuzzytree.report.plots.trees import MOST_LEAVES, draw_tree
+    from fuzzytree.report.svg_tree import MOST_LEAVES, draw_tree
     from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames
     from fuzzytree.tactile.sensor import pressed
@@ -309,7 +309,7 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
     found: dict[str, bytes] = {}
     study = outcome.study
     if len(outcome.tree.leaves) <= MOST_LEAVES:
-        found["tree.svg"] = drawn(draw_tree(outcome.tree), ".svg")
+        found["tree.svg"] = draw_tree(outcome.tree).svg.encode()
     else:
         say(f"no picture of a tree of {len(outcome.tree.leaves)} leaves", quiet=quiet)
     if len(study.classes) <= MOST_CLASSES:

@@ -66,9 +66,9 @@ from fuzzytree.tables import (
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    from matplotlib.figure import Figure
 
     from fuzzytree.model import FloatArray, Use
+    from fuzzytree.report import TreePicture
 
 
 Frame = TypeVar("Frame")
@@ -839,20 +839,19 @@ def recheck(
         raise ReadError(str(error)) from error
 
 
-def draw(tree: ModelSource, *, title: str | None = None) -> Figure:
-    """Draw a tree with matplotlib: its nodes, the terms of its branches, its classes.
+def draw(tree: ModelSource, *, title: str | None = None) -> TreePicture:
+    """Draw a tree: its nodes, the terms of its branches, its classes.
 
     Args:
         tree: A tree, a fitted classifier, or the path of a file that holds a tree.
         title: Above the picture; the name and size of the tree unless given.
 
     Returns:
-        A figure; `figure.savefig(path)` writes it.
+        A picture, which a notebook shows; `picture.save("tree.svg")` writes it.
 
     Raises:
         TypeError: If it is no tree.
         ValueError: If the tree is too large for a picture.
-        MissingExtraError: If matplotlib is not installed.
     """
     return report.draw_tree(_tree_of(tree, "draw"), title=title)
 

@@ -30,7 +30,7 @@ class ShowOptions:
     picture: str | None = option(
         "--picture",
         metavar="FILE",
-        help="Picture of the tree to write, as .svg or .png.",
+        help="Picture of the tree to write, as .svg.",
     )
     as_json: bool = json_option
     quiet: bool = quiet_option
@@ -105,7 +105,7 @@ def _draw(model: Document, picture: str, *, quiet: bool) -> None:
             f"--picture: {model.name} is no tree; rules have none to draw"
         )
     with wrong_options():
-        report.save(report.draw_tree(model), picture)
+        report.draw_tree(model).save(picture)
     say(f"wrote    {picture}", quiet=quiet)
 
 

@@ -18,10 +18,11 @@ from .plots.sheet import drawn as drawn
 from .plots.sheet import save as save
 from .plots.sheet import short as short
 from .plots.sheet import style as style
-from .plots.trees import draw_tree as draw_tree
 from .sarif import annotation_lines as annotation_lines
 from .sarif import sarif_text as sarif_text
 from .stability import stability_lines as stability_lines
+from .svg_tree import TreePicture as TreePicture
+from .svg_tree import draw_tree as draw_tree
 from .systems import document_facts as document_facts
 from .systems import document_text as document_text
 from .systems import system_lines as system_lines

@@ -20,7 +20,6 @@ Audited = FuzzyTree | RuleBase | FuzzySystem
 
 MOST_VARIABLES = 60
 _MOST_TERMS = 40  # of a variable that are described in words
-_MOST_PARTS = 12  # of a combination that are written
 
 
 def tree_section(tree: FuzzyTree, passed: Passing | None) -> Markup:
@@ -79,16 +78,11 @@ def _cards(
     for place, axis in enumerate(axes[:MOST_VARIABLES]):
         lines = _in_words(model, axis.name)
         if axis.parts:
-            lines.append(_sum(axis))
+            said = sum_text(axis.parts, is_whole=False)
+            lines.append(f"{axis.name} = {said}")
         if axis.undrawn:
             lines.append(f"not drawn: {', '.join(axis.undrawn)}")
         yield axis, terms_picture(axis, data, f"{name}{place}"), lines
-
-
-def _sum(axis: Axis) -> str:
-    more = len(axis.parts) - _MOST_PARTS
-    after = f" + {counted(more, 'more input')}" if more > 0 else ""
-    return f"{axis.name} = {sum_text(axis.parts[:_MOST_PARTS])}{after}"
 
 
 def _in_words(model: Audited, name: str) -> list[str]:

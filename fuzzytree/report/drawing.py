@@ -362,7 +362,13 @@ def cut(words: str, letters: float) -> str:
 
 
 def svg(
-    width: float, height: float, title: str, desc: str, *children: Content, name: str
+    width: float,
+    height: float,
+    title: str,
+    desc: str,
+    *children: Content,
+    name: str,
+    **attributes: Attribute,
 ) -> Markup:
     """Return a picture with its title and description; sizes are in points."""
     return tag(
@@ -375,6 +381,7 @@ def svg(
         height=height,
         role="img",
         aria_labelledby=f"{name}-t {name}-d",
+        **attributes,
     )
 
 

@@ -1,28 +1,41 @@
-"""A tree as a picture of the page: questions, branches, and the rows that pass."""
+"""A tree as a picture, on a page or alone: questions, branches, rows that pass."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
+from fuzzytree.files import PathLike, write_atomically
 from fuzzytree.model import FuzzyTree, Node
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import LETTER, Markup, cut, rect, svg, tag, words
+from fuzzytree.report.systems import sum_text
 from fuzzytree.report.text import counted, number, taken
 
-MOST_LEAVES = 120
-"""Of a tree that is drawn; a larger one is printed as an outline."""
+MOST_LEAVES = 200
+"""Of a tree that is drawn; the page prints a larger one as an outline."""
 
-WIDE, HIGH = 176.0, 52.0
-"""Of a box, in points."""
-
+_WIDE, _HIGH = 176.0, 52.0  # of a box, in points
 _ACROSS, _DOWN = 60.0, 26.0  # between boxes
-EDGE = 8.0
-"""Around a picture, in points."""
-
+_EDGE = 8.0  # around a picture
+_LINE = 20.0  # of words above or below a tree
 _LEAST, _MOST = 1.5, 9.0  # points: how thick a branch is
-_PALETTE = 10
+_PALETTE = (
+    *("#0072b2", "#c04d00", "#00795a", "#a3407f", "#7a6000"),
+    *("#5b4db2", "#b3261e", "#00788a", "#5f6b1f", "#57606a"),
+)  # of classes, in their order; more than ten classes share them
+_STYLE = """
+text { font: 12px system-ui, sans-serif; fill: #1b1c1e; }
+.small { font-size: 10.5px; fill: #595d66; }
+.strong { font-size: 13px; font-weight: 600; }
+.box { fill: #ffffff; stroke: #595d66; stroke-width: 1.5; }
+.branch { fill: none; stroke: #c8cacd; }
+.track { fill: #efefeb; }
+"""  # of a picture in a file of its own, in which no page says how it looks
 
 
 class Box(msgspec.Struct):
@@ -46,7 +59,7 @@ class Box(msgspec.Struct):
     @property
     def left(self) -> float:
         """How far from the left it begins, in points."""
-        return EDGE + self.level * (WIDE + _ACROSS)
+        return _EDGE + self.level * (_WIDE + _ACROSS)
 
 
 def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
@@ -56,18 +69,11 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
     rows of the leaves behind it, by the leaves' class. A branch is the thicker the
     more of them take it.
     """
-    boxes = boxes_of(tree, rows)
-    high = placed(boxes)
-    wide = max(box.left for box in boxes) + WIDE + EDGE
-    whole = sum(boxes[0].counts)
-    drawn = [_branch(box, whole) for box in boxes if box.above is not None]
-    drawn += [_drawn(box) for box in boxes]
-    nodes = counted(len(tree.nodes), "node")
-    leaves = counted(len(tree.leaves), "leaf", "leaves")
+    drawn, wide, high = _laid(boxes_of(tree, rows))
     return svg(
         wide,
         high,
-        f"The tree {tree.name}: {nodes}, {leaves}",
+        f"The tree {_size_text(tree)}",
         "From left to right: each box tests one variable, each branch takes a part of "
         "its values, and each rounded box is a class; the same as an outline follows",
         *drawn,
@@ -75,9 +81,97 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
     )
 
 
+class TreePicture(NamedTuple):
+    """A picture of a tree, which a notebook shows: the content of an SVG file."""
+
+    svg: str
+
+    def _repr_svg_(self) -> str:
+        """Return what a notebook shows."""
+        return self.svg
+
+    def save(self, path: PathLike) -> None:
+        """Write the picture to a file whose name ends in .svg.
+
+        Raises:
+            ValueError: If the name ends otherwise.
+            WriteError: If the file cannot be written.
+        """
+        if Path(path).suffix.lower() != ".svg":
+            raise ValueError(
+                f"{os.fspath(path)}: the name of a tree's picture ends in .svg"
+            )
+        write_atomically(path, self.svg.encode())
+
+
+def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> TreePicture:
+    """Draw a tree: the variable of each node, the terms of its branches, the classes.
+
+    A node shows its variable and its cuts. A leaf shows its class, the pattern if the
+    class has several, and how many training rows reached it; where that is known of
+    all leaves, a branch is the thicker the more rows took it. Below the tree stand the
+    combinations of variables that nodes test.
+
+    Args:
+        tree: At most `MOST_LEAVES` leaves.
+        title: Above the picture; by default the name and size of the tree.
+
+    Raises:
+        ValueError: If the tree has more leaves than that.
+    """
+    if len(tree.leaves) > MOST_LEAVES:
+        raise ValueError(
+            f"a picture shows at most {MOST_LEAVES} leaves, and {tree.name} has "
+            f"{len(tree.leaves)}; learn a smaller tree, or read its rules"
+        )
+    drawn, wide, high = _laid(boxes_of(tree, None))
+    said = _size_text(tree) if title is None else title
+    used = {node.variable for node in tree.nodes}
+    notes = [
+        f"{one.name} = {sum_text(one.parts, is_whole=False)}"
+        for one in tree.variables
+        if one.parts and one.name in used
+    ]
+    wide = max([wide, *(LETTER * 14 * min(len(one), 400) for one in (said, *notes))])
+    ends = range(len(notes))
+    colours = "".join(
+        f".box.k{k} {{ stroke: {colour}; }}\n"
+        f".bar.k{k}, .strong.k{k} {{ fill: {colour}; }}\n"
+        for k, colour in enumerate(_PALETTE)
+    )
+    picture = svg(
+        wide,
+        high + _LINE * (len(notes) + 1),
+        said,
+        "",
+        tag("style", Markup(_STYLE + colours)),
+        tag("rect", width="100%", height="100%", fill="#ffffff"),
+        words(_EDGE, _LINE, said, "strong"),
+        tag("g", *drawn, transform=f"translate(0 {_LINE:.0f})"),
+        *(words(_EDGE, high + _LINE * (k + 1.5), notes[k], "small") for k in ends),
+        name="tree",
+        xmlns="http://www.w3.org/2000/svg",
+    )
+    return TreePicture(f"{picture}\n")
+
+
+def _size_text(tree: FuzzyTree) -> str:
+    nodes = counted(len(tree.nodes), "node")
+    return f"{tree.name}: {nodes}, {counted(len(tree.leaves), 'leaf', 'leaves')}"
+
+
+def _laid(boxes: Sequence[Box]) -> tuple[list[Markup], float, float]:
+    """Return boxes with their branches, and the width and height of all."""
+    high = placed(boxes)
+    wide = max(box.left for box in boxes) + _WIDE + _EDGE
+    whole = sum(boxes[0].counts)
+    drawn = [_branch(box, whole) for box in boxes if box.above is not None]
+    return [*drawn, *map(_drawn, boxes)], wide, high
+
+
 def class_mark(code: int) -> str:
     """Return the name of a class's colour in the page's style."""
-    return f"k{code % _PALETTE}"
+    return f"k{code % len(_PALETTE)}"
 
 
 def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
@@ -132,22 +226,22 @@ def _branch_words(node: Node, place: int) -> str:
 
 def placed(boxes: Sequence[Box]) -> float:
     """Put leaves below one another and nodes in their middle; return the height."""
-    down = EDGE + 14.0
+    down = _EDGE + 14.0
     for box in boxes:
         if not box.below:
-            box.middle = down + HIGH / 2.0
-            down += HIGH + _DOWN
+            box.middle = down + _HIGH / 2.0
+            down += _HIGH + _DOWN
     for box in reversed(boxes):
         if box.below:
             box.middle = (box.below[0].middle + box.below[-1].middle) / 2.0
-    return down - _DOWN + EDGE
+    return down - _DOWN + _EDGE
 
 
 def _branch(box: Box, whole: int) -> Markup:
     above = box.above
     assert above is not None  # the root has no branch
     share = sum(box.counts) / whole if whole else 0.0
-    start, end = above.left + WIDE, box.left
+    start, end = above.left + _WIDE, box.left
     bend = (start + end) / 2.0
     way = f"M{start:.1f} {above.middle:.1f}C{bend:.1f} {above.middle:.1f} "
     way += f"{bend:.1f} {box.middle:.1f} {end:.1f} {box.middle:.1f}"
@@ -156,10 +250,10 @@ def _branch(box: Box, whole: int) -> Markup:
 
 
 def _drawn(box: Box) -> Markup:
-    left, top = box.left, box.middle - HIGH / 2.0
+    left, top = box.left, box.middle - _HIGH / 2.0
     is_leaf = box.code is not None
     mark = class_mark(box.code or 0) if is_leaf else ""
-    room = (WIDE - 20.0) / (LETTER * 13.0)
+    room = (_WIDE - 20.0) / (LETTER * 13.0)
     said = [box.branch, box.title, box.note, _counts_text(box.counts)]
     return tag(
         "g",
@@ -168,15 +262,15 @@ def _drawn(box: Box) -> Markup:
             "rect",
             x=left,
             y=top,
-            width=WIDE,
-            height=HIGH,
+            width=_WIDE,
+            height=_HIGH,
             rx=14.0 if is_leaf else 4.0,
             class_=f"box {mark}".rstrip(),
         ),
-        words(left + 2, top - 6, cut(box.branch, WIDE / 6.1), "small"),
+        words(left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
         words(left + 10, top + 18, cut(box.title, room), f"strong {mark}".rstrip()),
-        words(left + 10, top + 33, cut(box.note, WIDE / 6.4), "small"),
-        *_bar(box.counts, left + 10, top + 40, WIDE - 20),
+        words(left + 10, top + 33, cut(box.note, _WIDE / 6.4), "small"),
+        *_bar(box.counts, left + 10, top + 40, _WIDE - 20),
     )
 
 

@@ -248,14 +248,20 @@ def _span(one: SystemInput | SystemOutput) -> str:
     return f"{unit}, {number(one.low)} to {number(one.high)}{clipped}"
 
 
-def sum_text(parts: Sequence[Part]) -> str:
-    """Return a combination of columns as a sum."""
+_MOST_PARTS = 12  # of a combination that are written
+
+
+def sum_text(parts: Sequence[Part], *, is_whole: bool = True) -> str:
+    """Return a combination of columns as a sum, whole or its first parts."""
+    shown = parts if is_whole else parts[:_MOST_PARTS]
     terms = [
         f"{number(one.weight)} * ({one.input} - {number(one.centre)})"
         if one.centre
         else f"{number(one.weight)} * {one.input}"
-        for one in parts
+        for one in shown
     ]
+    if len(shown) < len(parts):
+        terms.append(counted(len(parts) - len(shown), "more input"))
     return " + ".join(terms)
 
 

@@ -100,7 +100,7 @@ VERBS: dict[str, Callable[[Any], object]] = {
     ),
     "convert": lambda model: ft.convert(model, "fcl", allow_loss=True).written,
     "diff": lambda model: ft.diff(model, model).verdict,
-    "draw": lambda model: ft.draw(model).axes[0].get_title(),
+    "draw": lambda model: ft.draw(model).svg,
     "export": lambda model: ft.export(model, "onnx").content,
     "needs": lambda model: ft.needs(model).needs,
     "rules_from_tree": ft.rules_from_tree,

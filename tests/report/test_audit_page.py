@@ -299,9 +299,9 @@ def test_a_tree_is_drawn_with_the_rows_that_pass() -> None:
 
 @pytest.mark.heavy
 def test_a_tree_of_many_leaves_is_printed_as_an_outline() -> None:
-    tree = random_tree(3, leaves=130)
+    tree = random_tree(3, leaves=210)
     text = Outline(page(audit_of(rule_base(), ()), tree)).text
-    assert "A picture shows at most 120 leaves, and this tree has 130" in text
+    assert "A picture shows at most 200 leaves, and this tree has 210" in text
 
 
 @pytest.mark.one_in(3)

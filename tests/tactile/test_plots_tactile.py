@@ -1,4 +1,4 @@
-"""Pictures of frames, trees and confusions show what they were given, and no more."""
+"""Pictures of frames and confusions show what they were given, and no more."""
 
 from __future__ import annotations
 
@@ -16,14 +16,9 @@ import numpy.typing as npt
 import pytest
 from confusion import draw_confusion
 
-import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
-from fuzzytree.model.rulebase import Band, Term, Variable
-from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.report import plots
 from fuzzytree.report.plots.sheet import drawn
-from fuzzytree.report.plots.trees import MOST_LEAVES
-from fuzzytree.report.svg_tree import boxes_of, placed
 from fuzzytree.tactile.plots import MOST_FRAMES, FrameAxis, colours, draw_frames
 
 if TYPE_CHECKING:
@@ -61,49 +56,6 @@ def overlapping(figure: Figure) -> list[tuple[str, str]]:
         for (one, a), (two, b) in itertools.combinations(boxes, 2)
         if a.overlaps(b)
     ]
-
-
-def learnt(classes: int, **settings: Any) -> FuzzyTree:
-    """Return a tree of that many classes on three columns."""
-    chance = np.random.default_rng(1)
-    label = np.repeat(np.arange(classes), 12)
-    table = chance.normal(size=(len(label), 3))
-    table[:, 0] += 9.0 * (label % 5)
-    table[:, 1] += 9.0 * (label // 5)
-    target = [f"class {k}" for k in label]
-    return ft.learn(
-        ft.table(table, columns=["a", "b", "c"]),
-        target=target,
-        name="grid",
-        settings=ft.LearningSettings(**settings),
-    )
-
-
-def comb(leaves: int) -> FuzzyTree:
-    """Return the deepest tree of that many leaves: each node cuts one off."""
-    nodes: list[Node] = []
-    terms: list[Term] = []
-    for k in range(leaves - 1):
-        low, high = f"below {k}", f"above {k}"
-        terms += [Term(low, Band(None, float(k))), Term(high, Band(float(k), None))]
-        last = Branch((high,), node=k + 2)
-        if k == leaves - 2:
-            last = Branch((high,), leaf=leaves)
-        branches = (Branch((low,), leaf=k + 1), last)
-        nodes.append(Node("x", (float(k),), (0, 1), branches))
-    ends = tuple(Leaf("a" if k % 2 else "b") for k in range(leaves))
-    variable = Variable("x", tuple(terms))
-    return FuzzyTree("comb", ("a", "b"), (variable,), tuple(nodes), ends)
-
-
-def slanted() -> FuzzyTree:
-    """Return a tree of two classes that only a combination of columns tells apart."""
-    chance = np.random.default_rng(2)
-    along, across = chance.normal(0.0, 9.0, 80), chance.normal(0.0, 0.3, 80)
-    across[40:] += 4.0
-    target = ["one"] * 40 + ["two"] * 40
-    table = np.column_stack([along + across, along - across])
-    return ft.learn(ft.table(table, columns=["a", "b"]), target=target)
 
 
 def test_every_dot_of_a_frame_has_the_colour_of_its_cell() -> None:
@@ -189,101 +141,6 @@ def test_frames_that_are_none_are_refused(
     assert str(caught.value) == text
 
 
-def test_a_tree_shows_its_questions_terms_and_leaves() -> None:
-    tree = learnt(4, mode="paper")
-    found = said(plots.draw_tree(tree))
-    assert {f"{node.variable}?" for node in tree.nodes} <= found
-    assert {leaf.label for leaf in tree.leaves} <= found
-    rows = {f"rule {k}, {leaf.support} rows" for k, leaf in enumerate(tree.leaves, 1)}
-    assert rows <= found
-    terms = {" or ".join(b.terms) for node in tree.nodes for b in node.branches}
-    assert terms <= {text.partition(":")[0] for text in found}
-    assert "grid: 1 node, 4 leaves" in found
-
-
-@pytest.mark.parametrize("classes", [2, 25])
-def test_no_words_of_a_tree_cover_each_other_or_leave_the_picture(classes: int) -> None:
-    figure = plots.draw_tree(learnt(classes, patterns_per_class=2))
-    assert overlapping(figure) == []
-    for text in words(figure):
-        box = text.get_window_extent()
-        assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.x1, text.get_text()
-        assert 0.0 <= box.y0 <= box.y1 <= figure.bbox.y1, text.get_text()
-
-
-def test_a_tree_of_one_leaf_is_that_leaf() -> None:
-    tree = FuzzyTree("all", ("a",), (), (), (Leaf("a", support=1),))
-    assert said(plots.draw_tree(tree)) == {"all: 0 nodes, 1 leaf", "a", "rule 1, 1 row"}
-
-
-def test_a_node_has_the_rows_of_all_that_is_below_it() -> None:
-    boxes = boxes_of(learnt(7), None)
-    assert sum(boxes[0].counts) == 7 * 12
-    for box in (one for one in boxes if one.below):
-        assert sum(box.counts) == sum(sum(one.counts) for one in box.below)
-
-
-def test_a_tree_without_known_rows_is_drawn_without_them() -> None:
-    from msgspec.structs import replace
-
-    tree = learnt(3)
-    bare = replace(
-        tree, leaves=tuple(replace(leaf, support=None) for leaf in tree.leaves)
-    )
-    assert not any("row" in text for text in said(plots.draw_tree(bare, title="")))
-
-
-def test_a_class_has_one_colour_in_every_picture() -> None:
-    tree = learnt(12)
-    codes = {box.code for box in boxes_of(tree, None) if box.title == "class 3"}
-    assert codes == {tree.classes.index("class 3")}
-
-
-def test_combinations_are_written_below_the_tree() -> None:
-    tree = slanted()
-    wanted = {node.variable for node in tree.nodes}
-    made = [v for v in tree.variables if v.parts and v.name in wanted]
-    assert made
-    notes = [text for text in said(plots.draw_tree(tree)) if " \u2248 " in text]
-    assert {note.split(" \u2248 ")[0] for note in notes} == {v.name for v in made}
-
-
-def test_names_with_signs_of_formulas_or_many_letters_do_no_harm() -> None:
-    name = "$\\frac{1}{" + "x" * 1000
-    tree = ft.learn(
-        ft.table(np.array([[0.0], [0.1], [5.0], [5.1]]), columns=["$x_1$"]),
-        target=["$a", "$a", name, name],
-    )
-    figure = plots.draw_tree(tree)
-    drawn(figure, ".png")
-    assert "$x_1$?" in said(figure)
-    assert figure.get_figwidth() < 16.0
-
-
-def test_a_tree_of_too_many_leaves_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert MOST_LEAVES == 200
-    monkeypatch.setattr("fuzzytree.report.plots.trees.MOST_LEAVES", 2)
-    with pytest.raises(ValueError, match="at most") as caught:
-        plots.draw_tree(learnt(3))
-    assert str(caught.value) == (
-        "a picture shows at most 2 leaves, and grid has 3; "
-        "learn a smaller tree, or read its rules"
-    )
-
-
-def test_a_tree_of_too_many_levels_is_refused() -> None:
-    tree = comb(90)
-    boxes = boxes_of(tree, None)
-    height = placed(boxes) / 72
-    width = (max(box.left for box in boxes) + 184) / 72
-    with pytest.raises(ValueError, match="inches") as caught:
-        plots.draw_tree(tree)
-    assert str(caught.value) == (
-        f"a picture of comb would be {width:.0f} x {height:.0f} inches; "
-        "learn a smaller tree, or read its rules"
-    )
-
-
 def test_a_confusion_shows_counts_rates_and_the_whole() -> None:
     figure = draw_confusion(np.array([[48, 2, 0], [7, 42, 1]]), ["bar", "disc"])
     assert said(figure) >= {
@@ -332,7 +189,6 @@ def test_tables_that_are_no_confusion_are_refused(
 def pictures() -> list[Figure]:
     return [
         draw_frames([FRAME, FRAME], axes=[None, FrameAxis(0.0, 0.0, 45.0)]),
-        plots.draw_tree(learnt(3)),
         draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
     ]
 
@@ -355,15 +211,12 @@ def test_a_users_settings_change_nothing() -> None:
 def test_drawing_without_matplotlib_says_what_installs_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    tree = learnt(2)
-
     def none(_name: str) -> None:
         return None
 
     monkeypatch.setattr(importlib.util, "find_spec", none)
     draws: list[Callable[[], object]] = [
         lambda: draw_frames([FRAME]),
-        lambda: plots.draw_tree(tree),
         lambda: draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
     ]
     for draw in draws:

@@ -1,8 +1,4 @@
-"""A sheet of paper for pictures, and pictures as SVG or PNG files.
-
-The axes of a sheet are in inches; words are measured before they stand. The same
-picture gives the same bytes.
-"""
+"""Pictures by matplotlib as SVG or PNG files; the same picture gives the same bytes."""
 
 from __future__ import annotations
 
@@ -18,7 +14,6 @@ from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import PathLike, write_atomically
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SUFFIXES = (".svg", ".png")
@@ -78,69 +73,6 @@ def drawn(figure: Figure, suffix: str) -> bytes:
 
 SIZE = 8.0
 """Of letters, in points."""
-
-LINE, FAINT, WORD = "#8c959f", "#57606a", "#24292f"
-"""The colours of lines, of words beside others, and of words."""
-
-MARGIN = 0.16
-"""Around a picture, in inches."""
-
-TITLE = 0.36
-"""Of the words above a picture, in inches."""
-
-
-class Sheet:
-    """A figure whose axes count inches, x to the right and y down, without lines."""
-
-    def __init__(self) -> None:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        self.figure: Figure = Figure()
-        canvas: Any = FigureCanvasAgg(self.figure)
-        self._renderer: Any = canvas.get_renderer()
-        self.axes: Axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        self.axes.set_axis_off()
-
-    def width(self, text: str, size: float = SIZE, *, bold: bool = False) -> float:
-        """Return how wide words are, in inches."""
-        drawn = self.figure.text(
-            0,
-            0,
-            text,
-            fontsize=size,
-            fontweight="bold" if bold else "normal",
-            parse_math=False,
-        )
-        wide: float = drawn.get_window_extent(self._renderer).width
-        drawn.remove()
-        return wide / self.figure.dpi
-
-    def resize(self, width: float, height: float) -> None:
-        """Make the sheet this large."""
-        self.figure.set_size_inches(width, height)
-        self.axes.set_xlim(0.0, width)
-        self.axes.set_ylim(height, 0.0)
-
-    def write(self, x: float, y: float, text: str, **style: Any) -> None:
-        """Write words; a name with the signs of a formula is no formula.
-
-        Args:
-            x: In inches from the left.
-            y: In inches from the top.
-            text: The words.
-            style: What matplotlib's `Text` takes, other than small, faint words whose
-                left end stands at x, and whose middle at y.
-        """
-        usual = {"fontsize": SIZE, "color": FAINT, "va": "center_baseline"}
-        fixed = {"rotation_mode": "anchor", "parse_math": False, "zorder": 3}
-        whole: dict[str, Any] = {**usual, **style, **fixed}
-        self.axes.text(x, y, text, **whole)
-
-    def write_title(self, text: str) -> None:
-        """Write words at the top."""
-        style = {"fontsize": SIZE + 3, "fontweight": "bold", "color": "black"}
-        self.write(MARGIN, MARGIN, text, va="top", **style)
 
 
 def short(text: str, longest: int) -> str:
