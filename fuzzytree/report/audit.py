@@ -24,6 +24,8 @@ from fuzzytree.report.audit_states import (
     SEVERITIES,
     STATES,
     as_in_file,
+    gravest_first,
+    known_as,
     result_text,
     state_text,
     state_word,
@@ -38,7 +40,6 @@ MOST_FINDINGS: Final = 200
 _MOST_SHORT = 8  # findings, unless all are printed
 _MOST_EVIDENCE = 2  # of them that are printed with their evidence
 _MOST_CALM = 40  # lines of answers that are no findings, unless all are wanted
-_MOST_ALIKE = 3  # of one code that are open
 _MOST_INPUTS = 12  # of a point or region on the terminal
 _LONGEST_NAME = 60  # above the findings
 _SHOWN = 84  # characters of a source line
@@ -63,10 +64,8 @@ ORIGINS: Mapping[str, str] = {
 """Where the ends of a variable's domain come from."""
 
 _Paint = Callable[[str, str], str]
-_SUMMARY = (
-    *("code", "question", "count", "found"),
-    *map(str.lower, STATES),
-)
+SUMMARY = ("code", "question", "count", "found", *map(str.lower, STATES))
+"""Above the columns of `summary_rows`."""
 
 
 def audit_lines(
@@ -94,118 +93,130 @@ def audit_lines(
     """
     audit = as_in_file(audit)
     paint = _painted if is_coloured else _plain
+    is_verbose |= is_whole
     yield from wrapped(audit_verdict(audit, gone), WIDTH, rest="  ")
-    findings = sorted(audit.open_findings, key=_gravity)
-    if not (is_verbose or is_whole):
-        yield from _short(audit, findings, paint)
+    yield from _head(audit, is_verbose=is_verbose)
+    findings = gravest_first(audit.open_findings)
+    most = MOST_FINDINGS if is_verbose else _MOST_SHORT
+    most = len(findings) if is_whole else most
+    for place, answer in enumerate(findings[:most]):
+        yield from _sentence(answer, audit, paint)
+        if is_verbose:
+            yield from _quoted(answer.places[:1], source)
+            yield from _evidence(answer, paint)
+            yield ""
+        elif place < _MOST_EVIDENCE and answer.severity != "info":
+            yield from _evidence(answer, paint, only=2)
+    if rest := Counter(one.code for one in findings[most:]):
+        said = ", ".join(f"{code} ({count})" for code, count in rest.items())
+        count = counted(rest.total(), "more finding")
+        option = "--all" if is_verbose else "--verbose"
+        yield from wrapped(f"{count}: {said}; {option} lists all", WIDTH, rest="  ")
+    if not is_verbose:
+        yield from _brief("the row of --row", _of_row(audit.answers), paint)
+        states = [f"{n} {word}" for word, n in known_as(audit.answers).items() if n]
+        count = counted(len(audit.answers), "question")
+        yield f"{count}: {', '.join(states) or 'none'}"
+        missed = [text for text in audit.unasked if "left out by the user" not in text]
+        if missed:
+            yield f"not examined, or not to the end: {counted(len(missed), 'code')}"
+        yield (
+            f"this audit does not establish {counted(len(audit.limits), 'thing')}; "
+            "--verbose lists them, with the evidence of each finding"
+        )
         return
-    yield from _head(audit)
-    yield ""
-    for answer in findings if is_whole else findings[:MOST_FINDINGS]:
-        yield from _finding(answer, audit, source, paint)
-        yield ""
-    if len(findings) > MOST_FINDINGS and not is_whole:
-        rest = counted(len(findings) - MOST_FINDINGS, "more finding")
-        yield f"and {rest}; --all lists each"
-        yield ""
     if audit.accepted:
         yield f"{counted(len(audit.accepted), 'accepted finding')} of the baseline"
         yield ""
     yield from _calm(audit, paint, is_whole=is_whole)
-    yield from summary_lines(audit)
-    yield from _declined(audit, is_whole=is_whole)
+    yield from aligned([SUMMARY, *summary_rows(audit)])
     if audit.unasked:
-        yield ""
-        yield "not examined, or not to the end"
+        yield from ("", "not examined, or not to the end")
         yield from (line for text in gathered(audit.unasked) for line in _item(text))
-    yield ""
-    yield "this audit does not establish"
+    yield from ("", "this audit does not establish")
     yield from (line for text in audit.limits for line in _item(text))
 
 
-def _short(
-    audit: Audit, findings: Sequence[AuditAnswer], paint: _Paint
-) -> Iterator[str]:
-    """Yield the gravest findings, the first with their evidence, and counts."""
-    yield _title(audit)
-    for result in audit.results:
-        yield f"results  {_name(result.file.name)}: {result_text(result)}"
-    for place, answer in enumerate(findings[:_MOST_SHORT]):
-        yield from _sentence(answer, audit, paint)
-        if place < _MOST_EVIDENCE and answer.severity != "info":
-            yield from _evidence(answer, paint, only=2)
-    if len(findings) > _MOST_SHORT:
-        codes = Counter(one.code for one in findings[_MOST_SHORT:])
-        said = ", ".join(f"{code} ({count})" for code, count in codes.items())
-        rest = counted(len(findings) - _MOST_SHORT, "more finding")
-        yield from wrapped(f"{rest}: {said}; --verbose lists all", WIDTH, rest="  ")
-    of_row = [o for o in audit.answers if (o.code, o.subject) == ("FT204", "row")]
-    yield from _brief("the row of --row", of_row, paint)
-    states = Counter(state_word(one.state) for one in audit.answers)
-    counts = [f"{states[word]} {word}" for word in STATES if states[word]]
-    yield f"{counted(len(audit.answers), 'question')}: {', '.join(counts) or 'none'}"
-    missed = [text for text in audit.unasked if "left out by the user" not in text]
-    if missed:
-        yield f"not examined, or not to the end: {counted(len(missed), 'code')}"
-    limits = counted(len(audit.limits), "thing")
-    yield (
-        f"this audit does not establish {limits}; --verbose lists them, with the "
-        "evidence of each finding"
-    )
-
-
-def summary_lines(audit: Audit) -> Iterator[str]:
+def summary_rows(audit: Audit) -> Iterator[Sequence[str]]:
     """Yield how many questions each code has, and how each answer is known."""
-    rows: list[Sequence[str]] = [_SUMMARY]
-    codes = dict.fromkeys(answer.code for answer in audit.answers)
-    for code in codes:
-        answers = [one for one in audit.answers if one.code == code]
-        title = CODES[code].title if code in CODES else ""
-        title = title.removeprefix("declined: ")
-        rows.append((code, title, *_counts(answers)))
-    rows.append(("all", "", *_counts(audit.answers)))
-    yield from aligned(rows)
+    groups: dict[str, list[AuditAnswer]] = {}
+    for answer in audit.answers:
+        groups.setdefault(answer.code, []).append(answer)
+    for code, answers in (*groups.items(), ("all", audit.answers)):
+        title = CODES[code].title.removeprefix("declined: ") if code in CODES else ""
+        findings = sum(answer.is_finding for answer in answers)
+        counts = (len(answers), findings, *known_as(answers).values())
+        yield code, title, *(str(count) if count else "-" for count in counts)
 
 
 def audit_verdict(audit: Audit, gone: Collection[str] = ()) -> str:
     """Return what an audit found, in a sentence, and what one might do next."""
     findings = audit.open_findings
-    said = _by_severity(findings) if findings else "nothing found"
-    if audit.accepted:
-        said += f" beside {len(audit.accepted)} accepted"
-    if audit.was_interrupted:
-        said += "; interrupted: what is proved is kept, the rest is not examined"
-    elif not audit.is_complete:
-        said += "; incomplete: the budget is spent (--budget SECONDS)"
+    said = [found_text(audit)]
+    if not audit.is_complete:
+        said.append(asked_text(audit))
     if gone:
         ids = counted(len(gone), "accepted finding")
-        said += f"; {ids} no longer found, which --write-baseline forgets"
+        said.append(f"{ids} no longer found, which --write-baseline forgets")
     if findings:
-        gravest = min(findings, key=_gravity).code
-        said += f"; `fuzzytree explain {gravest}` explains the gravest"
+        gravest = gravest_first(findings)[0].code
+        said.append(f"`fuzzytree explain {gravest}` explains the gravest")
     elif audit.is_complete:
-        said += f"; {_asked_text(audit)}"
-    return said
+        said.append(asked_text(audit))
+    return "; ".join(said)
+
+
+def found_text(audit: Audit) -> str:
+    """Return how many findings of each severity an audit has that are not accepted."""
+    findings = audit.open_findings
+    severities = Counter(one.severity for one in findings)
+    listed = ", ".join(
+        counted(severities[one], noun)
+        for one, noun in SEVERITIES.items()
+        if severities[one]
+    )
+    said = f"{counted(len(findings), 'finding')}: {listed}"
+    accepted = f" beside {len(audit.accepted)} accepted" if audit.accepted else ""
+    return f"{said if findings else 'nothing found'}{accepted}"
+
+
+def asked_text(audit: Audit) -> str:
+    """Return whether an audit is complete, and how much of it is open or declined."""
+    if audit.was_interrupted:
+        return "interrupted: what is proved is kept, the rest is not examined"
+    if not audit.is_complete:
+        return "incomplete: the budget is spent (--budget SECONDS)"
+    if not audit.answers:
+        return "no question applies to this model"
+    states = known_as(audit.answers)
+    count = counted(len(audit.answers), "question")
+    declined = [o.state.code for o in audit.answers if isinstance(o.state, Declined)]
+    if len(declined) == len(audit.answers):
+        return (
+            f"{count}, all declined: nothing is known; "
+            f"`fuzzytree explain {declined[0]}` explains why"
+        )
+    kinds = (("open", states["BRACKET"]), ("declined", states["DECLINED"]))
+    others = [f"{n} {word}" for word, n in kinds if n]
+    return f"{count}, {' and '.join(others)}" if others else f"{count} answered"
 
 
 # --- parts
 
 
-def _title(audit: Audit) -> str:
-    policy = audit.policy
+def _head(audit: Audit, *, is_verbose: bool) -> Iterator[str]:
+    """Yield what was audited, and on which domain."""
     decides = "the strongest rule decides"
-    if policy.decision == "all":
+    if audit.policy.decision == "all":
         decides = "every rule takes part"
-    means = f"AND is {policy.conjunction}, {decides}"
-    return f"{_name(audit.model)}: audited as {audit.form}; {means}"
-
-
-def _head(audit: Audit) -> Iterator[str]:
-    yield _title(audit)
-    if audit.data is not None:
+    means = f"AND is {audit.policy.conjunction}, {decides}"
+    yield f"{_name(audit.model)}: audited as {audit.form}; {means}"
+    if audit.data is not None and is_verbose:
         yield f"rows     {audit.rows} of {_name(audit.data.name)}"
     for result in audit.results:
         yield f"results  {_name(result.file.name)}: {result_text(result)}"
+    if not is_verbose:
+        return
     sides = audit.domain.sides
     rows = [
         (
@@ -219,21 +230,13 @@ def _head(audit: Audit) -> Iterator[str]:
     yield from aligned(rows) if rows else ["  none: the model has no inputs"]
     if len(sides) > _MOST_INPUTS:
         yield f"  and {counted(len(sides) - _MOST_INPUTS, 'more variable')}"
+    yield ""
 
 
 def _name(text: str) -> str:
     """Return a name as it fits into a line."""
     shown = text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 1]}…"
     return printable(shown)
-
-
-def _finding(
-    answer: AuditAnswer, audit: Audit, source: Sequence[str], paint: _Paint
-) -> Iterator[str]:
-    yield from _sentence(answer, audit, paint)
-    if answer.places:
-        yield from _quoted(answer.places[0], source)
-    yield from _evidence(answer, paint)
 
 
 def _sentence(answer: AuditAnswer, audit: Audit, paint: _Paint) -> Iterator[str]:
@@ -299,9 +302,10 @@ def _measure_text(measure: Measure) -> str:
     return f"{measure.name} {number(measure.value)}{unit}"
 
 
-def _quoted(place: FileLocation, source: Sequence[str]) -> Iterator[str]:
-    """Yield the line of the file that a place is in, and a caret below it."""
-    if not 0 < place.line <= len(source):
+def _quoted(places: Sequence[FileLocation], source: Sequence[str]) -> Iterator[str]:
+    """Yield the line of the file that a place is in, if any, and a caret below it."""
+    place = places[0] if places else None
+    if place is None or not 0 < place.line <= len(source):
         return
     line = source[place.line - 1].replace("\t", " ")
     begin = max(0, place.column - 1 - _SHOWN // 2) if len(line) > _SHOWN else 0
@@ -312,94 +316,56 @@ def _quoted(place: FileLocation, source: Sequence[str]) -> Iterator[str]:
     yield f"  {margin} | {' ' * (place.column - 1 - begin)}^"
 
 
-def _counts(answers: Sequence[AuditAnswer]) -> Iterator[str]:
-    words = [state_word(answer.state) for answer in answers]
-    findings = sum(answer.is_finding for answer in answers)
-    counts = [len(answers), findings]
-    counts += [words.count(word) for word in STATES]
-    yield from (str(count) if count else "-" for count in counts)
-
-
-def _gravity(answer: AuditAnswer) -> int:
-    return [*SEVERITIES].index(answer.severity)
-
-
-def _by_severity(findings: Sequence[AuditAnswer]) -> str:
-    counts = [
-        counted(sum(one.severity == severity for one in findings), SEVERITIES[severity])
-        for severity in SEVERITIES
-        if any(one.severity == severity for one in findings)
-    ]
-    return f"{counted(len(findings), 'finding')}: {', '.join(counts)}"
-
-
 def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
-    """Yield the answers that are no findings and were not declined, a line each.
+    """Yield the answers that are no findings, a line each.
 
     Unless all are wanted, only those about the row that was given and those that are
     open: the others are counted.
     """
     answers = [one for one in audit.answers if not one.is_finding]
-    answers = [one for one in answers if not isinstance(one.state, Declined)]
     if is_whole:
         yield from _brief("answers that are no findings", answers, paint)
         return
-    of_row = [one for one in answers if (one.code, one.subject) == ("FT204", "row")]
+    of_row = _of_row(answers)
     rest = [one for one in answers if one not in of_row]
-    unsure = [one for one in rest if isinstance(one.state, Bracket)]
-    shown = [*_first(unsure)][:_MOST_CALM]
+    unsure = [one for one in rest if isinstance(one.state, Bracket | Declined)]
     yield from _brief("the row that was given", of_row, paint)
-    yield from _brief("open", shown, paint, len(unsure) - len(shown))
+    yield from _brief("open", unsure, paint, most=_MOST_CALM)
     if sure := len(rest) - len(unsure):
         verb = "is no finding" if sure == 1 else "are no findings"
-        what = "more answer" if of_row or shown else "answer"
+        what = "more answer" if of_row or unsure else "answer"
         yield f"{counted(sure, what)} {verb}; --all lists each"
         yield ""
 
 
+def _of_row(answers: Iterable[AuditAnswer]) -> list[AuditAnswer]:
+    """Return the answers about the row that was given."""
+    return [one for one in answers if (one.code, one.subject) == ("FT204", "row")]
+
+
 def _brief(
-    title: str, answers: Sequence[AuditAnswer], paint: _Paint, more: int = 0
+    title: str, answers: Sequence[AuditAnswer], paint: _Paint, most: int | None = None
 ) -> Iterator[str]:
     """Yield answers by their sentences, below a title, and how many more there are."""
     if not answers:
         return
     yield title
-    for answer in answers:
+    for answer in answers[:most]:
         word = state_word(answer.state)
-        first, *rest = wrapped(answer.sentence, WIDTH - 17) or [""]
+        said = answer.sentence
+        match answer.state:
+            case Declined(reason=reason) if reason not in said:
+                said += f" ({state_text(answer.state)})"
+            case Declined(code=code) if code != answer.code:
+                said += f" ({code})"
+            case _:
+                pass
+        first, *rest = wrapped(said, WIDTH - 17) or [""]
         yield f"  {answer.code} {paint(f'{word:8}', word)} {first}".rstrip()
         yield from (f"{' ' * 17}{line}" for line in rest)
-    if more:
-        yield f"  and {more} more; --all lists each"
+    if most is not None and len(answers) > most:
+        yield f"  and {len(answers) - most} more; --all lists each"
     yield ""
-
-
-def _first(answers: Sequence[AuditAnswer]) -> Iterator[AuditAnswer]:
-    """Yield the first few answers of each code."""
-    counts: Counter[str] = Counter()
-    for answer in answers:
-        counts[answer.code] += 1
-        if counts[answer.code] <= _MOST_ALIKE:
-            yield answer
-
-
-def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
-    """Yield the declined questions that are no findings, and why."""
-    states = [(one, one.state) for one in audit.answers if not one.is_finding]
-    texts = [
-        f"{answer.code} {answer.subject}: "
-        f"{state_text(state).removeprefix(f'{answer.code}: ')}"
-        for answer, state in states
-        if isinstance(state, Declined)
-    ]
-    if not texts:
-        return
-    yield ""
-    yield "declined"
-    for text in texts if is_whole else texts[:_MOST_CALM]:
-        yield from _item(text)
-    if len(texts) > _MOST_CALM and not is_whole:
-        yield f"- and {len(texts) - _MOST_CALM} more; --all lists each"
 
 
 def gathered(unasked: Sequence[str]) -> Iterator[str]:
@@ -415,26 +381,6 @@ def gathered(unasked: Sequence[str]) -> Iterator[str]:
     for reason, texts in alike.items():
         codes = ", ".join(text.split()[0] for text in texts)
         yield f"{codes}: {reason}" if reason and len(texts) > 1 else texts[0]
-
-
-def _asked_text(audit: Audit) -> str:
-    """Return how many questions were examined, and how many are open or declined."""
-    if not audit.answers:
-        return "no question applies to this model"
-    count = counted(len(audit.answers), "question")
-    kinds = {"open": Bracket, "declined": Declined}
-    counts = {
-        word: sum(isinstance(one.state, kind) for one in audit.answers)
-        for word, kind in kinds.items()
-    }
-    declined = [o.state.code for o in audit.answers if isinstance(o.state, Declined)]
-    if counts["declined"] == len(audit.answers):
-        return (
-            f"{count}, all declined: nothing is known; "
-            f"`fuzzytree explain {declined[0]}` explains why"
-        )
-    others = [f"{n} {word}" for word, n in counts.items() if n]
-    return f"{count}, {' and '.join(others)}" if others else f"{count} answered"
 
 
 def _item(text: str) -> Iterator[str]:

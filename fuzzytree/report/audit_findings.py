@@ -18,7 +18,6 @@ from fuzzytree.auditing import (
     point_of,
 )
 from fuzzytree.model import RuleBase
-from fuzzytree.report.audit_states import SEVERITIES
 from fuzzytree.report.drawing import Axis, Markup
 from fuzzytree.report.parts import part
 from fuzzytree.report.svg_terms import bar_picture, map_picture, span_text, windows
@@ -49,12 +48,6 @@ def anchors(findings: Sequence[AuditAnswer]) -> list[str]:
         is_plain = _PLAIN.fullmatch(answer.id) and answer.id not in names
         names[answer.id if is_plain else f"finding_{place}"] = None
     return [*names]
-
-
-def gravest_first(findings: Sequence[AuditAnswer]) -> list[AuditAnswer]:
-    """Return findings by severity, then by code, else in their order."""
-    order = {severity: place for place, severity in enumerate(SEVERITIES)}
-    return sorted(findings, key=lambda one: (order[one.severity], one.code))
 
 
 def findings_section(

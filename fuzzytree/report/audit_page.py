@@ -19,7 +19,6 @@ from fuzzytree.report.audit_findings import (
     anchors,
     facts_section,
     findings_section,
-    gravest_first,
 )
 from fuzzytree.report.audit_model import rules_section, terms_section, tree_section
 from fuzzytree.report.audit_rows import data_of, passing
@@ -27,6 +26,7 @@ from fuzzytree.report.audit_states import (
     SEVERITIES,
     STATES,
     as_in_file,
+    gravest_first,
     known_as,
     result_text,
     state_note,

@@ -149,6 +149,12 @@ def _level(level: str | None) -> str:
         return level
 
 
+def gravest_first(findings: Sequence[AuditAnswer]) -> list[AuditAnswer]:
+    """Return findings by severity, then by code, else in their order."""
+    order = [*SEVERITIES]
+    return sorted(findings, key=lambda one: (order.index(one.severity), one.code))
+
+
 def known_as(answers: Sequence[AuditAnswer]) -> dict[str, int]:
     """Return how many answers have each state, in the order of `STATES`."""
     counts = dict.fromkeys(STATES, 0)
