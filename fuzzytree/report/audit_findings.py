@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from fuzzytree.auditing import (
     CODES,
@@ -26,17 +26,11 @@ from fuzzytree.report.text import counted
 MOST_FINDINGS = 300
 """The most that are listed one by one."""
 
-MOST_PICTURED = 30
-"""That have pictures: the first, and the gravest stand first."""
-
-MOST_MAPPED = 10
-"""That have maps of the decision: one takes up to a second."""
+MOST_PICTURED = 10
+"""That have pictures, a map of the decision among them, which takes up to a second."""
 
 MOST_WHOLE = 3
 """Of a code that are shown whole; of the others all but errors are folded."""
-
-MOST_FACTS = 8
-"""The most facts of a code, beside its findings."""
 
 _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
 
@@ -58,9 +52,6 @@ def findings_section(
     shown = [*zip(findings, names, strict=True)][:MOST_FINDINGS]
     groups: dict[tuple[Severity, str], list[ShownFinding]] = {}
     for place, (answer, name) in enumerate(shown):
-        drawn: Drawn = "nothing" if place >= MOST_PICTURED else "bars"
-        if place < MOST_MAPPED:
-            drawn = "maps"
         group = groups.setdefault((answer.severity, answer.code), [])
         group.append(
             ShownFinding(
@@ -70,18 +61,15 @@ def findings_section(
                 answer.severity == "error" or len(group) < MOST_WHOLE,
                 _concerned(answer, scene),
                 _region_text(answer.region, scene),
-                None if drawn == "nothing" else pictures(answer, name, scene, drawn),
+                pictures(answer, name, scene) if place < MOST_PICTURED else None,
             )
         )
     notes: list[str] = []
     if len(findings) > len(shown):
         more = counted(len(findings) - len(shown), "more finding")
         notes.append(f"{more}: the JSON has all of them")
-    if len(shown) > MOST_MAPPED:
-        said = f"Only the first {MOST_MAPPED} findings have maps"
-        if len(shown) > MOST_PICTURED:
-            said += f", and the first {MOST_PICTURED} pictures of variables"
-        notes.append(said)
+    if len(shown) > MOST_PICTURED:
+        notes.append(f"Only the first {MOST_PICTURED} findings have pictures")
     known = [(code, _explanations(code), some) for (_, code), some in groups.items()]
     return part("findings", known, notes)
 
@@ -110,24 +98,6 @@ def _explanations(code: str) -> list[tuple[str, str]]:
         ("What to do", known.remedy),
     )
     return [(title, words) for title, words in texts if words]
-
-
-def facts_section(answers: Sequence[AuditAnswer]) -> Markup | None:
-    """Return what else is known: answers that are no findings and have numbers.
-
-    What rows say of single rules is not among them: it stands in the table of rules.
-    """
-    groups: dict[str, list[AuditAnswer]] = {}
-    for answer in answers:
-        has_numbers = bool(answer.measures or answer.region)
-        is_of_rule = answer.code == "FT701" and answer.rules
-        if has_numbers and not answer.is_finding and not is_of_rule:
-            groups.setdefault(answer.code, []).append(answer)
-    shown = [
-        (code, known[:MOST_FACTS], len(known) - MOST_FACTS)
-        for code, known in groups.items()
-    ]
-    return part("facts", shown) if shown else None
 
 
 def _region_text(region: Sequence[Span], scene: Scene) -> str:
@@ -160,9 +130,6 @@ def _concerned(answer: AuditAnswer, scene: Scene) -> list[str]:
 _MOST_BARS = 6  # of one finding
 _MOST_MAP_RULES = 200
 
-Drawn = Literal["nothing", "bars", "maps"]
-"""Which pictures a finding has: maps stand beside bars."""
-
 
 class Scene(NamedTuple):
     """All variables by name, and the rules as they are audited."""
@@ -177,7 +144,7 @@ class Scene(NamedTuple):
         return self.viewed.rules if is_strongest else None
 
 
-def pictures(answer: AuditAnswer, name: str, scene: Scene, drawn: Drawn) -> Markup:
+def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
     """Return the region as pictures: a bar for each variable, a map of two."""
     point: dict[str, Fraction] = {}
     if isinstance(answer.state, (Witness, Bracket)):
@@ -200,7 +167,7 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene, drawn: Drawn) -> Mark
     ]
     undrawn = ", ".join(axis.name for axis in shown[_MOST_BARS:])
     maps: list[tuple[Markup | None, str]] = []
-    for whose, rules in _deciding(answer, scene) if drawn == "maps" else ():
+    for whose, rules in _deciding(answer, scene):
         mapped = _mapped(shown, rules, whose, scene)
         maps += _maps(mapped, region, values, f"{name}-{len(maps)}", whose, rules)
     return part("pictures", bars, undrawn, maps)

@@ -7,30 +7,32 @@ the page's own style and script, named by their digests, and nothing else.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.auditing import CODES, Audit, AuditAnswer, AuditRows, Declined, view
+from fuzzytree.auditing import Audit, AuditAnswer, AuditRows, Declined, view
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
-from fuzzytree.report.audit import ORIGINS, gathered
+from fuzzytree.report.audit import (
+    ORIGINS,
+    SUMMARY,
+    asked_text,
+    found_text,
+    gathered,
+    summary_rows,
+)
 from fuzzytree.report.audit_findings import (
     Scene,
     anchors,
-    facts_section,
     findings_section,
 )
 from fuzzytree.report.audit_model import rules_section, terms_section, tree_section
 from fuzzytree.report.audit_rows import data_of, passing
 from fuzzytree.report.audit_states import (
-    SEVERITIES,
-    STATES,
     as_in_file,
     gravest_first,
     known_as,
     result_text,
     state_note,
-    state_word,
 )
 from fuzzytree.report.drawing import Markup, axes_of, joined
 from fuzzytree.report.parts import part, whole_page
@@ -75,7 +77,7 @@ def page(
         >>> tree, nothing = random_tree(1), Domain(())
         >>> audit = Audit("0.1", tree.name, "tree", "", None, None, 0,
         ...     Policy("min", "strongest"), nothing, AuditSettings(), (), (), (), True)
-        >>> "Nothing was found" in page(audit, tree)
+        >>> "Nothing found" in page(audit, tree)
         True
     """
     audit = as_in_file(audit)
@@ -109,9 +111,6 @@ def _sections(
     scene = Scene(axes, viewed)
     shown = findings_section(findings, scene, audit.accepted)
     yield "findings", "Findings", shown
-    facts = facts_section(audit.answers)
-    if facts is not None:
-        yield "facts", "What else is known", facts
     yield "questions", "All questions", _questions(audit)
     if agreement is not None:
         yield "agreement", "Agreement", agreement_section(agreement)
@@ -161,16 +160,6 @@ def _links(findings: Sequence[AuditAnswer]) -> dict[int, Markup]:
 
 
 def _questions(audit: Audit) -> Markup:
-    groups: dict[str, list[AuditAnswer]] = {}
-    for answer in audit.answers:
-        groups.setdefault(answer.code, []).append(answer)
-    summary: list[Sequence[str]] = []
-    for code, answers in groups.items():
-        title = CODES[code].title if code in CODES else ""
-        findings = sum(answer.is_finding for answer in answers)
-        states = [str(n) if n else "·" for n in known_as(answers).values()]
-        summary.append((code, title, str(len(answers)), str(findings), *states))
-    head = ("code", "question", "count", "findings", *map(str.lower, STATES))
     declined = [
         *dict.fromkeys(
             f"{one.subject}: {state_note(one.state)}"
@@ -181,21 +170,18 @@ def _questions(audit: Audit) -> Markup:
     if len(declined) > _MOST_DECLINED:
         more = len(declined) - _MOST_DECLINED
         declined[_MOST_DECLINED:] = [f"and {more} more in the JSON"]
-    each = [
-        (
-            answer.code,
-            answer.subject,
-            part("state", state_word(answer.state)),
-            "yes" if answer.is_finding else "no",
-            part("answer", answer.sentence, state_note(answer.state)),
-        )
-        for answer in audit.answers[:MOST_QUESTIONS]
-    ]
     title = f"Every question, {len(audit.answers)} in all"
     if len(audit.answers) > MOST_QUESTIONS:
         title += f"; the first {MOST_QUESTIONS} are here, the JSON has all"
-    unasked = [*gathered(audit.unasked)]
-    return part("questions", head, summary, unasked, declined, title, each)
+    return part(
+        "questions",
+        SUMMARY,
+        [*summary_rows(audit)],
+        [*gathered(audit.unasked)],
+        declined,
+        title,
+        audit.answers[:MOST_QUESTIONS],
+    )
 
 
 def _repeat(audit: Audit) -> Markup:
@@ -229,69 +215,39 @@ def _command(answers: Sequence[AuditAnswer]) -> str:
 
 
 _MOST_URGENT = 12  # findings that are named
-_MOST_ALIKE = 3  # of one code and severity
 
 
 def verdict(audit: Audit) -> Markup:
     """Return what was found, in words, and how it is known."""
-    findings = gravest_first(audit.open_findings)
     states = known_as(audit.answers)
-    sign, said = _result(findings, states, is_complete=audit.is_complete)
-    accepted = len(audit.findings) - len(findings)
-    if accepted:
-        said += f"; {counted(accepted, 'other')} {'is' if accepted == 1 else 'are'} "
-        said += "accepted"
-    questions = counted(len(audit.answers), "question")
-    whole = f"The audit is complete: {questions}, all answered or declined"
-    if not audit.is_complete:
-        by = "by hand" if audit.was_interrupted else "by its budget"
-        whole = f"The audit was cut short {by}: {questions} examined, others were not"
-    urgent = _urgent(findings, gravest_first(audit.findings))
-    return part("verdict", sign, said, whole, audit.is_complete, *urgent, states)
-
-
-def _result(
-    findings: Sequence[AuditAnswer], states: Mapping[str, int], *, is_complete: bool
-) -> tuple[str, str]:
-    """Return a sign and a sentence: what was found, and what that is worth."""
-    counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
-    listing = [
-        counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]
-    ]
-    if listing:
-        worst = next(one for one in SEVERITIES if counts[one])
-        verb = "was" if len(findings) == 1 else "were"
-        others = ", ".join(listing[:-1])
-        return worst, f"{others}{' and ' if others else ''}{listing[-1]} {verb} found"
-    whole, declined = sum(states.values()), states["DECLINED"]
-    if declined and declined == whole:
-        return "declined", "Nothing was decided: every question was declined"
-    said = "Nothing was found" if is_complete else "Nothing was found so far"
-    if declined:
-        said += f"; {declined} of {whole} questions were declined"
-    return "calm" if is_complete and not declined else "info", said
-
-
-def _urgent(
-    findings: Sequence[AuditAnswer], named: Sequence[AuditAnswer]
-) -> tuple[list[tuple[AuditAnswer, str, int]], int]:
-    """Return errors and warnings, each with its link and how often it stands.
-
-    Those that say the same are one. Behind them stands how many more there are.
-    """
-    listing = {id(one) for one in findings if one.severity != "info"}
+    found, said = found_text(audit), asked_text(audit)
+    open_ones = {id(one) for one in audit.open_findings if one.severity != "info"}
+    findings = gravest_first(audit.findings)
     urgent: dict[tuple[str, str], list[tuple[AuditAnswer, str]]] = {}
-    for one, name in zip(named, anchors(named), strict=True):
-        if id(one) in listing:
+    for one, name in zip(findings, anchors(findings), strict=True):
+        if id(one) in open_ones:
             urgent.setdefault((one.code, one.sentence), []).append((one, name))
-    shown: list[tuple[AuditAnswer, str, int]] = []
-    kinds: Counter[tuple[str, str]] = Counter()
-    for alike in urgent.values():
-        one, name = alike[0]
-        kinds[one.code, one.severity] += 1
-        if kinds[one.code, one.severity] <= _MOST_ALIKE and len(shown) < _MOST_URGENT:
-            shown.append((one, name, len(alike)))
-    return shown, len(urgent) - len(shown)
+    shown = [(*alike[0], len(alike)) for alike in urgent.values()]
+    return part(
+        "verdict",
+        _sign(audit, states),
+        f"{found[0].upper()}{found[1:]}",
+        f"{said[0].upper()}{said[1:]}",
+        audit.is_complete,
+        shown[:_MOST_URGENT],
+        len(shown) - _MOST_URGENT,
+        states,
+    )
+
+
+def _sign(audit: Audit, states: Mapping[str, int]) -> str:
+    """Return the icon of a verdict: no audit that left something open looks calm."""
+    if findings := gravest_first(audit.open_findings):
+        return findings[0].severity
+    declined = states["DECLINED"]
+    if declined and declined == len(audit.answers):
+        return "declined"
+    return "calm" if audit.is_complete and not declined else "info"
 
 
 _MOST_CALM = 12  # comparisons that agree and are not folded

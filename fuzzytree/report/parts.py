@@ -16,6 +16,7 @@ from fuzzytree.report.audit_states import (
     SEVERITIES,
     STATES,
     claims_text,
+    state_note,
     state_text,
     state_word,
 )
@@ -67,7 +68,7 @@ def title_of(code: str) -> str:
 def _macros() -> object:
     functions = (
         *(as_row, claims_text, class_mark, coordinates, counted, how_known),
-        *(measure_texts, state_word, text_lines, title_of),
+        *(measure_texts, state_note, state_word, text_lines, title_of),
     )
     known: dict[str, object] = {one.__name__: one for one in functions}
     known |= {"CERTIFIED": CERTIFIED, "COMPARISON": COMPARISON, "CRITERION": CRITERION}

@@ -46,7 +46,8 @@ grip.yaml: FT202 warning: rules 1 and 2 are equally strong on a part of the doma
 1 accepted finding of the baseline
 
 open
-  FT401 DECLINED the term 'low' of 'force' is not decided (FTD02: its curve (gaussian) has no exact
+  FT401 DECLINED the term 'low' of 'force' is not decided (FTD02: its curve (gaussian) \
+has no exact
                  method)
 
 1 more answer is no finding; --all lists each

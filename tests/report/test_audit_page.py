@@ -81,25 +81,25 @@ def shown(model: RuleBase | None = None, **fields: Any) -> Outline:
 
 def test_the_verdict_counts_findings_by_severity() -> None:
     text = shown().text
-    assert "1 error, 1 warning and 2 notes were found" in text
-    assert "The audit is complete: 10 questions, all" in text
+    assert "4 findings: 1 error, 1 warning, 2 notes" in text
+    assert "10 questions, 1 open and 1 declined" in text
 
 
 def test_an_audit_without_findings_says_so() -> None:
     clean = tuple(one for one in answers() if not one.is_finding)
     rules = rule_base()
     text = Outline(page(audit_of(rules, clean[:1]), rules)).text
-    assert "Nothing was found The audit is complete" in text
+    assert "Nothing found 1 question answered" in text
     assert "There is no finding" in text
     text = Outline(page(audit_of(rules, clean), rules)).text
-    assert "Nothing was found; 1 of 6 questions were declined" in text
+    assert "Nothing found 6 questions, 1 declined" in text
 
 
 def test_an_audit_that_decided_nothing_does_not_look_calm() -> None:
     declined = tuple(one for one in answers() if isinstance(one.state, Declined))
     rules = rule_base()
     content = page(audit_of(rules, declined), rules)
-    assert "Nothing was decided: every question was declined" in content
+    assert "all declined: nothing is known" in content
     assert 'class="said calm"' not in content
 
 
@@ -107,23 +107,23 @@ def test_an_audit_that_found_nothing_so_far_does_not_look_calm() -> None:
     rules = rule_base()
     clean = tuple(one for one in answers() if not one.is_finding)
     content = page(audit_of(rules, clean[:1], is_complete=False), rules)
-    assert "Nothing was found so far" in content
+    assert "Nothing found" in content
     assert 'class="said calm"' not in content
 
 
 def test_an_audit_that_was_cut_short_says_so_and_what_was_not_asked() -> None:
     unasked = ("FT501 complexity: not run: the budget of 1 s is spent",)
     text = shown(is_complete=False, unasked=unasked).text
-    assert "The audit was cut short by its budget: 10 questions examined" in text
+    assert "Incomplete: the budget is spent" in text
     assert unasked[0] in text
     by_hand = ("FT501 complexity: not run: interrupted",)
     text = shown(is_complete=False, unasked=by_hand).text
-    assert "The audit was cut short by hand" in text
+    assert "Interrupted: what is proved is kept" in text
 
 
 def test_an_accepted_finding_is_shown_but_not_counted() -> None:
     text = shown(accepted=("FT101-9f2c11ab",)).text
-    assert "1 warning and 2 notes were found; 1 other is accepted" in text
+    assert "3 findings: 1 warning, 2 notes beside 1 accepted" in text
     assert "rule 4 never wins" in text
 
 
@@ -208,11 +208,9 @@ def test_what_else_is_known_is_reported_with_its_numbers() -> None:
         is_finding=False,
         measures=(Measure("clauses", 7.0), Measure("index", 0.5, "1/2")),
     )
-    found = shown(found=(size,) * 20)
-    assert "4 rules with 7 clauses FT501 clauses 7 index 0.5 = 1/2" in found.text
-    assert "FT501: 12 more answers below" in found.text
-    assert "facts" in found.ids
-    assert "facts" not in shown(found=()).ids
+    found = shown(found=(size,))
+    said = "4 rules with 7 clauses all were counted clauses 7 index 0.5 = 1/2"
+    assert said in found.text
 
 
 def test_links_lead_somewhere_and_no_id_stands_twice() -> None:
@@ -362,8 +360,6 @@ def test_of_many_findings_of_a_code_the_first_are_whole() -> None:
     assert folded.index('<div class="rest">') < folded.index("8.666666666666666")
     found = Outline(content)
     assert found.text.count("Where it is, and how it is known") == 2
-    assert "and 2 more" in found.text
-    assert found.links.count("#FT301-3") == 0
     errors = [msgspec.structs.replace(one, severity="error") for one in gaps]
     assert '<div class="rest">' not in page(audit_of(rules, tuple(errors)), rules)
 
@@ -386,12 +382,10 @@ def test_what_is_too_much_is_left_out_and_counted(
 ) -> None:
     monkeypatch.setattr(audit_findings, "MOST_FINDINGS", 3)
     monkeypatch.setattr(audit_findings, "MOST_PICTURED", 2)
-    monkeypatch.setattr(audit_findings, "MOST_MAPPED", 1)
     monkeypatch.setattr(audit_page, "MOST_QUESTIONS", 4)
     found = shown()
     assert "1 more finding: the JSON has all of them" in found.text
-    said = "Only the first 1 findings have maps, and the first 2 pictures of variables"
-    assert said in found.text
+    assert "Only the first 2 findings have pictures" in found.text
     assert "Every question, 10 in all; the first 4 are here" in found.text
     assert {link.removeprefix("#") for link in found.links} <= set(found.ids)
 
