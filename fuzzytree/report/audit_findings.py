@@ -20,7 +20,7 @@ from fuzzytree.auditing import (
 from fuzzytree.model import RuleBase
 from fuzzytree.report.drawing import Axis, Markup
 from fuzzytree.report.parts import part
-from fuzzytree.report.svg_terms import bar_picture, map_picture, span_text, windows
+from fuzzytree.report.svg_terms import map_picture, span_text, terms_picture, windows
 from fuzzytree.report.text import counted
 
 MOST_FINDINGS = 300
@@ -156,12 +156,16 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
     values = _values(point, scene)
     shown = _concerning(answer, region, values, scene)
     bars = [
-        bar_picture(
-            axis,
-            region.get(axis.name),
-            _near(values, axis),
-            f"{name}-v{k}",
-            {one.term for one in answer.terms if one.variable == axis.name},
+        (
+            _bar_text(axis, region.get(axis.name), _near(values, axis)),
+            terms_picture(
+                axis,
+                None,
+                f"{name}-v{k}",
+                span=region.get(axis.name),
+                value=_near(values, axis),
+                named={one.term for one in answer.terms if one.variable == axis.name},
+            ),
         )
         for k, axis in enumerate(shown[:_MOST_BARS])
     ]
@@ -171,6 +175,12 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
         mapped = _mapped(shown, rules, whose, scene)
         maps += _maps(mapped, region, values, f"{name}-{len(maps)}", whose, rules)
     return part("pictures", bars, undrawn, maps)
+
+
+def _bar_text(axis: Axis, span: Span | None, value: float | None) -> str:
+    said = [span_text(span, axis.unit, 3)] if span else []
+    said += [] if value is None else [f"witness {value:.4g}"]
+    return f"{axis.name}: {'; '.join(said)}" if said else axis.name
 
 
 def _values(point: Mapping[str, Fraction], scene: Scene) -> dict[str, Fraction]:

@@ -64,8 +64,25 @@ def scale_of(axis: Axis, data: Data | None, start: float, end: float) -> Scale:
     return Scale(*spread(ends), start, end)
 
 
-def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
-    """Return the terms of a variable, over the histogram of its rows."""
+def terms_picture(
+    axis: Axis,
+    data: Data | None,
+    name: str,
+    *,
+    span: Span | None = None,
+    value: float | None = None,
+    named: Collection[str] | None = None,
+) -> Markup:
+    """Return the terms of a variable, over the histogram of its rows.
+
+    Args:
+        axis: The variable.
+        data: The rows.
+        name: Of the picture, unlike all others of the page.
+        span: A part of its values, which is hatched.
+        value: A point, which is marked.
+        named: The terms that a finding is about; the others are faint.
+    """
     x = scale_of(axis, data, _LEFT, _RIGHT)
     drawn = axis.curves[:MOST_CURVES]
     names = _placed(drawn, x)
@@ -73,9 +90,16 @@ def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
     y = Scale(0.0, 1.0, top + _PLOT, top)
     parts = [*_bins(axis, data, x, y)]
     parts += outside(axis, x, top - 4, y.start)
+    if span is not None:
+        start, end = _ends(span, x)
+        parts.append(_box(start, end, top - 4, y.start))
     parts.append(line(_LEFT, _RIGHT, y.start, y.start, "axis"))
-    parts += _curves(drawn, x, y)
+    parts += _curves(drawn, x, y, named)
     parts += _names(names, top)
+    if value is not None:
+        at = x.at(value)
+        parts.append(line(at, at, top - 4, y.start, "pin"))
+        parts.append(tag("path", d=_diamond(at, y.start), class_="witness"))
     if len(names) < len(axis.curves):
         said = f"+ {len(drawn) - len(names)} unnamed"
         if len(drawn) < len(axis.curves):
@@ -90,9 +114,9 @@ def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
 def _curves(
     curves: Sequence[Curve], x: Scale, y: Scale, named: Collection[str] | None = None
 ) -> Iterator[Markup]:
-    """Yield the curves of terms; all but those that are named are faint."""
-    for place, curve in enumerate(curves[:MOST_CURVES]):
-        is_faint = named is not None and curve.name not in named
+    """Yield the curves of terms; all but those that are named, if any, are faint."""
+    for place, curve in enumerate(curves):
+        is_faint = bool(named) and curve.name not in (named or ())
         yield tag(
             "path",
             tag("title", curve.name),
@@ -184,7 +208,6 @@ def _top(curve: Curve, x: Scale) -> float:
     return x.at(between(min(tops), max(tops), 0.5))
 
 
-_HIGH, _TOP, _BASE = 92.0, 22.0, 70.0  # of a bar
 _SLIVER = 3.0  # points: a region is drawn at least so wide
 
 _MAP_HIGH = 288.0
@@ -228,34 +251,6 @@ def _ends_text(span: Span, digits: int) -> tuple[str | None, str | None]:
     return _ends_text(span, digits + 1) if is_hidden else (low, high)
 
 
-def bar_picture(
-    axis: Axis,
-    span: Span | None,
-    value: float | None,
-    name: str,
-    named: Collection[str] = (),
-) -> Markup:
-    """Return a variable with its terms, a part of it, and a point on it."""
-    x = scale_of(axis, None, _LEFT, _RIGHT)
-    y = Scale(0.0, 1.0, _BASE, _TOP)
-    parts: list[Markup] = [*outside(axis, x, _TOP - 4, _BASE)]
-    if span is not None:
-        start, end = _ends(span, x)
-        parts.append(_box(start, end, _TOP - 4, _BASE))
-    parts += _curves(axis.curves, x, y, named)
-    parts.append(line(_LEFT, _RIGHT, _BASE, _BASE, "axis"))
-    said = span_text(span, axis.unit, 3) if span else ""
-    if value is not None:
-        parts += _pin(x.at(value), _TOP - 4, _BASE)
-        said += f"{'; ' if said else ''}witness {value:.4g}"
-    said = cut(said, 34)
-    room = (_RIGHT - _LEFT - 6.6 * len(said)) / (LETTER * 14.5)
-    parts.append(words(_LEFT, 12.0, cut(axis.name, room), "strong"))
-    parts.append(words(_RIGHT, 12.0, said, "small", "end"))
-    parts += axis_marks(x, _BASE)
-    return svg(WIDE, _HIGH, f"{axis.title}: {said}", said, *parts, name=name)
-
-
 def _ends(span: Span, x: Scale) -> tuple[float, float]:
     start = x.start if span.low is None else x.at(span.low)
     end = x.end if span.high is None else x.at(span.high)
@@ -267,11 +262,6 @@ def _ends(span: Span, x: Scale) -> tuple[float, float]:
 
 def _box(start: float, end: float, top: float, base: float) -> Markup:
     return rect(start, top, end - start, base - top, "region")
-
-
-def _pin(at: float, top: float, base: float) -> Iterator[Markup]:
-    yield line(at, at, top, base, "pin")
-    yield tag("path", d=_diamond(at, base), class_="witness")
 
 
 def _diamond(x: float, y: float) -> str:
@@ -324,13 +314,14 @@ def map_picture(
         (down.name, _middles(window.down)),
         values,
     )
-    parts = [*_cells(codes)]
+    cells, names = _cells(codes, rules.classes)
+    parts = cells
     spans = [region.get(axis.name) or Span(axis.name, None, None) for axis in axes]
     if any(axis.name in region for axis in axes):
         start, end = _ends(spans[0], x)
         low, high = _ends(spans[1], y)
         parts.append(_box(start, end, min(low, high), max(low, high)))
-    parts += _class_names(codes, rules.classes)
+    parts += names
     point = float(values[across.name]), float(values[down.name])
     if x.low <= point[0] <= x.high and y.low <= point[1] <= y.high:
         way = _diamond(x.at(point[0]), y.at(point[1]))
@@ -393,51 +384,40 @@ def _middles(ends: tuple[float, float]) -> list[float]:
     return [between(*ends, (k + 0.5) / _CELLS) for k in range(_CELLS)]
 
 
-def _cells(codes: IntArray) -> Iterator[Markup]:
-    """Yield the part of each class as one path, made of runs of cells in a line."""
+def _cells(
+    codes: IntArray, classes: Sequence[str]
+) -> tuple[list[Markup], list[Markup]]:
+    """Return the part of each class as a path of runs of cells, and their names.
+
+    A name stands in the longest run of its class.
+    """
     left, right, top, base = _MAP
     wide, high = (right - left) / _CELLS, (base - top) / _CELLS
     ways: dict[int, list[str]] = {}
+    longest: dict[int, tuple[int, float, float]] = {}
     for row, cells in enumerate(codes.tolist()):
         start = 0
         for place in range(1, _CELLS + 1):
             if place < _CELLS and cells[place] == cells[start]:
                 continue
-            x, y = left + start * wide, base - (row + 1) * high
+            code, x, y = cells[start], left + start * wide, base - (row + 1) * high
             run = f"M{trimmed(x)} {trimmed(y)}h{trimmed((place - start) * wide)}"
-            run += f"v{trimmed(high)}H{trimmed(x)}z"
-            ways.setdefault(cells[start], []).append(run)
+            ways.setdefault(code, []).append(f"{run}v{trimmed(high)}H{trimmed(x)}z")
+            middle = x + (place - start) * wide / 2.0
+            run_here = (place - start, middle, y + high / 2.0)
+            longest[code] = max(longest.get(code, run_here), run_here)
             start = place
+    parts: list[Markup] = []
+    names: list[Markup] = []
     for code, runs in sorted(ways.items()):
         mark = "none" if code < 0 else class_mark(code)
-        yield tag("path", d=Markup("".join(runs)), class_=f"cell {mark}")
-
-
-def _class_names(codes: IntArray, classes: tuple[str, ...]) -> Iterator[Markup]:
-    """Yield the name of each class where there is most room for it."""
-    left, right, top, base = _MAP
-    wide, high = (right - left) / _CELLS, (base - top) / _CELLS
-    for code in np.unique(codes).tolist():
-        row, place = _innermost(codes == code)
+        parts.append(tag("path", d=Markup("".join(runs)), class_=f"cell {mark}"))
+        _, x, y = longest[code]
         said = cut("no class" if code < 0 else classes[code], 18)
         half = LETTER * _MAP_FONT * len(said) / 2.0
-        middle = min(max(left + (place + 0.5) * wide, left + half), right - half)
-        yield words(middle, base - (row + 0.5) * high + 4, said, "on-map", "middle")
-
-
-def _innermost(is_here: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> list[int]:
-    """Return a cell of a set that is far from all that is not in it."""
-    kept = np.pad(is_here, 1)
-    while True:
-        inner = kept.copy()
-        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            inner &= np.roll(kept, step, axis)
-        if not inner.any():
-            break
-        kept = inner
-    cells = np.argwhere(kept)
-    row, place = cells[len(cells) // 2].tolist()
-    return [row - 1, place - 1]
+        x = min(max(x, left + half), right - half)
+        names.append(words(x, y + 4, said, "on-map", "middle"))
+    return parts, names
 
 
 def _marks_upwards(y: Scale, left: float) -> Iterator[Markup]:

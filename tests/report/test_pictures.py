@@ -38,7 +38,6 @@ from fuzzytree.report.drawing import (
     ticks,
 )
 from fuzzytree.report.svg_terms import (
-    bar_picture,
     decisions,
     map_picture,
     terms_picture,
@@ -145,7 +144,9 @@ def test_ticks_and_pictures_are_finite_whatever_the_range(
     data = data_of(_force(low, high), AuditRows("", np.array([[low, high, low]])))
     for drawn in (
         terms_picture(axis(low, high), data, "p"),
-        bar_picture(axis(low, high), Span("force", low, high), low, "q"),
+        terms_picture(
+            axis(low, high), data, "q", span=Span("force", low, high), value=low
+        ),
     ):
         assert not re.search("nan|inf", drawn)
 
