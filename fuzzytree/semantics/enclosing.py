@@ -43,10 +43,20 @@ class Interval(NamedTuple):
 
     def times(self, other: Interval) -> Interval:
         """Return bounds of the product."""
-        pairs = [(a, b) for a in self for b in other]
+        a, b = self
+        c, d = other
+        if not a and not b:
+            return self
+        if not c and not d:
+            return other
+        if a < 0.0 and c >= 0.0:
+            (a, b), (c, d) = other, self
+        if a >= 0.0:  # of the other one each end needs one product
+            low = _product(a if c >= 0.0 else b, c, -_INF)
+            return Interval(low, _product(b if d >= 0.0 else a, d, _INF))
         return Interval(
-            min(_product(a, b, -_INF) for a, b in pairs),
-            max(_product(a, b, _INF) for a, b in pairs),
+            min(_product(x, y, -_INF) for x in (a, b) for y in (c, d)),
+            max(_product(x, y, _INF) for x in (a, b) for y in (c, d)),
         )
 
     def inverse(self) -> Interval:
@@ -77,6 +87,8 @@ class Interval(NamedTuple):
 
 
 def _sum(a: float, b: float, to: float) -> float:
+    if not b:
+        return a
     total = a + b
     if math.isnan(total) or math.isinf(total):
         return (
@@ -91,7 +103,7 @@ def _product(a: float, b: float, to: float) -> float:
     if a == 0.0 or b == 0.0:
         return 0.0
     product = a * b
-    is_exact = (_halves(a) or _halves(b)) and abs(product) >= _LEAST
+    is_exact = abs(product) >= _LEAST and (_halves(a) or _halves(b))
     return product if is_exact else math.nextafter(product, to)
 
 
@@ -376,6 +388,15 @@ class Enclosed(Numbers[Jet]):
         return _truth(is_same, is_less or is_more)
 
 
+def plain_jet(function: MembershipFunction, low: float, high: float) -> Jet:
+    """Return bounds as `jet` does, less narrow where the two numbers are far apart."""
+    return function.degree(_OPEN, Jet(Interval(low, high), _ONE))
+
+
+_OPEN: Final = Enclosed(is_open=True)
+_CLOSED: Final = Enclosed(is_open=False)
+
+
 def jet(function: MembershipFunction, low: float, high: float) -> Jet:
     """Return bounds of a function at all values strictly between two numbers.
 
@@ -388,14 +409,12 @@ def jet(function: MembershipFunction, low: float, high: float) -> Jet:
         >>> near.slope.high < 0.0, near.bend.high < 0.0, near.value.width < 0.04
         (True, True, True)
     """
-    whole = function.degree(
-        Enclosed(is_open=True), Jet(Interval(low, high), _ONE, _ZERO)
-    )
+    whole = plain_jet(function, low, high)
     middle = low + (high - low) / 2.0
     if not low < middle < high or math.isinf(whole.slope.size):
         return whole
     far = Interval(low, high).minus(Interval(middle, middle))
-    point = function.degree(Enclosed(is_open=True), Jet(Interval(middle, middle), _ONE))
+    point = plain_jet(function, middle, middle)
     slope, value = whole.slope, point.value.plus(whole.slope.times(far))
     if math.isfinite(whole.bend.size) and math.isfinite(point.slope.size):
         slope = slope.within(point.slope.plus(whole.bend.times(far)))
@@ -417,5 +436,4 @@ def degree_bounds(function: MembershipFunction, x: float | Fraction) -> Interval
         above = near > x
         low = math.nextafter(near, -_INF) if above else near
         high = near if above else math.nextafter(near, _INF)
-    whole = function.degree(Enclosed(is_open=False), Jet(Interval(low, high), _ONE))
-    return whole.value
+    return function.degree(_CLOSED, Jet(Interval(low, high), _ONE)).value

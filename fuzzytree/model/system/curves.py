@@ -47,8 +47,8 @@ class MembershipFunction(Value, frozen=True):
     def knots(self) -> tuple[float, ...]:
         """Return, in order, where it changes its formula, its direction or its bend.
 
-        Between two neighbours it is one smooth monotone piece, of one bend; those that
-        follow from its numbers by a rounded computation are two neighbouring doubles.
+        Between two neighbours it is one smooth monotone piece. In the place of a number
+        that was computed and rounded two stand around it.
         """
         return ()
 
@@ -67,6 +67,11 @@ class MembershipFunction(Value, frozen=True):
     def is_open(self) -> bool:
         """Whether it stays above 0 without end."""
         return False
+
+    @property
+    def is_bent_once(self) -> bool:
+        """Whether it bends to one side only between two neighbouring knots."""
+        return True
 
     def mistakes(self) -> Iterator[str]:
         """Yield what is wrong with its numbers."""
@@ -327,6 +332,11 @@ class SigmoidDifference(MembershipFunction, frozen=True, tag="sigmoid difference
         return min(a, c), max(b, d)
 
     @property
+    def is_bent_once(self) -> bool:
+        """Not surely."""
+        return False
+
+    @property
     def is_unit(self) -> bool:
         """Whether no slope is 0."""
         return self.first.is_unit and self.second.is_unit
@@ -356,6 +366,11 @@ class SigmoidProduct(MembershipFunction, frozen=True, tag="sigmoid product"):
         """That of both together."""
         (a, b), (c, d) = self.first.extent, self.second.extent
         return min(a, c), max(b, d)
+
+    @property
+    def is_bent_once(self) -> bool:
+        """Not surely."""
+        return False
 
     @property
     def is_unit(self) -> bool:
@@ -545,8 +560,9 @@ class Arc(MembershipFunction, frozen=True, tag="arc"):
     def degree(self, n: Numbers[N], x: N) -> N:
         """Return the quarter of an ellipse, 0 before it and 1 behind it."""
         u = scaled(n, x, self.start, self.end)
-        arc = n.where(n.at_most(1.0, u), 1.0, n.root(u * (2.0 - u)))
-        return n.where(n.at_most(u, 0.0), 0.0, arc)
+        before, behind = _beyond(n, x, self.start, self.end)
+        arc = n.where(behind, 1.0, n.root(u * (2.0 - u)))
+        return n.where(before, 0.0, arc)
 
     def inverse(self, n: Numbers[N], degree: N) -> N:
         """Return where it has a degree."""
@@ -682,15 +698,22 @@ def _odds(n: Numbers[N], degree: N) -> N:
     return n.divide(1.0, degree) - 1.0
 
 
+def _beyond(n: Numbers[N], x: N, start: float, end: float) -> tuple[N, N]:
+    """Return whether a value lies up to the start, and from the end on."""
+    if start < end:
+        return n.at_most(x, start), n.at_most(end, x)
+    return n.at_most(start, x), n.at_most(x, end)
+
+
 def _s(n: Numbers[N], x: N, start: float, end: float) -> N:
     if start == end:
         return n.where(n.at_most(x, start), 0.0, 1.0)
     t = scaled(n, x, start, end)
     rest = (x - end) / (n.constant(end) - start)
-    ends = ((end, x), (x, start)) if start < end else ((x, end), (start, x))
+    before, behind = _beyond(n, x, start, end)
     degree = n.where(n.at_most(t, 0.5), 2.0 * square(t), 1.0 - 2.0 * square(rest))
-    degree = n.where(n.at_most(*ends[0]), 1.0, degree)
-    return n.where(n.at_most(*ends[1]), 0.0, degree)
+    degree = n.where(behind, 1.0, degree)
+    return n.where(before, 0.0, degree)
 
 
 def _s_knots(start: float, end: float) -> tuple[float, ...]:

@@ -1,456 +1,304 @@
-"""How curves bend: the pieces along which points can be placed, and chords' errors.
+"""Points along a membership function, as far apart as a tolerance allows.
 
-Products and differences of two sigmoids bend to either side. With
-`t = slope (x - inflection)` and `s = 1 / (1 + exp(-t))` a sigmoid's derivatives by t
-are `s' = s (1 - s)`, largest at 0, and `s'' = s' (1 - 2 s)`, whose extremes are at
-`t = +-ln(2 + sqrt(3))`. So each has a range over an interval of t, and
+Between two neighbouring knots a function is one smooth piece, of which `jet` bounds the
+slope and the bend. Where it bends to one side only, it lies between its chord and its
+tangents: with tangents at both ends and in the middle, the chord is furthest from the
+outermost of them where two tangents meet. Where that is not known, a chord over a width
+h is off by at most `max |f''| h^2 / 8`, and by no more than the values are apart.
 
-    (s1 s2)'' = k1^2 s1'' s2 + 2 k1 k2 s1' s2' + k2^2 s1 s2''
-    (s1 - s2)'' = k1^2 s1'' - k2^2 s2''
-
-have one over an interval of x, by interval arithmetic. The absolute difference has an
-edge where both are equal, `k1 (x - c1) = k2 (x - c2)`, and is smooth elsewhere.
+Where a function goes on for ever towards a degree, the outermost point stands where it
+is as near to it as the tolerance, and stays as it is there. What rounding moves a
+point's own degree by is added to the bound.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
-from fractions import Fraction
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from fuzzytree.errors import LossError
-from fuzzytree.model import (
-    Curve,
-    curves,
-)
-from fuzzytree.semantics.inference.degrees import curve_degree
-from fuzzytree.semantics.programs.operations import divide
-from fuzzytree.semantics.programs.operations import power as raised
+from fuzzytree.model import MOST_POINTS, Formula, Linear, MembershipFunction
+from fuzzytree.semantics.enclosing import degree_bounds, plain_jet
+from fuzzytree.semantics.programs.operations import DOUBLES
 
-Function = Callable[[float], float]
-Error = Callable[[float, float], float]
+_TAIL = 0.99  # tails end a little below the tolerance, so that rounding has room
+_ROOM = 1.0 - 2.0**-40
+_MORE = 1.0 + 2.0**-40  # of a bound that is computed in doubles
+_TRIES = 40  # of a chord's end
+_MOST_STUCK = 16  # neighbouring doubles on one piece
+_FARTHEST = 2.0**1000
+_NOTHING = 2.0**-60
+_LEAST = 2.0**-43  # tolerance; below it rounding counts
+_JUMP = 2.0**-10  # between neighbouring doubles
+_TOO_COARSE = "doubles around it are too coarse"
+_TOO_MANY = f"it would need more than {MOST_POINTS} points"
 
-
-class CurvePiece(NamedTuple):
-    """A stretch of a curve."""
-
-    start: float
-    end: float
-    error: Error
+Point = tuple[float, float]
 
 
 class PointPlan(NamedTuple):
-    """How points can be placed along a curve.
+    """Points along a function.
 
     Attributes:
-        parts: Pieces, and points that must be there, from left to right; the curve is
-            constant between two that do not meet.
-        tail: How far it can be from its outermost points' degrees beyond them.
-        slack: What rounding can add to any error.
-        first: The degree of the first point, if it is known better than computed.
-        last: The degree of the last one.
+        points: Values and degrees, in order; a value twice is a step.
+        bound: How far the lines between them can be from the function.
+        is_cut: Whether the function goes on changing beyond them.
     """
 
-    parts: tuple[CurvePiece | tuple[float, float], ...]
-    tail: float = 0.0
-    slack: float = 0.0
-    first: float | None = None
-    last: float | None = None
+    points: tuple[Point, ...]
+    bound: float
+    is_cut: bool
 
 
-def bent(value: Function, slope: Function) -> Error:
-    """Return the error of chords of a curve that bends to one side only.
+class _Knot(NamedTuple):
+    """A knot, and the numbers between which it lies before rounding."""
 
-    Example:
-        >>> bent(lambda x: x * x, lambda x: 2.0 * x)(0.0, 1.0)
-        0.25
-    """
-
-    def error(a: float, b: float) -> float:
-        middle = a + (b - a) / 2
-        if not a < middle < b:
-            return 0.0  # no double lies between
-        at_a, at_m, at_b = value(a), value(middle), value(b)
-        rise = slope(middle)
-        chord = (at_b - at_a) / (b - a)
-
-        def apart(x: float) -> float:
-            return abs((at_a + chord * (x - a)) - (at_m + rise * (x - middle)))
-
-        left = _meeting(a, at_a, slope(a), middle, at_m, rise)
-        right = _meeting(b, at_b, slope(b), middle, at_m, rise)
-        return max(apart(left), apart(right))
-
-    return error
-
-
-def _meeting(
-    end: float, at_end: float, outer: float, middle: float, at_m: float, rise: float
-) -> float:
-    """Return where the tangent at an end meets that in the middle, between the two."""
-    if math.isinf(outer) or outer == rise:
-        return end
-    chord = (at_m - at_end) / (middle - end)
-    share = (rise - chord) / (rise - outer)
-    return end + (middle - end) * min(max(share, 0.0), 1.0)
-
-
-_TAIL = 0.99  # tails end a little below the tolerance, so that rounding has room
-
-
-def plan_of(curve: Curve, tolerance: float) -> PointPlan:
-    """Return how points can be placed along a curve that is no points itself.
-
-    Raises:
-        LossError: If the curve has no degrees of its own.
-    """
-    tail = tolerance * _TAIL
-    match curve:
-        case curves.Gaussian(mean=mean, deviation=deviation):
-            return _two_gaussians(
-                curve, curves.TwoGaussians(mean, deviation, mean, deviation), tail
-            )
-        case curves.TwoGaussians():
-            return _two_gaussians(curve, curve, tail)
-        case curves.Bell():
-            return _bell(curve, tail)
-        case curves.Sigmoid():
-            return _sigmoid(curve, tail)
-        case curves.SigmoidDifference() | curves.SigmoidProduct():
-            return sigmoid_plan(curve, tolerance)
-        case curves.SCurve():
-            return _s(curve)
-        case curves.PiCurve():
-            return _pi(curve)
-        case curves.Cosine():
-            return _cosine(curve)
-        case curves.Concave():
-            return _concave(curve, tail)
-        case curves.Spike():
-            return _spike(curve, tail)
-        case curves.Arc():
-            return _arc(curve)
-        case curves.SemiEllipse():
-            return _semi_ellipse(curve)
-        case _:
-            raise LossError("it is a formula, of which nothing is known between points")
-
-
-def _pieces(curve: Curve, knots: Iterable[float], slope: Function) -> list[CurvePiece]:
-    """Return the pieces between some places, on each of which the curve bends once."""
-
-    def value(x: float) -> float:
-        return curve_degree(curve, x)
-
-    error = bent(value, slope)
-    places = sorted(set(knots))
-    return [CurvePiece(a, b, error) for a, b in itertools.pairwise(places)]
-
-
-def _slack(scale: float, knots: Iterable[float], power: float = 1.0) -> float:
-    """Return what rounding can add to the error of a chord.
-
-    Degrees and slopes are good to a few units, amplified by `power`. A smooth
-    inflection that is rounded by h leaves a stretch of that width, and a bend of its
-    order, on the wrong side: it moves a chord by the order of its square.
-    """
-    coarse = divide(16.0 * math.ulp(max(map(abs, knots))), scale)
-    return (2.0**-44 + coarse * coarse) * (1.0 + power)
-
-
-def _two_gaussians(curve: Curve, two: curves.TwoGaussians, tail: float) -> PointPlan:
-    left, right = two.left, two.right
-    below, above = two.left_deviation, two.right_deviation
-    reach = math.sqrt(-2.0 * math.log(tail))
-    start, end = left - reach * below, right + reach * above
-    knots = [left, right]
-    knots += [x for x in (left - below,) if x < right]
-    knots += [x for x in (right + above,) if x > left]
-    if left > right:  # between them both fall: a gaussian of their precisions' sum
-        ratio = below / above
-        mean = right + (left - right) / (1.0 + ratio * ratio)
-        spread = below * (above / math.hypot(below, above))
-        knots += [mean]
-        knots += [x for x in (mean - spread, mean + spread) if right < x < left]
-        if not start < end:  # nowhere above the tolerance
-            return PointPlan(((mean, curve_degree(curve, mean)),), tail)
-
-    def slope(x: float) -> float:
-        rising = (left - min(x, left)) / below / below
-        falling = (max(x, right) - right) / above / above
-        return curve_degree(curve, x) * (rising - falling)
-
-    inner = [start, *(x for x in knots if start < x < end), end]
-    slack = _slack(min(below, above), [*inner, left, right])
-    return PointPlan(tuple(_pieces(curve, inner, slope)), tail, slack)
-
-
-def _halves(
-    curve: Curve, center: float, places: Sequence[float], steepness: Function
-) -> list[CurvePiece]:
-    """Return the pieces of a curve that falls alike on both sides of its center."""
-    left = [*(center - d for d in places), center]
-    right = [center, *(center + d for d in places)]
-    return [
-        *_pieces(curve, left, lambda x: steepness(center - x)),
-        *_pieces(curve, right, lambda x: -steepness(x - center)),
-    ]
-
-
-def _bell(curve: curves.Bell, tail: float) -> PointPlan:
-    power, width = 2.0 * abs(curve.slope), curve.width
-    if power == 0.0:
-        return PointPlan(((curve.center, 0.5),))
-    sign = math.copysign(1.0, curve.slope)
-
-    def steepness(distance: float) -> float:
-        if distance == 0.0:
-            return 0.0 if power > 1.0 else math.inf if power < 1.0 else sign / width
-        u = raised(distance / width, power)
-        return sign * power / distance / ((1.0 + u) * (1.0 + divide(1.0, u)))
-
-    places = [width * raised(1.0 / tail - 1.0, 1.0 / power)]
-    if power > 1.0:
-        places.append(width * raised((power - 1.0) / (power + 1.0), 1.0 / power))
-    inflections = [curve.center + d for d in (0.0, *places[1:])]
-    slack = _slack(width, inflections, power)
-    return PointPlan(
-        tuple(_halves(curve, curve.center, places, steepness)), tail, slack
-    )
-
-
-def _spike(curve: curves.Spike, tail: float) -> PointPlan:
-    rate = 10.0 / curve.width
-
-    def steepness(distance: float) -> float:
-        return rate * math.exp(-rate * distance)
-
-    places = [-math.log(tail) / rate]
-    ends = [curve.center + places[0], curve.center - places[0]]
-    slack = _slack(curve.width / 10.0, ends)
-    return PointPlan(
-        tuple(_halves(curve, curve.center, places, steepness)), tail, slack
-    )
-
-
-def _cosine(curve: curves.Cosine) -> PointPlan:
-    width = curve.width
-
-    def steepness(distance: float) -> float:
-        return math.pi / width * math.sin(2.0 * math.pi * (distance / width))
-
-    places = [width / 2.0, width / 4.0]
-    ends = [curve.center + places[0], curve.center - places[0]]
-    parts = _halves(curve, curve.center, places, steepness)
-    return PointPlan(tuple(parts), 0.0, _slack(width / 6.0, ends), 0.0, 0.0)
-
-
-def _sigmoid(curve: curves.Sigmoid, tail: float) -> PointPlan:
-    center, rate = curve.inflection, curve.slope
-    if rate == 0.0:
-        return PointPlan(((center, 0.5),))
-
-    def slope(x: float) -> float:
-        small = math.exp(-abs(rate * (x - center)))
-        return rate * (small / (1.0 + small)) / (1.0 + small)
-
-    reach = math.log(1.0 / tail - 1.0) / abs(rate)
-    knots = [center - reach, center, center + reach]
-    slack = _slack(1.0 / abs(rate), knots)
-    return PointPlan(tuple(_pieces(curve, knots, slope)), tail, slack)
-
-
-def _s_pieces(curve: Curve, start: float, end: float) -> tuple[list[CurvePiece], float]:
-    """Return the pieces of an S from one value to another, and its slack.
-
-    In the middle the bend jumps to the other side: a middle that is rounded moves a
-    chord by the order of the rounding itself.
-    """
-    width = end - start
-    middle = start + width / 2.0
-
-    def slope(x: float) -> float:
-        t = min(max((x - start) / width, 0.0), 1.0)
-        return 4.0 * min(t, 1.0 - t) / width
-
-    knots = [start, middle, end]
-    coarse = 16.0 * math.ulp(max(map(abs, knots))) / abs(width)
-    return _pieces(curve, knots, slope), 2.0**-44 + coarse
-
-
-def _s(curve: curves.SCurve) -> PointPlan:
-    if curve.start == curve.end:
-        return PointPlan(((curve.start, 0.0), (curve.start, 1.0)))
-    parts, slack = _s_pieces(curve, curve.start, curve.end)
-    return PointPlan(tuple(parts), 0.0, slack)
-
-
-def _pi(curve: curves.PiCurve) -> PointPlan:
-    a, b, c, d = curve.a, curve.b, curve.c, curve.d
-    if a == d:
-        return PointPlan(((a, 0.0),))
-    parts: list[CurvePiece | tuple[float, float]] = [(a, 0.0), (a, 1.0)]
-    slack = 0.0
-    if a < b:
-        rising, slack = _s_pieces(curve, a, b)
-        parts = [*rising]
-    if c == d:
-        return PointPlan((*parts, (c, 1.0), (c, 0.0)), 0.0, slack)
-    falling, more = _s_pieces(curve, d, c)
-    return PointPlan((*parts, *falling), 0.0, max(slack, more))
-
-
-def _concave(curve: curves.Concave, tail: float) -> PointPlan:
-    end = curve.end
-    width = end - curve.inflection
-    if width == 0.0:
-        before = math.nextafter(end, -math.inf)
-        return PointPlan(((before, 0.0), (before, 1.0)))
-
-    def slope(x: float) -> float:
-        degree = curve_degree(curve, x)
-        return degree * degree / width
-
-    knots = [end, end - width * (1.0 / tail - 1.0)]
-    slack = _slack(abs(width), knots)
-    return PointPlan(tuple(_pieces(curve, knots, slope)), tail, slack)
-
-
-def _arc(curve: curves.Arc) -> PointPlan:
-    start, end = curve.start, curve.end
-    width = end - start
-    if width == 0.0:
-        raise LossError("it is an arc without width")
-
-    def slope(x: float) -> float:
-        u = (x - start) / width
-        return math.inf if u <= 0.0 else (1.0 - u) / math.sqrt(u * (2.0 - u)) / width
-
-    knots = [start, end]
-    return PointPlan(
-        tuple(_pieces(curve, knots, slope)), 0.0, _slack(abs(width), knots)
-    )
-
-
-def _semi_ellipse(curve: curves.SemiEllipse) -> PointPlan:
-    start, end = curve.start, curve.end
-    width = end - start
-    if not width > 0.0:
-        return PointPlan(((start, 0.0),))
-
-    def slope(x: float) -> float:
-        p, q = (x - start) / width, (end - x) / width
-        return (q - p) / math.sqrt(p * q) / width if p * q > 0.0 else math.inf
-
-    knots = [start, start + width / 2.0, end]
-    return PointPlan(tuple(_pieces(curve, knots, slope)), 0.0, _slack(width, knots))
-
-
-_EXTREME = math.log(2.0 + math.sqrt(3.0))
-
-
-class _Range(NamedTuple):
     low: float
+    place: float
     high: float
 
-    def times(self, other: _Range) -> _Range:
-        products = [a * b for a in self for b in other]
-        return _Range(min(products), max(products))
 
-    def scaled(self, factor: float) -> _Range:
-        ends = self.low * factor, self.high * factor
-        return _Range(min(ends), max(ends))
+def plan_of(function: MembershipFunction, tolerance: float) -> PointPlan:
+    """Return points along a function that is no points itself.
 
-    def plus(self, other: _Range) -> _Range:
-        return _Range(self.low + other.low, self.high + other.high)
+    Raises:
+        LossError: If the function has no degrees of its own, or needs too many points.
 
-
-def sigmoid_plan(
-    curve: curves.SigmoidDifference | curves.SigmoidProduct, tolerance: float
-) -> PointPlan:
-    """Return how points can be placed along two sigmoids.
-
-    Where each sigmoid is within an eighth of the tolerance of 0 or 1, and so on for
-    ever, product and difference are within a half of it of what they are there.
+    Example:
+        >>> from fuzzytree.model import SCurve
+        >>> plan = plan_of(SCurve(0.0, 4.0), 0.01)
+        >>> plan.points[0], plan.points[-1], plan.bound <= 0.01, plan.is_cut
+        ((0.0, 0.0), (4.0, 1.0), True, False)
     """
-    pair = [one for one in (curve.first, curve.second) if one.slope != 0.0]
-    if not pair:
-        x = curve.first.inflection
-        return PointPlan(((x, curve_degree(curve, x)),))
-    reach = math.log(8.0 / tolerance)
-    start = min(one.inflection - reach / abs(one.slope) for one in pair)
-    end = max(one.inflection + reach / abs(one.slope) for one in pair)
-    knots = {start, end, *(one.inflection for one in pair)}
-    if isinstance(curve, curves.SigmoidDifference):
-        edge = _crossing(curve.first, curve.second)
-        if edge is not None and start < edge < end:
-            knots.add(edge)
-    error = _error(curve)
-    places = sorted(knots)
-    parts = [CurvePiece(a, b, error) for a, b in itertools.pairwise(places)]
-    steepness = sum(abs(one.slope) for one in pair) / 4.0
-    slack = 2.0**-44 + 16.0 * math.ulp(max(map(abs, places))) * steepness
-    return PointPlan(tuple(parts), tolerance / 2.0, slack)
-
-
-def _crossing(first: curves.Sigmoid, second: curves.Sigmoid) -> float | None:
-    """Return where two sigmoids are equal, rounded once."""
-    k, m = Fraction(first.slope), Fraction(second.slope)
-    if k == m:
-        return None
-    place = (k * Fraction(first.inflection) - m * Fraction(second.inflection)) / (k - m)
-    try:
-        return float(place)
-    except OverflowError:
-        return None
-
-
-def _error(curve: curves.SigmoidDifference | curves.SigmoidProduct) -> Error:
-    first, second = curve.first, curve.second
-    k, m = first.slope, second.slope
-
-    def error(a: float, b: float) -> float:
-        value_1, slope_1, bend_1 = _ranges(first, a, b)
-        value_2, slope_2, bend_2 = _ranges(second, a, b)
-        if isinstance(curve, curves.SigmoidDifference):
-            result = bend_1.scaled(k * k).plus(bend_2.scaled(-m * m))
-        else:
-            result = (
-                bend_1.times(value_2)
-                .scaled(k * k)
-                .plus(slope_1.times(slope_2).scaled(2.0 * k * m))
-                .plus(value_1.times(bend_2).scaled(m * m))
-            )
-        width = b - a
-        return max(-result.low, result.high) * width * width / 8.0
-
-    return error
-
-
-def _ranges(one: curves.Sigmoid, a: float, b: float) -> tuple[_Range, _Range, _Range]:
-    """Return the ranges of s, s' and s'' between two values of x."""
-    ends = sorted(one.slope * (x - one.inflection) for x in (a, b))
-    low, high = _sigmoids(ends[0]), _sigmoids(ends[1])
-    slopes, bends = [low[1], high[1]], [low[2], high[2]]
-    if ends[0] < 0.0 < ends[1]:
-        slopes.append(0.25)
-    for extreme in (-_EXTREME, _EXTREME):
-        if ends[0] < extreme < ends[1]:
-            bends.append(_sigmoids(extreme)[2])
-    return (
-        _Range(low[0], high[0]),
-        _Range(min(slopes), max(slopes)),
-        _Range(min(bends), max(bends)),
+    if isinstance(function, Formula | Linear):
+        raise LossError("it is a formula, of which nothing is known between points")
+    knots = _knots(function)
+    if tolerance < _LEAST or not math.isfinite(knots[-1].high - knots[0].low):
+        raise LossError(_TOO_COARSE)
+    (low, off), (high, rest) = (
+        _tail_end(function, knots, sign, tolerance * _TAIL) for sign in (-1, 1)
     )
+    worst = max(off, rest)
+    if low >= high:  # nowhere further than the tolerance from where it goes
+        low = high = knots[len(knots) // 2].place
+    ends = [_Knot(low, low, low), *knots, _Knot(high, high, high)]
+    inner = [knot for knot in ends if low <= knot.place <= high]
+    points = [*_at(function, low)]
+    for start, end in itertools.pairwise(inner):
+        if start.place < end.place:
+            for place, error in _march(function, start, end, tolerance * _ROOM):
+                worst = max(worst, error)
+                points += _at(function, place)
+                if len(points) > MOST_POINTS:
+                    raise LossError(_TOO_MANY)
+    rounding = max(_rounding(function, point) for point in points)
+    bound = math.nextafter(worst + rounding, math.inf)
+    if bound > tolerance:
+        raise LossError(_TOO_COARSE)
+    return PointPlan(tuple(points), bound, max(off, rest) > _NOTHING)
 
 
-def _sigmoids(t: float) -> tuple[float, float, float]:
-    """Return s, s' and s'' at t."""
-    small = math.exp(-abs(t))
-    below = small / (1.0 + small)
-    above = 1.0 / (1.0 + small)
-    slope = below * above
-    bend = slope * (above - below)
-    return (above, slope, -bend) if t > 0 else (below, slope, bend)
+def _knots(function: MembershipFunction) -> list[_Knot]:
+    """Return the knots; numbers around one that was rounded are one knot."""
+    known = sorted({knot for knot in function.knots() if math.isfinite(knot)})
+    if not known:
+        raise LossError(_TOO_COARSE)
+    near = 40.0 * math.ulp(max(map(abs, known)))
+    knots: list[_Knot] = []
+    for value in known:
+        if knots and value - knots[-1].high <= near:
+            low = knots.pop().low
+            knots.append(_Knot(low, low + (value - low) / 2.0, value))
+        else:
+            knots.append(_Knot(value, value, value))
+    return knots
+
+
+def _degree(function: MembershipFunction, x: float) -> float:
+    return function.degree(DOUBLES, x)
+
+
+def _tail_end(
+    function: MembershipFunction, knots: list[_Knot], sign: int, tail: float
+) -> tuple[float, float]:
+    """Return where a function is as near to where it goes, and how near it is."""
+    knot = knots[0].place if sign < 0 else knots[-1].place
+
+    def off(x: float) -> float:
+        here = degree_bounds(function, x)
+        ends = (x, _FARTHEST) if sign > 0 else (-_FARTHEST, x)
+        beyond = plain_jet(function, *ends).value.hull(here)
+        return max(beyond.high - here.low, here.high - beyond.low)
+
+    beyond = off(math.nextafter(knot, sign * math.inf))
+    if beyond <= tail:
+        return knot, beyond
+    near, far = 0.0, max(knots[-1].high - knots[0].low, math.ulp(knot) * 4.0)
+    while off(knot + sign * far) > tail:
+        near, far = far, far * 2.0
+        if far > _FARTHEST:
+            raise LossError("it reaches beyond the largest double")
+    while far - near > 2.0**-10 * far:
+        middle = near + (far - near) / 2.0
+        if not near < middle < far:
+            break
+        is_far = off(knot + sign * middle) > tail
+        near, far = (middle, far) if is_far else (near, middle)
+    end = knot + sign * far
+    return end, off(end)
+
+
+def _march(
+    function: MembershipFunction, start: _Knot, end: _Knot, room: float
+) -> Iterator[tuple[float, float]]:
+    """Yield where the chords of a piece end, and the error of each.
+
+    Where it jumps at an end, chords start or end at the double beside it.
+    """
+    above = math.nextafter(start.place, math.inf)
+    below = math.nextafter(end.place, -math.inf)
+    if abs(_degree(function, above) - _degree(function, start.place)) > _JUMP:
+        start = _Knot(above, above, max(above, start.high))
+    last = end
+    if abs(_degree(function, below) - _degree(function, end.place)) > _JUMP:
+        last = _Knot(min(below, end.low), below, below)
+    if start.place >= last.place:
+        yield end.place, 0.0
+    place, width, stuck = start.place, last.place - start.place, 0
+    while place < last.place:
+        after, error = _chord_end(function, place, (start, last), width, room)
+        stuck += after == math.nextafter(place, math.inf)
+        if stuck > _MOST_STUCK:
+            raise LossError(_TOO_COARSE)
+        yield end.place if after == last.place else after, error
+        share = math.sqrt(room / error) if error > 0.0 else 4.0
+        width, place = min(0.98 * share, 4.0) * (after - place), after
+
+
+def _chord_end(
+    function: MembershipFunction,
+    start: float,
+    piece: tuple[_Knot, _Knot],
+    width: float,
+    room: float,
+) -> tuple[float, float]:
+    """Return how far one chord is near enough, and its error."""
+    end = piece[1].place
+    after, bad = start + width, math.inf
+    after = _snapped(after, piece)
+    best = math.nextafter(start, math.inf), 0.0  # no double lies between
+    for _ in range(_TRIES):
+        if not best[0] < after < bad:
+            break
+        error = _error(function, start, after, piece)
+        if error <= room:
+            best = after, error
+            if after == end or error > 0.8 * room or bad < math.inf:
+                break
+        else:
+            bad = after
+        share = math.sqrt(room / error) if error > 0.0 else 4.0
+        after = start + (after - start) * min(max(0.97 * share, 2.0**-6), 4.0)
+        after = _snapped(after, piece)
+    return best
+
+
+def _snapped(x: float, piece: tuple[_Knot, _Knot]) -> float:
+    """Return a value, or the end of its piece if rounding can hardly tell them."""
+    start, end = piece
+    near = 4.0 * math.ulp(end.place - start.place)
+    is_end = x >= end.low or end.place - x <= near + _near(x, end.place)
+    return end.place if is_end else x
+
+
+def _near(a: float, b: float) -> float:
+    """Return a distance that rounding can hardly tell from none."""
+    return 64.0 * math.ulp(max(abs(a), abs(b)))
+
+
+def _error(
+    function: MembershipFunction,
+    start: float,
+    end: float,
+    piece: tuple[_Knot, _Knot],
+) -> float:
+    """Return how far the chord between two values can be from a function.
+
+    Of a knot that was rounded the chord counts from behind it, and how much it moves.
+    """
+    if math.nextafter(start, math.inf) >= end:
+        return 0.0  # no double lies between
+    first, last = max(start, piece[0].high), min(end, piece[1].low)
+    if last - first <= _near(start, end):
+        return plain_jet(function, start, end).value.width
+    moved = 0.0
+    for a, b in ((start, first), (last, end)):
+        if a < b:
+            moved += plain_jet(function, a, b).value.width + 2.0 * (b - a) / (
+                end - start
+            )
+    if function.is_bent_once:
+        return (_bent(function, first, last) + moved) * _MORE
+    bounds, h = plain_jet(function, first, last), math.nextafter(last - first, math.inf)
+    bent = bounds.bend.size * h * h / 8.0
+    return (min(bent, bounds.value.width) + moved) * _MORE
+
+
+def _bent(function: MembershipFunction, a: float, b: float) -> float:
+    """Return the error of the chord of a stretch that bends to one side only."""
+    middle = a + (b - a) / 2.0
+    (p, outer), (q, rise), (r, other) = (_tangent(function, x) for x in (a, middle, b))
+    chord = (r - p) / (b - a)
+
+    def apart(end: float, at: float, slope: float) -> float:
+        """Return how far the chord is from where the tangent meets the middle's."""
+        x = end
+        if math.isfinite(slope) and slope != rise:
+            share = (rise - (q - at) / (middle - end)) / (rise - slope)
+            x = end + (middle - end) * min(max(share, 0.0), 1.0)
+        return abs((p + chord * (x - a)) - (q + rise * (x - middle)))
+
+    error = max(apart(a, p, outer), apart(b, r, other))
+    return error + 2.0**-48 * (1.0 + abs(rise) * (b - a))
+
+
+def _tangent(function: MembershipFunction, x: float) -> tuple[float, float]:
+    """Return the degree and the slope at a value."""
+    point = plain_jet(function, x, x)
+    slope = point.slope.low / 2.0 + point.slope.high / 2.0
+    return _degree(function, x), math.inf if math.isnan(slope) else slope
+
+
+def _at(function: MembershipFunction, x: float) -> Iterator[Point]:
+    """Yield the points at a value: two where the function jumps behind it.
+
+    Where it jumps before it the step stands one double below.
+    """
+    below, above = math.nextafter(x, -math.inf), math.nextafter(x, math.inf)
+    before, here, after = (_degree(function, one) for one in (below, x, above))
+    if abs(before - here) > _JUMP:
+        _refuse_steep(function, below, x, here)
+        yield from ((below, before), (below, here))
+    else:
+        yield x, here
+    if abs(after - here) > _JUMP:
+        _refuse_steep(function, x, above, here)
+        yield x, after
+
+
+def _refuse_steep(
+    function: MembershipFunction, low: float, high: float, here: float
+) -> None:
+    """Refuse a function that comes near a degree between neighbours: it is no step."""
+    between = plain_jet(function, low, high).value
+    if between.low - _JUMP <= here <= between.high + _JUMP:
+        raise LossError(_TOO_COARSE)
+
+
+def _rounding(function: MembershipFunction, point: Point) -> float:
+    """Return how far the degree of a point can be from the function's; 0 at a step."""
+    bounds = degree_bounds(function, point[0])
+    off = max(bounds.high - point[1], point[1] - bounds.low)
+    return 0.0 if off > _JUMP else max(off, 0.0)

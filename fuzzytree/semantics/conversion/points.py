@@ -1,28 +1,14 @@
 """Points in the place of the curves that a format lacks, with certified bounds.
 
 Shapes of rule bases are placed by `fuzzytree.numerics.placing`; trapezoids, singletons
-and steps are points already (`shape_of`). The other curves are divided into *pieces*
-(`conversion.point_plans`), and points are put on each of them, as far apart as the
-tolerance allows:
-
-- On a piece that bends to one side only, the curve lies between its chord and its
-  tangents. With tangents at both ends and in the middle, the chord is furthest from the
-  outermost of them where two tangents meet. (An upright tangent meets at its own end.)
-- Products and differences of sigmoids may bend to either side. There a chord is at most
-  `max |f''| h^2 / 8` away, and f'' is enclosed over the stretch by interval arithmetic
-  of the sigmoids' own derivatives, whose extremes are known.
-- Where a curve goes on for ever towards 0 or 1, the outermost point stands where it is
-  as near as the tolerance; the degree stays what it is there.
-
-`_slack` covers rounding: degrees and slopes are good to a few units of 2^-52 times what
-their exponents amplify, and where pieces meet at a rounded value, the few doubles of
-another bend change a chord by no more than the curve's steepness times their width.
+and steps are points already (`shape_of`). Along the other curves points are put as far
+apart as the tolerance allows (`conversion.point_plans`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple, TypeVar, get_args
 
 from msgspec.structs import replace
@@ -30,12 +16,12 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     LR,
-    MOST_POINTS,
     Band,
     Binary,
     Curve,
     FuzzySystem,
     Loss,
+    MembershipFunction,
     Points,
     RuleBase,
     Shape,
@@ -45,16 +31,10 @@ from fuzzytree.model import (
     Trapezoid,
 )
 from fuzzytree.numerics import BELOW_ONE, points_of
-from fuzzytree.semantics.conversion.point_plans import CurvePiece, PointPlan, plan_of
-from fuzzytree.semantics.inference.degrees import curve_degree
+from fuzzytree.semantics.conversion.point_plans import plan_of
 
 EXACT = 2.0**-52
 """Bounds up to this are no loss: rounding alone makes as much."""
-
-_MOST_STUCK = 16  # neighbouring doubles on one piece
-_ROUNDING = 1.0 + 2.0**-40
-_TOO_COARSE = "doubles around it are too coarse"
-_TOO_MANY = f"it would need more than {MOST_POINTS} points"
 
 D = TypeVar("D", RuleBase, FuzzySystem)
 
@@ -188,7 +168,7 @@ def points_for(curve: Curve, tolerance: float) -> PlacedPoints:
         >>> from fuzzytree.model import Gaussian
         >>> found = points_for(Gaussian(0.0, 1.0), 0.01)
         >>> len(found.points.values), found.bound <= 0.01
-        (15, True)
+        (18, True)
     """
     check_tolerance(tolerance)
     tolerance = min(tolerance, 0.5)  # half of all degrees: no plan needs more
@@ -199,7 +179,8 @@ def points_for(curve: Curve, tolerance: float) -> PlacedPoints:
         return PlacedPoints(*straight_points(shape))
     if shape is not None:
         return PlacedPoints(*points_of(shape, tolerance))
-    return _placed(curve, plan_of(curve, tolerance), tolerance)
+    assert isinstance(curve, MembershipFunction)  # the others are shapes
+    return _placed(curve, tolerance)
 
 
 def straight_points(band: Band) -> tuple[Points, float]:
@@ -229,86 +210,17 @@ def straight_points(band: Band) -> tuple[Points, float]:
     return Points(values, degrees), 2.0**-53 if band.flanks else 0.0
 
 
-def _placed(curve: Curve, plan: PointPlan, tolerance: float) -> PlacedPoints:
-    """Return points along the pieces of a curve."""
-    room = (tolerance - plan.slack) / _ROUNDING
-    if not room > plan.tail:
-        raise LossError(_TOO_COARSE)
-    points: list[tuple[float, float]] = []
-    worst = plan.tail
-    for part in plan.parts:
-        if isinstance(part, CurvePiece):
-            if not points or points[-1][0] != part.start:
-                points.append((part.start, curve_degree(curve, part.start)))
-            for place, error in _march(part, room, MOST_POINTS - len(points)):
-                points.append((place, curve_degree(curve, place)))
-                worst = max(worst, error)
-        elif not points or points[-1] != part:
-            points.append(part)
-    if not points:
-        raise LossError(_TOO_COARSE)
-    if plan.first is not None:
-        points[0] = (points[0][0], plan.first)
-    if plan.last is not None:
-        points[-1] = (points[-1][0], plan.last)
-    if len(points) > MOST_POINTS:
-        raise LossError(_TOO_MANY)
-    values, degrees = zip(*points, strict=True)
-    if not all(map(math.isfinite, values)) or math.isinf(values[-1] - values[0]):
+def _placed(curve: MembershipFunction, tolerance: float) -> PlacedPoints:
+    """Return points along a curve."""
+    plan = plan_of(curve, tolerance)
+    values, degrees = zip(*plan.points, strict=True)
+    if math.isinf(values[-1] - values[0]):
         raise LossError("it reaches beyond the largest double")
-    bound = worst * _ROUNDING + plan.slack
-    return PlacedPoints(Points(values, degrees), bound, _tail_text(degrees, plan))
-
-
-def _tail_text(degrees: Sequence[float], plan: PointPlan) -> str:
-    if plan.tail == 0.0:
-        return ""
-    return f"before them it stays at {degrees[0]:.2g}, after them at {degrees[-1]:.2g}"
-
-
-def _march(piece: CurvePiece, room: float, most: int) -> Iterator[tuple[float, float]]:
-    """Yield where the next point of a piece stands, and the error before it."""
-    place, end = piece.start, piece.end
-    stuck = 0
-    while place < end:
-        most -= 1
-        if most < 0:
-            raise LossError(_TOO_MANY)
-        before = place
-        place, error = _furthest(piece.error, place, end, room)
-        stuck += place == math.nextafter(before, math.inf)
-        if stuck > _MOST_STUCK:
-            raise LossError(_TOO_COARSE)
-        yield place, error
-
-
-def _furthest(
-    error: Callable[[float, float], float],
-    start: float,
-    end: float,
-    room: float,
-) -> tuple[float, float]:
-    """Return the furthest place up to which one chord is near enough, and its error."""
-    whole = error(start, end)
-    if whole <= room:
-        return end, whole
-    good, bad = start, end
-    result = math.inf
-    for _ in range(1100):  # halving reaches any double
-        middle = good + (bad - good) / 2
-        if not good < middle < bad:
-            break
-        here = error(start, middle)
-        if here <= room:
-            good, result = middle, here
-        else:
-            bad = middle
-        if result < math.inf and bad - good <= (good - start) * 2.0**-6:
-            break
-    if good == start:
-        following = math.nextafter(start, math.inf)
-        return following, 0.0  # no double lies between
-    return good, result
+    tail = ""
+    if plan.is_cut:
+        first, last = degrees[0], degrees[-1]
+        tail = f"before them it stays at {first:.2g}, after them at {last:.2g}"
+    return PlacedPoints(Points(values, degrees), plan.bound, tail)
 
 
 _Pairs = list[tuple[float, float]]
