@@ -231,21 +231,25 @@ def curve_of(name: str, shape: Shape) -> Curve:
     def degree(value: float) -> float:
         return float(exact_degree(shape, Fraction(value)))
 
-    corners = sorted({c for c in _corners(shape) if c is not None and math.isfinite(c)})
-    return Curve(name, degree, tuple(corners))
+    return Curve(name, degree, _corners(shape))
 
 
-def _corners(shape: Shape) -> Iterator[float | None]:
-    match shape:
+def _corners(curve: SystemCurve) -> tuple[float, ...]:
+    """Return where a curve may turn or step, in order."""
+    corners: list[float | None] = []
+    match curve:
         case Band(low=low, high=high, left=left, right=right):
-            yield from (low, high, left, right)
+            corners = [low, high, left, right]
         case LR(mean=mean, left=left, right=right):
-            yield mean
+            corners = [mean]
             for sign, side in ((-1.0, left), (1.0, right)):
-                yield mean + sign * side.spread
-                yield mean + sign * side.spread * side.reach
+                corners.append(mean + sign * side.spread)
+                corners.append(mean + sign * side.spread * side.reach)
         case Points(values=values):
-            yield from values
+            corners = [*values]
+        case _:
+            corners = [*curve.knots()]
+    return tuple(sorted({c for c in corners if c is not None and math.isfinite(c)}))
 
 
 def _labelled(label: SystemTerm) -> Curve:
@@ -256,9 +260,11 @@ def _labelled(label: SystemTerm) -> Curve:
     def degree(value: float) -> float:
         return min(max(label.height * curve_degree(curve, value), 0.0), 1.0)
 
-    fields = (getattr(curve, field) for field in curve.__struct_fields__)
-    corners = {field for field in fields if isinstance(field, float)}
-    return Curve(label.name, degree, tuple(sorted(filter(math.isfinite, corners))))
+    corners = (
+        _corners(curve) if isinstance(curve, Band | LR | Points) else curve.knots()
+    )
+    known = {c for c in corners if c is not None and math.isfinite(c)}
+    return Curve(label.name, degree, tuple(sorted(known)))
 
 
 def polyline(curve: Curve, x: Scale, y: Scale) -> Markup:

@@ -14,29 +14,16 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model import (
     LR,
-    Arc,
     Band,
-    Bell,
-    Binary,
-    Concave,
-    Cosine,
     Curve,
     Document,
     FloatArray,
     Formula,
     FuzzySystem,
     FuzzyTree,
-    Gaussian,
     Linear,
     Points,
-    SCurve,
-    Sigmoid,
-    SigmoidDifference,
-    SigmoidProduct,
-    Spike,
     SystemInput,
-    Trapezoid,
-    TwoGaussians,
 )
 
 Within = Literal["model", "data"]
@@ -59,7 +46,6 @@ class AuditDomain(msgspec.Struct, frozen=True, kw_only=True):
 
 
 _MOST_FAULTS = 10
-_STEEP = 5.0  # a sigmoid is within 0.7 % of its ends so many times 1 / slope away
 
 
 def domain_of(
@@ -237,10 +223,10 @@ def _is_open(curve: Curve) -> bool:
             return low is None or high is None
         case Points(degrees=degrees):
             return degrees[0] > 0.0 or degrees[-1] > 0.0
-        case Trapezoid(a=a, d=d):
-            return a is None or d is None
+        case LR():
+            return False
         case _:
-            return isinstance(curve, Sigmoid | SCurve | Concave | Arc | Binary)
+            return curve.is_open
 
 
 def _ends(curve: Curve) -> Iterator[float]:
@@ -253,28 +239,5 @@ def _ends(curve: Curve) -> Iterator[float]:
             yield mean + right_side.spread * right_side.reach
         case Points(values=values):
             yield from (values[0], values[-1])
-        case Gaussian(mean=middle, deviation=width) | Bell(center=middle, width=width):
-            yield from _about(middle, 3 * width)
-        case TwoGaussians(left=low, right=high):
-            yield low - 3 * curve.left_deviation
-            yield high + 3 * curve.right_deviation
-        case Sigmoid(inflection=middle, slope=slope):
-            yield from _about(middle, _STEEP / slope if slope else 0.0)
-        case (
-            SigmoidDifference(first=one, second=other)
-            | SigmoidProduct(first=one, second=other)
-        ):
-            yield from (*_ends(one), *_ends(other))
-        case Cosine(center=middle, width=width) | Spike(center=middle, width=width):
-            yield from _about(middle, width / 2)
-        case Binary(start=value):
-            yield value
-        case Linear() | Formula():
-            return
-        case _:  # its fields are values of the input
-            fields = [getattr(curve, name) for name in curve.__struct_fields__]
-            yield from (one for one in fields if one is not None)
-
-
-def _about(middle: float, reach: float) -> tuple[float, float]:
-    return middle - reach, middle + reach
+        case _:
+            yield from curve.extent or ()
