@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -20,14 +20,14 @@ from fuzzytree.auditing import (
 from fuzzytree.model import RuleBase
 from fuzzytree.report.drawing import Axis, Markup
 from fuzzytree.report.parts import part
-from fuzzytree.report.svg_terms import map_picture, span_text, terms_picture, windows
+from fuzzytree.report.svg_terms import span_text, terms_picture
 from fuzzytree.report.text import counted
 
 MOST_FINDINGS = 300
 """The most that are listed one by one."""
 
-MOST_PICTURED = 10
-"""That have pictures, a map of the decision among them, which takes up to a second."""
+MOST_PICTURED = 30
+"""That have pictures: the first, and the gravest stand first."""
 
 MOST_WHOLE = 3
 """Of a code that are shown whole; of the others all but errors are folded."""
@@ -128,7 +128,6 @@ def _concerned(answer: AuditAnswer, scene: Scene) -> list[str]:
 
 
 _MOST_BARS = 6  # of one finding
-_MOST_MAP_RULES = 200
 
 
 class Scene(NamedTuple):
@@ -137,15 +136,9 @@ class Scene(NamedTuple):
     axes: Mapping[str, Axis]
     viewed: AuditView
 
-    @property
-    def deciding(self) -> RuleBase | None:
-        """The rules, if the strongest of them decides."""
-        is_strongest = self.viewed.policy.decision == "strongest"
-        return self.viewed.rules if is_strongest else None
-
 
 def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
-    """Return the region as pictures: a bar for each variable, a map of two."""
+    """Return a picture of each variable that a finding is about, with its region."""
     point: dict[str, Fraction] = {}
     if isinstance(answer.state, (Witness, Bracket)):
         point = point_of(answer.state.point)
@@ -170,11 +163,7 @@ def pictures(answer: AuditAnswer, name: str, scene: Scene) -> Markup:
         for k, axis in enumerate(shown[:_MOST_BARS])
     ]
     undrawn = ", ".join(axis.name for axis in shown[_MOST_BARS:])
-    maps: list[tuple[Markup | None, str]] = []
-    for whose, rules in _deciding(answer, scene):
-        mapped = _mapped(shown, rules, whose, scene)
-        maps += _maps(mapped, region, values, f"{name}-{len(maps)}", whose, rules)
-    return part("pictures", bars, undrawn, maps)
+    return part("pictures", bars, undrawn)
 
 
 def _bar_text(axis: Axis, span: Span | None, value: float | None) -> str:
@@ -239,66 +228,3 @@ def _concerning(
             if 0 < k <= len(rules.rules):
                 names |= dict.fromkeys(c.variable for c in rules.rules[k - 1].when)
     return [scene.axes[one] for one in names if one in scene.axes]
-
-
-def _deciding(answer: AuditAnswer, scene: Scene) -> list[tuple[str, RuleBase]]:
-    """Return whose decisions maps show: those of the tree and of its raw rules."""
-    if scene.deciding is None:
-        return []
-    claims = answer.state.claims if isinstance(answer.state, Witness) else ()
-    raw = scene.viewed.raw
-    if raw is not None and any(claim.of == "raw rules" for claim in claims):
-        return [("the tree", scene.deciding), ("the raw rules", raw)]
-    return [("", scene.deciding)]
-
-
-def _mapped(
-    shown: Sequence[Axis], rules: RuleBase, whose: str, scene: Scene
-) -> list[Axis]:
-    """Return the variables that a map may show; of one who differs, all if two."""
-    tested = dict.fromkeys(clause.variable for r in rules.rules for clause in r.when)
-    axes = {axis.name: axis for axis in shown}
-    if whose and len(tested) == 2:
-        axes |= {name: scene.axes[name] for name in tested if name in scene.axes}
-    return [axis for axis in axes.values() if axis.name in tested]
-
-
-def _maps(
-    shown: Sequence[Axis],
-    region: Mapping[str, Span],
-    values: Mapping[str, Fraction],
-    name: str,
-    whose: str,
-    rules: RuleBase,
-) -> Iterator[tuple[Markup | None, str]]:
-    """Yield maps of the decision on the two variables that a region limits most."""
-    tested = {clause.variable for rule in rules.rules for clause in rule.when}
-    drawn = sorted(shown, key=lambda axis: _share(axis, region.get(axis.name)))
-    if len(drawn) < 2 or tested - values.keys():
-        return
-    if len(rules.rules) > _MOST_MAP_RULES:
-        yield None, f"not drawn: a map of more than {_MOST_MAP_RULES} rules"
-        return
-    across, down = drawn[:2]
-    for k, (where, window) in enumerate(windows(across, down, region)):
-        axes = (across, down)
-        picture = map_picture(rules, axes, window, region, values, f"{name}-m{k}")
-        said = (
-            f"What {whose or 'the rules'} decide{'s' * (whose == 'the tree')} {where}"
-        )
-        others = len(tested - {across.name, down.name})
-        if others:
-            said += f", with {counted(others, 'other variable')} as at the witness"
-        if across.parts or down.parts:
-            said += "; a combination is drawn as if it were free"
-        yield picture, said
-
-
-def _share(axis: Axis, span: Span | None) -> float:
-    """Return which part of the domain a side of a region takes."""
-    if span is None or axis.low is None or axis.high is None:
-        return 1.0
-    low = axis.low if span.low is None else span.low
-    high = axis.high if span.high is None else span.high
-    width = axis.high / 2 - axis.low / 2  # halves: no range overflows
-    return (high / 2 - low / 2) / width if width > 0.0 else 1.0

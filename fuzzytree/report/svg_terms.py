@@ -1,16 +1,13 @@
-"""Variables and decisions as pictures: terms over rows, a part of the values, a map."""
+"""Variables as pictures: terms over rows, a part of the values, a point."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from fuzzytree.auditing import Span
-from fuzzytree.model import IntArray, RuleBase
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
     LETTER,
@@ -27,14 +24,10 @@ from fuzzytree.report.drawing import (
     spread,
     svg,
     tag,
-    tick_words,
-    ticks,
-    trimmed,
     words,
 )
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import number
-from fuzzytree.runtimes import fire
 
 WIDE = 340.0
 MOST_CURVES = 24
@@ -51,7 +44,7 @@ _BINS = 36
 _FONT = 11.0
 
 
-def scale_of(axis: Axis, data: Data | None, start: float, end: float) -> Scale:
+def scale_of(axis: Axis, data: Data | None) -> Scale:
     """Return the scale of a variable: its domain and its rows, with some room."""
     ends = [value for value in (axis.low, axis.high) if value is not None]
     if data is not None and axis.name in data.axes:
@@ -61,7 +54,7 @@ def scale_of(axis: Axis, data: Data | None, start: float, end: float) -> Scale:
             ends += [float(finite.min()), float(finite.max())]
     if not ends:
         ends = [corner for curve in axis.curves for corner in curve.corners] or [0, 1]
-    return Scale(*spread(ends), start, end)
+    return Scale(*spread(ends), _LEFT, _RIGHT)
 
 
 def terms_picture(
@@ -83,7 +76,7 @@ def terms_picture(
         value: A point, which is marked.
         named: The terms that a finding is about; the others are faint.
     """
-    x = scale_of(axis, data, _LEFT, _RIGHT)
+    x = scale_of(axis, data)
     drawn = axis.curves[:MOST_CURVES]
     names = _placed(drawn, x)
     top = 8.0 + _ROW * max((name.row + 1 for name in names), default=0)
@@ -92,7 +85,7 @@ def terms_picture(
     parts += outside(axis, x, top - 4, y.start)
     if span is not None:
         start, end = _ends(span, x)
-        parts.append(_box(start, end, top - 4, y.start))
+        parts.append(rect(start, top - 4, end - start, y.start - top + 4, "region"))
     parts.append(line(_LEFT, _RIGHT, y.start, y.start, "axis"))
     parts += _curves(drawn, x, y, named)
     parts += _names(names, top)
@@ -210,18 +203,6 @@ def _top(curve: Curve, x: Scale) -> float:
 
 _SLIVER = 3.0  # points: a region is drawn at least so wide
 
-_MAP_HIGH = 288.0
-_MAP = (56.0, 332.0, 8.0, 248.0)  # left, right, top, base
-_CELLS = 48
-_MAP_FONT = 12.0
-
-
-class Window(NamedTuple):
-    """Which part of two axes a map shows."""
-
-    across: tuple[float, float]
-    down: tuple[float, float]
-
 
 def span_text(span: Span, unit: str = "", digits: int = 6) -> str:
     """Return a side of a region in words; its ends have digits enough to differ.
@@ -260,169 +241,5 @@ def _ends(span: Span, x: Scale) -> tuple[float, float]:
     return start, end
 
 
-def _box(start: float, end: float, top: float, base: float) -> Markup:
-    return rect(start, top, end - start, base - top, "region")
-
-
 def _diamond(x: float, y: float) -> str:
     return f"M{x:.1f} {y - 5.5:.1f}l5.5 5.5l-5.5 5.5l-5.5 -5.5z"
-
-
-def windows(
-    across: Axis, down: Axis, region: Mapping[str, Span]
-) -> list[tuple[str, Window]]:
-    """Return what maps show, with a word for it: the domain, and near a sliver.
-
-    There is none if an axis has no domain, or one without width.
-    """
-    whole: list[tuple[float, float]] = []
-    near: list[tuple[float, float]] = []
-    is_sliver = False
-    for axis in (across, down):
-        if axis.low is None or axis.high is None or not axis.low < axis.high:
-            return []
-        low, high = axis.low, axis.high
-        whole.append((low, high))
-        span = region.get(axis.name)
-        start = low if span is None or span.low is None else max(span.low, low)
-        end = high if span is None or span.high is None else min(span.high, high)
-        is_sliver |= 0.0 < end - start < 0.04 * (high - low)
-        room = 1.5 * (end - start)
-        near.append((max(start - room, low), min(end + room, high)))
-    shown = [("on the domain", Window(whole[0], whole[1]))]
-    if is_sliver and all(a < b for a, b in near):
-        shown.append(("near the region", Window(near[0], near[1])))
-    return shown
-
-
-def map_picture(
-    rules: RuleBase,
-    axes: tuple[Axis, Axis],
-    window: Window,
-    region: Mapping[str, Span],
-    values: Mapping[str, Fraction],
-    name: str,
-) -> Markup:
-    """Return the classes on two variables, the others being those of a point."""
-    across, down = axes
-    left, right, top, base = _MAP
-    x = Scale(*window.across, left, right)
-    y = Scale(*window.down, base, top)
-    codes = decisions(
-        rules,
-        (across.name, _middles(window.across)),
-        (down.name, _middles(window.down)),
-        values,
-    )
-    cells, names = _cells(codes, rules.classes)
-    parts = cells
-    spans = [region.get(axis.name) or Span(axis.name, None, None) for axis in axes]
-    if any(axis.name in region for axis in axes):
-        start, end = _ends(spans[0], x)
-        low, high = _ends(spans[1], y)
-        parts.append(_box(start, end, min(low, high), max(low, high)))
-    parts += names
-    point = float(values[across.name]), float(values[down.name])
-    if x.low <= point[0] <= x.high and y.low <= point[1] <= y.high:
-        way = _diamond(x.at(point[0]), y.at(point[1]))
-        parts.append(tag("path", d=way, class_="witness"))
-    parts += axis_marks(x, base)
-    parts += _marks_upwards(y, left)
-    parts.append(words((left + right) / 2, base + 33, across.title, "small", "middle"))
-    turned = f"rotate(-90 11 {(top + base) / 2:.0f})"
-    parts.append(
-        words(11, (top + base) / 2, down.title, "small", "middle", transform=turned)
-    )
-    title = f"The classes on {across.title} and {down.title}"
-    desc = "Each part has the name of its class; the hatched part is the region, the "
-    desc += "diamond the witness; all other variables are those of the witness"
-    return svg(WIDE, _MAP_HIGH, title, desc, *parts, name=name)
-
-
-def decisions(
-    rules: RuleBase,
-    across: tuple[str, Sequence[float]],
-    down: tuple[str, Sequence[float]],
-    others: Mapping[str, Fraction],
-) -> IntArray:
-    """Return the number of the class decided for at each point of a grid, -1 for none.
-
-    The native runtime decides, in double; a combination is a variable like any other.
-    The result has the shape (values down, values across).
-
-    Example:
-        >>> from fuzzytree.model.rulebase import Band, Clause, Rule, Term, Variable
-        >>> low = Term("low", Band(high=0.0))
-        >>> axes = Variable("a", (low,)), Variable("b", (low,))
-        >>> both = Rule((Clause("a", ("low",)), Clause("b", ("low",))), "k")
-        >>> rules = RuleBase("r", ("k",), axes, (both,))
-        >>> decisions(rules, ("a", [-1.0, 1.0]), ("b", [-1.0, 1.0]), {}).tolist()
-        [[0, -1], [-1, -1]]
-    """
-    tested = {clause.variable for rule in rules.rules for clause in rule.when}
-    variables = (one for one in rules.variables if one.name in tested)
-    free = tuple(msgspec.structs.replace(one, parts=()) for one in variables)
-    rules = msgspec.structs.replace(rules, variables=free, columns=())
-    columns = {name: float(value) for name, value in others.items()}
-    x, y = np.meshgrid(across[1], down[1])
-    values = np.stack(
-        [
-            x if name == across[0] else y if name == down[0] else x * 0 + columns[name]
-            for name in rules.inputs
-        ]
-    )
-    outcome = fire(rules)(values.reshape(len(rules.inputs), -1))
-    codes = {label: code for code, label in enumerate(rules.classes)}
-    uncovered = rules.semantics.uncovered
-    none = -1 if uncovered is None else codes[uncovered]
-    classes = np.array([none, *(codes[rule.then] for rule in rules.rules)])
-    grid: IntArray = classes[outcome.rule].reshape(x.shape)
-    return grid
-
-
-def _middles(ends: tuple[float, float]) -> list[float]:
-    return [between(*ends, (k + 0.5) / _CELLS) for k in range(_CELLS)]
-
-
-def _cells(
-    codes: IntArray, classes: Sequence[str]
-) -> tuple[list[Markup], list[Markup]]:
-    """Return the part of each class as a path of runs of cells, and their names.
-
-    A name stands in the longest run of its class.
-    """
-    left, right, top, base = _MAP
-    wide, high = (right - left) / _CELLS, (base - top) / _CELLS
-    ways: dict[int, list[str]] = {}
-    longest: dict[int, tuple[int, float, float]] = {}
-    for row, cells in enumerate(codes.tolist()):
-        start = 0
-        for place in range(1, _CELLS + 1):
-            if place < _CELLS and cells[place] == cells[start]:
-                continue
-            code, x, y = cells[start], left + start * wide, base - (row + 1) * high
-            run = f"M{trimmed(x)} {trimmed(y)}h{trimmed((place - start) * wide)}"
-            ways.setdefault(code, []).append(f"{run}v{trimmed(high)}H{trimmed(x)}z")
-            middle = x + (place - start) * wide / 2.0
-            run_here = (place - start, middle, y + high / 2.0)
-            longest[code] = max(longest.get(code, run_here), run_here)
-            start = place
-    parts: list[Markup] = []
-    names: list[Markup] = []
-    for code, runs in sorted(ways.items()):
-        mark = "none" if code < 0 else class_mark(code)
-        parts.append(tag("path", d=Markup("".join(runs)), class_=f"cell {mark}"))
-        _, x, y = longest[code]
-        said = cut("no class" if code < 0 else classes[code], 18)
-        half = LETTER * _MAP_FONT * len(said) / 2.0
-        x = min(max(x, left + half), right - half)
-        names.append(words(x, y + 4, said, "on-map", "middle"))
-    return parts, names
-
-
-def _marks_upwards(y: Scale, left: float) -> Iterator[Markup]:
-    values = ticks(y.low, y.high)
-    for value, said in zip(values, tick_words(values), strict=True):
-        at = y.at(value)
-        yield line(left - 4, left, at, at, "tick")
-        yield words(left - 6, at + 3.5, cut(said, 5), "small", "end")

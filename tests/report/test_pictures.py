@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from fractions import Fraction
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -19,10 +17,9 @@ from fuzzytree.model.rulebase import (
     Points,
     Rule,
     RuleBase,
-    Semantics,
     Variable,
 )
-from fuzzytree.numerics.exact import exact_answer, exact_axis, exact_degree
+from fuzzytree.numerics.exact import exact_axis, exact_degree
 from fuzzytree.report.audit_findings import exact_axes
 from fuzzytree.report.audit_rows import data_of, histogram, passing
 from fuzzytree.report.drawing import (
@@ -38,13 +35,9 @@ from fuzzytree.report.drawing import (
     ticks,
 )
 from fuzzytree.report.svg_terms import (
-    decisions,
-    map_picture,
     terms_picture,
-    windows,
 )
 from fuzzytree.report.svg_tree import tree_picture
-from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import descend
 from fuzzytree.testing import random_tree
 from tests.report.page_audits import rows_of, rule_base
@@ -64,37 +57,6 @@ def axis(low: float | None = 0.0, high: float | None = 10.0) -> Axis:
 
 def _force(low: float, high: float) -> RuleBase:
     return RuleBase("r", ("k",), (Variable("force", (), "", low, high),), ALWAYS)
-
-
-@pytest.mark.parametrize("conjunction", ["min", "product"])
-@pytest.mark.parametrize("kind", ["relative", "raw"])
-@pytest.mark.parametrize("seed", range(3))
-def test_a_map_shows_the_exact_decision(seed: int, kind: str, conjunction: str) -> None:
-    tree = random_tree(seed, leaves=5)
-    rules = rules_from_tree(tree, "raw" if kind == "raw" else "relative")
-    meant = Semantics("product" if conjunction == "product" else "min")
-    free = [Variable(v.name, v.terms) for v in rules.variables]
-    rules = msgspec.structs.replace(
-        rules, variables=tuple(free), semantics=meant, columns=()
-    )
-    across, down, *others = rules.inputs
-    xs, ys = np.linspace(-3, 3, 9).tolist(), np.linspace(-2, 2, 7).tolist()
-    still = dict.fromkeys(others, 0.25)
-    fixed = {name: Fraction(value) for name, value in still.items()}
-    found = decisions(rules, (across, xs), (down, ys), fixed)
-    for (i, y), (j, x) in itertools.product(enumerate(ys), enumerate(xs)):
-        label = exact_answer(rules, {across: x, down: y, **still}).label
-        code = -1 if label is None else rules.classes.index(label)
-        assert found[i, j] == code
-
-
-def test_where_no_rule_fires_a_map_shows_the_answer_for_that() -> None:
-    rules = rule_base()
-    assert decisions(rules, ("pressure", [9.0]), ("area", [50.0]), {}).tolist() == [
-        [-1]
-    ]
-    hard = msgspec.structs.replace(rules, semantics=Semantics(uncovered="hard"))
-    assert decisions(hard, ("pressure", [9.0]), ("area", [50.0]), {}).tolist() == [[2]]
 
 
 def test_the_axes_of_a_point_are_exact() -> None:
@@ -206,30 +168,6 @@ def test_a_combination_reaches_what_its_inputs_allow() -> None:
     found = axes_of(rules, domain)["mix"]
     assert (found.low, found.high) == (-5.0, 2.0)
     assert axes_of(rules, Domain(()))["mix"].low is None
-
-
-def test_a_sliver_has_a_second_map_near_it() -> None:
-    pair = axis(), axis()._replace(name="slip")
-    wide = {"force": Span("force", 1.0, 4.0)}
-    thin = {"force": Span("force", 1.0, 1.001)}
-    assert [where for where, _ in windows(*pair, wide)] == ["on the domain"]
-    found = windows(*pair, thin)
-    assert [where for where, _ in found] == ["on the domain", "near the region"]
-    assert found[1][1].across == pytest.approx((0.9985, 1.0025))
-    assert windows(axis(None, None), pair[1], thin) == []
-
-
-def test_a_witness_outside_of_a_map_is_not_drawn_on_its_edge() -> None:
-    rules = rule_base()
-    axes = axes_of(
-        rules, Domain((DomainSide("pressure", 0, 10), DomainSide("area", 0, 100)))
-    )
-    pair = axes["pressure"], axes["area"]
-    window = windows(*pair, {})[0][1]
-    for at, count in ((Fraction(5), 1), (Fraction(11), 0)):
-        point = {"pressure": at, "area": Fraction(50)}
-        drawn = map_picture(rules, pair, window, {}, point, "m")
-        assert drawn.count('class="witness"') == count
 
 
 def test_a_tree_without_nodes_or_with_many_classes_is_drawn() -> None:
