@@ -29,11 +29,10 @@ from fuzzytree.exporters.pmml_elements import (
     ref,
     schema,
 )
-from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
-from fuzzytree.exporters.program_text import title_of
+from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields, step_value
+from fuzzytree.exporters.program_text import named_steps, strengths_of, title_of
 from fuzzytree.exporters.xml_text import XmlElement, element, text_of
 from fuzzytree.model import (
-    Clause,
     Document,
     Format,
     FuzzySystem,
@@ -50,6 +49,7 @@ from fuzzytree.model import (
     intervals,
     refusal,
     sentence,
+    shapes_of,
     unlike,
 )
 from fuzzytree.semantics import pointed
@@ -266,29 +266,30 @@ def _rules(
     rules: RuleBase, names: _Names, *, is_exact: bool
 ) -> tuple[list[XmlElement], XmlElement]:
     """Return the derived fields and the model of a rule base."""
-    terms: dict[tuple[str, str], str] = {}
+    program, places = strengths_of(rules)
+    shapes = shapes_of(rules.variables)
+    titles = [f"{variable} is {term}" for variable, term in shapes]
+    terms = {
+        title: key
+        for title, key in zip(titles, shapes, strict=True)
+        if titles.count(title) == 1
+    }
     fields: list[XmlElement] = []
-    for variable in rules.variables:
-        for term in variable.terms:
-            name = names.new(f"{variable.name} is {term.name}")
-            terms[variable.name, term.name] = name
-            field = variable.name
-            degree = (
-                norm_continuous(term.shape, field)
-                if isinstance(term.shape, Points) and not is_exact
-                else names.functions.degree(term.shape, field)
-            )
-            fields.append(derived(name, degree))
+    known: dict[int, XmlElement] = {}
+    named = named_steps(program, places)
+    for place, title in named.items():
+        name = names.new(title or f"step {place}")
+        value = step_value(program, place, known)
+        if title in terms and not is_exact:
+            shape = shapes[terms[title]]
+            if isinstance(shape, Points):
+                value = norm_continuous(shape, terms[title][0])
+        fields.append(derived(name, value))
+        known[place] = ref(name)
     strengths = [names.new(f"strength {k}") for k in range(1, len(rules.rules) + 1)]
-    how = "product" if rules.semantics.conjunction == "product" else "min"
-    clauses: dict[int, XmlElement] = {}
-    for strength, rule in zip(strengths, rules.rules, strict=True):
-        for clause in rule.when:
-            if id(clause) not in clauses:
-                clauses[id(clause)] = _clause(clause, terms)
-        parts = [clauses[id(clause)] for clause in rule.when]
-        whole = joined(how, parts) if parts else constant(1.0)
-        fields.append(derived(strength, whole))
+    for strength, place in zip(strengths, places, strict=True):
+        value = known.get(place) or step_value(program, place, known)
+        fields.append(derived(strength, value))
     usable, best = names.new("usable"), names.new("best")
     fields.append(derived(usable, _usable(rules.variables, names.functions)))
     fields.append(derived(best, joined("max", list(map(ref, strengths)))))
@@ -296,12 +297,6 @@ def _rules(
     fields.append(derived(winner, _winner(strengths, usable, best)))
     outputs = _outputs(rules, strengths, usable, names)
     return fields, _model(rules, names, outputs, _rule_nodes(rules, winner))
-
-
-def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> XmlElement:
-    degrees = [ref(terms[clause.variable, term]) for term in clause.terms]
-    whole = joined("max", degrees)
-    return apply("-", constant(1.0), whole) if clause.negated else whole
 
 
 def _winner(strengths: Sequence[str], usable: str, best: str) -> XmlElement:

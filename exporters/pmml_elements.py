@@ -11,8 +11,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from fuzzytree.exporters.xml_text import XmlElement, element
-from fuzzytree.model import LR, Band, Points, Shape, Side
-from fuzzytree.semantics import BELOW_ONE
+from fuzzytree.model import Points
 
 NUMBER = {"optype": "continuous", "dataType": "double"}
 TEXT = {"optype": "categorical", "dataType": "string"}
@@ -102,27 +101,6 @@ class Functions:
     def __init__(self) -> None:
         self.defined: dict[str, XmlElement] = {}
 
-    def degree(self, shape: Shape, field: str) -> XmlElement:
-        """Return the degree of a field's value."""
-        x = ref(field)
-        match shape:
-            case Band(low=low, high=high, left=left, right=right):
-                result = constant(1.0)
-                if high is not None:
-                    beyond = self._flank(high, right, x)
-                    is_above = apply("greaterThan", x, constant(high))
-                    result = apply("if", is_above, beyond, result)
-                if low is not None:
-                    below = self._flank(low, left, x)
-                    result = apply("if", _up_to(x, low), below, result)
-                return result
-            case LR(mean=mean, left=left, right=right):
-                below = self._side(left, apply("-", constant(mean), x))
-                above = self._side(right, apply("-", x, constant(mean)))
-                return apply("min", below, above)
-            case Points():
-                return self._points(shape, x)
-
     def finite(self, x: XmlElement) -> XmlElement:
         """Return 1 where a value is there and finite, and 0 elsewhere."""
         value, zero = ref("value"), constant(0.0)
@@ -154,80 +132,6 @@ class Functions:
             )
         return name
 
-    def _clipped(self, value: XmlElement, high: XmlElement) -> XmlElement:
-        clamped = apply("max", ref("value"), constant(0.0))
-        body = apply("min", clamped, ref("high"))
-        return apply(self._define("clip", ("value", "high"), body), value, high)
-
-    def _flank(self, edge: float, end: float | None, x: XmlElement) -> XmlElement:
-        if end is None:
-            return constant(0.0)
-        q = apply("/", apply("-", x, constant(end)), constant(edge - end))
-        return self._clipped(q, constant(BELOW_ONE))
-
-    def _side(self, side: Side, distance: XmlElement) -> XmlElement:
-        names = _names(len(side.curve))
-        count = len(names)
-        coefficients = tuple(map(ref, names))
-        v = apply("-", apply("*", constant(2.0), ref("t")), constant(1.0))
-        horner = self._define(f"horner{count}", ("v", *names), _horner(names, ref("v")))
-        fall = apply("*", ref("t"), apply(horner, v, *coefficients))
-        kept = self._clipped(apply("-", constant(1.0), fall), constant(1.0))
-        body = self._define(f"body{count}", ("t", *names), kept)
-        square = self._define("square", ("w",), apply("*", ref("w"), ref("w")))
-        left = apply("/", apply("-", ref("reach"), ref("u")), ref("length"))
-        w = self._clipped(left, constant(1.0))
-        whole = apply(
-            "*",
-            apply(body, apply("min", ref("u"), constant(1.0)), *coefficients),
-            apply(square, apply(square, w)),
-        )
-        parameters = ("u", "reach", "length", *names)
-        lr = self._define(f"side{count}", parameters, whole)
-        u = apply("/", distance, constant(side.spread))
-        return apply(
-            lr,
-            self._clipped(u, constant(side.reach)),
-            constant(side.reach),
-            constant(side.reach - 1.0),
-            *map(constant, side.curve),
-        )
-
-    def _points(self, points: Points, x: XmlElement) -> XmlElement:
-        """Return nested questions that halve the points, down to a line or a degree."""
-        values, count = points.values, len(points.values)
-        if count == 1:
-            return constant(points.degrees[0])
-        # Of places 0 (up to the first point), 1, ..., count (behind the last one).
-        return bisection(
-            x, count, values.__getitem__, lambda place: self._line(points, place, x)
-        )
-
-    def _line(self, points: Points, after: int, x: XmlElement) -> XmlElement:
-        values, degrees = points.values, points.degrees
-        if after in (0, len(values)):
-            return constant(degrees[after and -1])
-        anchor, other = values[after], values[after - 1]
-        near, far = degrees[after], degrees[after - 1]
-        if near == far or anchor == other:
-            return constant(near)  # behind a step nothing lies between
-        if far == 0.0:
-            anchor, other, near, far = other, anchor, far, near
-        share = apply("/", apply("-", ref("x"), ref("anchor")), ref("run"))
-        line = apply("+", ref("near"), apply("*", share, ref("rise")))
-        clamped = apply("min", apply("max", line, ref("low")), ref("high"))
-        names = ("x", "anchor", "run", "near", "rise", "low", "high")
-        numbers = (
-            anchor,
-            other - anchor,
-            near,
-            far - near,
-            min(near, far),
-            max(near, far),
-        )
-        name = self._define("line", names, clamped)
-        return apply(name, x, *map(constant, numbers))
-
 
 def norm_continuous(points: Points, field: str) -> XmlElement:
     """Return points as PMML's own lists, one for each stretch between steps.
@@ -253,17 +157,6 @@ def _run(run: list[tuple[float, float]], field: str) -> XmlElement:
     result = element("NormContinuous", *norms, field=field, outliers="asExtremeValues")
     highest = max(degree for _, degree in run)
     return result if highest == 1.0 else apply("min", result, constant(highest))
-
-
-def _names(count: int) -> tuple[str, ...]:
-    return tuple(f"c{k}" for k in range(count))
-
-
-def _horner(names: Sequence[str], x: XmlElement) -> XmlElement:
-    total = ref(names[-1])
-    for name in reversed(names[:-1]):
-        total = apply("+", apply("*", total, x), ref(name))
-    return total
 
 
 def _up_to(x: XmlElement, value: float) -> XmlElement:

@@ -213,6 +213,37 @@ class SystemFields:
         )
 
 
+def step_value(
+    program: Program, place: int, known: Mapping[int, XmlElement]
+) -> XmlElement:
+    """Return a step of a program whose numbers all have a value, as an expression.
+
+    Args:
+        program: The program.
+        place: Of the step.
+        known: The fields of steps that have one.
+    """
+    step = program.steps[place]
+    operands = [
+        known.get(one) or step_value(program, one, known) for one in step.arguments
+    ]
+    match step.operation:
+        case "constant":
+            return constant(step.number)
+        case "input":
+            return ref(step.name)
+        case "below" | "pick":
+            return _table(step, operands[0])
+        case "negate":
+            return apply("-", _ZERO, *operands)
+        case "where":
+            return apply("if", *operands)
+        case "divide":
+            return apply("/", *operands)
+        case operation:
+            return apply({**_PLAIN, **_COMPARED, **_LOGIC}[operation], *operands)
+
+
 def _refuse_unknown(name: str, program: Program) -> None:
     known = {*_PLAIN, *_PARTIAL, *_COMPARED, *_LOGIC, "negate", "is_finite", "where"}
     known |= {"constant", "input", "index", "total", "running", "last"}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from msgspec.structs import replace
 
 from fuzzytree.model import (
     Document,
@@ -28,6 +29,7 @@ from fuzzytree.semantics import (
     descend,
     error_bounds,
     evaluate,
+    from_rules,
     from_system,
     infer,
     still_results,
@@ -127,6 +129,55 @@ class StepText:
                 return f"{operands[0]} {self.signs[operation]} {operands[1]}"
             case _:
                 return self.call(step, operands)
+
+
+def strengths_of(rules: RuleBase) -> tuple[Program, list[int]]:
+    """Return a program that computes strengths where all values are known.
+
+    Combinations are inputs of it: they are computed before, where it is known what is
+    missing.
+
+    Returns:
+        The program, and the place of each rule's strength.
+    """
+    plain = tuple(replace(variable, parts=()) for variable in rules.variables)
+    program = from_rules(replace(rules, variables=plain, columns=()))
+    # What is shown is the strength where all values are known, else NaN.
+    shown = [(place, program.steps[place]) for place in program.of("strength")]
+    places = [
+        step.arguments[1] if step.operation == "where" else place
+        for place, step in shown
+    ]
+    return program, places
+
+
+def named_steps(program: Program, places: Sequence[int]) -> dict[int, str]:
+    """Return the steps that need a name where steps are written within each other.
+
+    They are the degrees of terms, and what is used twice and is more than one
+    operation on names and numbers.
+
+    Returns:
+        Their titles, or "", by their places, in order.
+    """
+    uses: dict[int, int] = dict.fromkeys(places, 2)
+    for place in range(len(program.steps) - 1, -1, -1):
+        if place in uses:
+            for argument in program.steps[place].arguments:
+                uses[argument] = uses.get(argument, 0) + 1
+    named: dict[int, str] = {}
+    sizes: dict[int, int] = {}
+    for place in sorted(uses):
+        step = program.steps[place]
+        inner = [sizes[one] for one in step.arguments if one not in named]
+        sizes[place] = sum(inner) + bool(step.arguments)
+        title = program.titles[place]
+        is_part = title.endswith(f" {step.operation.replace('_', ' ')}")
+        is_term = " is " in title and not is_part
+        is_long = uses[place] > 1 and sizes[place] > 1 and place not in places
+        if step.arguments and (is_term or is_long):
+            named[place] = title if is_term else ""
+    return named
 
 
 class ScriptSteps(StepText):

@@ -7,32 +7,30 @@ answer; each step is a common table expression, so a person can follow it.
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.program_text import title_of
+from fuzzytree.exporters.program_text import (
+    StepText,
+    named_steps,
+    strengths_of,
+    title_of,
+)
 from fuzzytree.model import (
-    LR,
-    Band,
     Format,
     FuzzyTree,
     Model,
     Node,
-    Points,
     RuleBase,
-    Shape,
-    Side,
     Written,
     fingerprint,
     sentence,
-    shapes_of,
 )
-from fuzzytree.semantics import BELOW_ONE
+from fuzzytree.semantics import Step
 
 Dialect = Literal["sqlite", "duckdb", "postgresql", "spark"]
 
@@ -212,40 +210,20 @@ def _last(query: Query, label: str, rule: str, status: str) -> Iterator[str]:
 def _rule_steps(
     query: Query, rules: RuleBase, *, with_strengths: bool
 ) -> Iterator[str]:
-    line = {v.name: f"x_{number}" for number, v in enumerate(rules.variables, 1)}
-    shapes = shapes_of(rules.variables)
-    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
-    keys = list(dict.fromkeys((c.variable, term) for c in clauses for term in c.terms))
-    place = {clause: f"d_{number}" for number, clause in enumerate(clauses, 1)}
-    helpers = SqlDegrees(query)
-    degrees = {key: f"m_{number}" for number, key in enumerate(keys, 1)}
-    texts = [
-        f"{helpers.degree(shapes[key], line[key[0]])} AS {degrees[key]}"
-        f" -- {key[0]!r} is {key[1]!r}"
-        for key in keys
-    ]
+    steps = SqlSteps(query, rules)
     before = "known"
-    for name, columns in zip(("places", "parts"), helpers.columns, strict=True):
-        yield query.step(name, is_heavy=True)
-        yield f"  SELECT\n{_listed([f'{before}.*', *columns])}\n  FROM {before}\n),"
-        before = name
-    yield query.step("terms", is_heavy=True)
-    yield _commented(["parts.*", *texts]) + "\n  FROM parts\n),"
-    yield query.step("clauses", is_heavy=True)
-    result: list[str] = []
-    for clause in clauses:
-        highest = query.greatest(*(degrees[clause.variable, t] for t in clause.terms))
-        whole = f"1e0 - {highest}" if clause.negated else highest
-        result.append(f"{whole} AS {place[clause]}")
-    yield f"  SELECT\n{_listed(['terms.*', *result])}\n  FROM terms\n),"
+    for number, columns in enumerate(steps.levels, 1):
+        yield query.step(f"level_{number}", is_heavy=True)
+        yield _commented([f"{before}.*", *columns]) + f"\n  FROM {before}\n),"
+        before = f"level_{number}"
+    fired = [
+        f"{strength} AS s_{number} -- {sentence(rule)!r}"
+        for number, (strength, rule) in enumerate(
+            zip(steps.strengths, rules.rules, strict=True), 1
+        )
+    ]
     yield query.step("fired", is_heavy=True)
-    fired: list[str] = []
-    for number, rule in enumerate(rules.rules, 1):
-        parts = [place[clause] for clause in rule.when] or ["1e0"]
-        is_product = rules.semantics.conjunction == "product"
-        strength = " * ".join(parts) if is_product else query.least(*parts)
-        fired.append(f"{strength} AS s_{number} -- {sentence(rule)!r}")
-    yield _commented(["clauses.*", *fired]) + "\n  FROM clauses\n),"
+    yield _commented([f"{before}.*", *fired]) + f"\n  FROM {before}\n),"
     yield from _decision(query, rules, with_strengths=with_strengths)
 
 
@@ -380,11 +358,6 @@ class Query:
             ]
         return many[0]
 
-    def clip(self, value: str, high: float) -> str:
-        """Return a value clamped to 0 and high; 0.0 of -0.0, as the first of equals."""
-        zero = self.number(0.0)
-        return self.least(self.greatest(zero, value), self.number(high))
-
 
 _RESERVED = frozenset(
     """
@@ -426,90 +399,73 @@ def _ratio(value: float) -> str:
     return text
 
 
-class SqlDegrees:
-    """Degrees as expressions; the argument of a polynomial is a column before."""
+class SqlSteps(StepText):
+    """The program of a rule base as columns: of degrees, and of what is used twice.
 
-    def __init__(self, query: Query) -> None:
+    Attributes:
+        levels: The columns of one query after another; each needs those before it.
+        strengths: The strength of each rule, where every value is known.
+    """
+
+    signs: ClassVar[Mapping[str, str]] = {
+        **StepText.signs,
+        **{"equal": "=", "and": "AND", "or": "OR", "not": "NOT "},
+        "where": "CASE WHEN {} THEN {} ELSE {} END",
+    }
+
+    def __init__(self, query: Query, rules: RuleBase) -> None:
+        program, places = strengths_of(rules)
+        super().__init__(program)
         self.query = query
-        self.columns: tuple[list[str], list[str]] = ([], [])  # of two steps
+        numbers = enumerate(rules.variables, 1)
+        self._inputs = {one.name: f"x_{number}" for number, one in numbers}
+        self._columns: dict[int, str] = {}
+        self.levels: list[list[str]] = []
+        levels: dict[int, int] = {}
+        named = named_steps(program, places)
+        for place, step in enumerate(self.steps):
+            levels[place] = max((levels[one] for one in step.arguments), default=0)
+            if place in named:
+                if levels[place] == len(self.levels):
+                    self.levels.append([])
+                name = f"v_{len(self._columns) + 1}"
+                comment = f" -- {named[place]!r}" if named[place] else ""
+                column = f"{self.expression(step)} AS {name}{comment}"
+                self.levels[levels[place]].append(column)
+                self._columns[place] = name
+                levels[place] += 1
+        self.strengths = [self.value(place) for place in places]
 
-    def degree(self, shape: Shape, x: str) -> str:
-        """Return the degree of a shape at a column, as the reference computes it."""
-        match shape:
-            case Band():
-                return self._band(shape, x)
-            case LR(mean=mean, left=left, right=right):
-                distance = f"({x} - {self.query.number(mean)})"
-                below = self._side(left, f"-{distance}")
-                return self.query.least(below, self._side(right, distance))
-            case Points():
-                return self._points(shape, x)
+    def value(self, place: int) -> str:
+        """Return a step's result: a column, a number, or an expression."""
+        step, known = self.steps[place], self.still[place]
+        if isinstance(known, float):
+            return self.query.number(known)
+        if step.operation == "input":
+            return self._inputs[step.name]
+        if place in self._columns:
+            return self._columns[place]
+        text = self.expression(step)
+        is_call = step.operation in ("minimum", "maximum")
+        return text if is_call else f"({text})"
 
-    def _column(self, text: str, step: int = 0) -> str:
-        names = self.columns[step]
-        name = f"{'hg'[step]}_{len(names) + 1}"
-        names.append(f"{text} AS {name}")
-        return name
-
-    def _band(self, band: Band, x: str) -> str:
-        q = self.query
-        cases: list[str] = []
-        for bound, sign, end in (
-            (band.low, "<=", band.left),
-            (band.high, ">", band.right),
-        ):
-            if bound is not None:
-                degree = "0e0" if end is None else self._flank(bound, end, x)
-                cases.append(f"WHEN {x} {sign} {q.number(bound)} THEN {degree}")
-        return f"CASE {' '.join(cases)} ELSE 1e0 END" if cases else "1e0"
-
-    def _flank(self, edge: float, end: float, x: str) -> str:
-        q = self.query
-        share = f"({x} - {q.number(end)}) / {q.number(edge - end)}"
-        return q.clip(share, BELOW_ONE)
-
-    def _side(self, side: Side, distance: str) -> str:
-        q = self.query
-        one, reach = q.number(1.0), q.number(side.reach)
-        u = self._column(q.clip(f"{distance} / {q.number(side.spread)}", side.reach))
-        t = self._column(q.least(u, one), 1)
-        v = f"({q.number(2.0)} * {t} - {one})"
-        body = q.clip(f"{one} - {t} * ({_horner(q, side.curve, v)})", 1.0)
-        fall = q.number(side.reach - 1.0)
-        w = self._column(q.clip(f"({reach} - {u}) / {fall}", 1.0), 1)
-        return f"{body} * (({w} * {w}) * ({w} * {w}))"
-
-    def _points(self, points: Points, x: str) -> str:
-        q = self.query
-        known = list(zip(points.values, points.degrees, strict=True))
-        first, last = known[0], known[-1]
-        cases = [f"WHEN {x} <= {q.number(first[0])} THEN {q.number(first[1])}"]
-        for left, right in itertools.pairwise(known):
-            if left[0] < right[0]:
-                line = self._line(left, right, x)
-                cases.append(f"WHEN {x} <= {q.number(right[0])} THEN {line}")
-        return f"CASE {' '.join(cases)} ELSE {q.number(last[1])} END"
-
-    def _line(
-        self, left: tuple[float, float], right: tuple[float, float], x: str
-    ) -> str:
-        q = self.query
-        (anchor, near), (other, far) = right, left
-        if near == far:
-            return q.number(near)
-        if far == 0.0:
-            (anchor, near), (other, far) = left, right
-        share = f"({x} - {q.number(anchor)}) / {q.number(other - anchor)}"
-        line = f"{q.number(near)} + {share} * {q.number(far - near)}"
-        low, high = sorted((near, far))
-        return q.least(q.greatest(line, q.number(low)), q.number(high))
-
-
-def _horner(query: Query, curve: Sequence[float], at: str) -> str:
-    text = query.number(curve[-1])
-    for coefficient in reversed(curve[:-1]):
-        text = f"({text}) * {at} + {query.number(coefficient)}"
-    return text
+    def call(self, step: Step, operands: Sequence[str]) -> str:
+        """Return the smaller or larger of two, or what is looked up in a table."""
+        match step.operation:
+            case "minimum":  # of two equal numbers the second one, 0.0 for -0.0
+                return self.query.least(*reversed(operands))
+            case "maximum":
+                return self.query.greatest(*reversed(operands))
+            case "below":
+                cases = [
+                    f"WHEN {operands[0]} <= {self.query.number(one)} THEN {count}e0"
+                    for count, one in enumerate(step.table)
+                ]
+                return f"CASE {' '.join(cases)} ELSE {len(step.table)}e0 END"
+            case _:
+                numbers = enumerate(map(self.query.number, step.table))
+                cases = [f"WHEN {place}e0 THEN {one}" for place, one in numbers]
+                return f"CASE {operands[0]} {' '.join(cases)} END"
 
 
 FORMAT = Format(

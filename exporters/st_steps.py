@@ -9,12 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from msgspec.structs import replace
-
-from fuzzytree.exporters.program_text import StepText
+from fuzzytree.exporters.program_text import StepText, strengths_of
 from fuzzytree.exporters.st_text import StNumbers, remark, table
 from fuzzytree.model import RuleBase, sentence
-from fuzzytree.semantics import BELOW_ONE, Program, Step, from_rules, still_results
+from fuzzytree.semantics import BELOW_ONE, Program, Step, still_results
 
 _SIGNS: Mapping[str, str] = {**StepText.signs, "equal": "=", "and": "AND", "or": "OR"}
 _COMPARED = {"minimum": "<", "maximum": ">", "lowest": "<", "highest": ">"}
@@ -333,9 +331,7 @@ class RuleSteps(StSteps):
         self, rules: RuleBase, values: Mapping[str, str], numbers: StNumbers
     ) -> None:
         """Prepare the statements."""
-        # Combinations are computed before, where it is known what is missing.
-        plain = tuple(replace(variable, parts=()) for variable in rules.variables)
-        program = from_rules(replace(rules, variables=plain, columns=()))
+        program, self._strengths = strengths_of(rules)
         super().__init__(program, values, numbers)
         self.rules = rules
         self._numbers: dict[int, int] = {}
@@ -343,9 +339,7 @@ class RuleSteps(StSteps):
     def statements(self) -> Iterator[str]:
         """Yield the steps that each rule needs first, and then its strength."""
         done: set[int] = set()
-        for number, shown in enumerate(self.program.of("strength"), 1):
-            # What is shown is the strength where all values are known, else NaN.
-            place = self.program.steps[shown].arguments[1]
+        for number, place in enumerate(self._strengths, 1):
             rule = self.rules.rules[number - 1]
             yield f"    (* {number}. {remark(sentence(rule))} *)\n"
             for step in self._needed(place, done):
