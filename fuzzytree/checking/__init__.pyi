@@ -4,10 +4,12 @@ from .abilities import Outcome as Outcome
 from .abilities import abilities_of as abilities_of
 from .abilities import dialects_of as dialects_of
 from .comparing import ModelRun as ModelRun
+from .comparing import compare_bits as compare_bits
 from .comparing import counted as counted
 from .comparing import judged as judged
 from .comparing import labels as labels
 from .comparing import probed as probed
+from .comparing import row_set as row_set
 from .conformance import failures as failures
 from .converting import CALLED as CALLED
 from .converting import Conversion as Conversion

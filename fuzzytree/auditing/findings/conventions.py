@@ -26,14 +26,12 @@ from fuzzytree.auditing.findings.codes import finding, note
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import rows_outside, sample_points
-from fuzzytree.checking import ModelRun, labels
+from fuzzytree.checking import ModelRun, compare_bits, row_set
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
-    BoolArray,
     FloatArray,
     FuzzySystem,
     FuzzyTree,
-    IntArray,
     Model,
     RuleBase,
     Run,
@@ -173,18 +171,36 @@ def convention_answers(
     their form. Raw rules are a model of their own.
     """
     first: dict[str, ModelRun] = {}
+    rows = row_set(subject.rules.inputs, question.values, None)
     is_alike = True
     for one in results:
         form = one.title.rpartition(": ")[2]
         base = first.setdefault(form, one)
         if base is one and form != "raw rules":
             base = results[0]
-        rows = np.flatnonzero(_differ(one, base))
-        if rows.size:
+        is_of_tree = type(one.model) is not type(base.model)
+        answers, right = (_decision(x, has_ties=not is_of_tree) for x in (one, base))
+        compared = compare_bits(answers, right, rows)
+        if compared.differing:
             is_alike = False
-            yield _broken(subject, question, one, base, rows)
+            answer = _differing(
+                question, one.title, compared.detail[0], compared.differing
+            )
+            numbers = [*compared.row_numbers]
+            state = witness(subject, base.model, question.values[:, numbers])
+            yield answer if state is None else replace(answer, state=state)
     if is_alike:
         yield _alike(question, [one.title for one in results])
+
+
+def _decision(run: ModelRun, *, has_ties: bool) -> ModelRun:
+    """Return answers without strengths, and without ties, unknown to a tree."""
+    outcome = replace(run.outcome, strengths=None)
+    if not has_ties:
+        is_tie = outcome.status == Status.TIE
+        status = np.where(is_tie, Status.DECIDED, outcome.status)
+        outcome = replace(outcome, status=status.astype(np.int64))
+    return replace(run, outcome=outcome)
 
 
 def _alike(question: Convention, titles: Sequence[str]) -> AuditAnswer:
@@ -198,55 +214,12 @@ def _alike(question: Convention, titles: Sequence[str]) -> AuditAnswer:
     return note("FT602", name, text, Proved(how))
 
 
-def _differ(one: ModelRun, base: ModelRun) -> BoolArray:
-    """Return where two representations differ in class or in a missing value.
-
-    A tree does not know ties: between a tree and rules these are no difference.
-    """
-    differ: BoolArray = labels(one) != labels(base)
-    differ |= one.outcome.rule != base.outcome.rule
-    if type(one.model) is type(base.model):
-        differ |= one.outcome.status != base.outcome.status
-        return differ
-    missing = [x.outcome.status == Status.MISSING for x in (one, base)]
-    differ |= missing[0] != missing[1]
-    return differ
-
-
-def _broken(
-    subject: Subject,
-    question: Convention,
-    one: ModelRun,
-    base: ModelRun,
-    rows: IntArray,
-) -> AuditAnswer:
-    row = int(rows[0])
-    text = f"answers {_said(one, row)} where {base.title} answers {_said(base, row)}"
-    answer = _differing(subject, question, one.title, text, rows)
-    state = witness(subject, base.model, question.values[:, rows])
-    return answer if state is None else replace(answer, state=state)
-
-
-def _differing(
-    subject: Subject, question: Convention, title: str, text: str, rows: IntArray
-) -> AuditAnswer:
+def _differing(question: Convention, title: str, fact: str, count: int) -> AuditAnswer:
     """Return that a representation differs in some probes, and the first of them."""
-    values = zip(
-        subject.rules.inputs, question.values[:, rows[0]].tolist(), strict=True
-    )
-    probe = ", ".join(f"{name} {x!r}" for name, x in values)
-    sentence = f"{question.name}: {title} {text}, at {probe}; "
-    sentence += f"{rows.size} of {question.values.shape[1]} probes differ"
-    proof = Proved(f"both were run on the probe {probe}")
+    sentence = f"{question.name}: {title} differs in {count} of "
+    sentence += f"{question.values.shape[1]} probes: {fact}"
+    proof = Proved(f"both were run; {fact}")
     return finding("FT602", f"{question.name}, {title}", sentence, proof)
-
-
-def _said(answers: ModelRun, row: int) -> str:
-    number = int(labels(answers)[row])
-    label = "no class" if number < 0 else repr(answers.model.classes[number])
-    rule, status = int(answers.outcome.rule[row]), int(answers.outcome.status[row])
-    how = "" if status == Status.DECIDED else f", {Status(status).name.lower()}"
-    return f"{label} ({f'rule {rule}' if rule else 'no rule'}{how})"
 
 
 # --- systems
@@ -276,15 +249,16 @@ def system_answers(
 ) -> Iterator[AuditAnswer]:
     """Yield what runtimes of a system answer: each that differs, or that none does."""
     first, base = results[0]
+    rows = row_set(subject.rules.inputs, question.values, None)
     is_alike = True
     for name, one in results[1:]:
         differ = one.status != base.status
         differ |= (np.isnan(one.outputs) != np.isnan(base.outputs)).any(axis=0)
-        rows = np.flatnonzero(differ)
-        if rows.size:
+        if differ.any():
             is_alike = False
-            text = f"and {first} differ in which outputs have a number"
-            yield _differing(subject, question, name, text, rows)
+            row = rows.text(int(np.flatnonzero(differ)[0]))
+            fact = f"{row}: {first} gives a number to other outputs"
+            yield _differing(question, name, fact, int(differ.sum()))
     if is_alike:
         yield _alike(question._replace(left_out=0), [name for name, _ in results])
 
