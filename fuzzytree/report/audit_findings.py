@@ -70,7 +70,7 @@ def findings_section(
         notes.append(f"{more}: the JSON has all of them")
     if len(shown) > MOST_PICTURED:
         notes.append(f"Only the first {MOST_PICTURED} findings have pictures")
-    known = [(code, _explanations(code), some) for (_, code), some in groups.items()]
+    known = [(code, CODES.get(code), some) for (_, code), some in groups.items()]
     return part("findings", known, notes)
 
 
@@ -84,20 +84,6 @@ class ShownFinding(NamedTuple):
     concerned: list[str]
     where: str
     pictures: Markup | None
-
-
-def _explanations(code: str) -> list[tuple[str, str]]:
-    """Return what a code means, with the title of each text."""
-    if code not in CODES:
-        return []
-    known = CODES[code]
-    texts = (
-        ("What it means", known.what),
-        ("Why it matters", known.why),
-        ("Example", known.example),
-        ("What to do", known.remedy),
-    )
-    return [(title, words) for title, words in texts if words]
 
 
 def _region_text(region: Sequence[Span], scene: Scene) -> str:

@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.auditing import Audit, AuditAnswer, AuditRows, Declined, view
+from fuzzytree.auditing import Audit, AuditAnswer, AuditRows, view
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import (
-    ORIGINS,
     SUMMARY,
     asked_text,
     found_text,
@@ -31,15 +30,9 @@ from fuzzytree.report.audit_states import (
     as_in_file,
     gravest_first,
     known_as,
-    result_text,
-    state_note,
 )
 from fuzzytree.report.drawing import Markup, axes_of, joined
 from fuzzytree.report.parts import part, whole_page
-from fuzzytree.report.stability import advice, criterion_row
-from fuzzytree.report.stability import stability_verdict as stability_text
-from fuzzytree.report.text import agreement_verdict as agreement_text
-from fuzzytree.report.text import certified_row, comparison_row, counted, number
 
 if TYPE_CHECKING:
     from fuzzytree.checking import Stability
@@ -47,10 +40,7 @@ if TYPE_CHECKING:
 MOST_QUESTIONS = 1000
 """That are listed one by one."""
 
-_MOST_DECLINED = 100  # reasons that are listed
-
 _Section = tuple[str, str, Markup]  # its anchor, its title, its content
-_FORMS = {"tree": "a tree", "rules": "a rule base", "system": "a fuzzy system"}
 
 
 def page(
@@ -81,10 +71,11 @@ def page(
         True
     """
     audit = as_in_file(audit)
+    classes = None if isinstance(model, FuzzySystem) else model.classes
     sections = [*_sections(audit, model, rows, agreement, stability)]
     return whole_page(
         title=f"{audit.model}: audit",
-        head=_head(audit, model),
+        head=part("head", audit, classes),
         verdict=verdict(audit),
         sections=sections,
         body=joined(part("section", *section) for section in sections),
@@ -113,41 +104,13 @@ def _sections(
     yield "findings", "Findings", shown
     yield "questions", "All questions", _questions(audit)
     if agreement is not None:
-        yield "agreement", "Agreement", agreement_section(agreement)
+        yield "agreement", "Agreement", part("agreement", agreement)
     if stability is not None:
-        yield "stability", "Numerical stability", stability_section(stability)
+        yield "stability", "Numerical stability", part("stability", stability)
     yield "limits", "What this audit does not establish", part("limits", audit)
-    yield "repeat", "How to repeat it", _repeat(audit)
-
-
-def _head(audit: Audit, model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
-    data = "no table was given"
-    if audit.data is not None:
-        data = f"{audit.data.name}, {counted(audit.rows, 'row')}"
-    elif audit.rows:
-        data = counted(audit.rows, "row")
-    results = [
-        ("agreement" if one.verb == "check" else one.verb, result_text(one))
-        for one in audit.results
-    ]
-    classes = None if isinstance(model, FuzzySystem) else model.classes
-    kind = _FORMS.get(audit.form, audit.form)
-    return part("head", audit, kind, classes, _policy_text(audit), data, results)
-
-
-def _policy_text(audit: Audit) -> str:
-    policy = audit.policy
-    if policy.decision == "all":
-        return f"AND is {policy.conjunction}; every rule that fires takes part"
-    who = "the first of the strongest rules wins"
-    none = [
-        f"{what}: {'no class' if label is None else label}"
-        for what, label in (
-            ("no rule fires", policy.uncovered),
-            ("a missing value", policy.missing),
-        )
-    ]
-    return f"AND is {policy.conjunction}; {'; '.join([who, *none])}"
+    command, sides = _command(audit.answers), audit.domain.sides[:MOST_QUESTIONS]
+    repeat = part("repeat", audit, command, sides)
+    yield "repeat", "How to repeat it", repeat
 
 
 def _links(findings: Sequence[AuditAnswer]) -> dict[int, Markup]:
@@ -160,49 +123,9 @@ def _links(findings: Sequence[AuditAnswer]) -> dict[int, Markup]:
 
 
 def _questions(audit: Audit) -> Markup:
-    declined = [
-        *dict.fromkeys(
-            f"{one.subject}: {state_note(one.state)}"
-            for one in audit.answers
-            if isinstance(one.state, Declined)
-        )
-    ]
-    if len(declined) > _MOST_DECLINED:
-        more = len(declined) - _MOST_DECLINED
-        declined[_MOST_DECLINED:] = [f"and {more} more in the JSON"]
-    title = f"Every question, {len(audit.answers)} in all"
-    if len(audit.answers) > MOST_QUESTIONS:
-        title += f"; the first {MOST_QUESTIONS} are here, the JSON has all"
-    return part(
-        "questions",
-        SUMMARY,
-        [*summary_rows(audit)],
-        [*gathered(audit.unasked)],
-        declined,
-        title,
-        audit.answers[:MOST_QUESTIONS],
-    )
-
-
-def _repeat(audit: Audit) -> Markup:
-    sources = [("model", audit.file), ("table", audit.data)]
-    names = {"check": "check", "stability": "study of stability"}
-    sources += [(names[one.verb], one.file) for one in audit.results]
-    settings: list[tuple[str, str]] = []
-    for name in audit.settings.__struct_fields__:
-        value: float = getattr(audit.settings, name)
-        unit = " s" if name.endswith("_s") else ""
-        settings.append((name.removesuffix("_s"), f"{number(value)}{unit}"))
-    sides = [
-        (
-            side.variable,
-            f"{'above ' if side.is_open else ''}{side.low!r}",
-            repr(side.high),
-            ORIGINS[side.origin],
-        )
-        for side in audit.domain.sides[:MOST_QUESTIONS]
-    ]
-    return part("repeat", audit, _command(audit.answers), sources, settings, sides)
+    shown = audit.answers[:MOST_QUESTIONS]
+    unasked = [*gathered(audit.unasked)]
+    return part("questions", audit, SUMMARY, [*summary_rows(audit)], unasked, shown)
 
 
 def _command(answers: Sequence[AuditAnswer]) -> str:
@@ -248,38 +171,3 @@ def _sign(audit: Audit, states: Mapping[str, int]) -> str:
     if declined and declined == len(audit.answers):
         return "declined"
     return "calm" if audit.is_complete and not declined else "info"
-
-
-_MOST_CALM = 12  # comparisons that agree and are not folded
-
-
-def agreement_section(agreement: Agreement) -> Markup:
-    """Return the result of a check as a table."""
-    calm = [one for one in agreement.comparisons if one.verdict == "agrees"]
-    if len(calm) <= _MOST_CALM:
-        calm = []
-    wrong = [one for one in agreement.comparisons if one not in calm]
-    details = [line for one in agreement.comparisons for line in one.detail]
-    details += [line for one in agreement.certificates for line in one.detail]
-    return part(
-        "agreement",
-        agreement_text(agreement),
-        [*map(comparison_row, wrong)],
-        [*map(comparison_row, calm)],
-        [*map(certified_row, agreement.certificates)],
-        details,
-        agreement.skipped,
-    )
-
-
-def stability_section(study: Stability) -> Markup:
-    """Return the result of a study as a table of its stability checks."""
-    probes, tried = counted(study.probes, "probe"), counted(study.tried, "row")
-    return part(
-        "stability",
-        f"{stability_text(study)} ({probes}, {tried})",
-        [*map(criterion_row, study.criteria)],
-        [*advice(study)],
-        [f"{one.code}: {line}" for one in study.criteria for line in one.detail],
-        [f"{one.code}: {line}" for one in study.criteria for line in one.skipped],
-    )

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from fuzzytree.auditing import Audit
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import audit_lines
-from fuzzytree.report.audit_page import agreement_section
 from fuzzytree.report.drawing import Markup, joined, tag, text_lines
 from fuzzytree.report.parts import part
 from fuzzytree.report.systems import system_lines
@@ -34,7 +33,7 @@ def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
 
 def agreement_html(agreement: Agreement) -> Markup:
     """Return the result of a check as a table."""
-    return agreement_section(agreement)
+    return part("agreement", agreement)
 
 
 def audit_html(audit: Audit) -> Markup:

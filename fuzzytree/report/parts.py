@@ -12,18 +12,33 @@ from importlib import resources
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from fuzzytree.auditing import CODES, Coordinate, Measure, State, Witness
+from fuzzytree.report.audit import ORIGINS
 from fuzzytree.report.audit_states import (
     SEVERITIES,
     STATES,
     claims_text,
+    result_text,
     state_note,
     state_text,
     state_word,
 )
 from fuzzytree.report.drawing import Markup, text, text_lines
-from fuzzytree.report.stability import CRITERION
+from fuzzytree.report.stability import (
+    CRITERION,
+    advice,
+    criterion_row,
+    stability_verdict,
+)
 from fuzzytree.report.svg_tree import class_mark
-from fuzzytree.report.text import CERTIFIED, COMPARISON, counted, number
+from fuzzytree.report.text import (
+    CERTIFIED,
+    COMPARISON,
+    agreement_verdict,
+    certified_row,
+    comparison_row,
+    counted,
+    number,
+)
 
 MOST_RULES = 1000
 MOST_LINES = 400
@@ -67,10 +82,12 @@ def title_of(code: str) -> str:
 @functools.cache
 def _macros() -> object:
     functions = (
-        *(as_row, claims_text, class_mark, coordinates, counted, how_known),
-        *(measure_texts, state_note, state_word, text_lines, title_of),
+        *(advice, agreement_verdict, as_row, claims_text, class_mark, coordinates),
+        *(counted, how_known, measure_texts, number, result_text, stability_verdict),
+        *(state_note, state_word, text_lines, title_of),
     )
     known: dict[str, object] = {one.__name__: one for one in functions}
+    known |= {"number": number, "ORIGINS": ORIGINS}
     known |= {"CERTIFIED": CERTIFIED, "COMPARISON": COMPARISON, "CRITERION": CRITERION}
     known |= {"MOST_INPUTS": _MOST_INPUTS, "MOST_LISTED": _MOST_LISTED}
     known |= {"MOST_LINES": MOST_LINES, "MOST_RULES": MOST_RULES}
@@ -80,13 +97,16 @@ def _macros() -> object:
 
 @functools.cache
 def _environment() -> Environment:
-    return Environment(
+    environment = Environment(
         loader=FunctionLoader(lambda name: re.sub(r"\n *", "", _source(name))),
         autoescape=True,
         finalize=_content,
         keep_trailing_newline=True,
         undefined=StrictUndefined,
     )
+    rows = comparison_row, certified_row, criterion_row
+    environment.filters |= {one.__name__: one for one in rows}
+    return environment
 
 
 def _source(name: str) -> str:
