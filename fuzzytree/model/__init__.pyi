@@ -40,6 +40,15 @@ from .contracts import loss_text as loss_text
 from .contracts import narrowing_refusal as narrowing_refusal
 from .contracts import nowhere as nowhere
 from .contracts import refusal as refusal
+from .functions import BELOW_ONE as BELOW_ONE
+from .functions import LR as LR
+from .functions import MOST_POINTS as MOST_POINTS
+from .functions import Band as Band
+from .functions import MembershipFunction as MembershipFunction
+from .functions import Points as Points
+from .functions import Shape as Shape
+from .functions import Side as Side
+from .functions import smaller_slope as smaller_slope
 from .interrupts import checkpoint as checkpoint
 from .interrupts import noticed as noticed
 from .interrupts import watched as watched
@@ -59,9 +68,6 @@ from .options import check_names as check_names
 from .options import check_options as check_options
 from .options import option_value as option_value
 from .options import options_of as options_of
-from .rulebase import LR as LR
-from .rulebase import MOST_POINTS as MOST_POINTS
-from .rulebase import Band as Band
 from .rulebase import Clause as Clause
 from .rulebase import Conjunction as Conjunction
 from .rulebase import Kind as Kind
@@ -70,14 +76,10 @@ from .rulebase import LabelType as LabelType
 from .rulebase import Mistake as Mistake
 from .rulebase import Part as Part
 from .rulebase import Path as Path
-from .rulebase import Points as Points
 from .rulebase import Rule as Rule
 from .rulebase import RuleBase as RuleBase
 from .rulebase import Semantics as Semantics
-from .rulebase import Shape as Shape
-from .rulebase import Side as Side
 from .rulebase import Term as Term
-from .rulebase import Value as Value
 from .rulebase import Variable as Variable
 from .rulebase import clause_text as clause_text
 from .rulebase import fingerprint as fingerprint
@@ -87,7 +89,6 @@ from .rulebase import label_type_of as label_type_of
 from .rulebase import name_choice as name_choice
 from .rulebase import naming_mistakes as naming_mistakes
 from .rulebase import sentence as sentence
-from .rulebase import shape_mistakes as shape_mistakes
 from .rulebase import shapes_of as shapes_of
 from .rulebase import summary as summary
 from .rulebase import text_fault as text_fault
@@ -116,7 +117,6 @@ from .system.curves import Expression as Expression
 from .system.curves import Formula as Formula
 from .system.curves import Gaussian as Gaussian
 from .system.curves import Linear as Linear
-from .system.curves import MembershipFunction as MembershipFunction
 from .system.curves import Name as Name
 from .system.curves import Number as Number
 from .system.curves import PiCurve as PiCurve
@@ -130,10 +130,8 @@ from .system.curves import Spike as Spike
 from .system.curves import SystemCurve as SystemCurve
 from .system.curves import Trapezoid as Trapezoid
 from .system.curves import TwoGaussians as TwoGaussians
-from .system.curves import curve_mistakes as curve_mistakes
 from .system.curves import is_nan as is_nan
 from .system.curves import names_in as names_in
-from .system.curves import smaller_slope as smaller_slope
 from .system.curves import value_of as value_of
 from .system.rules import Activation as Activation
 from .system.rules import ActivationMethod as ActivationMethod
@@ -162,3 +160,4 @@ from .tree import intervals as intervals
 from .tree import node_mistakes as node_mistakes
 from .tree import outline as outline
 from .tree import with_label_type as with_label_type
+from .values import Value as Value

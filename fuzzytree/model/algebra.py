@@ -8,7 +8,7 @@ where it is not taken. A truth is a number of the same kind.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Protocol, Self, TypeVar
 
 
@@ -52,6 +52,10 @@ class Numbers(Protocol[N]):
 
     def __call__(self, operation: str, /, *operands: N | float) -> N:
         """Return what an operation of programs makes of numbers or truths."""
+        ...
+
+    def table(self, operation: str, place: N, table: Sequence[float], /) -> N:
+        """Return what `below` or `pick` finds in a table for a number."""
         ...
 
     def where(self, truth: N, then: N | float, other: N | float, /) -> N:

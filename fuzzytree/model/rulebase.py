@@ -18,10 +18,13 @@ from typing import Literal
 import msgspec
 
 from fuzzytree.errors import InvalidModelError
-
-_LARGEST_COEFFICIENT = 1e6  # keeps every polynomial finite, in float32 too
-
-MOST_POINTS = 4096
+from fuzzytree.model.functions import LR as LR
+from fuzzytree.model.functions import MOST_POINTS as MOST_POINTS
+from fuzzytree.model.functions import Band as Band
+from fuzzytree.model.functions import Points as Points
+from fuzzytree.model.functions import Shape as Shape
+from fuzzytree.model.functions import Side as Side
+from fuzzytree.model.values import Value as Value
 
 _MOST_MISTAKES = 200  # looking for similar names takes long
 _MOST_COMPARED = 1000  # names among which a similar one is sought
@@ -32,10 +35,6 @@ _CONTROL = re.compile(
 
 Path = tuple[str | int, ...]
 Mistake = tuple[Path, str]
-
-
-class Value(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A frozen, comparable, hashable record."""
 
 
 _ONE = {"leaves": "leaf", "classes": "class", "losses": "loss"}
@@ -53,99 +52,6 @@ def summary(name: str, **counts: int) -> str:
         for noun, count in counts.items()
     )
     return f"{name}({', '.join(shown)})"
-
-
-class Band(Value, frozen=True, tag="band"):
-    """A plateau with straight flanks: degree exactly 1 for `low < x <= high`.
-
-    For `x <= low` the degree is `clip((x - left) / (low - left), 0, 1)`, and for
-    `x > high` it is `clip((x - right) / (high - right), 0, 1)`: 0 at `left` and `right`
-    and beyond. Both are at most the largest number below 1.
-
-    Attributes:
-        low: The plateau's open lower end; None reaches down without end.
-        high: The plateau's closed upper end; None reaches up without end.
-        left: Where the degree has fallen to 0, below `low`; None is a step at `low`.
-        right: Where it has fallen to 0, above `high`; None is a step at `high`.
-    """
-
-    low: float | None = None
-    high: float | None = None
-    left: float | None = None
-    right: float | None = None
-
-    @property
-    def flanks(self) -> tuple[tuple[float, float], ...]:
-        """The lines beside the plateau: where each starts, and where it is 0."""
-        sides = (self.low, self.left), (self.high, self.right)
-        return tuple((a, b) for a, b in sides if a is not None and b is not None)
-
-
-class Side(Value, frozen=True):
-    """One side of an LR set, in `u`, the distance from the mean in spreads.
-
-    With `t = min(u, 1)`, `v = 2 t - 1` and `w = clip((reach - u) / (reach - 1), 0, 1)`
-    the degree is `clip(1 - t * (c0 + v * (c1 + ...)), 0, 1) * w**4`: the paper's
-    fitted polynomial within one spread, a falling tail beyond.
-
-    Attributes:
-        spread: The unit of u, in the variable's unit; above 0.
-        curve: c0, c1, ...: one to eight coefficients.
-        reach: Where the degree becomes exactly 0, in spreads; above 1.
-    """
-
-    spread: float
-    curve: tuple[float, ...]
-    reach: float = 5.0
-
-
-class LR(Value, frozen=True, tag="lr"):
-    """The paper's LR-type fuzzy set (2.2.2): degree exactly 1 at the mean.
-
-    Attributes:
-        mean: The peak, in the variable's unit.
-        left: The side below the mean.
-        right: The side above the mean.
-    """
-
-    mean: float
-    left: Side
-    right: Side
-
-
-class Points(Value, frozen=True, tag="points"):
-    """Points joined by lines: triangles, trapezoids, ramps, steps and free curves.
-
-    Between two neighbours `(a, p)` and `(b, r)`, for `a < x <= b`, the degree is
-    `r + (x - b) / (a - b) * (p - r)`, or `(x - a) / (b - a) * r` if p is 0, each
-    operation rounded once, clamped between p and r: so it is exact at the points and
-    where p = r, and monotone between them. Before the first point its degree holds,
-    behind the last one the last one's.
-
-    A value that occurs twice is a step: at the value itself the first degree holds,
-    above it the second.
-
-    Attributes:
-        values: One to 4096, in the variable's unit, none below the one before it and
-            none more than twice.
-        degrees: As many, in [0, 1].
-
-    Example:
-        >>> triangle = Points((0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
-        >>> step = Points((2.5, 2.5), (1.0, 0.0))
-    """
-
-    values: tuple[float, ...]
-    degrees: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        """Make a degree of -0.0 a 0.0, so that every runtime gives the same bits."""
-        if 0.0 in self.degrees:
-            degrees = tuple(degree + 0.0 for degree in self.degrees)
-            msgspec.structs.force_setattr(self, "degrees", degrees)
-
-
-Shape = Band | LR | Points
 
 
 class Term(Value, frozen=True):
@@ -444,7 +350,7 @@ def variable_mistakes(
                     (*path, "terms", index),
                     f"a term of {variable.name!r} has no name",
                 )
-            for text in shape_mistakes(term.shape):
+            for text in term.shape.mistakes():
                 yield (*path, "terms", index, "shape"), f"{where}: {text}"
         known[variable.name] = bool(variable.parts)
 
@@ -498,89 +404,6 @@ def part_mistakes(
                 (*where, "centre"),
                 f"the centre of {part.input!r} in {name!r} must be finite",
             )
-
-
-def shape_mistakes(shape: Shape) -> Iterator[str]:
-    """Yield what is wrong with a shape, without saying whose it is."""
-    match shape:
-        case Band():
-            yield from _band_mistakes(shape)
-        case LR():
-            if not math.isfinite(shape.mean):
-                yield f"the mean must be finite, not {shape.mean!r}"
-            for name, side in (("left", shape.left), ("right", shape.right)):
-                yield from _side_mistakes(name, side)
-        case Points():
-            yield from _points_mistakes(shape)
-
-
-def _points_mistakes(points: Points) -> Iterator[str]:
-    values, degrees = points.values, points.degrees
-    if len(values) != len(degrees):
-        yield f"{len(values)} values of points need as many degrees, not {len(degrees)}"
-    if not 1 <= len(values) <= MOST_POINTS:
-        yield f"a shape needs 1 to {MOST_POINTS} points, not {len(values)}"
-    if not all(map(math.isfinite, values)):
-        wrong = next(value for value in values if not math.isfinite(value))
-        yield f"the values of points must be finite, not {wrong!r}"
-        return
-    yield from itertools.islice(_order_mistakes(values), 1)
-    for value, degree in zip(values, degrees, strict=False):
-        if not 0.0 <= degree <= 1.0:
-            yield f"the degree at {value!r} must lie in [0, 1], not {degree!r}"
-            return
-
-
-def _order_mistakes(values: tuple[float, ...]) -> Iterator[str]:
-    for before, value in itertools.pairwise(values):
-        if value < before:
-            yield (
-                f"the values of points must not decrease: {value!r} stands "
-                f"behind {before!r}"
-            )
-        elif not math.isfinite(value - before):
-            yield f"the points at {before!r} and {value!r} are too far apart"
-    for before, after in zip(values, values[2:], strict=False):
-        if before == after:
-            yield f"three points at {before!r}; two make a step"
-
-
-def _band_mistakes(band: Band) -> Iterator[str]:
-    for name, value in (("low", band.low), ("high", band.high)):
-        if value is not None and not math.isfinite(value):
-            yield f"{name} must be finite or left out, not {value!r}"
-            return
-    low, high = band.low, band.high
-    if low is not None and high is not None and low >= high:
-        yield f"the plateau starts at {low!r} and must end above it, not at {high!r}"
-    for name, bound, end, sign in (
-        ("left", low, band.left, 1),
-        ("right", high, band.right, -1),
-    ):
-        if end is None:
-            continue
-        if bound is None:
-            yield f"a plateau that is open on the {name} has no {name} flank"
-        elif not math.isfinite(bound - end):
-            yield f"the {name} flank must end at a finite value, not {end!r}"
-        elif (bound - end) * sign <= 0:
-            side = "below" if sign > 0 else "above"
-            yield f"the {name} flank must end {side} {bound!r}, not at {end!r}"
-
-
-def _side_mistakes(name: str, side: Side) -> Iterator[str]:
-    if not (math.isfinite(side.spread) and side.spread > 0):
-        yield f"the {name} spread must be finite and above 0, not {side.spread!r}"
-    if not (math.isfinite(side.reach) and side.reach > 1):
-        yield f"the {name} reach must be finite and above 1, not {side.reach!r}"
-    yield from _curve_mistakes(f"{name} side", side.curve)
-
-
-def _curve_mistakes(name: str, curve: tuple[float, ...]) -> Iterator[str]:
-    if not 1 <= len(curve) <= 8:
-        yield f"the {name} needs 1 to 8 coefficients, not {len(curve)}"
-    if not all(abs(coefficient) <= _LARGEST_COEFFICIENT for coefficient in curve):
-        yield f"the coefficients of the {name} must lie within +-1e6"
 
 
 def term_names(variables: Iterable[Variable]) -> dict[str, dict[str, None]]:

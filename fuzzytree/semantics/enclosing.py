@@ -14,7 +14,8 @@ slope and bend.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
 
@@ -198,6 +199,13 @@ def _jet(number: Jet | float) -> Jet:
     return Jet(Interval(number, number))
 
 
+def _jet_between(low: float, high: float) -> Jet:
+    """Return bounds of a number that jumps from one value to another, or stays."""
+    if low == high:
+        return _jet(float(low))
+    return Jet(Interval(float(low), float(high)), EVERYTHING, EVERYTHING)
+
+
 def _rising(function: Callable[[float], float], of: Interval) -> Interval:
     """Return bounds of a rising function that is good to two units."""
     low, high = function(of.low), function(of.high)
@@ -371,6 +379,16 @@ class Enclosed(Numbers[Jet]):
         return (
             Jet(EVERYTHING, EVERYTHING, EVERYTHING) if known is None else known(*jets)
         )
+
+    def table(self, operation: str, place: Jet, table: Sequence[float], /) -> Jet:
+        """Return bounds of what `below` or `pick` finds in a table for a number."""
+        low, high = place.value
+        if operation == "below":
+            is_moving = self.is_open and place.slope != _ZERO
+            first = (bisect_right if is_moving else bisect_left)(table, low)
+            return _jet_between(first, bisect_left(table, high))
+        inside = table[int(low) : int(high) + 1]
+        return _jet_between(min(inside), max(inside))
 
     def _compared(self, operation: str, a: Jet, b: Jet) -> Jet:
         """Return whether a number is less than, at most or equal to another one."""

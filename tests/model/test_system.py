@@ -44,7 +44,6 @@ from fuzzytree.model import (
     SystemRule,
     SystemTerm,
     Trapezoid,
-    curve_mistakes,
     names_in,
     questions,
 )
@@ -295,13 +294,13 @@ def deep(levels: int) -> Expression:
     ids=lambda one: type(one).__name__ if isinstance(one, Curve) else "",
 )
 def test_a_curve_that_is_wrong_is_refused(curve: Curve, text: str | None) -> None:
-    found = [*curve_mistakes(curve)]
+    found = [*curve.mistakes()]
     assert len(found) == 1
     assert text is None or found == [text]
 
 
 def test_the_deepest_formula_is_accepted() -> None:
-    assert [*curve_mistakes(Formula(deep(MOST_LEVELS)))] == []
+    assert [*Formula(deep(MOST_LEVELS)).mistakes()] == []
 
 
 def labelled(curve: Curve) -> SystemTerm:

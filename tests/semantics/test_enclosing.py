@@ -10,11 +10,11 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.model import MembershipFunction, curve_mistakes, curves
+from fuzzytree.model import LR, Band, Curve, MembershipFunction, Points, Side, curves
 from fuzzytree.numerics.curve_values import Between, degree_between
 from fuzzytree.semantics.enclosing import Interval, Jet, degree_bounds, jet
 
-Make = Callable[[random.Random], curves.SystemCurve]
+Make = Callable[[random.Random], Curve]
 
 
 def _number(chance: random.Random) -> float:
@@ -34,7 +34,25 @@ def _corners(chance: random.Random) -> list[float]:
     return sorted(_number(chance) for _ in range(4))
 
 
+def _points(chance: random.Random) -> Points:
+    count = chance.choice([1, 2, 3, 5, 12])
+    values = sorted({_number(chance) for _ in range(count)})
+    degrees = [chance.choice([0.0, 1.0, chance.random()]) for _ in values]
+    return Points(tuple(values), tuple(degrees))
+
+
+def _lr(chance: random.Random) -> LR:
+    left, right = (
+        Side(_above_zero(chance), (chance.random(), chance.random() / 2))
+        for _ in range(2)
+    )
+    return LR(_number(chance), left, right)
+
+
 MAKERS: dict[str, Make] = {
+    "points": _points,
+    "lr": _lr,
+    "band": lambda c: Band(-_above_zero(c), _above_zero(c), None, 9.0),
     "trapezoid": lambda c: curves.Trapezoid(*_corners(c)),
     "gaussian": lambda c: curves.Gaussian(_number(c), _above_zero(c)),
     "two gaussians": lambda c: curves.TwoGaussians(
@@ -61,7 +79,7 @@ def test_bounds_hold_between_knots_and_at_values(name: str) -> None:
     chance = random.Random(name)
     for _ in range(12):
         function = MAKERS[name](chance)
-        if [*curve_mistakes(function)]:
+        if [*function.mistakes()]:
             continue
         knots = function.knots()
         for start, end in itertools.pairwise([-20.0, *knots, 20.0]):

@@ -45,7 +45,6 @@ from fuzzytree.model import (
     Term,
     Variable,
     questions,
-    shape_mistakes,
 )
 from fuzzytree.model import SystemTerm as SystemLabel
 from fuzzytree.semantics import shape_of
@@ -152,7 +151,7 @@ def _shape(label: SystemLabel) -> Shape | None:
     """Return the exact shape of a term, with its height; None if there is none."""
     shape = shape_of(label.curve)
     if shape is None or label.height == 1.0:
-        return None if shape is None or any(shape_mistakes(shape)) else shape
+        return None if shape is None or any(shape.mistakes()) else shape
     if not isinstance(shape, Points):
         return None
     lines = scale(CurveBounds(shape, shape, (shape,)), label.height)
@@ -161,7 +160,7 @@ def _shape(label: SystemLabel) -> Shape | None:
 
 def _between(label: SystemLabel, of: Interval | None) -> CurveBounds | None:
     shape = shape_of(label.curve)
-    if shape is not None and any(shape_mistakes(shape)):
+    if shape is not None and any(shape.mistakes()):
         return None
     lines = curve_bounds(label.curve, of)
     return lines and (lines if label.height == 1.0 else scale(lines, label.height))

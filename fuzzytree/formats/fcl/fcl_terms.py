@@ -20,7 +20,6 @@ from fuzzytree.model import (
     Curve,
     Points,
     SystemTerm,
-    curve_mistakes,
     curves,
     name_choice,
 )
@@ -88,7 +87,7 @@ def _number(token: Token) -> float:
 
 
 def _checked(token: Token, name: str, curve: Curve, where: TermScope) -> FllTerm:
-    for sentence in curve_mistakes(curve):
+    for sentence in curve.mistakes():
         whose = f"term {name!r} of {where.variable!r}"
         raise PartError((*place(token), f"{whose}: {sentence}"))
     return FllTerm(SystemTerm(name, curve), "")

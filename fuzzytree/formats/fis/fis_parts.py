@@ -42,7 +42,6 @@ from fuzzytree.model import (
     SystemOutput,
     SystemRule,
     SystemTerm,
-    curve_mistakes,
     name_choice,
     numbered,
 )
@@ -350,7 +349,7 @@ def _conclusion_number(
             )
         else:
             curve = Linear(tuple(numbers[:-1]), numbers[-1])
-        return next(curve_mistakes(curve), curve)
+        return next(curve.mistakes(), curve)
     if dialect != "fuzzylite" or kind == "linear":
         return f"a {kind!r} belongs to the outputs of a Sugeno system"
     notes.remark(
@@ -368,7 +367,7 @@ def _formula(
     except FormulaError as error:
         notes.mistake((place[0], place[1] + error.column - 1), error.sentence)
         return None
-    for mistake in curve_mistakes(curve):
+    for mistake in curve.mistakes():
         notes.mistake(place, mistake)
     return curve
 

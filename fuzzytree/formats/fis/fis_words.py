@@ -18,7 +18,6 @@ from fuzzytree.model import (
     Points,
     SNorm,
     TNorm,
-    curve_mistakes,
     curves,
 )
 
@@ -210,7 +209,7 @@ def curve_of(kind: str, numbers: Sequence[float]) -> Curve | str:
     if any(number != number for number in numbers):
         return "the numbers must be finite"
     curve = word.make(numbers)
-    for text in curve_mistakes(curve):
+    for text in curve.mistakes():
         return text
     return curve
 
@@ -221,6 +220,6 @@ def _points(numbers: Sequence[float]) -> Curve | str:
     if len(numbers) > 2 * MOST_POINTS:
         return f"{len(numbers) // 2} points are more than the {MOST_POINTS} of a curve"
     curve = Points(tuple(numbers[0::2]), tuple(numbers[1::2]))
-    for text in curve_mistakes(curve):
+    for text in curve.mistakes():
         return text
     return curve

@@ -19,7 +19,6 @@ from fuzzytree.model import (
     Number,
     Points,
     SystemTerm,
-    curve_mistakes,
     curves,
     name_choice,
 )
@@ -122,7 +121,7 @@ def _error(word: Word, sentence: str) -> PartError:
 
 def _check(kind: Word, label: SystemTerm, place: TermScope) -> None:
     where = f"term {label.name!r} of {place.variable!r}"
-    for sentence in curve_mistakes(label.curve):
+    for sentence in label.curve.mistakes():
         raise _error(kind, f"{where}: {sentence}")
     if not 0.0 < label.height <= 1.0:
         sentence = f"{where}: the height must lie in (0, 1], not {label.height!r}"

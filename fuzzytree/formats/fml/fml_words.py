@@ -22,7 +22,6 @@ from fuzzytree.model import (
     TNorm,
     Trapezoid,
     TwoGaussians,
-    curve_mistakes,
     name_choice,
 )
 
@@ -144,7 +143,7 @@ def curve_of(term: FmlElement, where: str, notes: ReaderNotes) -> Curve | None:
         return None
     if len(notes.mistakes) > before:
         return None
-    for text in curve_mistakes(curve):
+    for text in curve.mistakes():
         notes.mistake(shape.position, f"{where}: {text}")
     if isinstance(curve, Trapezoid) and curve.a == curve.d:
         return Singleton(curve.b)  # JFML samples the corners of each shape

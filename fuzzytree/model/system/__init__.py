@@ -36,7 +36,6 @@ from fuzzytree.model.system.curves import (
     Linear,
     Singleton,
     Trapezoid,
-    curve_mistakes,
     names_in,
     width_mistakes,
 )
@@ -331,7 +330,7 @@ def _label_mistakes(
         where = f"term {label.name!r} of {variable.name!r}"
         if not 0.0 < label.height <= 1.0:
             yield place, f"{where}: the height must lie in (0, 1], not {label.height!r}"
-        texts = [*curve_mistakes(label.curve)]
+        texts = [*label.curve.mistakes()]
         match label.curve:
             case Linear(weights=weights):
                 count = len(weights)

@@ -1,113 +1,25 @@
-"""The membership functions of systems, and formulas among them.
-
-Each says in one place what it is: its numbers, what is wrong with them, its degree for
-any kind of number (`fuzzytree.model.algebra`), where it changes, and, if it is
-monotone, where it has a degree. Evaluation, programs, enclosures and points in its
-place are derived from that.
-"""
+"""The membership functions that rule bases do not have, and formulas among them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
 from fuzzytree.model.algebra import N, Numbers, as_number, square
-from fuzzytree.model.rulebase import (
-    LR,
-    Band,
-    Points,
-    Value,
-    name_choice,
-    shape_mistakes,
+from fuzzytree.model.functions import (
+    MembershipFunction,
+    Shape,
+    around,
+    scaled,
+    smaller_slope,
 )
+from fuzzytree.model.rulebase import name_choice
+from fuzzytree.model.values import Value
 
 MOST_LEVELS = 100
 """The deepest nesting of conditions and formulas."""
-
-_ABOVE_ZERO = frozenset({"deviation", "left_deviation", "right_deviation", "width"})
-
-
-class MembershipFunction(Value, frozen=True):
-    """A function from the values of a variable to degrees.
-
-    A new one is a subclass with a tag, its numbers as fields and `degree`.
-    """
-
-    def degree(self, n: Numbers[N], x: N) -> N:
-        """Return the degree at a value, without the term's height."""
-        raise NotImplementedError
-
-    def inverse(self, n: Numbers[N], degree: N) -> N | None:
-        """Return where it has a degree, after Tsukamoto; None if it is not monotone."""
-        del n, degree
-        return None
-
-    def knots(self) -> tuple[float, ...]:
-        """Return, in order, where it changes its formula, its direction or its bend.
-
-        Between two neighbours it is one smooth monotone piece. In the place of a number
-        that was computed and rounded two stand around it.
-        """
-        return ()
-
-    @property
-    def extent(self) -> tuple[float, float] | None:
-        """The values between which it changes most; None if nothing is known."""
-        knots = self.knots()
-        return (knots[0], knots[-1]) if knots else None
-
-    @property
-    def is_unit(self) -> bool:
-        """Whether the degree lies in [0, 1] at every finite value, surely."""
-        return True
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it stays above 0 without end."""
-        return False
-
-    @property
-    def is_bent_once(self) -> bool:
-        """Whether it bends to one side only between two neighbouring knots."""
-        return True
-
-    def mistakes(self) -> Iterator[str]:
-        """Yield what is wrong with its numbers."""
-        for field in self.__struct_fields__:
-            value = getattr(self, field)
-            name = field.replace("_", " ")
-            if not isinstance(value, float | int) or isinstance(value, bool):
-                continue
-            if not math.isfinite(value):
-                yield f"the {name} must be finite, not {value!r}"
-            elif field in _ABOVE_ZERO and value <= 0.0:
-                yield f"the {name} must be above 0, not {value!r}"
-
-
-def scaled(n: Numbers[N], x: N, start: float, end: float) -> N:
-    """Return 0 at one value, 1 at another, and the line through them elsewhere."""
-    return (x - start) / (n.constant(end) - start)
-
-
-def smaller_slope(n: Numbers[N], slopes: Sequence[N], *, is_peak: bool) -> N:
-    """Return the smaller of some slopes, clamped to [0, 1].
-
-    Rounding keeps order, so a slope is at least 1 wherever the other one counts.
-    """
-    degree = slopes[0]
-    for slope in slopes[1:]:
-        degree = n.minimum(degree, slope)
-    if not is_peak:
-        degree = n.minimum(degree, 1.0)
-    return n.maximum(degree, 0.0)
-
-
-def around(place: float, *others: float) -> tuple[float, float]:
-    """Return numbers below and above one that was computed from others and rounded."""
-    near = 8.0 * math.ulp(max(map(abs, (place, *others))))
-    return place - near, place + near
 
 
 class Trapezoid(MembershipFunction, frozen=True, tag="trapezoid"):
@@ -920,7 +832,7 @@ SystemCurve = (
     | Formula
 )
 """The membership functions that rule bases do not have."""
-Curve = Band | LR | Points | SystemCurve
+Curve = Shape | SystemCurve
 
 
 def names_in(expression: Expression) -> Iterator[str]:
@@ -933,15 +845,6 @@ def names_in(expression: Expression) -> Iterator[str]:
                 yield from names_in(argument)
         case Number():
             return
-
-
-def curve_mistakes(curve: Curve) -> Iterator[str]:
-    """Yield what is wrong with a curve, without saying whose it is."""
-    match curve:
-        case Band() | LR() | Points():
-            yield from shape_mistakes(curve)
-        case _:
-            yield from curve.mistakes()
 
 
 def _formula_mistakes(expression: Expression) -> Iterator[str]:

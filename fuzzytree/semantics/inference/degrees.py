@@ -13,14 +13,12 @@ from fuzzytree.model import (
     Curve,
     Expression,
     Hedge,
-    Shape,
     SNorm,
     TNorm,
 )
 from fuzzytree.model import value_of as value_in
-from fuzzytree.semantics.programs import membership, norms
+from fuzzytree.semantics.programs import norms
 from fuzzytree.semantics.programs.operations import DOUBLES, NOTHING, Doubles
-from fuzzytree.semantics.reference import degree as shape_degree
 
 
 def curve_degree(curve: Curve, x: float, names: Mapping[str, float] = NOTHING) -> float:
@@ -45,8 +43,6 @@ def curve_degree(curve: Curve, x: float, names: Mapping[str, float] = NOTHING) -
         >>> curve_degree(Arc(0.0, 1.0), 0.0), curve_degree(Arc(0.0, 1.0), 2.0)
         (0.0, 1.0)
     """
-    if isinstance(curve, Shape):
-        return shape_degree(curve, x)
     return curve.degree(Doubles(names), x)
 
 
@@ -68,7 +64,7 @@ def value_at(curve: Curve, degree: float) -> float | None:
         >>> value_at(Gaussian(0.0, 1.0), 0.5) is None
         True
     """
-    return membership.value_at(DOUBLES, curve, degree)
+    return curve.inverse(DOUBLES, degree)
 
 
 def value_of(expression: Expression, names: Mapping[str, float]) -> float:

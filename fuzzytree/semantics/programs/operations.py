@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import operator
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
@@ -270,6 +270,10 @@ class Doubles(Numbers[float]):
     def __call__(self, operation: str, /, *operands: float) -> float:
         """Return what an operation of `OPERATIONS` makes of numbers or truths."""
         return _MEANINGS[operation](*operands)
+
+    def table(self, operation: str, place: float, table: Sequence[float], /) -> float:
+        """Return what `below` or `pick` finds in a table for a number."""
+        return of_table(operation, tuple(table), place)
 
 
 _MEANINGS: Mapping[str, Callable[..., float]] = {**NUMERIC, **LOGICAL}

@@ -5,8 +5,7 @@ A tree is no program, for a row passes few of its nodes; the values of its nodes
 
 from __future__ import annotations
 
-from fuzzytree.model import Clause, FuzzyTree, Rule, RuleBase, shapes_of
-from fuzzytree.semantics.programs.membership import axis, shape_degree
+from fuzzytree.model import Clause, FuzzyTree, Rule, RuleBase, Variable, shapes_of
 from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
 
 DECIDED, TIE, UNCOVERED, MISSING = 0.0, 1.0, 2.0, 3.0
@@ -67,6 +66,15 @@ def from_axes(tree: FuzzyTree) -> Program:
     return make.program(tree.name, tree.inputs, tuple(results))
 
 
+def axis(make: Maker, variable: Variable) -> Place:
+    """Return the value of a variable: an input, or a sum of parts in order."""
+    if not variable.parts:
+        return make.input(variable.name)
+    parts = variable.parts
+    terms = [one.weight * (make.input(one.input) - one.centre) for one in parts]
+    return make.chain("add", terms)
+
+
 def known_row(make: Maker, axes: list[Place]) -> Place:
     """Return whether all of some values are finite; always if there are none."""
     if not axes:
@@ -84,7 +92,7 @@ def _strengths(make: Maker, rules: RuleBase, axes: dict[str, Place]) -> list[Pla
             x = axes[clause.variable]
             terms: list[Place] = []
             for term in clause.terms:
-                degree = shape_degree(make, shapes[clause.variable, term], x)
+                degree = shapes[clause.variable, term].degree(make, x)
                 terms.append(make.titled(degree, f"{clause.variable} is {term}"))
             highest = make.chain("maximum", terms)
             if clause.negated:

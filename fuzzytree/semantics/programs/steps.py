@@ -228,7 +228,9 @@ class Maker(Numbers[Place]):
         """Return the place of the numbers 0, 1, ... of as many samples."""
         return self._added(Step("index", samples=samples))
 
-    def table(self, operation: str, argument: Place, table: Iterable[float]) -> Place:
+    def table(
+        self, operation: str, argument: Place, table: Iterable[float], /
+    ) -> Place:
         """Return the place of `below` or `pick`."""
         numbers = tuple(table)
         operands = self._steps[argument.index]

@@ -40,7 +40,6 @@ from fuzzytree.model import (
     value_of,
 )
 from fuzzytree.semantics.inference import Lines, line_tables
-from fuzzytree.semantics.programs.membership import curve_degree, is_unit, value_at
 from fuzzytree.semantics.programs.norms import (
     KEEPS_UNIT,
     S_NORMS,
@@ -325,11 +324,11 @@ class _Run:
         key = variable, label.name, x
         if key not in self.degrees:
             with self.make.topic(f"{variable} is {label.name}"):
-                degree = curve_degree(self.make, label.curve, x)
+                degree = label.curve.degree(self.make, x)
                 height = self.make.constant(label.height)
                 result = height * degree
                 self.make.titled(result, f"{variable} is {label.name}")
-            if is_unit(label.curve):
+            if label.curve.is_unit:
                 self.units.add(result)
             self.degrees[key] = result
         return self.degrees[key]
@@ -431,7 +430,7 @@ class _Run:
         for one in result:
             if one.implication not in ("minimum", "product"):
                 return result
-            if not is_unit(self.labels[output.name, one.label].curve):
+            if not self.labels[output.name, one.label].curve.is_unit:
                 return result
             key = one.label, one.implication
             if key in gathered:
@@ -503,7 +502,7 @@ class _Run:
                 return value_of(make, expression, {**self.values, "x": degree})
             case curve:
                 height = make.constant(label.height)
-                result = value_at(make, curve, degree / height)
+                result = curve.inverse(make, degree / height)
                 if result is not None:
                     return result
                 return self._label_degree(output.name, label, degree)
