@@ -236,20 +236,7 @@ def curve_of(name: str, shape: Shape) -> Curve:
 
 def _corners(curve: SystemCurve) -> tuple[float, ...]:
     """Return where a curve may turn or step, in order."""
-    corners: list[float | None] = []
-    match curve:
-        case Band(low=low, high=high, left=left, right=right):
-            corners = [low, high, left, right]
-        case LR(mean=mean, left=left, right=right):
-            corners = [mean]
-            for sign, side in ((-1.0, left), (1.0, right)):
-                corners.append(mean + sign * side.spread)
-                corners.append(mean + sign * side.spread * side.reach)
-        case Points(values=values):
-            corners = [*values]
-        case _:
-            corners = [*curve.knots()]
-    return tuple(sorted({c for c in corners if c is not None and math.isfinite(c)}))
+    return tuple(sorted({one for one in curve.knots() if math.isfinite(one)}))
 
 
 def _labelled(label: SystemTerm) -> Curve:
@@ -260,11 +247,9 @@ def _labelled(label: SystemTerm) -> Curve:
     def degree(value: float) -> float:
         return min(max(label.height * curve_degree(curve, value), 0.0), 1.0)
 
-    corners = (
-        _corners(curve) if isinstance(curve, Band | LR | Points) else curve.knots()
-    )
-    known = {c for c in corners if c is not None and math.isfinite(c)}
-    return Curve(label.name, degree, tuple(sorted(known)))
+    if isinstance(curve, (Band, LR, Points)):
+        return Curve(label.name, degree, _corners(curve))
+    return Curve(label.name, degree, _corners(curve))
 
 
 def polyline(curve: Curve, x: Scale, y: Scale) -> Markup:

@@ -8,6 +8,7 @@ import hashlib
 import re
 from collections.abc import Callable, Iterator, Sequence
 from importlib import resources
+from typing import cast
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
@@ -104,8 +105,9 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         undefined=StrictUndefined,
     )
+    filters = cast("dict[str, object]", environment.filters)
     rows = comparison_row, certified_row, criterion_row
-    environment.filters |= {one.__name__: one for one in rows}
+    filters.update({one.__name__: one for one in rows})
     return environment
 
 

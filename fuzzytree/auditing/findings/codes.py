@@ -44,8 +44,8 @@ class Code(Value, frozen=True):
 
 def _codes() -> Mapping[str, Code]:
     """Return the codes of the file beside this module, in its order."""
-    text = resources.files(__package__).joinpath("codes.toml").read_text("utf-8")
-    entries = tomllib.loads(text).items()
+    folder = resources.files("fuzzytree.auditing.findings")
+    entries = tomllib.loads(folder.joinpath("codes.toml").read_text("utf-8")).items()
     return {name: msgspec.convert({"code": name, **one}, Code) for name, one in entries}
 
 

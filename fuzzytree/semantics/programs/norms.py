@@ -55,9 +55,19 @@ def _seldom(n: Numbers[N], d: N) -> N:
     return n.where(n.at_most(d, 0.5), n.root(0.5 * d), high)
 
 
+def _any(n: Numbers[N], d: N) -> N:
+    del d
+    return n.constant(1.0)
+
+
 def _not(n: Numbers[N], d: N) -> N:
     del n
     return 1.0 - d
+
+
+def _very(n: Numbers[N], d: N) -> N:
+    del n
+    return square(d)
 
 
 def _cubed(n: Numbers[N], d: N) -> N:
@@ -71,9 +81,9 @@ def _fourth(n: Numbers[N], d: N) -> N:
 
 
 _HEDGES: Mapping[Hedge, _Hedging] = {
-    "any": lambda n, d: n.constant(1.0),
+    "any": _any,
     "not": _not,
-    "very": lambda n, d: square(d),
+    "very": _very,
     "somewhat": lambda n, d: n.root(d),
     "extremely": _extremely,
     "seldom": _seldom,
