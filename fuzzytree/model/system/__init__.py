@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
+from fuzzytree.model.norms import SNorm
 from fuzzytree.model.rulebase import (
     Mistake,
     Part,
@@ -42,7 +43,6 @@ from fuzzytree.model.system.curves import (
 from fuzzytree.model.system.rules import (
     Conclusion,
     RuleBlock,
-    SNorm,
     SystemRule,
     Terms,
     activation_mistakes,

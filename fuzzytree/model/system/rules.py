@@ -1,7 +1,6 @@
 """The rules of a fuzzy system as frozen values: conditions, conclusions, blocks.
 
-What they *mean* is computed in `fuzzytree.semantics.inference` and
-`fuzzytree.semantics.programs.norms`.
+What they *mean* is computed in `fuzzytree.semantics.inference`.
 """
 
 from __future__ import annotations
@@ -9,53 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
 
+from fuzzytree.model.norms import Hedge, SNorm, TNorm
 from fuzzytree.model.rulebase import Mistake, Path, Value, name_choice
 from fuzzytree.model.system.curves import MOST_LEVELS
-
-TNorm = Literal[
-    "minimum",
-    "product",
-    "bounded difference",
-    "drastic product",
-    "einstein product",
-    "hamacher product",
-    "nilpotent minimum",
-]
-"""An AND. With a and b: min; a b; max(0, a + b - 1); min(a, b) if max(a, b) = 1, else
-0; a b / (2 - (a + b - a b)); a b / (a + b - a b), 0 if both are 0; min(a, b) if
-a + b > 1, else 0."""
-
-SNorm = Literal[
-    "maximum",
-    "algebraic sum",
-    "bounded sum",
-    "drastic sum",
-    "einstein sum",
-    "hamacher sum",
-    "nilpotent maximum",
-    "normalized sum",
-    "sum",
-]
-"""An OR. With a and b: max; a + b - a b; min(1, a + b); max(a, b) if min(a, b) = 0,
-else 1; (a + b) / (1 + a b); (a + b - 2 a b) / (1 - a b), 1 if a b = 1; max(a, b) if
-a + b < 1, else 1; (a + b) / max(1, a + b); a + b."""
-
-Hedge = Literal[
-    "any",
-    "not",
-    "very",
-    "somewhat",
-    "extremely",
-    "seldom",
-    "cubed",
-    "very very",
-    "plus",
-    "minus",
-    "cube root",
-]
-"""What is done to a degree d: 1; 1 - d; d d; sqrt(d); 2 d d up to 1/2, then
-1 - 2 (1 - d)(1 - d); sqrt(d / 2) up to 1/2, then 1 - sqrt((1 - d) / 2); d d d;
-(d d)(d d); d^1.25; d^0.75; d^(1/3)."""
 
 
 class Is(Value, frozen=True, tag="is"):

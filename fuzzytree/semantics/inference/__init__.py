@@ -49,7 +49,7 @@ from fuzzytree.semantics.inference.degrees import (
     value_at,
     value_of,
 )
-from fuzzytree.semantics.programs.norms import passes
+from fuzzytree.semantics.programs.activations import passes
 from fuzzytree.semantics.programs.operations import DOUBLES, divide, maximum, total
 from fuzzytree.semantics.reference import Status
 

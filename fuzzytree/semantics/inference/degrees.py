@@ -1,6 +1,6 @@
 """Membership functions, norms, hedges and formulas in plain floats; none of them fails.
 
-What they are stands with the functions, and in `fuzzytree.semantics.programs.norms`;
+What they are stands with the functions, and in `fuzzytree.model.norms`;
 here each operation is performed at once. Where it has no value the result is what IEEE
 754 and the C library say: NaN, or an infinity.
 """
@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from fuzzytree.model import (
+    S_NORMS,
+    T_NORMS,
     Curve,
     Expression,
     Hedge,
     SNorm,
     TNorm,
 )
+from fuzzytree.model import hedged as hedged_in
 from fuzzytree.model import value_of as value_in
-from fuzzytree.semantics.programs import norms
 from fuzzytree.semantics.programs.operations import DOUBLES, NOTHING, Doubles
 
 
@@ -89,7 +91,7 @@ def hedged(hedges: Sequence[Hedge], degree: float) -> float:
         >>> hedged(["not", "very"], 0.5), hedged(["any"], 0.25)
         (0.75, 1.0)
     """
-    return norms.hedged(DOUBLES, hedges, degree)
+    return hedged_in(DOUBLES, hedges, degree)
 
 
 def t_norm(name: TNorm, a: float, b: float) -> float:
@@ -99,7 +101,7 @@ def t_norm(name: TNorm, a: float, b: float) -> float:
         >>> t_norm("bounded difference", 0.5, 0.75)
         0.25
     """
-    return norms.T_NORMS[name](DOUBLES, a, b)
+    return T_NORMS[name](DOUBLES, a, b)
 
 
 def s_norm(name: SNorm, a: float, b: float) -> float:
@@ -109,4 +111,4 @@ def s_norm(name: SNorm, a: float, b: float) -> float:
         >>> s_norm("algebraic sum", 0.5, 0.5), s_norm("sum", 1.0, 1.0)
         (0.75, 2.0)
     """
-    return norms.S_NORMS[name](DOUBLES, a, b)
+    return S_NORMS[name](DOUBLES, a, b)

@@ -16,6 +16,9 @@ from collections.abc import Iterable, Iterator, Sequence
 import msgspec
 
 from fuzzytree.model import (
+    KEEPS_UNIT,
+    S_NORMS,
+    T_NORMS,
     Activation,
     And,
     Condition,
@@ -23,6 +26,7 @@ from fuzzytree.model import (
     FuzzySystem,
     Is,
     Linear,
+    Norm,
     Not,
     Or,
     RuleBlock,
@@ -34,18 +38,14 @@ from fuzzytree.model import (
     TNorm,
     as_number,
     checkpoint,
+    hedged,
     is_drawn_by_lines,
     is_nan,
     sampled_values,
     value_of,
 )
 from fuzzytree.semantics.inference import Lines, line_tables
-from fuzzytree.semantics.programs.norms import (
-    KEEPS_UNIT,
-    S_NORMS,
-    T_NORMS,
-    Norm,
-    hedged,
+from fuzzytree.semantics.programs.activations import (
     passes,
     positive,
     proportional,
