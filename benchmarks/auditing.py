@@ -81,7 +81,9 @@ def asked(base: RuleBase, budget_s: float) -> Asked:
     box = unit_domain(base)
     start = time.process_time()
     arrangement = arrange(base, box)
-    levels = len(arrangement.bands.low) if base.semantics.conjunction == "min" else 0
+    levels = (
+        len(arrangement.bands.low) if base.semantics.conjunction == "minimum" else 0
+    )
     cut_s = time.process_time() - start
     states: list[State] = []
     each: list[float] = []
@@ -150,7 +152,7 @@ def questions(conjunction: Conjunction, rules: int, features: int, count: int) -
 
 def a_sliver(rows: int) -> None:
     """Print how a rule that wins in a sliver is found, and how often rows meet it."""
-    base = with_hidden_rule(random_base(0, 7, 4, "min", "lr"), 0.7 - 1e-6)
+    base = with_hidden_rule(random_base(0, 7, 4, "minimum", "lr"), 0.7 - 1e-6)
     found = asked(base, 60.0)
     start = time.process_time()
     values = np.random.default_rng(0).random((len(base.inputs), rows))
@@ -174,7 +176,7 @@ def shared(
     terms: int,
     classes: int,
     clauses: int,
-    conjunction: Conjunction = "min",
+    conjunction: Conjunction = "minimum",
 ) -> RuleBase:
     """Return rules over the same few triangles of each input, on [0, 1]."""
     chance = random.Random(f"{rules} {inputs} {terms} {classes} {clauses}")
@@ -299,13 +301,13 @@ def main() -> None:
     if given.large:
         large(given.budgets)
         return
-    questions("min", 7, 4, given.bases)
-    questions("min", 12, 8, max(given.bases // 2, 1))
+    questions("minimum", 7, 4, given.bases)
+    questions("minimum", 12, 8, max(given.bases // 2, 1))
     a_sliver(1_000_000)
     questions("product", 7, 4, given.bases)
     if given.more:
-        questions("min", 20, 11, max(given.bases // 5, 1))
-        questions("min", 40, 11, 1)
+        questions("minimum", 20, 11, max(given.bases // 5, 1))
+        questions("minimum", 40, 11, 1)
         questions("product", 20, 11, max(given.bases // 5, 1))
 
 

@@ -280,7 +280,7 @@ def _branch(branch: Branch) -> Short:
 def _semantics(semantics: Semantics) -> dict[str, Entry]:
     entries: dict[str, Entry] = {
         "and": semantics.conjunction,
-        "or": "max",
+        "or": "maximum",
         "not": "1 - degree",
         "uncovered": Noted(_answer(semantics.uncovered), "where no rule fires"),
         "missing": Noted(

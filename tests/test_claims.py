@@ -143,7 +143,7 @@ def test_answers_are_counted_and_each_row_has_one_vote() -> None:
     # The second seed: row 2 undecided now, row 3 for the raw rules again.
     second = _seen(tree="10001", raw="10100", same="11000", covered="11110")
     third = _seen(tree="10001", raw="11100", same="10000", covered="11110")
-    found = compared(("t", "paper", "min"), 3.0, [first, second, third])
+    found = compared(("t", "paper", "minimum"), 3.0, [first, second, third])
     assert (found.rows, found.answers) == (5, 15)
     assert (found.tree_right, found.raw_right) == (7, 7)
     assert (found.tree_only, found.raw_only, found.both_wrong) == (1, 4, 3)
@@ -174,7 +174,7 @@ def _two_leaves() -> FuzzyTree:
 def test_rows_are_answered_by_tree_and_raw_rules_apart() -> None:
     # The sets are as high at 0.25 as each other: there the first rule wins.
     rows = np.array([[-1.0, 0.125, 0.25, 1.5, 9.0]])
-    found = answered(_two_leaves(), "min", rows, np.array([0, 1, 1, 0, 1]))
+    found = answered(_two_leaves(), "minimum", rows, np.array([0, 1, 1, 0, 1]))
     assert found.tree_right.tolist() == [True, True, True, False, True]
     assert found.raw_right.tolist() == [True, False, False, False, False]
     assert found.is_covered.tolist() == [True, True, True, True, False]
@@ -188,7 +188,7 @@ def test_no_further_seed_begins_when_the_time_is_over() -> None:
     found = list(
         agreement.comparisons(["iris"], 5, seconds=1e-9, tell=lambda _text: None)
     )
-    assert [one.conjunction for one in found] == ["min", "product"] * 2
+    assert [one.conjunction for one in found] == ["minimum", "product"] * 2
     assert {len(one.of_seeds) for one in found} == {1}
     assert all(one.relative_differs == 0 for one in found)
 
@@ -299,7 +299,7 @@ def _comparison(tree: int, raw: int) -> Comparison:
     return Comparison(
         "iris",
         "paper",
-        "min",
+        "minimum",
         rows=150,
         leaves=3.0,
         tree_right=100 + tree,

@@ -26,7 +26,7 @@ Tell = Callable[[str], None]
 
 FOLDS = 10
 MODES: tuple[Mode, ...] = ("default", "paper")
-CONJUNCTIONS: tuple[Conjunction, ...] = ("min", "product")
+CONJUNCTIONS: tuple[Conjunction, ...] = ("minimum", "product")
 LOADERS = {
     "iris": datasets.load_iris,
     "wine": datasets.load_wine,

@@ -325,7 +325,7 @@ def _reliable_text(comparisons: Sequence[Comparison], found: Sequence[Verdict]) 
     verdict = "changes no verdict" if not changed else f"changes {changed} verdicts"
     by_and = {
         name: sum(one.raw_right for one in comparisons if one.conjunction == name)
-        for name in ("min", "product")
+        for name in ("minimum", "product")
     }
     return "\n".join(
         bullet(sentence)
@@ -335,8 +335,8 @@ def _reliable_text(comparisons: Sequence[Comparison], found: Sequence[Verdict]) 
             "predictions.",
             f"Raw rules are decided by their order among equals in {ties:,} rows; "
             f"{tied:,} of these are among the {apart:,} that differ from the tree's.",
-            f"With min, raw rules are right in {by_and['min']:,} rows, with product "
-            f"in {by_and['product']:,}.",
+            f"With minimum, raw rules are right in {by_and['minimum']:,} rows, with "
+            f"product in {by_and['product']:,}.",
         )
     )
 

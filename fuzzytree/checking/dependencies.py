@@ -279,7 +279,7 @@ _FEATURES: Mapping[str, Callable[[RuleBase], RuleBase]] = MappingProxyType(
             rules, lambda clause: replace(clause, terms=clause.terms[:1])
         ),
         "product as AND": lambda rules: replace(
-            rules, semantics=replace(rules.semantics, conjunction="min")
+            rules, semantics=replace(rules.semantics, conjunction="minimum")
         ),
         "an answer of its own for missing values": lambda rules: replace(
             rules, semantics=replace(rules.semantics, missing=rules.semantics.uncovered)

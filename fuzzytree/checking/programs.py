@@ -139,7 +139,7 @@ def _documents(model: Document) -> Iterator[Document]:
     if isinstance(model, FuzzyTree):
         own = model.semantics.conjunction
         for kind in ("relative", "raw") if model.sets else ("relative",):
-            for conjunction in ("min", "product"):
+            for conjunction in ("minimum", "product"):
                 if conjunction != own:
                     yield rules_from_tree(model, kind, conjunction=conjunction)
 

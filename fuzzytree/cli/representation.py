@@ -23,8 +23,8 @@ terms_option = option(
 )
 conjunction_option = option(
     "--conjunction",
-    type=click.Choice(["min", "product"]),
-    help="AND operator of the rules; min by default.",
+    type=click.Choice(["minimum", "product"]),
+    help="AND operator of the rules; minimum by default.",
 )
 
 

@@ -112,7 +112,7 @@ class Rule(Value, frozen=True):
     support: int | None = None
 
 
-Conjunction = Literal["min", "product"]
+Conjunction = Literal["minimum", "product"]
 
 LabelType = Literal["number", "boolean"]
 """What class names stand for where they are no text."""
@@ -135,7 +135,7 @@ class Semantics(Value, frozen=True):
             "1" or "0.5", or a boolean, "False" or "True". Predictions have these.
     """
 
-    conjunction: Conjunction = "min"
+    conjunction: Conjunction = "minimum"
     uncovered: str | None = None
     missing: str | None = None
     label_type: LabelType | msgspec.UnsetType = msgspec.UNSET

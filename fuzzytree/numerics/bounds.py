@@ -138,7 +138,7 @@ def _joined(rules: RuleBase, dtype: Dtype, errors: Mapping[Key, Reals]) -> Reals
     if not clauses:
         return np.zeros(())
     degrees = {c: _clause_error(c, unit, errors) for c in clauses}
-    if rules.semantics.conjunction == "min":
+    if rules.semantics.conjunction == "minimum":
         worst = _largest(degrees.values())
     else:
         paths = dict.fromkeys(rule.when for rule in rules.rules if rule.when)

@@ -66,7 +66,8 @@ def page(
         >>> from fuzzytree.testing import random_tree
         >>> tree, nothing = random_tree(1), Domain(())
         >>> audit = Audit("0.1", tree.name, "tree", "", None, None, 0,
-        ...     Policy("min", "strongest"), nothing, AuditSettings(), (), (), (), True)
+        ...     Policy("minimum", "strongest"), nothing, AuditSettings(), (), (), (),
+        ...     is_complete=True)
         >>> "Nothing found" in page(audit, tree)
         True
     """

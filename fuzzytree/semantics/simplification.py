@@ -151,7 +151,7 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
         for variable, names in same.items()
         for name, other in names.items()
     ]
-    is_min = rules.semantics.conjunction == "min"
+    is_min = rules.semantics.conjunction == "minimum"
     # Rules of a tree share their clauses, and these may name thousands of terms.
     renamed = functools.cache(partial(_renamed, same=same))
     is_idle = functools.cache(partial(always_holds, shapes=shapes_of(rules.variables)))
@@ -466,7 +466,7 @@ def _rule_faults(
 def _rule_forms(rules: RuleBase) -> list[object]:
     axes, shapes = _axes(rules), shapes_of(rules.variables)
     curves = {key: curve_bytes(shape) for key, shape in shapes.items()}
-    is_min = rules.semantics.conjunction == "min"
+    is_min = rules.semantics.conjunction == "minimum"
 
     @functools.cache
     def form(clause: Clause) -> tuple[object, ...]:

@@ -323,7 +323,11 @@ def rules_cases() -> list[RuleBase]:
     cases = [
         rules_from_tree(random_tree(seed, leaves=6, semantics=semantics), kind)
         for seed, semantics in enumerate(
-            (Semantics(), Semantics("product"), Semantics("min", "class 1", "class 2"))
+            (
+                Semantics(),
+                Semantics("product"),
+                Semantics("minimum", "class 1", "class 2"),
+            )
         )
         for kind in ("relative", "raw")
     ]

@@ -241,7 +241,7 @@ def test_a_format_that_cannot_carry_something_may_refuse_it() -> None:
         if isinstance(model, RuleBase) and model.semantics.conjunction == "product":
             if not allow_loss:
                 raise LossError("AND: becomes min; pass allow_loss=True to write it")
-            meant = replace(model.semantics, conjunction="min")
+            meant = replace(model.semantics, conjunction="minimum")
             written = YAML.write(replace(model, semantics=meant))
             return replace(written, losses=(Loss("AND", "becomes min"),))
         return YAML.write(model, allow_loss=allow_loss)

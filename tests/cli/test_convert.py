@@ -206,9 +206,9 @@ def test_streams_name_their_formats(call: Call) -> None:
             + HELP,
         ),
         (
-            ("tipper.fll", "a.yaml", "--conjunction", "min"),
-            "--conjunction min: tipper is a fuzzy system; such rules are made from a "
-            "tree" + HELP,
+            ("tipper.fll", "a.yaml", "--conjunction", "minimum"),
+            "--conjunction minimum: tipper is a fuzzy system; such rules are made from "
+            "a tree" + HELP,
         ),
         (
             ("tipper.fll", "a.yaml", "--as", "tree"),

@@ -125,8 +125,8 @@ def test_a_file_that_is_read_back_as_another_model_is_not_written(
 @pytest.mark.parametrize(
     ("words", "kind", "conjunction"),
     [
-        (("--as", "rules"), "relative", "min"),
-        (("--terms", "relative"), "relative", "min"),
+        (("--as", "rules"), "relative", "minimum"),
+        (("--terms", "relative"), "relative", "minimum"),
         (("--conjunction", "product"), "relative", "product"),
     ],
 )

@@ -55,7 +55,7 @@ def test_rules_are_numbered_sentences(call: Call) -> None:
         "grip: relative rule base, 3 rules\n"
         "inputs   2 of 3 columns: force, slip\n"
         "classes  3: firm, loose, soft\n"
-        "answers  missing value: no class; no rule fires: no class; AND is min; "
+        "answers  missing value: no class; no rule fires: no class; AND is minimum; "
         "the first of the strongest wins\n\n"
     )
     assert call("show", "rules.yaml") == (0, head + RULES, "")

@@ -122,7 +122,7 @@ def test_the_tables_of_a_tree_say_what_the_reference_says(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_the_tables_of_rules_say_what_the_reference_says(
     seed: int, conjunction: str
 ) -> None:
@@ -131,7 +131,7 @@ def test_the_tables_of_rules_say_what_the_reference_says(
     rules = rules_from_tree(
         tree,
         "raw" if seed % 2 else "relative",
-        conjunction="product" if is_product else "min",
+        conjunction="product" if is_product else "minimum",
     )
     rules = with_points(rules, seed)
     file = CModel(rules, DOUBLE)

@@ -41,7 +41,9 @@ def grip() -> RuleBase:
     some = Term("some", Points((0.0, 0.1), (0.0, 1.0)))
     rules = (Rule((Clause("force", ("low", "some"), True),), "soft"), Rule((), "hard"))
     inputs = (Variable("force", (low, some), unit="N"),)
-    return RuleBase("grip", ("soft", "hard"), inputs, rules, Semantics("min", "hard"))
+    return RuleBase(
+        "grip", ("soft", "hard"), inputs, rules, Semantics("minimum", "hard")
+    )
 
 
 def test_a_small_rule_base_is_written_step_by_step() -> None:

@@ -160,7 +160,7 @@ def test_the_metadata_says_what_the_file_is() -> None:
         "fuzzytree.classes": '["cup", "pen"]',
         "fuzzytree.rules": "3",
         "fuzzytree.outputs": '["label", "rule"]',
-        "fuzzytree.semantics": '{"conjunction": "min", "uncovered": null, '
+        "fuzzytree.semantics": '{"conjunction": "minimum", "uncovered": null, '
         '"missing": null}',
     }
     assert proto.doc_string == (

@@ -234,7 +234,7 @@ def test_a_tree_predicts_as_the_reference(seed: int) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(6))
 def test_rules_have_the_references_bits(seed: int, kind: Kind) -> None:
-    semantics = Semantics(("min", "product")[seed % 2], "class 1", "class 2")
+    semantics = Semantics(("minimum", "product")[seed % 2], "class 1", "class 2")
     rules = rules_from_tree(random_tree(seed, semantics=semantics), kind)
     assert_alike(rules)
     assert_alike(with_points(rules, seed))

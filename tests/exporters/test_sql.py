@@ -55,7 +55,7 @@ def same(found: Sequence[tuple[object, ...]], right: Outcome) -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_sqlite_answers_with_the_bits_of_the_reference(seed: int) -> None:
     semantics = Semantics(
-        "product" if seed % 2 else "min", missing="class 1" if seed % 3 else None
+        "product" if seed % 2 else "minimum", missing="class 1" if seed % 3 else None
     )
     tree = random_tree(seed, leaves=2 + seed, semantics=semantics)
     rules = rules_from_tree(tree)

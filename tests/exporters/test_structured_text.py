@@ -31,7 +31,9 @@ def grip() -> RuleBase:
     low = Term("low", Band(high=1.0, right=3.0))
     rules = (Rule((Clause("grip force", ("low",)),), "soft"), Rule((), "hard"))
     inputs = (Variable("grip force", (low,), unit="N"),)
-    return RuleBase("grip", ("soft", "hard"), inputs, rules, Semantics("min", "hard"))
+    return RuleBase(
+        "grip", ("soft", "hard"), inputs, rules, Semantics("minimum", "hard")
+    )
 
 
 def test_a_small_rule_base_as_one_reads_it() -> None:

@@ -65,7 +65,7 @@ def assert_kept(model: Model) -> bytes:
 def test_every_random_model_comes_back_bit_for_bit(seed: int) -> None:
     labels = itertools.cycle([None, "class 1", "class 2"])
     answers = list(itertools.islice(labels, seed, seed + 2))
-    meant = Semantics("min" if seed % 2 else "product", answers[0], answers[1])
+    meant = Semantics("minimum" if seed % 2 else "product", answers[0], answers[1])
     tree = random_tree(
         seed,
         leaves=1 + seed * 2,
@@ -94,7 +94,7 @@ def named(names: list[str], *, kind: str = "rules") -> Model:
         for index, name in enumerate(names)
     ]
     every = Rule(tuple(Clause(name, (last,)) for name in names), last)
-    meant = Semantics("min", first, last)
+    meant = Semantics("minimum", first, last)
     return RuleBase(
         first, tuple(names), tuple(inputs), (*rules, every), meant, columns=tuple(names)
     )

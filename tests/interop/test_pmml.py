@@ -86,7 +86,7 @@ def test_models_of_all_kinds_answer_alike_with_missing_and_infinite_values(
     library: Any, seed: int
 ) -> None:
     library("jpmml_evaluator")
-    semantics = Semantics(("min", "product")[seed % 2], "class 1", "class 2")
+    semantics = Semantics(("minimum", "product")[seed % 2], "class 1", "class 2")
     tree = random_tree(seed, semantics=semantics if seed < 2 else None)
     raw = rules_from_tree(tree, "raw")
     for model in (tree, rules_from_tree(tree), raw, with_points(raw, seed)):
@@ -157,7 +157,7 @@ def test_our_files_are_valid_by_the_published_schema(library: Any) -> None:
     (jar,) = (engine.parent / "dependencies").glob("pmml-model-1*.jar")
     with zipfile.ZipFile(jar) as archive:
         schema = etree.XMLSchema(etree.parse(io.BytesIO(archive.read("pmml.xsd"))))
-    tree = random_tree(3, semantics=Semantics("min", "class 1", "class 2"))
+    tree = random_tree(3, semantics=Semantics("minimum", "class 1", "class 2"))
     raw = rules_from_tree(tree, "raw")
     for model in (
         tree,

@@ -40,7 +40,7 @@ SHAPES: dict[str, LR] = {
     "set with a long tail": LR(0.0, Side(1.0, (0.5,), 1e300), Side(1.0, (0.5,), 1.01)),
     "set at 1e9": LR(1e9, Side(1.0, (0.4, 0.1)), Side(1 / 3, (0.4,))),
 }
-CONJUNCTIONS: tuple[Conjunction, ...] = ("min", "product")
+CONJUNCTIONS: tuple[Conjunction, ...] = ("minimum", "product")
 TOLERANCES = (0.1, 1e-3, 1e-5)
 CASES = [
     pytest.param(shape, tolerance, id=f"{name} {tolerance}")
@@ -73,7 +73,7 @@ def largest_error(found: Shape, shape: Shape, at: list[Fraction]) -> Fraction:
     return max(abs(exact_degree(found, x) - exact_degree(shape, x)) for x in at)
 
 
-def model_of(*shapes: Shape, conjunction: Conjunction = "min") -> RuleBase:
+def model_of(*shapes: Shape, conjunction: Conjunction = "minimum") -> RuleBase:
     """Return a rule that tests a variable for each shape."""
     variables = tuple(
         Variable(f"x{number}", (Term("t", shape),))

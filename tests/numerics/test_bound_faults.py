@@ -48,7 +48,7 @@ NATIVE = {"float64": "native", "mixed": "native mixed", "float32": "native float
 
 
 def ruled(
-    *shapes: Shape, conjunction: Conjunction = "min", parts: tuple[Part, ...] = ()
+    *shapes: Shape, conjunction: Conjunction = "minimum", parts: tuple[Part, ...] = ()
 ) -> RuleBase:
     """Return one rule that all shapes hold, of one variable each or of a sum."""
     names = [f"x{k}" for k in range(max(len(shapes), len(parts)))]
@@ -145,13 +145,15 @@ def test_a_step_that_is_forgotten_is_found(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.heavy
 @pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
 def test_no_error_of_many_models_exceeds_its_bound(dtype: Dtype) -> None:
-    forms = itertools.product(range(200, 230), ("relative", "raw"), ("min", "product"))
+    forms = itertools.product(
+        range(200, 230), ("relative", "raw"), ("minimum", "product")
+    )
     for seed, kind, conjunction in forms:
         tree = random_tree(seed, leaves=2 + seed % 9, inputs=3)
         rules = rules_from_tree(
             tree,
             "raw" if kind == "raw" else "relative",
-            conjunction="min" if conjunction == "min" else "product",
+            conjunction="minimum" if conjunction == "minimum" else "product",
         )
         if seed % 3 == 0:
             rules = with_points(rules, seed)

@@ -35,7 +35,7 @@ LOW = Term("low", Band(high=1.0, right=3.0))
 STEP = Term("low", Band(high=1.0))
 
 
-def grip(*terms: Term, conjunction: Conjunction = "min") -> RuleBase:
+def grip(*terms: Term, conjunction: Conjunction = "minimum") -> RuleBase:
     """Return one rule that tests the first term of each of its inputs."""
     names = [f"x{k}" for k in range(1, len(terms) + 1)]
     return RuleBase(
@@ -181,7 +181,7 @@ def test_a_path_differs_only_where_it_is_open(seed: int, dtype: Dtype) -> None:
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", ["relative", "raw"])
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 @pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
 def test_no_observed_error_exceeds_its_bound(
     seed: int, kind: Kind, conjunction: Conjunction, dtype: Dtype

@@ -122,7 +122,7 @@ def test_a_path_follows_the_exact_value_and_not_the_rounded_one() -> None:
 
 
 def answered(
-    x: float, *terms: Shape, then: str, conjunction: Conjunction = "min"
+    x: float, *terms: Shape, then: str, conjunction: Conjunction = "minimum"
 ) -> tuple[int, str | None, int, Fraction | int]:
     """Ask rules with one clause each, of one variable, for the classes in `then`."""
     variable = Variable("x", tuple(Term(str(k), t) for k, t in enumerate(terms)))

@@ -86,7 +86,7 @@ def faults(model: Model, values: FloatArray, found: Decisions) -> list[str]:
 @pytest.mark.one_in(8)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", ["relative", "raw"])
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_many_rows_are_decided_as_one_at_a_time(
     seed: int, kind: Kind, conjunction: Conjunction
 ) -> None:
@@ -196,7 +196,7 @@ def test_policies_answer_where_nothing_is_weighed() -> None:
 
 
 def test_no_rows_give_no_answers() -> None:
-    rules = made(1, "raw", "min")
+    rules = made(1, "raw", "minimum")
     found = decide(rules, np.empty((len(rules.inputs), 0)))
     assert found.rule.shape == (0,)
     assert found.strengths is not None
@@ -229,7 +229,7 @@ def test_values_of_another_shape_are_refused(shape: tuple[int, ...]) -> None:
 
 def shapes_of(seed: int) -> list[Shape]:
     """Return the shapes of some models made from a seed, and points among them."""
-    models = (made(seed, "relative", "min"), made(seed, "raw", "min"))
+    models = (made(seed, "relative", "minimum"), made(seed, "raw", "minimum"))
     return [t.shape for rules in models for v in rules.variables for t in v.terms]
 
 
@@ -301,7 +301,7 @@ def test_a_filter_that_forgets_the_slack_of_combinations_is_found(
     monkeypatch.setattr("fuzzytree.numerics.oracle.axis_value", forgetful)
     found = 0
     for seed in range(8):
-        rules = made(seed, "relative", "min")
+        rules = made(seed, "relative", "minimum")
         values = values_of(rules)
         found += len(faults(rules, values, decide(rules, values)))
     assert found > 10
@@ -346,7 +346,7 @@ def test_a_missing_row_on_one_side_alone_is_one_off() -> None:
 
 
 def test_strengths_of_another_shape_are_refused() -> None:
-    rules = made(1, "raw", "min")
+    rules = made(1, "raw", "minimum")
     values = np.zeros((len(rules.inputs), 2))
     text = rf"^strengths must have shape \({len(rules.rules)}, 2\), not \(1, 2\)$"
     with pytest.raises(ValueError, match=text):
@@ -412,7 +412,7 @@ def test_a_part_of_a_combination_is_not_lost_beside_larger_ones() -> None:
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("kind", ["relative", "raw"])
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_many_rows_of_many_models_are_decided_as_one_at_a_time(
     kind: Kind, conjunction: Conjunction
 ) -> None:

@@ -21,7 +21,7 @@ RUNTIMES = [runtime for runtime in all_runtimes() if is_installed(runtime)]
     "runtime", [r for r in RUNTIMES if "rules" in r.runs], ids=lambda r: r.name
 )
 @pytest.mark.parametrize("kind", ["relative", "raw"])
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_no_strength_of_a_runtime_is_farther_off_than_certified(
     runtime: Runtime, kind: Kind, conjunction: Conjunction
 ) -> None:

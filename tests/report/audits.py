@@ -106,7 +106,7 @@ def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Aud
         file=SourceFile(name, "a" * 64),
         data=SourceFile("grasps.csv", "b" * 64),
         rows=4,
-        policy=Policy("min", "strongest"),
+        policy=Policy("minimum", "strongest"),
         domain=Domain(
             (DomainSide("force", 0.0, 5.0, "model"), DomainSide("slip", 0.0, 1.0))
         ),

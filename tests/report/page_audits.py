@@ -171,7 +171,7 @@ def audit_of(
         file=SourceFile("grip.yaml", "ab" * 32),
         data=SourceFile("grasps.csv", "cd" * 32),
         rows=40,
-        policy=Policy("min", "strongest"),
+        policy=Policy("minimum", "strongest"),
         domain=Domain(tuple(sides)),
         settings=AuditSettings(),
         answers=answers(model.variables[0].name) if found is None else found,

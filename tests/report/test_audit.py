@@ -21,7 +21,7 @@ WHOLE = """\
 2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is spent \
 (--budget
   SECONDS); `fuzzytree explain FT101` explains the gravest
-grip: audited as rules; AND is min, the strongest rule decides
+grip: audited as rules; AND is minimum, the strongest rule decides
 rows     4 of grasps.csv
 domain
   force  0 to 5  the model's range

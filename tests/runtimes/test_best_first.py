@@ -92,7 +92,7 @@ def families() -> dict[str, list[Shape]]:
 FAMILIES = families()
 
 
-def rules_of(shapes: list[Shape], conjunction: Conjunction = "min") -> RuleBase:
+def rules_of(shapes: list[Shape], conjunction: Conjunction = "minimum") -> RuleBase:
     """Return rules that ask a variable for all, some, one, and none of its terms."""
     names = tuple(f"t{number}" for number in range(len(shapes)))
     clauses = [
@@ -196,7 +196,7 @@ def test_bounds_of_a_clause_are_close_where_its_terms_are() -> None:
 
 
 @pytest.mark.one_in(4)
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_winner_is_that_of_firing_at_every_landmark(
     family: str, conjunction: Conjunction
@@ -213,7 +213,7 @@ def assert_fired(rules: RuleBase, values: FloatArray) -> None:
 
 
 @pytest.mark.one_in(8)
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 @pytest.mark.parametrize("seed", range(3))
 def test_raw_rules_of_a_tree_are_won_as_by_firing(
     seed: int, conjunction: Conjunction
@@ -231,7 +231,7 @@ def test_more_rows_than_go_through_together_are_answered() -> None:
     assert_fired(rules, values)
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_a_row_that_many_rules_reach_alike_is_a_tie_of_the_first(
     conjunction: Conjunction,
 ) -> None:

@@ -22,7 +22,7 @@ needs_compiler = pytest.mark.skipif(
 @pytest.mark.heavy
 @needs_compiler
 @pytest.mark.parametrize("kind", ["relative", "raw"])
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_the_search_finds_the_winner_among_many_rules(
     kind: str, conjunction: str
 ) -> None:
@@ -30,7 +30,7 @@ def test_the_search_finds_the_winner_among_many_rules(
     rules = rules_from_tree(
         tree,
         "relative" if kind == "relative" else "raw",
-        conjunction="min" if conjunction == "min" else "product",
+        conjunction="minimum" if conjunction == "minimum" else "product",
     )
     values = probe_values(rules, 2_000)
     result, expected = load_best_first(rules)(values), load(rules)(values)

@@ -93,7 +93,7 @@ def random_rules(seed: int) -> RuleBase:
     rules.append(rules[0])
     if chance.random() < 0.2:
         rules.append(Rule((), "z"))
-    conjunction: Conjunction = chance.choice(("min", "product"))
+    conjunction: Conjunction = chance.choice(("minimum", "product"))
     return RuleBase(
         f"rules {seed}",
         ("x", "y", "z"),
@@ -364,7 +364,7 @@ def test_relative_rules_answer_like_the_tree_in_every_native_runtime(seed: int) 
     tree = random_tree(seed, leaves=60, inputs=5)
     values = probe_values(tree, 3000)
     expected = find_runtime("native").load(tree)(values)
-    for conjunction in ("min", "product"):
+    for conjunction in ("minimum", "product"):
         rules = rules_from_tree(tree, conjunction=conjunction)
         for name in ("native", "native mixed", "best-first"):
             result = find_runtime(name).load(rules)(values)

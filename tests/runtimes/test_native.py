@@ -161,11 +161,11 @@ def overlapping(conjunction: str) -> RuleBase:
         for _ in range(25)
     )
     is_product = conjunction == "product"
-    semantics = Semantics("product" if is_product else "min")
+    semantics = Semantics("product" if is_product else "minimum")
     return RuleBase("ties", ("x", "y"), variables, rules[1:], semantics)
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_best_first_finds_ties_and_the_first_of_equals(conjunction: str) -> None:
     rules = overlapping(conjunction)
     grid = np.array([-1.0, 0.0, 0.5, 1.0, 1.25, 1.5, 3.0])

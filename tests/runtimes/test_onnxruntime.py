@@ -111,7 +111,7 @@ def random_rules(seed: int) -> RuleBase:
         for _ in range(chance.randint(1, 9))
     )
     answers = (None, *classes)
-    conjunction: Conjunction = chance.choice(("min", "product"))
+    conjunction: Conjunction = chance.choice(("minimum", "product"))
     semantics = Semantics(conjunction, chance.choice(answers), chance.choice(answers))
     return RuleBase(f"random {seed}", classes, tuple(variables), rules, semantics)
 

@@ -101,7 +101,7 @@ def many() -> Iterator[RuleBase]:
     """Rule bases of all kinds."""
     kinds: tuple[Kind, ...] = ("relative", "raw")
     for seed, kind in itertools.product(range(4), kinds):
-        tree = random_tree(seed, semantics=Semantics(("min", "product")[seed % 2]))
+        tree = random_tree(seed, semantics=Semantics(("minimum", "product")[seed % 2]))
         rules = rules_from_tree(tree, kind)
         yield rules
         yield with_points(rules, seed)

@@ -17,7 +17,7 @@ from fuzzytree.testing import probes, random_tree
     leaves=st.integers(1, 12),
     inputs=st.integers(1, 5),
     combinations=st.sampled_from([0.0, 0.5, 1.0]),
-    conjunction=st.sampled_from(["min", "product"]),
+    conjunction=st.sampled_from(["minimum", "product"]),
 )
 def test_relative_rules_equal_the_tree_on_every_probe(
     seed: int, leaves: int, inputs: int, combinations: float, conjunction: Conjunction
@@ -54,7 +54,10 @@ def test_the_rules_keep_the_answers_of_the_tree(kind: Kind) -> None:
     semantics = Semantics("product", "class 1", "class 2")
     tree = random_tree(1, semantics=semantics)
     assert rules_from_tree(tree, kind).semantics == semantics
-    assert rules_from_tree(tree, kind, conjunction="min").semantics.conjunction == "min"
+    assert (
+        rules_from_tree(tree, kind, conjunction="minimum").semantics.conjunction
+        == "minimum"
+    )
 
 
 def test_a_tree_of_one_leaf_becomes_one_rule_that_always_holds() -> None:

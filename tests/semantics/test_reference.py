@@ -97,7 +97,7 @@ def rules(
 ) -> RuleBase:
     x = Variable("x", (Term("low", RAMP), Term("ten", LINEAR)))
     y = Variable("y", (Term("low", RAMP),))
-    semantics = Semantics("product" if product else "min", uncovered, missing)
+    semantics = Semantics("product" if product else "minimum", uncovered, missing)
     made = tuple(
         Rule(when, label) for when, label in zip(clauses, ("a", "b", "c"), strict=False)
     )

@@ -130,7 +130,7 @@ def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
         known: set[Hashable] = set()
         for rule in rules.rules:
             counts = Counter(map(said.clause, rule.when))
-            if one.conjunction == "min":  # a clause that stands twice counts once
+            if one.conjunction == "minimum":  # a clause that stands twice counts once
                 counts = Counter({*counts})
             known.add((frozenset(counts.items()), rule.then))
         keys.append(known)

@@ -434,7 +434,7 @@ def _on_box(
         kind, low, high, is_short = known[axis][number]
         if kind == NEVER:
             return None
-        if kind == ALWAYS or (conjunction == "min" and (axis, kind) in form):
+        if kind == ALWAYS or (conjunction == "minimum" and (axis, kind) in form):
             continue
         form.append((axis, kind))
         kept.append((axis, number))
@@ -458,7 +458,7 @@ def _on_box(
 def _joined(degrees: Sequence[float], conjunction: Conjunction, *, up: bool) -> float:
     """Return a bound of a strength; each product is moved outwards by its rounding."""
     lowest = min(degrees, default=1.0)
-    if conjunction == "min" or len(degrees) < 2:
+    if conjunction == "minimum" or len(degrees) < 2:
         return lowest
     result = 1.0
     for degree in degrees:
@@ -485,7 +485,7 @@ def _beats(
     least = _joined([one.bounds[c][0] for c in mine], conjunction, up=False)
     most = _joined([other.bounds[c][1] for c in theirs], conjunction, up=True)
     if one.place < other.place:
-        if conjunction == "min":
+        if conjunction == "minimum":
             most = min(most, common)
         return least >= most or _is_above(mine, theirs, axes, box, conjunction)
     floor = min((one.bounds[c][0] for c in shared), default=1.0)

@@ -555,7 +555,7 @@ def _checked(
     if reached < level:
         return None
     region: tuple[Span, ...] = ()
-    if base.rules.semantics.conjunction == "min":
+    if base.rules.semantics.conjunction == "minimum":
         region = region_around(base, point, rules, (), between=(level, level))
     weakest = min(rules, key=lambda rule: strengths[rule - 1])
     claims = (

@@ -348,7 +348,7 @@ class _Search:
 
     def _widest(self, box: Box, rules: Sequence[Contender]) -> int | None:
         """Return the axis on which a degree that matters varies most."""
-        is_min = all(m.semantics.conjunction == "min" for m in self.models)
+        is_min = all(m.semantics.conjunction == "minimum" for m in self.models)
         common: set[ClauseNumber] = set()
         if rules and not is_min:
             common = set.intersection(*({*rule.form} for rule in rules))

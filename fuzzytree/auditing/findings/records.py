@@ -158,7 +158,7 @@ class Policy(Value, frozen=True):
     """How the audited rules decide, which says which questions apply.
 
     Attributes:
-        conjunction: The AND: `min`, `product`, or another norm's name.
+        conjunction: The AND: `minimum`, `product`, or another norm's name.
         decision: `strongest` (the class of the first of the strongest rules) or `all`
             (every rule that fires takes part in the answer).
         uncovered: The answer where no rule fires; None is no class.

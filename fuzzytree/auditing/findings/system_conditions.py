@@ -196,9 +196,6 @@ MOST_WAYS: Final = 64
 MOST_QUESTIONS: Final = 1_000
 """The most propositions in the condition of a rule."""
 
-NORMS: Mapping[str | None, Conjunction] = {"minimum": "min", "product": "product"}
-"""The norms with an exact method, and what rules of ours call them."""
-
 Way = tuple[Clause, ...]
 """Clauses that all hold."""
 
@@ -303,7 +300,7 @@ class Conditions:
             decline("FTD07", "it negates a product, which has no exact method")
         if word == "or" and negated and self.conjunction == "product":
             decline("FTD07", "it negates an 'or' within rules that multiply")
-        if word == "and" and not negated and NORMS[norm] != self.conjunction:
+        if word == "and" and not negated and norm != self.conjunction:
             text = f"its 'and' is the {norm}, and that of most rules is another"
             decline("FTD01", text)
 
@@ -327,7 +324,7 @@ class Conditions:
     def _both(self, one: Way, other: Way) -> Way:
         """Return clauses of both; a minimum does not change by repetition."""
         both = (*one, *other)
-        return tuple(dict.fromkeys(both)) if self.conjunction == "min" else both
+        return tuple(dict.fromkeys(both)) if self.conjunction == "minimum" else both
 
 
 def _plain_questions(parts: Iterable[Condition]) -> Iterator[Is | None]:

@@ -27,7 +27,6 @@ from fuzzytree.auditing.findings.rule_bounds import bounded_rules
 from fuzzytree.auditing.findings.subject import AuditView
 from fuzzytree.auditing.findings.system_conditions import (
     MOST_QUESTIONS,
-    NORMS,
     Conditions,
     DecliningError,
     SystemTerms,
@@ -135,12 +134,12 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
 
 def _conjunction(system: FuzzySystem) -> Conjunction:
     """Return the AND of most rules that have one, of those with an exact method."""
-    counts: dict[Conjunction, int] = {"min": 0, "product": 0}
+    counts: dict[Conjunction, int] = {"minimum": 0, "product": 0}
     for block in system.blocks:
-        norm = NORMS.get(block.conjunction)
-        if norm:
+        norm = block.conjunction
+        if norm == "minimum" or norm == "product":
             counts[norm] += sum(And in joints(rule.when) for rule in block.rules)
-    return "product" if counts["product"] > counts["min"] else "min"
+    return "product" if counts["product"] > counts["minimum"] else "minimum"
 
 
 def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[AuditAnswer]]:
@@ -216,7 +215,7 @@ class _Taken:
             if rule.weight != 1.0 and not self.terms.plain:
                 decline("FTD07", "there is no input that its weight could stand for")
             ways = Conditions(self.conjunction, self.terms, block).ways(rule.when)
-            if rule.weight != 1.0 and self.conjunction == "min":
+            if rule.weight != 1.0 and self.conjunction == "minimum":
                 self._check_weight(ways)
         except DecliningError as error:
             self.is_whole = False

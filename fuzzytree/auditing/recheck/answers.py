@@ -133,7 +133,7 @@ def _bracket(case: Case, report: Report, answer: Answer, state: Bracket) -> None
     may_be = is_far or answer.code in ("FT401", "FT403", "FT203", "FT204", "FT601")
     require(may_be or not answer.is_finding, "what is open is no finding")
     entries = {measure.name: measure.value for measure in answer.measures}
-    is_min = case.rules.semantics.conjunction == "min"
+    is_min = case.rules.semantics.conjunction == "minimum"
     is_same = answer.code == "FT102" or (answer.code == "FT201" and is_min)
     for name, end in entries.items() if is_same else ():
         wanted = state.high if name.endswith("at most") else state.low

@@ -139,7 +139,7 @@ class Case:
     @cached_property
     def ties(self) -> Ties:
         """The pairs of rules that tie."""
-        if self.rules.semantics.conjunction != "min":
+        if self.rules.semantics.conjunction != "minimum":
             raise UndecidedError("ties under product are not decided again here")
         return Ties(self.grid)
 
@@ -249,7 +249,7 @@ class Case:
         """Return whether a rule is somewhere stronger than each of some others."""
         mine = self.bits_of(rule) if isinstance(rule, int) else rule
         rivals = [self.bits_of(number) for number in numbers]
-        if self.rules.semantics.conjunction == "min":
+        if self.rules.semantics.conjunction == "minimum":
             return self.grid.wins(mine, rivals)
         if any(self.grid.is_below(mine, rival) for rival in rivals):
             return False

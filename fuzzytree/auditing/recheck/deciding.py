@@ -166,7 +166,7 @@ def copied(case: Case, answer: Answer) -> None:
 
 def apart(case: Case, answer: Answer) -> None:
     """Check that no pair without a finding can reach the level together."""
-    if case.rules.semantics.conjunction != "min":
+    if case.rules.semantics.conjunction != "minimum":
         raise UndecidedError("conflicts under product are not decided again here")
     entries = {one.rules for one in case.coded("FT201")}
     level, grid = Fraction(case.audit.settings.level), case.grid
@@ -189,7 +189,7 @@ def apart(case: Case, answer: Answer) -> None:
 
 def highest(case: Case, answer: Answer) -> None:
     """Check that two rules reach no higher level together than the reported one."""
-    if case.rules.semantics.conjunction != "min":
+    if case.rules.semantics.conjunction != "minimum":
         raise UndecidedError("conflicts under product are not decided again here")
     tops = [one for one in answer.measures if one.name in LEVELS]
     require(len(tops) == 1 and len(answer.rules) == 2, "it has no highest level")
@@ -277,7 +277,7 @@ def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
     is_claimed = is_high and answer.is_finding
     require(is_claimed, "it is not claimed that both reach the level")
     require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
-    if case.rules.semantics.conjunction == "min":
+    if case.rules.semantics.conjunction == "minimum":
         highest(case, answer)
 
 
@@ -438,7 +438,7 @@ def covered(case: Case, answer: Answer) -> None:
             raise UndecidedError("a curve may touch 0 where it is not known exactly")
         case.never(is_gap, "there are points at which no rule fires")
         return
-    if case.rules.semantics.conjunction != "min":
+    if case.rules.semantics.conjunction != "minimum":
         raise UndecidedError("gaps under product are not decided again here")
     below = grid.gap(Fraction(case.audit.settings.epsilon), is_above=False)
     is_gap = grid.leaves(None, grid.of, below)
@@ -516,7 +516,7 @@ def shows_gap(case: Case, answer: Answer, state: Witness) -> None:
     met = [c for c in below if {*c.rules} == {*case.numbers}]
     is_low = any(fraction(claim.level or "1") <= level for claim in met)
     require(is_low and answer.is_finding, "it is not claimed that all rules are below")
-    if not is_gap and case.rules.semantics.conjunction == "min":
+    if not is_gap and case.rules.semantics.conjunction == "minimum":
         least_cover(case, answer)
 
 

@@ -241,14 +241,14 @@ class View:
                 return self._ways(part, block, negated=negated)
             case And(parts=parts):
                 is_fit = block.conjunction == "minimum" or not negated
-                is_fit &= negated or _NAMES.get(block.conjunction) == self.conjunction
+                is_fit &= negated or block.conjunction == self.conjunction
                 is_union = negated
             case Or(parts=parts):
                 one = self._one_clause(parts, block, negated=negated)
                 if one is not None:
                     return [(one,)]
                 is_fit = block.disjunction == "maximum"
-                is_fit &= not negated or self.conjunction == "min"
+                is_fit &= not negated or self.conjunction == "minimum"
                 is_union = not negated
         if not is_fit:
             raise UndecidedError("a condition that does not hold by its ways")
@@ -266,7 +266,7 @@ class View:
 
     def _both(self, one: Way, other: Way) -> Way:
         both = (*one, *other)
-        return tuple(dict.fromkeys(both)) if self.conjunction == "min" else both
+        return tuple(dict.fromkeys(both)) if self.conjunction == "minimum" else both
 
     def _ways_of_clause(self, clause: Is, *, negated: bool) -> list[Way]:
         hedges = clause.hedges
@@ -333,7 +333,7 @@ class View:
                 when = self.rules.rules[number - 1].when
                 for clause in {*when} - known.keys():
                     known[clause] = self._degree(clause, values[clause.variable])
-                one = joined(_NORMS[self.conjunction], [known[c] for c in when])
+                one = joined(self.conjunction, [known[c] for c in when])
                 result[number] = _times(owner.weight, one)
             best = [max(result[number][end] for number in ways) for end in (0, 1)]
             if own[1] < best[0] or best[1] < own[0]:
@@ -375,26 +375,19 @@ class View:
                 return joined(norm, [self.condition(p, block, values) for p in parts])
 
 
-_NAMES: dict[str | None, Literal["min", "product"]] = {
-    "minimum": "min",
-    "product": "product",
-}
-_NORMS = {"min": "minimum", "product": "product"}
-
-
 def _times(weight: Fraction, one: Between) -> Between:
     return weight * one[0], weight * one[1]
 
 
-def _conjunction(system: System) -> Literal["min", "product"]:
+def _conjunction(system: System) -> Literal["minimum", "product"]:
     """Return the AND of most rules that have one, of minimum and product."""
-    counts = {"min": 0, "product": 0}
+    counts = {"minimum": 0, "product": 0}
     for block in system.blocks:
-        norm = _NAMES.get(block.conjunction)
-        if norm:
+        norm = block.conjunction
+        if norm in counts:
             parts = [[*_walk(rule.when)] for rule in block.rules]
             counts[norm] += sum(any(isinstance(p, And) for p in ps) for ps in parts)
-    return "product" if counts["product"] > counts["min"] else "min"
+    return "product" if counts["product"] > counts["minimum"] else "minimum"
 
 
 def _walk(condition: Condition | None) -> Iterator[Condition]:

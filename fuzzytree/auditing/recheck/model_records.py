@@ -82,7 +82,7 @@ class Rule(NamedTuple):
 
 
 class Semantics(NamedTuple):
-    conjunction: Literal["min", "product"]
+    conjunction: Literal["minimum", "product"]
     uncovered: str | None
     missing: str | None
     label_type: str | None = None  # number or boolean; None for text

@@ -425,7 +425,7 @@ Known = Mapping[str, Collection[str]]  # the terms of variables
 
 MEANINGS = {
     "rule base": {
-        "or": "max",
+        "or": "maximum",
         "not": "1 - degree",
         "answer": "the class of the first of the strongest rules",
     },

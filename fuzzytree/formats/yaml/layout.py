@@ -177,8 +177,8 @@ class RuleSemantics(FileRecord, frozen=True, kw_only=True):
     """What an answer depends on beside the rules."""
 
     noun: ClassVar[str] = "the semantics of rules"
-    and_: Literal["min", "product"] = field(name="and")
-    or_: Literal["max"] = field(name="or")
+    and_: Literal["minimum", "product"] = field(name="and")
+    or_: Literal["maximum"] = field(name="or")
     not_: Literal["1 - degree"] = field(name="not")
     uncovered: Answer
     missing: Answer
@@ -190,7 +190,7 @@ class TreeSemantics(FileRecord, frozen=True, kw_only=True):
     """What an answer depends on beside the nodes, and the AND of the tree's rules."""
 
     noun: ClassVar[str] = "the semantics of a tree"
-    and_: Literal["min", "product"] = field(name="and")
+    and_: Literal["minimum", "product"] = field(name="and")
     uncovered: Answer
     missing: Answer
     label_type: LabelType | None = field(name="label type", default=None)

@@ -354,7 +354,7 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
         isinstance(rule.when, And) for rule in block.rules
     )
     uncovered = None if default is None else classes[int(default) - 1]
-    semantics = Semantics("product" if is_product else "min", uncovered)
+    semantics = Semantics("product" if is_product else "minimum", uncovered)
     try:
         rules = tuple(
             Rule(tuple(_clauses(rule.when)), rule.then[0].label) for rule in block.rules

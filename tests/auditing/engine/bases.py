@@ -33,7 +33,7 @@ def random_base(
     seed: int,
     rules: int = 7,
     features: int = 4,
-    conjunction: Conjunction = "min",
+    conjunction: Conjunction = "minimum",
     kind: Kind = "lr",
     *,
     classes: int = 0,

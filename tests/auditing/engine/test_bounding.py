@@ -43,7 +43,7 @@ from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
 
-CONJUNCTIONS: tuple[Conjunction, ...] = ("min", "product")
+CONJUNCTIONS: tuple[Conjunction, ...] = ("minimum", "product")
 
 
 def _strengths(rules: RuleBase, point: tuple[Coordinate, ...]) -> tuple[Fraction, ...]:
@@ -114,14 +114,14 @@ def _check_against_cells(rules: RuleBase) -> None:
 
 
 def test_boxes_and_cells_agree_under_the_minimum() -> None:
-    _check_against_cells(random_base(2, 5, 2, "min", "mixed", shared=0.4))
+    _check_against_cells(random_base(2, 5, 2, "minimum", "mixed", shared=0.4))
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("seed", range(8))
 def test_boxes_and_cells_agree_on_many_bases(seed: int) -> None:
     _check_against_cells(
-        random_base(seed, 5, 3, "min", "mixed", shared=0.2 * (seed % 4))
+        random_base(seed, 5, 3, "minimum", "mixed", shared=0.2 * (seed % 4))
     )
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
 
 
-def _rules(seed: int, conjunction: Conjunction = "min") -> RuleBase:
+def _rules(seed: int, conjunction: Conjunction = "minimum") -> RuleBase:
     tree = random_tree(seed, inputs=3, combinations=0.5)
     terms: Literal["raw", "relative"] = "raw" if tree.sets else "relative"
     return rules_from_tree(tree, terms, conjunction=conjunction)
@@ -41,7 +41,7 @@ def _within(draw: random.Random, low: FloatArray, high: FloatArray) -> list[Frac
     ]
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 @pytest.mark.parametrize("seed", range(4))
 def test_no_point_of_a_box_is_outside_the_bounds(
     seed: int, conjunction: Conjunction

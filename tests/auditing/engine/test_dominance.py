@@ -101,12 +101,12 @@ def test_under_min_a_rule_that_is_above_is_stronger_wherever_the_other_fires(
             assert all(a > b or not b for a, b in pairs)
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_the_strengths_of_a_ground_are_those_of_the_definition(
     conjunction: str,
 ) -> None:
     rules = random_base(3, 6, 2, kind="mixed", odd=0.7, combinations=1)
-    meant = Semantics("product" if conjunction == "product" else "min")
+    meant = Semantics("product" if conjunction == "product" else "minimum")
     rules = replace(rules, semantics=meant)
     given = arrange(rules, unit_domain(rules))
     for a, b in itertools.product(GRID[1::2], repeat=2):
@@ -116,14 +116,14 @@ def test_the_strengths_of_a_ground_are_those_of_the_definition(
 
 def test_rules_that_ask_nothing_are_equal() -> None:
     rules = RuleBase("all", ("a", "b"), (), (Rule((), "a"), Rule((), "b")))
-    for meant in (Semantics("min"), Semantics("product")):
+    for meant in (Semantics("minimum"), Semantics("product")):
         both = RulePairs(arrange(replace(rules, semantics=meant), Domain(())))
         assert both.never_weaker(1, 2) == "always"
         assert both.above(1, 2) != "always"
         assert both.fires.all()
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_an_open_lower_end_does_not_count(conjunction: str) -> None:
     # At 0 itself the second is stronger, above it never.
     terms = (
@@ -135,7 +135,7 @@ def test_an_open_lower_end_does_not_count(conjunction: str) -> None:
         ("a",),
         (Variable("x", terms),),
         tuple(Rule((Clause("x", (term.name,)),), "a") for term in terms),
-        Semantics("product" if conjunction == "product" else "min"),
+        Semantics("product" if conjunction == "product" else "minimum"),
     )
     verdicts = [
         RulePairs(
@@ -173,12 +173,12 @@ def test_no_point_of_a_grid_is_farther_than_a_distance(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_no_point_of_a_grid_reaches_more_than_where_rules_meet(
     conjunction: str, seed: int
 ) -> None:
     rules = random_base(seed, 4, 2, kind="mixed", shared=0.3)
-    meant = Semantics("product" if conjunction == "product" else "min")
+    meant = Semantics("product" if conjunction == "product" else "minimum")
     rules = replace(rules, semantics=meant)
     both, rows, level = compared(rules), strengths(rules), Fraction(1, 10)
     for one, other in itertools.combinations(range(1, 5), 2):
@@ -188,7 +188,7 @@ def test_no_point_of_a_grid_reaches_more_than_where_rules_meet(
         assert most <= joint_bounds(both, one)[other - 1]
         if isinstance(found.state, Witness):
             assert Fraction(found.state.claims[0].level or 0) >= level
-        if conjunction == "min":
+        if conjunction == "minimum":
             assert found.level.high - found.level.low < Fraction(1, 10**9)
 
 

@@ -64,7 +64,9 @@ def pair(seed: int) -> tuple[RuleBase, RuleBase]:
         return Rule(tuple(when), chance.choice("abc"))
 
     rules = tuple(rule() for _ in range(chance.randint(2, 5)))
-    semantics = Semantics(chance.choice(["min", "product"]), chance.choice([None, "a"]))
+    semantics = Semantics(
+        chance.choice(["minimum", "product"]), chance.choice([None, "a"])
+    )
     old = RuleBase("a", ("a", "b", "c"), variables, rules, semantics)
     terms = (Term("t0", line()), *variables[0].terms[1:])
     changed = [

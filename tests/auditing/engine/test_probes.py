@@ -15,7 +15,7 @@ from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_ru
 
 
 @pytest.mark.one_in(2)
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_a_rule_that_is_seen_to_win_does_so_in_fractions(
     conjunction: Conjunction,
 ) -> None:

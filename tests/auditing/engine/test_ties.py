@@ -33,7 +33,7 @@ DOWN = Term("down", Points((0.0, 1.0), (1.0, 0.0)))
 HALF = Term("half", Points((0.0,), (0.5,)))
 
 
-def _rules(*rules: tuple[str, str, str], conjunction: str = "min") -> RuleBase:
+def _rules(*rules: tuple[str, str, str], conjunction: str = "minimum") -> RuleBase:
     variables = (Variable("x", (UP, DOWN, HALF)), Variable("y", (UP, DOWN, HALF)))
     made = tuple(
         Rule((Clause("x", (a,)), Clause("y", (b,))), label) for a, b, label in rules
@@ -151,7 +151,7 @@ def test_products_of_combinations_of_one_direction_are_declined() -> None:
 
 
 @pytest.mark.one_in(5)
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 @pytest.mark.parametrize("seed", range(8))
 def test_no_row_ties_where_a_tie_is_excluded(
     seed: int, conjunction: Conjunction

@@ -30,7 +30,10 @@ def bands(name: str, cut: float) -> tuple[Term, Term]:
 
 
 def one_cut(
-    meeting: float = 0.5, conjunction: Conjunction = "min", *, is_steep: bool = False
+    meeting: float = 0.5,
+    conjunction: Conjunction = "minimum",
+    *,
+    is_steep: bool = False,
 ) -> FuzzyTree:
     """Return a tree with one cut of x, at 0.5, and whose fitted sets meet elsewhere.
 

@@ -34,7 +34,7 @@ NEVER = Term("never", Points((2.0, 3.0, 4.0), (0.0, 1.0, 0.0)))
 TERMS = (LOW, HIGH, MIDDLE, FLAT, SMALL, NEVER)
 
 
-def _base(*rules: tuple[str, str], conjunction: str = "min") -> RuleBase:
+def _base(*rules: tuple[str, str], conjunction: str = "minimum") -> RuleBase:
     variables = (Variable("x", TERMS), Variable("y", TERMS))
     made: list[Rule] = []
     for terms, label in rules:
@@ -47,7 +47,7 @@ def _base(*rules: tuple[str, str], conjunction: str = "min") -> RuleBase:
 
 
 def _asked(
-    *rules: tuple[str, str], conjunction: str = "min", decision: str = "strongest"
+    *rules: tuple[str, str], conjunction: str = "minimum", decision: str = "strongest"
 ) -> list[AuditAnswer]:
     base = _base(*rules, conjunction=conjunction)
     box = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
@@ -169,7 +169,7 @@ def test_where_all_rules_take_part_only_firing_is_tested() -> None:
 def _subject(base: RuleBase, clock: Clock) -> Subject:
     return Subject(
         rules=base,
-        policy=Policy("min", "strongest"),
+        policy=Policy("minimum", "strongest"),
         domain=unit_domain(base),
         settings=AuditSettings(),
         clock=clock,

@@ -40,7 +40,7 @@ def _number(answer: AuditAnswer, name: str) -> float:
     return next(one.value for one in answer.measures if one.name == name)
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_sets_that_meet_off_the_cut_are_found_and_those_at_the_cut_are_not(
     conjunction: Conjunction,
 ) -> None:

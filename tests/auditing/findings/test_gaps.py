@@ -38,7 +38,7 @@ def _asked(
     semantics = Semantics(uncovered=uncovered)
     base = RuleBase("b", ("a", "b"), (Variable("x", terms),), rules, semantics)
     box = Domain((DomainSide("x", 0.0, 4.0),))
-    policy = Policy("min", "strongest", uncovered)
+    policy = Policy("minimum", "strongest", uncovered)
     subject = Subject(
         rules=base,
         policy=policy,

@@ -49,7 +49,7 @@ NONE = Term("none", Points((0.0, 1.0), (1.0, 0.0)))
 UP = Term("up", Points((0.0, 4.0), (0.0, 1.0)))
 DOWN = Term("down", Points((0.0, 4.0), (1.0, 0.0)))
 TERMS = (LOW, HIGH, WIDE, NONE)
-CONJUNCTIONS: tuple[Conjunction, ...] = ("min", "product")
+CONJUNCTIONS: tuple[Conjunction, ...] = ("minimum", "product")
 
 
 def clause(text: str) -> Clause:
@@ -59,7 +59,7 @@ def clause(text: str) -> Clause:
 
 def base(
     *rules: tuple[str, str],
-    conjunction: Conjunction = "min",
+    conjunction: Conjunction = "minimum",
     more: tuple[Term, ...] = (),
     high: float = 4.0,
 ) -> RuleBase:

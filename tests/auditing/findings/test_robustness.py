@@ -78,7 +78,7 @@ def test_a_domain_decided_alike_has_no_other_decision() -> None:
     assert isinstance(found.state, Proved)
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_the_radius_of_a_row_of_rules_is_found_by_their_strengths(
     conjunction: Conjunction,
 ) -> None:

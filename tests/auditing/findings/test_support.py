@@ -177,7 +177,7 @@ def test_a_rule_that_fires_and_never_wins_is_found() -> None:
     ]
 
 
-@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("conjunction", ["minimum", "product"])
 def test_counts_are_those_of_answers_in_fractions(conjunction: str) -> None:
     rules = random_base(3, 7, 4, conjunction, shared=0.5)  # type: ignore[arg-type]
     subject = subject_of(rules)

@@ -197,7 +197,7 @@ def test_rules_of_another_norm_than_most_are_left_out() -> None:
     both = And((A_LOW, B_LOW))
     system = system_of(block_of(both, both), block_of(both, conjunction="product"))
     found = view(system, BOX)
-    assert found.policy.conjunction == "min"
+    assert found.policy.conjunction == "minimum"
     assert reasons(found) == [
         "rule 1 of block 2 is left out: its 'and' is the product, and that of "
         "most rules is another"

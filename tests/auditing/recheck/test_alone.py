@@ -67,7 +67,7 @@ def test_alone_in_an_empty_folder_it_checks_a_real_audit(tmp_path: Path) -> None
 
 def test_alone_it_reports_what_is_wrong(tmp_path: Path) -> None:
     audit, model = small()
-    (tmp_path / "audit.json").write_bytes(audit.replace(b'"min"', b'"product"', 1))
+    (tmp_path / "audit.json").write_bytes(audit.replace(b'"minimum"', b'"product"', 1))
     (tmp_path / "grip.yaml").write_bytes(model)
     ran = alone(tmp_path, f"..{os.sep}audit.json", f"..{os.sep}grip.yaml")
     assert (ran.returncode, ran.stderr) == (1, "")

@@ -123,7 +123,7 @@ def test_audits_of_every_form_hold(kind: str) -> None:
     if kind == "relative" or kind == "raw":
         model = rules_from_tree(tree, "raw" if kind == "raw" else "relative")
     elif kind != "tree":
-        norm: Conjunction = "product" if kind == "product" else "min"
+        norm: Conjunction = "product" if kind == "product" else "minimum"
         model = random_base(3, 4, 2, norm, "points", shared=0.5)
     found = recheck(*audited(model, ignore=["FT6", "FT204"]), ("a.json", "m.yaml"))
     assert found.wrong == []
@@ -141,7 +141,7 @@ def wrong_of(model: RuleBase | FuzzyTree, **options: Any) -> list[str]:
     return recheck(*audited(model, **options), ("a.json", "m.yaml")).wrong
 
 
-def rules_of(*when: tuple[Clause, ...], norm: Conjunction = "min") -> RuleBase:
+def rules_of(*when: tuple[Clause, ...], norm: Conjunction = "minimum") -> RuleBase:
     """Return rules of one class on `x` and a sum in which it stands twice."""
     parts = (Part("x", 1.0), Part("x", -0.5, 1.0))
     terms = (Term("up", UP), Term("late", LATE))
@@ -201,7 +201,7 @@ def unit(tree: FuzzyTree) -> Domain:
 @pytest.mark.parametrize("seed", range(16))
 def test_audits_of_odd_models_hold(seed: int) -> None:
     chance = random.Random(seed)
-    norm: Conjunction = chance.choice(["min", "product"])
+    norm: Conjunction = chance.choice(["minimum", "product"])
     kinds: tuple[Kind, ...] = ("lr", "points", "band", "mixed")
     kind, sums = chance.choice(kinds), chance.randrange(2)
     model = random_base(seed, 3, 2, norm, kind, shared=0.7, odd=0.5, combinations=sums)

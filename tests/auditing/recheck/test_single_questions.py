@@ -71,7 +71,7 @@ def random_points(chance: random.Random) -> Points:
 def random_rules(seed: int) -> RuleBase:
     """Return a few rules, some of which are equal, contradict or never fire."""
     chance = random.Random(seed)
-    norm: Conjunction = chance.choice(("min", "product"))
+    norm: Conjunction = chance.choice(("minimum", "product"))
     names = ("x", "y")[: chance.randint(1, 2)]
     shapes = [random_points(chance) for _ in range(3)]
     terms = tuple(
@@ -168,7 +168,7 @@ class Grid:
 
     def __init__(self, rules: RuleBase) -> None:
         self.rules = rules
-        self.is_min = rules.semantics.conjunction == "min"
+        self.is_min = rules.semantics.conjunction == "minimum"
         self.one = WHOLE if self.is_min else WHOLE**4
         made = [self.strength(rule.when) for rule in rules.rules]
         self.strengths = np.array(made)
