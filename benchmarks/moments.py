@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from exact_features import exact_features
 
 from fuzzytree.tactile.features import costs
-from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.names import FEATURES, PAPER
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Cells, Sensor

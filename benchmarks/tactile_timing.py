@@ -10,6 +10,7 @@ from functools import partial
 
 import msgspec
 import numpy as np
+from exact_features import errors, exact_features
 
 from fuzzytree.benchmarking.clock import Call, time_calls
 from fuzzytree.benchmarking.machine import after, machine
@@ -26,18 +27,16 @@ from fuzzytree.tactile.exporters.onnx_frames import (
 )
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import aimed_frames
-from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.plain import plain_answer, plain_shown
-from fuzzytree.tactile.recognition.agreement import errors
 from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
     LOOP,
     NUMPY,
     ONNX,
     PLAIN,
+    Answers,
     C,
     Runner,
-    RunnerResult,
     as_sent,
     runners,
 )
@@ -62,7 +61,7 @@ class Point(msgspec.Struct, frozen=True):
         timings: One for each number of frames in a call.
         bytes: The size of the file that runs; 0 if there is none.
         error: The largest error of a feature, as a share of its scale
-            (`fuzzytree.tactile.recognition.agreement`); None for a floor.
+            (`exact_features.errors`); None for a floor.
         flips: Frames whose class is not that of the exact features, rounded once.
     """
 
@@ -204,7 +203,7 @@ def _steps(
     if not isinstance(model, RuleBase):  # rules have no prediction without strengths
         found[STRENGTHS] = recogniser
     if ONNX in ways:
-        content = write_frames(model, sensor, reject=reject, verify=False).content
+        content = write_frames(model, sensor, reject=reject).content
         bare, size = open_bare(content), frames_at_once(sensor)
         sizes[ONNX] = len(content)
 
@@ -277,20 +276,22 @@ def _judged(
     """Return the largest error and the flips of each way, on some of the frames."""
     some = frames[:_MOST_EXACT]
     exact = [exact_features(sensor, frame, model.inputs) for frame in some]
-    codes = [
+    labels = [*model.classes, ""]
+    right = [
         plain_answer(
             model,
             [float(value) for value in values],
             is_pressed=bool(pressed(sensor, frame).any()),
             reject=reject,
-        ).code
+        )
         for frame, values in zip(some, exact, strict=True)
     ]
+    wanted = np.array([labels[one.code] for one in right], np.object_)
     found: dict[str, tuple[float, int]] = {}
     for name, run in ways.items():
         answers = run(some)
         largest = _largest(model, sensor, some, answers, exact)
-        found[name] = largest, int((answers.codes != np.array(codes)).sum())
+        found[name] = largest, int((answers["label"] != wanted).sum())
     return found
 
 
@@ -298,13 +299,13 @@ def _largest(
     model: Model,
     sensor: Sensor,
     frames: Cells,
-    found: RunnerResult,
+    found: Answers,
     exact: Sequence[Sequence[Fraction]],
 ) -> float:
     shares = [
         errors(sensor, frame, model.inputs, values, right)
         for frame, values, right in zip(
-            frames, found.features.T.tolist(), exact, strict=True
+            frames, found["features"].tolist(), exact, strict=True
         )
     ]
     return max((share for one in shares for share in one), default=0.0)

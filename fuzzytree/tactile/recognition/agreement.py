@@ -1,14 +1,11 @@
-"""Agreement of all implementations from frame to class, and files that are checked.
+"""Agreement of all implementations from frame to class: NumPy, ONNX, C, plain Python.
 
-NumPy, ONNX and C must give the bits and classes of plain Python, and plain Python must
-give the features of exact rational arithmetic up to rounding.
+Each must give the bits and classes of the others.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from fractions import Fraction
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -17,108 +14,32 @@ from fuzzytree.checking import counted
 from fuzzytree.errors import TableError
 from fuzzytree.model import (
     Agreement,
+    BoolArray,
     Comparison,
-    FloatArray,
     Model,
     RuleBase,
     fingerprint,
 )
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import proving_frames
-from fuzzytree.tactile.features.exact import exact_features
-from fuzzytree.tactile.features.names import Feature, feature_of
-from fuzzytree.tactile.features.plain import State, plain_answer
+from fuzzytree.tactile.features.plain import State
 from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
     NUMPY,
     PLAIN,
+    Answers,
     Runner,
-    RunnerResult,
     as_sent,
     runners,
 )
-from fuzzytree.tactile.sensor import Cells, Sensor, pressed, saturated
+from fuzzytree.tactile.sensor import Cells, Sensor, saturated
 
-_ORDERS = ("2", "22", "33", "33", "3333", "332", "44", "44", "4", "444", "42")
-"""Of S1 to S11: the orders of the moments that it is a product of."""
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
-_TWICE = (5, 6, 10, 11)  # of the invariants: twice the real part of the product
+    Array = npt.NDArray[Any]
 
-_DEGREES = 90.0 / math.pi  # of half an angle, for each radian of the whole
-
-
-def errors(
-    sensor: Sensor,
-    frame: Cells,
-    names: Sequence[str],
-    values: Sequence[float],
-    exact: Sequence[Fraction],
-) -> tuple[float, ...]:
-    """Return how far features are from the exact ones, as shares of their scales.
-
-    Example:
-        >>> bar = np.array([[0, 255, 255]])
-        >>> errors(Sensor(1, 3), bar, ["S1"], [0.75], [Fraction(1, 2)])
-        (0.5,)
-    """
-    cells = pressed(sensor, frame)[0] / sensor.full
-    if not cells.any():
-        return tuple(0.0 if value == 0.0 else math.inf for value in values)
-    sizes = _sizes(cells)
-    found: list[float] = []
-    every = zip(map(feature_of, names), values, exact, strict=True)
-    for feature, value, right in every:
-        apart = abs(Fraction(value) - right)
-        if feature.base == "angle":
-            apart = min(apart, 180 - apart)  # -90 and 90 are one direction
-        scale = _scale(feature, sizes, max(cells.shape))
-        if feature.is_log:  # an error of v is one of v / (1 + |v|) in log(1 + |v|)
-            size = abs(float(right))
-            scale = scale / (1.0 + math.expm1(size)) + max(size, 1.0)
-        share = float(apart) / scale if scale else math.inf
-        found.append(share if apart else 0.0)
-    return tuple(found)
-
-
-def _sizes(cells: FloatArray) -> list[float]:
-    """Return the sums of g r^n for n from 0 to 4; |C20| at the end."""
-    force = cells.sum()
-    down, along = np.mgrid[0 : cells.shape[0], 0 : cells.shape[1]]
-    z = (along - (along * cells).sum() / force) + 1j * (
-        (down * cells).sum() / force - down
-    )
-    found = [float((cells * np.abs(z) ** order).sum()) for order in range(5)]
-    return [*found, float(abs((cells * z**2).sum()))]
-
-
-def _scale(feature: Feature, sizes: Sequence[float], side: int) -> float:
-    """Return the scale of a feature, of its value itself if it is a logarithm."""
-    unit = sizes[0] if feature.per_force else 1.0
-    base, direction = feature.base, sizes[2] / (sizes[5] or math.inf)
-    if feature.kind != "moment" or base in ("force", "area", "peak"):
-        return sizes[0] / unit
-    match base:
-        case "x" | "y":
-            return float(side)
-        case "angle":
-            return 90.0 + _DEGREES * direction
-        case "cos2" | "sin2":
-            return 1.0 + direction
-        case _ if base[0] == "S":
-            number = int(base[1:])
-            product = math.prod(sizes[int(n)] / unit for n in _ORDERS[number - 1])
-            return 2 * product if number in _TWICE else product
-        case _:
-            return sizes[int(base[-2]) + int(base[-1])] / unit
-
-
-EXACT = "exact arithmetic"
-
-ALLOWED = 1e-12
-"""The largest error of a feature as a share of its scale: some thousand roundings, and
-what the series of angles and logarithms leave out (`docs/explanation/moments.md`)."""
-
-_PLAIN_CELLS, _EXACT_CELLS = 512_000, 51_200  # of frames for the slow ones
+_PLAIN_CELLS = 512_000  # of frames for plain Python
 _FEWEST, _SHOWN = 10, 3
 
 
@@ -147,27 +68,32 @@ class FramesAgreement(Agreement, frozen=True, kw_only=True):
 
     Attributes:
         shown: What the frames show.
-        largest_error: Of a feature against exact arithmetic, as a share of its scale.
     """
 
     shown: FrameCounts
-    largest_error: float
 
 
 def check_frames_agree(
-    model: Model, sensor: Sensor, frames: Cells | None = None, *, reject: float = 0.0
+    model: Model,
+    sensor: Sensor,
+    frames: Cells | None = None,
+    *,
+    reject: float = 0.0,
+    graph: bytes | None = None,
 ) -> FramesAgreement:
-    """Compare every implementation with plain Python, and that with exact arithmetic.
+    """Compare every implementation with every other one.
 
     Args:
         model: A tree or a rule base whose inputs are names of features.
         sensor: Whose frames come.
         frames: Shape (frames, rows, columns); beside the aimed ones.
         reject: Of raw rules: what is weaker in the rule that decides is unknown.
+        graph: An ONNX file of the model; one that is written now if None.
 
     Raises:
         TableError: If an input of the model is no feature, or frames do not fit.
         InvalidModelError: If a feature is beyond the sensor.
+        ReadError: If onnxruntime does not run the graph.
         ValueError: If the model has no strengths to reject by.
 
     Example:
@@ -178,104 +104,112 @@ def check_frames_agree(
         True
     """
     check_inputs(model)
-    aimed = proving_frames(frame_program(sensor, model.inputs), model)
-    every = [aimed] if frames is None else [aimed, as_sent(sensor, frames)]
-    rows = np.concatenate(every)
-    ways, skipped = runners(model, sensor, reject)
-    run_plain = ways.pop(PLAIN)
+    rows, aimed = proving_rows(model, sensor, frames)
+    ways, skipped = runners(model, sensor, reject, graph=graph)
+    plain = ways.pop(PLAIN)(rows[: max(_PLAIN_CELLS // rows[0].size, _FEWEST)])
+    if left := len(rows) - len(plain["label"]):
+        skipped.append(f"{PLAIN}: {left} frames, to save time")
     found = {name: run(rows) for name, run in ways.items()}
-    cells = sensor.rows * sensor.columns
-    plain = run_plain(rows[: max(_PLAIN_CELLS // cells, _FEWEST)])
-    exact = _against_exact(
-        model, sensor, rows[: max(_EXACT_CELLS // cells, _FEWEST)], plain, reject
-    )
-    for name, count in ((PLAIN, len(plain.codes)), (EXACT, exact.rows)):
-        if count < len(rows):
-            skipped.append(f"{name}: {len(rows) - count} frames, to save time")
-    comparisons = [exact, _compared(NUMPY, found[NUMPY], PLAIN, plain, model)]
+    comparisons = [compared(NUMPY, found[NUMPY], PLAIN, plain, model)]
     for name, one in found.items():
         if name != NUMPY:
             comparisons += [
-                _compared(name, one, NUMPY, found[NUMPY], model),
-                _compared(name, one, PLAIN, plain, model),
+                compared(name, one, NUMPY, found[NUMPY], model),
+                compared(name, one, PLAIN, plain, model),
             ]
     comparisons += [_singly(n, run, rows, found[n]) for n, run in ways.items()]
+    shown = Recogniser(model, sensor, reject)(rows)
+    top = np.sort(np.vstack([np.zeros((2, len(rows))), shown.strengths]), axis=0)
+    is_tied = (top[-1] == top[-2]) & (top[-1] > 0.0)
     return FramesAgreement(
         model.name,
         fingerprint(model),
         tuple(comparisons),
         skipped=tuple(skipped),
-        probes=len(aimed),
-        shown=_shown(model, sensor, rows, len(aimed), reject),
-        largest_error=exact.largest_difference,
+        probes=aimed,
+        shown=FrameCounts(
+            len(rows),
+            aimed,
+            int((shown.states == State.NOTHING).sum()),
+            int((shown.states == State.UNKNOWN).sum()),
+            int((saturated(sensor, rows) > 0).sum()),
+            int(is_tied.sum()) if isinstance(model, RuleBase) else 0,
+        ),
     )
 
 
-def _shown(
-    model: Model, sensor: Sensor, frames: Cells, aimed: int, reject: float
-) -> FrameCounts:
-    found = Recogniser(model, sensor, reject)(frames)
-    top = np.sort(np.vstack([np.zeros((2, len(frames))), found.strengths]), axis=0)
-    is_tied = (top[-1] == top[-2]) & (top[-1] > 0.0)
-    return FrameCounts(
-        len(frames),
-        aimed,
-        int((found.states == State.NOTHING).sum()),
-        int((found.states == State.UNKNOWN).sum()),
-        int((saturated(sensor, frames) > 0).sum()),
-        int(is_tied.sum()) if isinstance(model, RuleBase) else 0,
-    )
+def proving_rows(
+    model: Model, sensor: Sensor, frames: Cells | None
+) -> tuple[Cells, int]:
+    """Return aimed frames with others behind them, and how many are aimed."""
+    aimed = proving_frames(frame_program(sensor, model.inputs), model)
+    every = [aimed] if frames is None else [aimed, as_sent(sensor, frames)]
+    return np.concatenate(every), len(aimed)
 
 
-def _compared(
-    name: str, one: RunnerResult, other_name: str, other: RunnerResult, model: Model
+def compared(
+    name: str, one: Answers, against: str, other: Answers, model: Model
 ) -> Comparison:
-    """Compare the answers to some frames with others: bits, states, classes, rules."""
-    count = min(one.features.shape[1], other.features.shape[1])
-    values, others = (np.ascontiguousarray(f.features[:, :count]) for f in (one, other))
-    wrong = (values.view(np.uint64) != others.view(np.uint64)).any(axis=0)
-    flips = one.codes[:count] != other.codes[:count]
-    wrong = wrong | flips | (one.states[:count] != other.states[:count])
-    if one.rules is not None and other.rules is not None:
-        wrong = wrong | (one.rules[:count] != other.rules[:count])
-    shown = np.flatnonzero(wrong)[:_SHOWN].tolist()
+    """Compare the answers to some frames with others, each output that both have.
+
+    Features and strengths are compared bit by bit. Where there are answers to more
+    frames on one side, the first ones are compared.
+    """
+    wrong = {key: _apart(one[key], other[key]) for key in one if key in other}
+    every = [*wrong.values()]
+    is_wrong: BoolArray = np.logical_or.reduce(every)
+    flips = [wrong[key] for key in ("label", "state") if key in wrong]
+    largest = 0.0
+    if "features" in wrong:
+        values = one["features"][: len(is_wrong)] - other["features"][: len(is_wrong)]
+        largest = float(np.abs(values).max(initial=0.0))
+    shown = np.flatnonzero(is_wrong)[:_SHOWN].tolist()
     return Comparison(
         name,
-        other_name,
+        against,
         "rows",
-        count,
-        "DISAGREES" if wrong.any() else "agrees",
-        differing=int(wrong.sum()),
-        largest_difference=float(np.abs(values - others).max(initial=0.0)),
-        flips=int(flips.sum()),
-        detail=tuple(_difference_text(frame, one, other, model) for frame in shown),
+        len(is_wrong),
+        "DISAGREES" if is_wrong.any() else "agrees",
+        differing=int(is_wrong.sum()),
+        largest_difference=largest,
+        flips=int(np.logical_or.reduce(flips).sum()) if flips else 0,
+        detail=tuple(_difference_text(row, one, other, model) for row in shown),
     )
 
 
-def _difference_text(
-    frame: int, one: RunnerResult, other: RunnerResult, model: Model
-) -> str:
-    ends = (found.features[:, frame].tolist() for found in (one, other))
-    every = zip(model.inputs, *ends, strict=True)
-    shown = [(name, repr(a), repr(b)) for name, a, b in every]  # -0.0 is not 0.0
-    texts = [f"{name} {a}, not {b}" for name, a, b in shown if a != b]
-    codes = [(int(f.codes[frame]), State(f.states[frame])) for f in (one, other)]
-    labels = [model.classes[c] if c >= 0 else state.name.lower() for c, state in codes]
-    if labels[0] != labels[1]:
-        texts.append(f"{labels[0]}, not {labels[1]}")
-    return f"frame {frame}: {'; '.join(texts) or 'another rule'}"
+def _apart(one: Array, other: Array) -> BoolArray:
+    """Return in which of the frames that both have two outputs differ."""
+    count = min(len(one), len(other))
+    pair = (np.ascontiguousarray(found[:count]) for found in (one, other))
+    if one.dtype == np.float64:
+        pair = (found.view(np.uint64) for found in pair)
+    first, second = pair
+    apart: BoolArray = (first != second).reshape(count, -1).any(axis=1)
+    return apart
 
 
-def _singly(name: str, run: Runner, frames: Cells, found: RunnerResult) -> Comparison:
+def _difference_text(frame: int, one: Answers, other: Answers, model: Model) -> str:
+    texts: list[str] = []
+    for key, own in one.items():
+        a, b = (np.asarray(f[frame]).tolist() for f in (own, other.get(key, own)))
+        if key == "features":
+            pairs = zip(model.inputs, map(repr, a), map(repr, b), strict=True)
+            texts += [f"{name} {x}, not {y}" for name, x, y in pairs if x != y]
+        elif a != b:
+            texts.append(f"{key} {a!r}, not {b!r}")
+    return f"frame {frame}: {'; '.join(texts)}"
+
+
+def _singly(name: str, run: Runner, frames: Cells, found: Answers) -> Comparison:
     """Compare calls: no frame, single ones, some, other memory order, wrong width."""
     wrong: list[str] = []
     step = max(len(frames) // 8, 1)
     part = slice(None, None, step)
-    if run(frames[:0]).features.shape[1]:
+    if any(map(len, run(frames[:0]).values())):
         wrong.append("no frames get an answer")
     for place in range(0, len(frames), step):
-        own = run(frames[place : place + 1])
-        if not _is_same(own, found, slice(place, place + 1)):
+        one = slice(place, place + 1)
+        if not _is_same(run(frames[one]), found, one):
             wrong.append(f"frame {place} alone gets another answer")
     for given in (frames[part], np.asfortranarray(frames[part])):
         if not _is_same(run(given), found, part):
@@ -289,52 +223,5 @@ def _singly(name: str, run: Runner, frames: Cells, found: RunnerResult) -> Compa
     return counted("calls", name, "itself", calls, wrong)
 
 
-def _is_same(one: RunnerResult, all_of: RunnerResult, part: slice) -> bool:
-    return (
-        np.array_equal(one.features, all_of.features[:, part])
-        and np.array_equal(one.codes, all_of.codes[part])
-        and np.array_equal(one.states, all_of.states[part])
-    )
-
-
-def _against_exact(
-    model: Model, sensor: Sensor, frames: Cells, plain: RunnerResult, reject: float
-) -> Comparison:
-    """Compare plain Python's features with fractions, and its classes with theirs.
-
-    A class may differ where a feature is within its rounding of a cut.
-    """
-    largest, flips, detail = 0.0, 0, list[str]()
-    wrong = np.zeros(len(frames), np.bool_)
-    for place, frame in enumerate(frames):
-        exact = exact_features(sensor, frame, model.inputs)
-        values = plain.features[:, place].tolist()
-        apart = errors(sensor, frame, model.inputs, values, exact)
-        largest = max(largest, *apart, 0.0)
-        wrong[place] = any(not share <= ALLOWED for share in apart)
-        if wrong[place]:
-            worst = int(np.argmax(apart))
-            detail.append(
-                f"frame {place}: {model.inputs[worst]} {values[worst]!r}, not "
-                f"{float(exact[worst])!r}"
-            )
-        shown = plain_answer(
-            model,
-            [float(value) for value in exact],
-            is_pressed=bool(plain.states[place] != State.NOTHING),
-            reject=reject,
-        )
-        flips += shown.code != int(plain.codes[place])
-    return Comparison(
-        PLAIN,
-        EXACT,
-        "rows",
-        len(frames),
-        "DISAGREES" if wrong.any() else "agrees",
-        differing=int(wrong.sum()),
-        largest_difference=largest,
-        allowed=ALLOWED,
-        origin="a share of each feature's scale",
-        flips=flips,
-        detail=tuple(detail[:_SHOWN]),
-    )
+def _is_same(one: Answers, all_of: Answers, part: slice) -> bool:
+    return not any(_apart(one[key], all_of[key][part]).any() for key in one)

@@ -7,26 +7,20 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import msgspec
-import numpy as np
 
 from fuzzytree.checking import counted, judged
 from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.model import Agreement, Comparison, FuzzyTree, Model, fingerprint
-from fuzzytree.runtimes import loaded, parsed, texts_of
-from fuzzytree.tactile.exporters.onnx_frames import Output, apart, write_frames
-from fuzzytree.tactile.features import frame_program
-from fuzzytree.tactile.features.aimed import proving_frames
+from fuzzytree.runtimes import parsed, texts_of
+from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
+from fuzzytree.tactile.recognition.agreement import compared, proving_rows
 from fuzzytree.tactile.recognition.recogniser import check_inputs
-from fuzzytree.tactile.recognition.runners import PLAIN, as_sent
+from fuzzytree.tactile.recognition.runners import PLAIN, graph_runner, plain_runner
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
+    from fuzzytree.exporters import Differences
 
-    from fuzzytree.exporters import Bare, Differences
-
-
-_SHOWN = 3
 _RECORDS = ("sensor", "features", "classes", "outputs", "reject")
 _MOST_CELLS = 2**22  # of frames for plain Python, about a minute
 
@@ -110,6 +104,7 @@ def check_onnx_files(
         MissingExtraError: If onnx or onnxruntime is not installed.
 
     Example:
+        >>> import numpy as np
         >>> from fuzzytree import learn, table
         >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
         >>> tree = learn(table(areas, columns=["area"]), target=["s", "s", "l", "l"])
@@ -134,14 +129,11 @@ def check_onnx_files(
             against = "the model's features and classes"
             comparisons.append(counted("file", name, against, 1, (text,)))
             continue
-        made = frame_program(known.sensor, model.inputs)
-        aimed = proving_frames(made, model)
-        every = [aimed] if frames is None else [aimed, as_sent(known.sensor, frames)]
-        rows = np.concatenate(every)
-        some = rows[: _MOST_CELLS // aimed[0].size]
+        rows, aimed = proving_rows(model, known.sensor, frames)
+        some = rows[: _MOST_CELLS // rows[0].size]
         if len(some) < len(rows):
             skipped.append(f"{name}: {len(rows) - len(some)} frames, to save time")
-        probes += len(aimed)
+        probes += aimed
         stated: list[str] = []
         if sensor is not None and known.sensor != sensor:
             own, other = _sensor_text(known.sensor), _sensor_text(sensor)
@@ -149,7 +141,9 @@ def check_onnx_files(
         if known.reject != reject:
             stated.append(f"its reject is {known.reject!r}, not {reject!r}")
         graph, metadata = _differences(model, known, content)
-        answers = _answers(model, known, loaded(content, name), some, name)
+        run = graph_runner(content, name, known.sensor)
+        right = plain_runner(model, known.sensor, known.reject)(some)
+        answers = compared(name, run(some), PLAIN, right, model)
         comparisons += [
             counted("file", name, "the model's metadata", 1, (*metadata, *stated)),
             judged(name, "a freshly written graph", graph, [answers]),
@@ -189,48 +183,7 @@ def _differences(model: Model, known: FramesFile, content: bytes) -> Differences
             opset=versions.get("", 0),
             ir=proto.ir_version,
             plain=isinstance(model, FuzzyTree) and TREES not in versions,
-            verify=False,
         ).content
     except ValueError as error:
         return Differences((str(error),), ())
     return proto_differences(onnx.load_model_from_string(fresh), proto)
-
-
-def _answers(
-    model: Model, known: FramesFile, bare: Bare, frames: Cells, name: str
-) -> Comparison:
-    """Compare the predictions of some frames with plain Python, bit by bit."""
-    found = _run(bare, known, frames, name)
-    made = frame_program(known.sensor, model.inputs)
-    wrong: dict[int, list[tuple[Output, str]]] = {}
-    for number, output, text in apart(found, made, model, frames, known.reject):
-        wrong.setdefault(number, []).append((output, text))
-    detail = [f"frame {n}: {' '.join(every[0])}" for n, every in wrong.items()]
-    decisive = {"label", "state"}
-    flips = [not decisive.isdisjoint(dict(every)) for every in wrong.values()]
-    return Comparison(
-        name,
-        PLAIN,
-        "rows",
-        len(frames),
-        "DISAGREES" if wrong else "agrees",
-        differing=len(wrong),
-        flips=sum(flips),
-        detail=tuple(detail[:_SHOWN]),
-    )
-
-
-def _run(
-    bare: Bare, known: FramesFile, frames: Cells, name: str
-) -> dict[Output, npt.NDArray[np.generic]]:
-    from fuzzytree.exporters import RUNTIME_ERRORS, first_line
-
-    try:
-        found = bare(list(known.outputs), {"frames": frames})
-    except RUNTIME_ERRORS as error:
-        text = f"{name}: onnxruntime does not run it: {first_line(error)}"
-        raise ReadError(text) from error
-    arrays = [np.asarray(one) for one in found]
-    if any(not one.ndim or len(one) != len(frames) for one in arrays):
-        raise ReadError(f"{name}: it does not give an answer for each frame")
-    return dict(zip(known.outputs, arrays, strict=True))

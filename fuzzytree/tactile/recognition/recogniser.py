@@ -28,6 +28,7 @@ class Recognition:
         classes: The names of the classes.
         codes: Shape (frames,): the place of the class in `classes`; -1 for none.
         states: Shape (frames,): a `State` each.
+        rules: Shape (frames,): the number of the rule or leaf that decides; 0 for none.
         strengths: Shape (classes, frames), in [0, 1]: the strongest rule of each
             class; 0 where nothing presses.
         saturated: Shape (frames,): how many cells take no more.
@@ -37,6 +38,7 @@ class Recognition:
     classes: tuple[str, ...]
     codes: IntArray
     states: IntArray
+    rules: IntArray
     strengths: FloatArray
     saturated: IntArray
     features: Features
@@ -118,10 +120,12 @@ class Recogniser:
         states = np.where(is_missing & features.is_pressed, State.UNKNOWN, states)
         by_class = np.zeros((len(self.model.classes), len(rules)))
         np.fmax.at(by_class, self._class_of, strengths)  # NaN, missing, counts 0
+        is_object = states == State.OBJECT
         return Recognition(
             self.model.classes,
-            np.where(states == State.OBJECT, codes, -1),
+            np.where(is_object, codes, -1),
             states.astype(np.int64),
+            np.where(is_object, rules, 0),
             np.where(features.is_pressed, by_class, 0.0),
             saturated(self.sensor, frames),
             features,

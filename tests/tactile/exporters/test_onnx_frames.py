@@ -14,10 +14,12 @@ from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.tactile.exporters.onnx_frames import Output, differences, write_frames
+from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import aimed_frames, proving_frames
 from fuzzytree.tactile.features.plain import plain_features
+from fuzzytree.tactile.recognition.agreement import check_frames_agree
+from fuzzytree.tactile.recognition.onnx_files import check_onnx_files
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.testing import random_tree
@@ -68,7 +70,7 @@ def test_a_floor_makes_what_is_weak_unknown() -> None:
 
 
 def test_no_frames_give_no_answers() -> None:
-    content = write_frames(TREE, PLAIN, outputs=ALL, verify=False).content
+    content = write_frames(TREE, PLAIN, outputs=ALL).content
     found = answers(content, np.zeros((0, 16, 16), np.uint8), ALL)
     assert [found[name].shape for name in ALL] == [(0,), (0,), (0,), (0, 2)]
 
@@ -114,7 +116,7 @@ def test_every_constant_is_taken_by_a_node() -> None:
 
 
 def test_the_same_model_gives_the_same_bytes() -> None:
-    one, two = (write_frames(TREE, PLAIN, verify=v).content for v in (True, False))
+    one, two = (write_frames(TREE, PLAIN).content for _ in range(2))
     assert one == two
 
 
@@ -152,7 +154,9 @@ def test_a_tree_does_without_tree_operators() -> None:
 )
 def test_operator_sets_give_the_same_answers(opset: int) -> None:
     tree = learnt_tree(SMALL, MIXED)
-    write_frames(tree, SMALL, opset=opset, ir=8 if opset < 20 else 10, outputs=ALL)
+    ir = 8 if opset < 20 else 10
+    content = write_frames(tree, SMALL, opset=opset, ir=ir, outputs=ALL).content
+    assert check_onnx_files(tree, {"small.onnx": content}, sensor=SMALL).ok
 
 
 def test_a_model_of_one_leaf_reports_something_from_nothing() -> None:
@@ -173,16 +177,18 @@ def _one_leaf() -> FuzzyTree:
     )
 
 
-def test_the_proof_finds_a_file_of_another_model() -> None:
+def test_the_check_finds_a_file_of_another_model() -> None:
     other = learnt_tree(PLAIN, ("S9", "area"))
-    content = write_frames(other, PLAIN, outputs=ALL, verify=False).content
-    made = frame_program(PLAIN, TREE.inputs)
-    frames = proving_frames(made, TREE)
-    found = [*differences(content, made, TREE, frames, ("rule", "features"), 0.0)]
-    assert found[0] == (
-        "the onnx file of tree gives other features than plain Python for aimed "
-        "frame 2: [12650.666666666666, 256.0], not "
-        "[213.33333333333334, 12650.666666666666]"
+    content = write_frames(other, PLAIN, outputs=ALL).content
+    found = check_frames_agree(TREE, PLAIN, graph=content)
+    wrong = [one for one in found.comparisons if one.verdict == "DISAGREES"]
+    assert [(one.representation, one.against) for one in wrong] == [
+        ("onnx", "numpy"),
+        ("onnx", "plain Python"),
+    ]
+    assert wrong[1].detail[0] == (
+        "frame 2: label 'class 1', not 'class 0'; S1 12650.666666666666, not "
+        "213.33333333333334; S9 256.0, not 12650.666666666666"
     )
 
 

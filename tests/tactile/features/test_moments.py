@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from exact_features import exact_features
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.runtimes.programs import plan_program, run_program
 from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
 from fuzzytree.tactile.features import frame_program, moments
-from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.moments import Centred, Noisy, complex_moment, sum_name
 from fuzzytree.tactile.features.names import FEATURES, PAPER
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of

@@ -1,4 +1,4 @@
-"""Features of a frame in fractions, the reference of every other computation.
+"""Features of a frame in fractions, and how far other computations are from them.
 
 Written from the definitions (paper, 2.1), sum by sum about the exact centre of
 pressure, and not from the steps of `fuzzytree.tactile.features`.
@@ -6,10 +6,14 @@ pressure, and not from the steps of `fuzzytree.tactile.features`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 
+import numpy as np
+
+from fuzzytree.model.contracts import FloatArray
 from fuzzytree.tactile.features.names import Feature, feature_of
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
@@ -197,3 +201,80 @@ def _arc_tangent(t: Decimal) -> Decimal:
         t = t / (1 + (1 + t * t).sqrt())
     terms = ((-1) ** k * t ** (2 * k + 1) / (2 * k + 1) for k in range(32))
     return 64 * sum(terms, Decimal(0))
+
+
+ALLOWED = 1e-12
+"""The largest error of a feature as a share of its scale: some thousand roundings, and
+what the series of angles and logarithms leave out (`docs/explanation/moments.md`)."""
+
+_ORDERS = ("2", "22", "33", "33", "3333", "332", "44", "44", "4", "444", "42")
+"""Of S1 to S11: the orders of the moments that it is a product of."""
+
+_TWICE = (5, 6, 10, 11)  # of the invariants: twice the real part of the product
+
+_DEGREES = 90.0 / math.pi  # of half an angle, for each radian of the whole
+
+
+def errors(
+    sensor: Sensor,
+    frame: Cells,
+    names: Sequence[str],
+    values: Sequence[float],
+    exact: Sequence[Fraction],
+) -> tuple[float, ...]:
+    """Return how far features are from the exact ones, as shares of their scales.
+
+    Example:
+        >>> bar = np.array([[0, 255, 255]])
+        >>> errors(Sensor(1, 3), bar, ["S1"], [0.75], [Fraction(1, 2)])
+        (0.5,)
+    """
+    cells = pressed(sensor, frame)[0] / sensor.full
+    if not cells.any():
+        return tuple(0.0 if value == 0.0 else math.inf for value in values)
+    sizes = _sizes(cells)
+    found: list[float] = []
+    every = zip(map(feature_of, names), values, exact, strict=True)
+    for feature, value, right in every:
+        apart = abs(Fraction(value) - right)
+        if feature.base == "angle":
+            apart = min(apart, 180 - apart)  # -90 and 90 are one direction
+        scale = _scale(feature, sizes, max(cells.shape))
+        if feature.is_log:  # an error of v is one of v / (1 + |v|) in log(1 + |v|)
+            size = abs(float(right))
+            scale = scale / (1.0 + math.expm1(size)) + max(size, 1.0)
+        share = float(apart) / scale if scale else math.inf
+        found.append(share if apart else 0.0)
+    return tuple(found)
+
+
+def _sizes(cells: FloatArray) -> list[float]:
+    """Return the sums of g r^n for n from 0 to 4; |C20| at the end."""
+    force = cells.sum()
+    down, along = np.mgrid[0 : cells.shape[0], 0 : cells.shape[1]]
+    z = (along - (along * cells).sum() / force) + 1j * (
+        (down * cells).sum() / force - down
+    )
+    found = [float((cells * np.abs(z) ** order).sum()) for order in range(5)]
+    return [*found, float(abs((cells * z**2).sum()))]
+
+
+def _scale(feature: Feature, sizes: Sequence[float], side: int) -> float:
+    """Return the scale of a feature, of its value itself if it is a logarithm."""
+    unit = sizes[0] if feature.per_force else 1.0
+    base, direction = feature.base, sizes[2] / (sizes[5] or math.inf)
+    if feature.kind != "moment" or base in ("force", "area", "peak"):
+        return sizes[0] / unit
+    match base:
+        case "x" | "y":
+            return float(side)
+        case "angle":
+            return 90.0 + _DEGREES * direction
+        case "cos2" | "sin2":
+            return 1.0 + direction
+        case _ if base[0] == "S":
+            number = int(base[1:])
+            product = math.prod(sizes[int(n)] / unit for n in _ORDERS[number - 1])
+            return 2 * product if number in _TWICE else product
+        case _:
+            return sizes[int(base[-2]) + int(base[-1])] / unit
