@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import msgspec
 
-from fuzzytree.formats import METHOD_WORDS, S_WORDS, T_WORDS
+from fuzzytree.formats import FCL_METHODS, FCL_SNORMS, FCL_TNORMS
 from fuzzytree.model import (
     FUNCTIONS,
     DefuzzifierMethod,
@@ -54,15 +54,15 @@ class FclWords(msgspec.Struct, frozen=True):
 
 
 def _t_norms(words: str) -> dict[TNorm, str]:
-    return {T_WORDS[word]: word for word in words.split()}
+    return {FCL_TNORMS[word]: word for word in words.split()}
 
 
 def _s_norms(words: str) -> dict[SNorm, str]:
-    return {S_WORDS[word.upper()]: word for word in words.split()}
+    return {FCL_SNORMS[word.upper()]: word for word in words.split()}
 
 
 def _methods(words: str) -> dict[DefuzzifierMethod, str]:
-    return {METHOD_WORDS[word]: word for word in words.split()}
+    return {FCL_METHODS[word]: word for word in words.split()}
 
 
 _ANDS, _ACTS = _t_norms("MIN PROD BDIF"), _t_norms("MIN PROD")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
@@ -10,13 +10,9 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
 from fuzzytree.exporters.fuzzy_files import refuse, with_labels
-from fuzzytree.formats import FCL_SHAPES, in_words, is_plain
+from fuzzytree.formats import shape_in_fcl
 from fuzzytree.model import (
-    LR,
-    Band,
-    Bell,
     Call,
-    Cosine,
     Curve,
     Expression,
     Formula,
@@ -26,13 +22,10 @@ from fuzzytree.model import (
     Name,
     Number,
     Points,
-    SigmoidDifference,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemTerm,
-    Trapezoid,
-    TwoGaussians,
 )
 from fuzzytree.semantics import EXACT, points_for
 
@@ -70,27 +63,8 @@ def term_text(
         return None
     if is_weighted:
         return _function_text(curve, names)
-    return _shape_text(curve)
-
-
-def _shape_text(curve: Curve) -> str | None:
-    parts: Sequence[float]
-    match curve:
-        case Band() | LR() | Points():
-            return None
-        case Trapezoid(a=float(a), b=b, c=c, d=float(d)):
-            word, parts = ("TRIAN", (a, b, d)) if b == c else ("TRAPE", (a, b, c, d))
-        case Cosine(center=center, width=width):
-            word, parts = "COSINE", (width / 2.0, center)
-        case TwoGaussians() if curve.left > curve.right:
-            return None
-        case Bell(slope=slope) if slope < 0.0:
-            return None
-        case SigmoidDifference() if not is_plain(curve):
-            return None
-        case _:
-            word, parts = in_words(curve, FCL_SHAPES) or ("", [])
-    return " ".join([word, *map(number, parts)]) or None
+    shape = shape_in_fcl(curve)
+    return None if shape is None else " ".join([shape[0], *map(number, shape[1])])
 
 
 _OPERATORS = frozenset({"+", "-", "*", "/", "^"})

@@ -17,7 +17,6 @@ from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.exporters.fuzzy_files import (
     TITLE,
     FileNames,
-    inverse,
     refuse,
     without_heights,
 )
@@ -35,6 +34,7 @@ from fuzzytree.formats import (
     fuzzylite_losses,
     middle,
     read_fis,
+    word_for,
 )
 from fuzzytree.model import (
     Activation,
@@ -267,15 +267,14 @@ def _methods(system: FuzzySystem, dialect: Dialect) -> dict[str, str]:
     output = system.outputs[0]
     is_weighted = output.defuzzifier.is_weighted
     aggregation = output.aggregation or ("sum" if is_weighted else "maximum")
-    methods = {meant: word for word, meant in FIS_METHODS.items()}
     return {
-        "AndMethod": inverse(FIS_TNORMS, block.conjunction or "minimum"),
+        "AndMethod": word_for(FIS_TNORMS, block.conjunction, "min"),
         "OrMethod": _s_norm(block.disjunction or "maximum", dialect),
-        "ImpMethod": inverse(
-            FIS_TNORMS, block.implication or ("product" if is_weighted else "minimum")
+        "ImpMethod": word_for(
+            FIS_TNORMS, block.implication, "prod" if is_weighted else "min"
         ),
         "AggMethod": _s_norm(aggregation, dialect),
-        "DefuzzMethod": methods[output.defuzzifier.method],
+        "DefuzzMethod": word_for(FIS_METHODS, output.defuzzifier.method),
     }
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from fuzzytree.formats import (
     FIS_FAR,
     FIS_KINDS,
+    PRIVATE,
     Dialect,
     curve_of,
     fuzzylite_text_of,
@@ -111,7 +112,7 @@ def _formed(curve: SystemCurve, dialect: Dialect) -> Term | None:
         case _:
             is_known = dialect == "fuzzylite"
             kinds = FIS_KINDS.items()
-            known = {k: v.word for k, v in kinds if is_known or not v.is_private}
+            known = {k: v for k, v in kinds if is_known or k not in PRIVATE}
             result = in_words(curve, known)
             return None if result is None else (result[0], _text(result[1]))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final, get_args
 
 from msgspec.structs import replace
@@ -27,12 +26,13 @@ from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
 from fuzzytree.formats import (
     ACTIVATIONS,
     FLL_METHODS,
+    FLL_SNORMS,
+    FLL_TNORMS,
     LONGEST_NAME,
     RULE_WORDS,
-    S_NORMS,
-    T_NORMS,
     differences,
     read_fll,
+    word_for,
 )
 from fuzzytree.model import (
     FUNCTIONS,
@@ -239,10 +239,10 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
     for output in system.outputs:
         yield f"OutputVariable: {names.variables[output.name]}"
         yield from _common(output)
-        yield f"  aggregation: {_S_WORDS[output.aggregation]}"
+        yield f"  aggregation: {word_for(FLL_SNORMS, output.aggregation, 'none')}"
         how = output.defuzzifier
         rest = weighted_type(output) if how.is_weighted else str(how.samples)
-        yield f"  defuzzifier: {_METHOD_WORDS[how.method]} {rest}"
+        yield f"  defuzzifier: {word_for(FLL_METHODS, how.method, '')} {rest}"
         default = math.nan if output.default is None else output.default
         yield f"  default: {float(default)!r}"
         yield "  lock-previous: false"
@@ -253,9 +253,9 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
     for block in system.blocks:
         yield f"RuleBlock: {_line(block.name)}".rstrip()
         yield "  enabled: true"
-        yield f"  conjunction: {_T_WORDS[block.conjunction]}"
-        yield f"  disjunction: {_S_WORDS[block.disjunction]}"
-        yield f"  implication: {_T_WORDS[block.implication]}"
+        yield f"  conjunction: {word_for(FLL_TNORMS, block.conjunction, 'none')}"
+        yield f"  disjunction: {word_for(FLL_SNORMS, block.disjunction, 'none')}"
+        yield f"  implication: {word_for(FLL_TNORMS, block.implication, 'none')}"
         yield f"  activation: {_activation(block.activation)}"
         for rule in block.rules:
             yield f"  rule: {rule_text(rule, names.words, always)}"
@@ -276,7 +276,7 @@ def _terms(variable: SystemInput | SystemOutput, names: FileNames) -> Iterator[s
 
 
 def _activation(activation: Activation) -> str:
-    word = _ACTIVATION_WORDS[activation.method]
+    word = word_for(ACTIVATIONS, activation.method)
     match activation.method:
         case "general" | "proportional":
             return word
@@ -286,12 +286,6 @@ def _activation(activation: Activation) -> str:
             return f"{word} {activation.count}"
         case "threshold":
             return f"{word} {activation.relation} {float(activation.threshold)!r}"
-
-
-_T_WORDS = MappingProxyType({None: "none", **{v: k for k, v in T_NORMS.items()}})
-_S_WORDS = MappingProxyType({None: "none", **{v: k for k, v in S_NORMS.items()}})
-_METHOD_WORDS = MappingProxyType({v: k for k, v in FLL_METHODS.items()})
-_ACTIVATION_WORDS = MappingProxyType({v: k for k, v in ACTIVATIONS.items()})
 
 
 def _line(text: str) -> str:

@@ -10,11 +10,10 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.formats import (
-    FLL_CLASSES,
     FLL_HEDGES,
     fuzzylite_text_of,
-    in_words,
     parse,
+    term_in_words,
 )
 from fuzzytree.model import (
     LR,
@@ -32,7 +31,6 @@ from fuzzytree.model import (
     Or,
     Points,
     RuleBlock,
-    SystemCurve,
     SystemOutput,
     SystemRule,
     SystemTerm,
@@ -174,7 +172,7 @@ def degree_text(label: SystemTerm, names: Mapping[str, str]) -> str | None:
         case Points():
             parts = _points(label.curve)
         case curve:
-            parts = _parts(curve)
+            parts = term_in_words(curve)
     if label.height != 1.0:
         parts = (*parts, label.height)
     kind, *numbers = parts
@@ -208,28 +206,6 @@ def number_text(label: SystemTerm, kind: str, names: Mapping[str, str]) -> str |
 
 def _number(value: float) -> str:
     return repr(float(value))
-
-
-def _parts(curve: SystemCurve) -> tuple[str | float, ...]:
-    match curve:
-        case curves.Trapezoid(a=a, b=b, c=c, d=d):
-            low = -math.inf if a is None else a
-            high = math.inf if d is None else d
-            if low == b and c == high:
-                return "Rectangle", b, c
-            return (
-                ("Triangle", low, b, high) if b == c else ("Trapezoid", low, b, c, high)
-            )
-        case curves.SCurve(start=start, end=end):
-            rises = start <= end
-            return ("SShape", start, end) if rises else ("ZShape", end, start)
-        case curves.Binary(start=start, is_above=is_above):
-            return "Binary", start, math.inf if is_above else -math.inf
-        case curves.Singleton(value=value):
-            return "Rectangle", value, value
-        case _:
-            name, numbers = in_words(curve, FLL_CLASSES) or ("", [])
-            return name, *numbers
 
 
 def _points(points: Points) -> tuple[str | float, ...]:

@@ -9,26 +9,26 @@ them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from fuzzytree.exporters.fml_rules import FmlRule, FmlRules
-from fuzzytree.exporters.fuzzy_files import FileNames, inverse, without_heights
+from fuzzytree.exporters.fuzzy_files import FileNames, without_heights
 from fuzzytree.exporters.xml_text import XmlElement, element, text_element, text_of
 from fuzzytree.formats import (
-    FML_FAR,
     FML_METHODS,
     FML_SNORMS,
     FML_TNORMS,
     NAMESPACE,
     USUAL,
     read_fml,
+    shape_in_words,
+    word_for,
 )
 from fuzzytree.model import (
     DIGITS,
     LETTERS,
     Activation,
-    Curve,
     Format,
     FuzzySystem,
     Gaussian,
@@ -160,7 +160,7 @@ def _with_known_curves(
     if has_heights:
         refuse_singletons(system, "fml with the heights of terms")
     is_one_sided = all(
-        _shape(label.curve) is not None
+        shape_in_words(label.curve) is not None
         for one in system.variables
         for label in one.labels
         if isinstance(label.curve, TwoGaussians)
@@ -221,7 +221,7 @@ def _root(system: FuzzySystem, rules: FmlRules, names: _Ids) -> XmlElement:
     for place, (kind, block, own_rules) in enumerate(rules.bases, 1):
         norms = {
             "andMethod": _t(block.conjunction),
-            "orMethod": inverse(FML_SNORMS, block.disjunction, "MAX"),
+            "orMethod": word_for(FML_SNORMS, block.disjunction, "MAX"),
         }
         own = [
             _rule(rule, k, kind == "tsk", norms, names)
@@ -237,7 +237,7 @@ def _root(system: FuzzySystem, rules: FmlRules, names: _Ids) -> XmlElement:
 
 
 def _t(norm: str | None) -> str:
-    return inverse(FML_TNORMS, norm, "MIN")
+    return word_for(FML_TNORMS, norm, "MIN")
 
 
 def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> XmlElement:
@@ -289,8 +289,8 @@ def _output(one: SystemOutput, names: _Ids) -> XmlElement:
     if not one.defuzzifier.is_weighted:
         kind, tag = "fuzzyTerm", "fuzzyVariable"
         last = {
-            "accumulation": inverse(FML_SNORMS, one.aggregation, "MAX"),
-            "defuzzifier": inverse(FML_METHODS, one.defuzzifier.method, "COG"),
+            "accumulation": word_for(FML_SNORMS, one.aggregation, "MAX"),
+            "defuzzifier": word_for(FML_METHODS, one.defuzzifier.method, "COG"),
             "defaultValue": default,
         }
     elif all(isinstance(label.curve, Singleton | Linear) for label in one.labels):
@@ -310,7 +310,7 @@ def _term(kind: str, variable: str, label: SystemTerm, names: _Ids) -> XmlElemen
         case Linear(weights=weights, offset=offset) if kind == "tskTerm":
             return _tsk_term(name, offset, *weights)
         case curve:
-            result = _shape(curve)
+            result = shape_in_words(curve)
     if result is not None:
         word, numbers = result
         texts = {f"param{k}": _float(one) for k, one in enumerate(numbers, 1)}
@@ -328,31 +328,6 @@ def _tsk_term(name: str, *numbers: float) -> XmlElement:
     values = [text_element("tskValue", _float(number)) for number in numbers]
     order = "1" if len(numbers) > 1 else "0"
     return element("tskTerm", *values, name=name, order=order)
-
-
-def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
-    """Return a shape with parameters; None if the curve must be points."""
-    match curve:
-        case Points(values=(a, b), degrees=(0.0, 1.0)):
-            return "rightLinearShape", (a, b)
-        case Points(values=(a, b), degrees=(1.0, 0.0)):
-            return "leftLinearShape", (a, b)
-        case Trapezoid(a=float(a), b=b, c=c, d=float(d)) if a < b and c < d:
-            is_peak = b == c
-            numbers = (a, b, d) if is_peak else (a, b, c, d)
-            return "triangularShape" if is_peak else "trapezoidShape", numbers
-        case Singleton(value=value):
-            return "singletonShape", (value,)
-        case Gaussian(mean=mean, deviation=deviation):
-            return "gaussianShape", (mean, deviation)
-        case TwoGaussians(left=c, left_deviation=s, right=right) if right >= FML_FAR:
-            return "rightGaussianShape", (c, s)
-        case TwoGaussians(left=left, right=c, right_deviation=s) if left <= -FML_FAR:
-            return "leftGaussianShape", (c, s)
-        case SCurve(start=a, end=b) if a != b:
-            return ("sShape", (a, b)) if a < b else ("zShape", (b, a))
-        case _:
-            return None
 
 
 def _rule(

@@ -12,9 +12,9 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.fuzzy_files import inverse, operands, refuse
+from fuzzytree.exporters.fuzzy_files import operands, refuse
 from fuzzytree.exporters.xml_text import XmlElement, element, text_element
-from fuzzytree.formats import FML_SNORMS, FML_TNORMS, MODIFIERS
+from fuzzytree.formats import FML_SNORMS, FML_TNORMS, MODIFIERS, word_for
 from fuzzytree.model import (
     And,
     Condition,
@@ -212,7 +212,7 @@ class FmlRules:
         is_or = isinstance(condition, Or)
         norms = FML_SNORMS if is_or else FML_TNORMS
         meant = block.disjunction if is_or else block.conjunction
-        norm = inverse(norms, meant)
+        norm = word_for(norms, meant)
         if not norm:
             raise LossError(f"FML has no {meant}")
         word = "or" if is_or else "and"

@@ -122,8 +122,3 @@ def operands(condition: Condition, block: RuleBlock) -> list[Condition]:
         is_same = isinstance(part, type(condition))
         parts += operands(part, block) if is_same and is_open else [part]
     return parts
-
-
-def inverse(words: Mapping[str, str], meaning: str | None, default: str = "") -> str:
-    """Return the first word of a table with a meaning."""
-    return next((word for word, known in words.items() if known == meaning), default)

@@ -442,13 +442,13 @@ END_RULEBLOCK
         "file.fcl:5:3: found 'TREM', with which no statement begins "
         "(did you mean 'TERM'?)",
         "file.fcl:7:13: found '(0, 0)'; expected ':='",
-        "file.fcl:8:15: no shape 'TRIANGEL'; there is FUNCTION, TRIAN, TRAPE, GAUSS, "
-        "GAUSS2, GBELL, SIGM, DSIGM, COSINE, Constant, Discrete, Function, ... "
+        "file.fcl:8:15: no shape 'TRIANGEL'; there is FUNCTION, TRIAN, TRAPE, GBELL, "
+        "GAUSS, SIGM, DSIGM, GAUSS2, COSINE, Constant, Discrete, Function, ... "
         "(did you mean 'TRIAN'?)",
         "file.fcl:9:17: term 'back' of 'a': the values of points must not decrease: "
         "1.0 stands behind 2.0",
-        "file.fcl:13:12: no method 'COGZ'; there is COG, COGS, COGF, COGSS, COA, BIS, "
-        "LM, SOM, RM, LOM, MM, MOM, ... (did you mean 'COG'?)",
+        "file.fcl:13:12: no method 'COGZ'; there is COG, COA, BIS, LM, SOM, RM, "
+        "LOM, MM, MOM, COGS, COGF, COGSS, ... (did you mean 'COG'?)",
         "file.fcl:17:9: no AND 'MNI'; there is MIN, PROD, BDIF, DPROD, DMIN, EPROD, "
         "HPROD, HAMACHER, NMIN, NIPMIN, MINIMUM, ALGEBRAICPRODUCT, ... "
         "(did you mean 'MIN'?)",

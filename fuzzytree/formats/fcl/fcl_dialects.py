@@ -23,9 +23,16 @@ from fuzzytree.formats.fcl.fcl_syntax import (
     place,
 )
 from fuzzytree.formats.fll.fll_terms import CLASSES
-from fuzzytree.formats.fll.fll_words import FLL_METHODS, S_NORMS, T_NORMS
 from fuzzytree.formats.text_files import ReaderNotes
-from fuzzytree.model import Defuzzifier, DefuzzifierMethod, SNorm, TNorm, name_choice
+from fuzzytree.formats.words import (
+    METHOD_WORDS,
+    S_NORM_WORDS,
+    T_NORM_WORDS,
+    Meaning,
+    Words,
+    meanings,
+)
+from fuzzytree.model import Defuzzifier, SNorm, TNorm, name_choice
 
 _Norm = TypeVar("_Norm")
 
@@ -51,50 +58,16 @@ DEFUZZIFIERS: Mapping[Dialect, Defuzzifier] = {
 }
 """At how many values an engine of each dialect looks; a file does not say it."""
 
-T_WORDS: Mapping[str, TNorm] = {
-    "MIN": "minimum",
-    "PROD": "product",
-    "BDIF": "bounded difference",
-    "DPROD": "drastic product",
-    "DMIN": "drastic product",
-    "EPROD": "einstein product",
-    "HPROD": "hamacher product",
-    "HAMACHER": "hamacher product",
-    "NMIN": "nilpotent minimum",
-    "NIPMIN": "nilpotent minimum",
-    **{name.upper(): norm for name, norm in T_NORMS.items()},
-}
-S_WORDS: Mapping[str, SNorm] = {
-    "MAX": "maximum",
-    "ASUM": "algebraic sum",
-    "PROBOR": "algebraic sum",
-    "BSUM": "bounded sum",
-    "NSUM": "normalized sum",
-    "DSUM": "drastic sum",
-    "DMAX": "drastic sum",
-    "ESUM": "einstein sum",
-    "EINSTEIN": "einstein sum",
-    "HSUM": "hamacher sum",
-    "NMAX": "nilpotent maximum",
-    "NIPMAX": "nilpotent maximum",
-    "SUM": "sum",
-    **{name.upper(): norm for name, norm in S_NORMS.items()},
-}
-METHOD_WORDS: Mapping[str, DefuzzifierMethod] = {
-    "COG": "centroid",
-    "COGS": "weighted average",
-    "COGF": "weighted average",
-    "COGSS": "weighted sum",
-    "COA": "bisector",
-    "BIS": "bisector",
-    "LM": "smallest of maximum",
-    "SOM": "smallest of maximum",
-    "RM": "largest of maximum",
-    "LOM": "largest of maximum",
-    "MM": "mean of maximum",
-    "MOM": "mean of maximum",
-    **{name.upper(): method for name, method in FLL_METHODS.items()},
-}
+
+def _words(table: Mapping[Meaning, Words]) -> dict[str, Meaning]:
+    """Return what words mean, in capitals: those of FLL too, as fuzzylite has it."""
+    known = meanings(table, "fcl", "fll")
+    return {word.upper(): meaning for word, meaning in known.items()}
+
+
+FCL_TNORMS: Final = _words(T_NORM_WORDS)
+FCL_SNORMS: Final = _words(S_NORM_WORDS)
+FCL_METHODS: Final = _words(METHOD_WORDS)
 PAIRS: Mapping[TNorm, SNorm] = {
     "minimum": "maximum",
     "product": "algebraic sum",

@@ -20,8 +20,8 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fcl import fcl_terms
 from fuzzytree.formats.fcl.fcl_dialects import (
     DEFUZZIFIERS,
-    METHOD_WORDS,
-    S_WORDS,
+    FCL_METHODS,
+    FCL_SNORMS,
     Dialect,
     detected,
     is_marked,
@@ -178,7 +178,7 @@ def _aggregated(
     it says nothing.
     """
     own = known.outputs[output.name].block
-    stated = [None if own is None else norm_of(own, "ACCU", S_WORDS, known.notes)]
+    stated = [None if own is None else norm_of(own, "ACCU", FCL_SNORMS, known.notes)]
     stated += [one.accu for one in blocks if output.name in one.concluded]
     norms = [one for one in stated if one is not None]
     where = f"output {output.name!r}"
@@ -427,9 +427,9 @@ def _defuzzifier(name: str, block: FclBlock, known: FclVariables) -> Defuzzifier
         word = "COGS" if is_number else "COG"
         known.notes.remark(f"output {name!r}: METHOD is missing; {word} is taken")
         return Defuzzifier("weighted average") if is_number else default
-    method = METHOD_WORDS.get(words[0].upper())
+    method = FCL_METHODS.get(words[0].upper())
     if method is None:
-        choice = name_choice(words[0].upper()[:99], METHOD_WORDS)
+        choice = name_choice(words[0].upper()[:99], FCL_METHODS)
         known.mistake(words[0], f"no method {str(words[0])!r}; {choice}")
         return Defuzzifier("weighted average")
     if method in ("weighted average", "weighted sum"):

@@ -10,10 +10,10 @@ from lark import Token
 from msgspec.structs import replace
 
 from fuzzytree.formats.fcl.fcl_dialects import (
+    FCL_SNORMS,
+    FCL_TNORMS,
     JFUZZYLOGIC_PAIRS,
     PAIRS,
-    S_WORDS,
-    T_WORDS,
     Dialect,
     norm_of,
 )
@@ -217,14 +217,14 @@ def read_block(block: FclBlock, scope: Scope) -> FclRuleBlock:
         implication=_implication(block, rules, scope),
         name=raw(block.head.words),
     )
-    accu = norm_of(block, "ACCU", S_WORDS, scope.notes)
+    accu = norm_of(block, "ACCU", FCL_SNORMS, scope.notes)
     return FclRuleBlock(result, block.head.keyword, tuple(tokens), accu)
 
 
 def _implication(
     block: FclBlock, rules: Sequence[SystemRule], scope: Scope
 ) -> TNorm | None:
-    stated = norm_of(block, "ACT", T_WORDS, scope.notes)
+    stated = norm_of(block, "ACT", FCL_TNORMS, scope.notes)
     is_needed = any(one.output in scope.curved for rule in rules for one in rule.then)
     if stated is not None or not is_needed:
         return stated
@@ -236,8 +236,8 @@ def _norms(
     block: FclBlock, rules: Sequence[SystemRule], scope: Scope
 ) -> tuple[TNorm | None, SNorm | None]:
     """Return AND and OR; one that is missing and needed comes with the other one."""
-    conjunction = norm_of(block, "AND", T_WORDS, scope.notes)
-    disjunction = norm_of(block, "OR", S_WORDS, scope.notes)
+    conjunction = norm_of(block, "AND", FCL_TNORMS, scope.notes)
+    disjunction = norm_of(block, "OR", FCL_SNORMS, scope.notes)
     is_jfuzzylogic = scope.dialect == "jfuzzylogic"
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
     if conjunction is None and any(_uses(rule.when, And) for rule in rules):

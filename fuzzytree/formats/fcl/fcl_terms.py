@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import msgspec
 from lark import Token
+from msgspec.structs import astuple
 
-from fuzzytree.formats.curve_words import CurveWord, fields
 from fuzzytree.formats.fcl.fcl_dialects import Dialect
 from fuzzytree.formats.fcl.fcl_syntax import TermStatement, place
 from fuzzytree.formats.fll.fll_terms import CLASSES, FllTerm, TermScope, read_term
 from fuzzytree.formats.text_files import PartError, Word, number_of
+from fuzzytree.formats.words import (
+    FunctionWord,
+    FunctionWords,
+    function_words,
+    in_words,
+)
 from fuzzytree.model import (
     LR,
     Band,
@@ -139,17 +145,31 @@ def _two_gaussians(n: Sequence[float]) -> Curve:
     return curves.TwoGaussians(*n)
 
 
-FCL_SHAPES: Final[Mapping[str, CurveWord]] = {
-    "TRIAN": CurveWord(3, lambda n: curves.Trapezoid(n[0], n[1], n[1], n[2])),
-    "TRAPE": CurveWord(4, lambda n: curves.Trapezoid(*n)),
-    "GAUSS": fields(curves.Gaussian, 0, 1),
-    "GAUSS2": CurveWord(4, _two_gaussians, curves.TwoGaussians, (0, 1, 2, 3)),
-    "GBELL": fields(curves.Bell, 1, 2, 0),
-    "SIGM": fields(curves.Sigmoid, 1, 0),
-    "DSIGM": fields(curves.SigmoidDifference, 1, 0, 3, 2),
-    "COSINE": CurveWord(2, lambda n: curves.Cosine(n[1], 2.0 * n[0])),
+FCL_SHAPES: Final[FunctionWords] = {
+    "TRIAN": FunctionWord("a b c", lambda n: curves.Trapezoid(n[0], n[1], n[1], n[2])),
+    "TRAPE": FunctionWord("a b c d", lambda n: curves.Trapezoid(*n)),
+    **function_words("fcl"),
+    "GAUSS2": FunctionWord("mean deviation mean deviation", _two_gaussians),
+    "COSINE": FunctionWord("half center", lambda n: curves.Cosine(n[1], 2.0 * n[0])),
 }
 """The curves of jFuzzyLogic."""
+
+
+def shape_in_fcl(curve: Curve) -> tuple[str, Sequence[float]] | None:
+    """Return the word of jFuzzyLogic for a curve and its numbers, if there is one."""
+    match curve:
+        case curves.Trapezoid(a=float(a), b=b, c=c, d=float(d)):
+            return ("TRIAN", (a, b, d)) if b == c else ("TRAPE", (a, b, c, d))
+        case curves.Cosine(center=center, width=width):
+            return "COSINE", (width / 2.0, center)
+        case curves.TwoGaussians() if curve.left <= curve.right:
+            return "GAUSS2", astuple(curve)
+        case curves.Bell(slope=slope) if slope < 0.0:
+            return None
+        case curves.SigmoidDifference() if not is_plain(curve):
+            return None
+        case _:
+            return in_words(curve, FCL_SHAPES)
 
 
 def is_plain(curve: curves.SigmoidDifference) -> bool:

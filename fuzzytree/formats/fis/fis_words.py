@@ -8,16 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Final, Literal, NamedTuple, get_args
+from typing import Final, Literal, get_args
 
-from fuzzytree.formats.curve_words import CurveWord, fields
+from fuzzytree.formats.words import (
+    METHOD_WORDS,
+    S_NORM_WORDS,
+    T_NORM_WORDS,
+    FunctionWord,
+    FunctionWords,
+    function_words,
+    meanings,
+)
 from fuzzytree.model import (
     MOST_POINTS,
     Curve,
     Hedge,
     Points,
-    SNorm,
-    TNorm,
     curves,
 )
 
@@ -27,37 +33,9 @@ DIALECTS: Final[tuple[Dialect, ...]] = get_args(Dialect)
 FIS_FAR: Final = 1e300
 """Corners beyond it stand for none: a trapezoid has no way to say `1 up to here`."""
 
-FIS_TNORMS: Final[Mapping[str, TNorm]] = {
-    "min": "minimum",
-    "prod": "product",
-    "algebraic_product": "product",
-    "bounded_difference": "bounded difference",
-    "drastic_product": "drastic product",
-    "einstein_product": "einstein product",
-    "hamacher_product": "hamacher product",
-    "nilpotent_minimum": "nilpotent minimum",
-}
-FIS_SNORMS: Final[Mapping[str, SNorm]] = {
-    "max": "maximum",
-    "probor": "algebraic sum",
-    "algebraic_sum": "algebraic sum",
-    "bounded_sum": "bounded sum",
-    "drastic_sum": "drastic sum",
-    "einstein_sum": "einstein sum",
-    "hamacher_sum": "hamacher sum",
-    "nilpotent_maximum": "nilpotent maximum",
-    "normalized_sum": "normalized sum",
-    "sum": "sum",
-}
-FIS_METHODS: Final = {
-    "centroid": "centroid",
-    "bisector": "bisector",
-    "som": "smallest of maximum",
-    "lom": "largest of maximum",
-    "mom": "mean of maximum",
-    "wtaver": "weighted average",
-    "wtsum": "weighted sum",
-}
+FIS_TNORMS: Final = meanings(T_NORM_WORDS, "fis")
+FIS_SNORMS: Final = meanings(S_NORM_WORDS, "fis")
+FIS_METHODS: Final = meanings(METHOD_WORDS, "fis")
 
 _BASIC_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
     0: (),
@@ -88,14 +66,6 @@ CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
 """The same behind the comma of a Sugeno rule in Octave, which takes the root there."""
 
 
-class CurveKind(NamedTuple):
-    """A kind of curve: the names of its numbers, and how they make one."""
-
-    numbers: str
-    word: CurveWord
-    is_private: bool = False
-
-
 def trapezoid(a: float, b: float, c: float, d: float) -> curves.Trapezoid:
     """Return a trapezoid; two corners beyond `FAR` leave a side open.
 
@@ -117,7 +87,8 @@ def trapezoid(a: float, b: float, c: float, d: float) -> curves.Trapezoid:
     return curves.Trapezoid(a, b, c, d)
 
 
-def _ramp(start: float, end: float) -> Curve:
+def _ramp(numbers: Sequence[float]) -> Curve:
+    start, end = numbers
     if start == end:
         return Points((start,), (0.0,))  # as fuzzylite
     if start < end:
@@ -125,13 +96,15 @@ def _ramp(start: float, end: float) -> Curve:
     return Points((end, start), (1.0, 0.0))
 
 
-def _rising(start: float, end: float) -> Curve:
+def _rising(numbers: Sequence[float]) -> Curve:
+    start, end = numbers
     if start < end:
         return curves.SCurve(start, end)
     return curves.Binary((start + end) / 2)  # as MATLAB's smf
 
 
-def _falling(start: float, end: float) -> Curve:
+def _falling(numbers: Sequence[float]) -> Curve:
+    start, end = numbers
     if start < end:
         return curves.SCurve(end, start)
     return curves.Binary((start + end) / 2, is_above=False)
@@ -147,40 +120,26 @@ def _binary(numbers: Sequence[float]) -> Curve:
     return curves.Binary(start, is_above=direction > start)
 
 
-_TWO_SIGMOIDS = "slope inflection slope inflection"
-FIS_KINDS: Final[Mapping[str, CurveKind]] = {
-    "trimf": CurveKind("a b c", CurveWord(3, lambda n: trapezoid(*n[:2], *n[1:]))),
-    "trapmf": CurveKind("a b c d", CurveWord(4, lambda n: trapezoid(*n))),
-    "linzmf": CurveKind("a b", CurveWord(2, lambda n: _ramp(n[1], n[0]))),
-    "linsmf": CurveKind("a b", CurveWord(2, lambda n: _ramp(*n))),
-    "gaussmf": CurveKind("deviation mean", fields(curves.Gaussian, 1, 0, by_size=True)),
-    "gauss2mf": CurveKind(
-        "deviation mean deviation mean",
-        fields(curves.TwoGaussians, 1, 0, 3, 2, by_size=True),
-    ),
-    "gbellmf": CurveKind(
-        "width slope center", fields(curves.Bell, 1, 2, 0, by_size=True)
-    ),
-    "sigmf": CurveKind("slope inflection", fields(curves.Sigmoid, 1, 0)),
-    "dsigmf": CurveKind(_TWO_SIGMOIDS, fields(curves.SigmoidDifference, 1, 0, 3, 2)),
-    "psigmf": CurveKind(_TWO_SIGMOIDS, fields(curves.SigmoidProduct, 1, 0, 3, 2)),
-    "smf": CurveKind("start end", CurveWord(2, lambda n: _rising(*n))),
-    "zmf": CurveKind("start end", CurveWord(2, lambda n: _falling(*n))),
-    "pimf": CurveKind("a b c d", fields(curves.PiCurve, 0, 1, 2, 3)),
-    "rampmf": CurveKind("start end", CurveWord(2, lambda n: _ramp(*n)), True),
-    "rectmf": CurveKind("start end", CurveWord(2, _rectangle), True),
-    "cosinemf": CurveKind("center width", fields(curves.Cosine, 0, 1), True),
-    "spikemf": CurveKind("center width", fields(curves.Spike, 0, 1), True),
-    "concavemf": CurveKind("inflection end", fields(curves.Concave, 0, 1), True),
-    "binarymf": CurveKind("start direction", CurveWord(2, _binary), True),
+_FUZZYLITE: Final = {
+    **function_words("fuzzylite_fis"),
+    "rampmf": FunctionWord("start end", _ramp),
+    "rectmf": FunctionWord("start end", _rectangle),
+    "binarymf": FunctionWord("start direction", _binary),
+}
+FIS_KINDS: Final[FunctionWords] = {
+    "trimf": FunctionWord("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
+    "trapmf": FunctionWord("a b c d", lambda n: trapezoid(*n)),
+    "linzmf": FunctionWord("a b", lambda n: _ramp([n[1], n[0]])),
+    "linsmf": FunctionWord("a b", _ramp),
+    "smf": FunctionWord("start end", _rising),
+    "zmf": FunctionWord("start end", _falling),
+    **function_words("fis"),
+    **_FUZZYLITE,
 }
 """The curves with a fixed number of parameters, by their name in a file."""
 
 OTHER_KINDS: Final = ("discretemf", "constant", "linear", "function")
-PRIVATE: Final = frozenset(
-    {name for name, kind in FIS_KINDS.items() if kind.is_private}
-    | {"discretemf", "function"}
-)
+PRIVATE: Final = frozenset({*_FUZZYLITE, "discretemf", "function"})
 """Kinds that MATLAB lacks; all of them are fuzzylite's."""
 
 _MAY_BE_INFINITE: Final = frozenset({"trapmf", "binarymf"})
@@ -202,10 +161,10 @@ def curve_of(kind: str, numbers: Sequence[float]) -> Curve | str:
         return "the numbers must be finite"
     if kind == "discretemf":
         return _points(numbers)
-    words, word, _ = FIS_KINDS[kind]
+    word = FIS_KINDS[kind]
     needed = word.arity
     if len(numbers) != needed:
-        return f"a {kind!r} has {needed} numbers ({words}), not {len(numbers)}"
+        return f"a {kind!r} has {needed} numbers ({word.numbers}), not {len(numbers)}"
     if any(number != number for number in numbers):
         return "the numbers must be finite"
     curve = word.make(numbers)

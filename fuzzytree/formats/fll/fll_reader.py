@@ -289,7 +289,7 @@ def _variable(
             low,
             high,
             how[0],
-            fll.named(section.one_of("aggregation"), fll.S_NORMS, notes),
+            fll.named(section.one_of("aggregation"), fll.FLL_SNORMS, notes),
             _default(section.one_of("default"), notes),
             clips,
         )
@@ -438,9 +438,9 @@ def read_block(
         )
     block = RuleBlock(
         tuple(rules),
-        fll.named(section.one_of("conjunction"), fll.T_NORMS, notes),
-        fll.named(section.one_of("disjunction"), fll.S_NORMS, notes),
-        fll.named(section.one_of("implication"), fll.T_NORMS, notes),
+        fll.named(section.one_of("conjunction"), fll.FLL_TNORMS, notes),
+        fll.named(section.one_of("disjunction"), fll.FLL_SNORMS, notes),
+        fll.named(section.one_of("implication"), fll.FLL_TNORMS, notes),
         fll.activation(section.one_of("activation"), notes),
         section.head.value,
     )

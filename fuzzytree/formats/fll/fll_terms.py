@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import msgspec
 
-from fuzzytree.formats.curve_words import CurveWord, fields
 from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import FileMistake, PartError, Word, number_of
+from fuzzytree.formats.words import (
+    FunctionWord,
+    FunctionWords,
+    function_words,
+    in_words,
+)
 from fuzzytree.model import (
     Call,
     Curve,
@@ -231,32 +236,50 @@ def _z_shape(numbers: Sequence[float]) -> Curve:
     return Points((start, start), (1.0, 0.0))
 
 
-FLL_CLASSES: Final[Mapping[str, CurveWord]] = {
-    "Arc": fields(curves.Arc, 0, 1),
-    "Bell": fields(curves.Bell, 0, 1, 2, by_size=True),
-    "Binary": CurveWord(2, _binary),
-    "Concave": fields(curves.Concave, 0, 1),
-    "Cosine": fields(curves.Cosine, 0, 1),
-    "Gaussian": fields(curves.Gaussian, 0, 1, by_size=True),
-    "GaussianProduct": fields(curves.TwoGaussians, 0, 1, 2, 3, by_size=True),
-    "PiShape": fields(curves.PiCurve, 0, 1, 2, 3),
-    "Ramp": CurveWord(2, _ramp),
-    "Rectangle": CurveWord(2, _rectangle),
-    "SemiEllipse": CurveWord(
-        2, lambda n: curves.SemiEllipse(*sorted(n)), curves.SemiEllipse, (0, 1)
-    ),
-    "Sigmoid": fields(curves.Sigmoid, 0, 1),
-    "SigmoidDifference": fields(curves.SigmoidDifference, 0, 1, 3, 2),
-    "SigmoidProduct": fields(curves.SigmoidProduct, 0, 1, 3, 2),
-    "Spike": fields(curves.Spike, 0, 1, by_size=True),
-    "SShape": CurveWord(2, _s_shape),
-    "Trapezoid": CurveWord(4, _trapezoid),
-    "Triangle": CurveWord(3, lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
-    "ZShape": CurveWord(2, _z_shape),
+FLL_CLASSES: Final[FunctionWords] = {
+    **function_words("fll"),
+    "Binary": FunctionWord("start direction", _binary),
+    "Ramp": FunctionWord("start end", _ramp),
+    "Rectangle": FunctionWord("start end", _rectangle),
+    "SemiEllipse": FunctionWord("start end", lambda n: curves.SemiEllipse(*sorted(n))),
+    "SShape": FunctionWord("start end", _s_shape),
+    "Trapezoid": FunctionWord("a b c d", _trapezoid),
+    "Triangle": FunctionWord("a b c", lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
+    "ZShape": FunctionWord("start end", _z_shape),
 }
 """The classes with a fixed number of parameters."""
 CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *FLL_CLASSES)
 """The classes of terms, by their names in files."""
+
+
+def term_in_words(curve: curves.SystemCurve) -> tuple[str | float, ...]:
+    """Return the class of a curve and its numbers.
+
+    Example:
+        >>> term_in_words(curves.Trapezoid(0.0, 1.0, 1.0, 2.5))
+        ('Triangle', 0.0, 1.0, 2.5)
+    """
+    match curve:
+        case curves.Trapezoid(a=a, b=b, c=c, d=d):
+            low = -math.inf if a is None else a
+            high = math.inf if d is None else d
+            if low == b and c == high:
+                return "Rectangle", b, c
+            return (
+                ("Triangle", low, b, high) if b == c else ("Trapezoid", low, b, c, high)
+            )
+        case curves.SCurve(start=start, end=end):
+            rises = start <= end
+            return ("SShape", start, end) if rises else ("ZShape", end, start)
+        case curves.Binary(start=start, is_above=is_above):
+            return "Binary", start, math.inf if is_above else -math.inf
+        case curves.SemiEllipse(start=start, end=end):
+            return "SemiEllipse", start, end
+        case curves.Singleton(value=value):
+            return "Rectangle", value, value
+        case _:
+            name, numbers = in_words(curve, FLL_CLASSES) or ("", [])
+            return name, *numbers
 
 
 def as_degree(label: SystemTerm) -> SystemTerm:

@@ -17,15 +17,18 @@ from fuzzytree.formats.text_files import (
     split_lines,
     words,
 )
+from fuzzytree.formats.words import (
+    HEDGE_WORDS,
+    METHOD_WORDS,
+    S_NORM_WORDS,
+    T_NORM_WORDS,
+    meanings,
+)
 from fuzzytree.model import (
     Activation,
     ActivationMethod,
     Defuzzifier,
-    DefuzzifierMethod,
-    Hedge,
     Relation,
-    SNorm,
-    TNorm,
     name_choice,
 )
 
@@ -52,36 +55,10 @@ MOST_WORDS: Final = 20_000
 
 _REPEATED = frozenset({"term", "rule"})
 
-T_NORMS: Mapping[str, TNorm] = {
-    "Minimum": "minimum",
-    "AlgebraicProduct": "product",
-    "BoundedDifference": "bounded difference",
-    "DrasticProduct": "drastic product",
-    "EinsteinProduct": "einstein product",
-    "HamacherProduct": "hamacher product",
-    "NilpotentMinimum": "nilpotent minimum",
-}
-S_NORMS: Mapping[str, SNorm] = {
-    "Maximum": "maximum",
-    "AlgebraicSum": "algebraic sum",
-    "BoundedSum": "bounded sum",
-    "DrasticSum": "drastic sum",
-    "EinsteinSum": "einstein sum",
-    "HamacherSum": "hamacher sum",
-    "NilpotentMaximum": "nilpotent maximum",
-    "NormalizedSum": "normalized sum",
-    "UnboundedSum": "sum",
-}
-
-FLL_METHODS: Mapping[str, DefuzzifierMethod] = {
-    "Centroid": "centroid",
-    "Bisector": "bisector",
-    "SmallestOfMaximum": "smallest of maximum",
-    "LargestOfMaximum": "largest of maximum",
-    "MeanOfMaximum": "mean of maximum",
-    "WeightedAverage": "weighted average",
-    "WeightedSum": "weighted sum",
-}
+FLL_TNORMS: Final = meanings(T_NORM_WORDS, "fll")
+FLL_SNORMS: Final = meanings(S_NORM_WORDS, "fll")
+FLL_METHODS: Final = meanings(METHOD_WORDS, "fll")
+FLL_HEDGES: Final = meanings(HEDGE_WORDS, "fll")
 TYPES: Final = ("Automatic", "TakagiSugeno", "Tsukamoto")
 """How a weighted defuzzifier may treat terms."""
 
@@ -91,16 +68,6 @@ SAMPLES: Final = 1000
 ACTIVATIONS: Mapping[str, ActivationMethod] = {
     method.capitalize(): method for method in get_args(ActivationMethod)
 }
-FLL_HEDGES: Mapping[str, Hedge] = {
-    "any": "any",
-    "not": "not",
-    "very": "very",
-    "somewhat": "somewhat",
-    "extremely": "extremely",
-    "seldom": "seldom",
-}
-"""The hedges that fuzzylite knows, by their words."""
-
 _RELATIONS: Mapping[str, Relation] = {one: one for one in get_args(Relation)}
 
 

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from fuzzytree.formats.fml.xml import FmlElement
 from fuzzytree.formats.text_files import ReaderNotes, number_of
+from fuzzytree.formats.words import (
+    HEDGE_WORDS,
+    METHOD_WORDS,
+    S_NORM_WORDS,
+    T_NORM_WORDS,
+    FunctionWord,
+    FunctionWords,
+    function_words,
+    in_words,
+    meanings,
+)
 from fuzzytree.model import (
     Curve,
     Defuzzifier,
-    DefuzzifierMethod,
-    Gaussian,
-    Hedge,
     PiCurve,
     Points,
     SCurve,
     Singleton,
-    SNorm,
-    TNorm,
     Trapezoid,
     TwoGaussians,
     name_choice,
@@ -29,68 +35,67 @@ NAMESPACE: Final = "http://www.ieee1855.org"
 FML_FAR: Final = 1e300
 """The flat side of a right or left gaussian ends beyond all values."""
 
-FML_TNORMS: Final[Mapping[str, TNorm]] = {
-    "MIN": "minimum",
-    "PROD": "product",
-    "BSUM": "bounded difference",  # so the published schema; BDIF in the text
-    "BDIF": "bounded difference",
-    "DRS": "drastic product",
-    "DRP": "drastic product",
-    "EPROD": "einstein product",
-    "HPROD": "hamacher product",
-    "NILMIN": "nilpotent minimum",
-}
-FML_SNORMS: Final[Mapping[str, SNorm]] = {
-    "MAX": "maximum",
-    "PROBOR": "algebraic sum",
-    "BSUM": "bounded sum",
-    "DRS": "drastic sum",
-    "ESUM": "einstein sum",
-    "HSUM": "hamacher sum",
-    "NILMAX": "nilpotent maximum",
-}
-FML_METHODS: Final[Mapping[str, DefuzzifierMethod]] = {
-    "COG": "centroid",
-    "COA": "bisector",
-    "LM": "smallest of maximum",
-    "RM": "largest of maximum",
-    "MOM": "mean of maximum",
-}
+FML_TNORMS: Final = meanings(T_NORM_WORDS, "fml")
+FML_SNORMS: Final = meanings(S_NORM_WORDS, "fml")
+FML_METHODS: Final = meanings(METHOD_WORDS, "fml")
 USUAL: Final = Defuzzifier("centroid", 1000, "middle")
 """FML says nothing of samples; its reference implementation takes 1000."""
 
-MODIFIERS: Final[Mapping[str, Hedge]] = {
-    "any": "any",
-    "not": "not",
-    "very": "very",
-    "somewhat": "somewhat",
-    "seldom": "seldom",
-    "plus": "plus",
-    "extremely": "cubed",
-    "intensify": "extremely",
-    "more_or_less": "cube root",
-}
+MODIFIERS: Final = meanings(HEDGE_WORDS, "fml")
 """The modifiers with a meaning here; above, below, norm and slightly have none."""
 
 OTHER_MODIFIERS: Final = ("above", "below", "norm", "slightly")
 
 
-_Make = Callable[[Sequence[float]], Curve]
-
-SHAPES: Final[Mapping[str, tuple[int, _Make]]] = {
-    "rightLinearShape": (2, lambda n: Points((n[0], n[1]), (0.0, 1.0))),
-    "leftLinearShape": (2, lambda n: Points((n[0], n[1]), (1.0, 0.0))),
-    "piShape": (2, lambda n: PiCurve(n[0], n[1], n[1], n[1] + abs(n[1] - n[0]))),
-    "triangularShape": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
-    "trapezoidShape": (4, lambda n: Trapezoid(n[0], n[1], n[2], n[3])),
-    "gaussianShape": (2, lambda n: Gaussian(n[0], abs(n[1]))),
-    "rightGaussianShape": (2, lambda n: TwoGaussians(n[0], abs(n[1]), FML_FAR, 1.0)),
-    "leftGaussianShape": (2, lambda n: TwoGaussians(-FML_FAR, 1.0, n[0], abs(n[1]))),
-    "singletonShape": (1, lambda n: Singleton(n[0])),
-    "rectangularShape": (2, lambda n: Trapezoid(n[0], n[0], n[1], n[1])),
-    "sShape": (2, lambda n: SCurve(n[0], n[1])),
-    "zShape": (2, lambda n: SCurve(n[1], n[0])),
+SHAPES: Final[FunctionWords] = {
+    "rightLinearShape": FunctionWord("a b", lambda n: Points((n[0], n[1]), (0.0, 1.0))),
+    "leftLinearShape": FunctionWord("a b", lambda n: Points((n[0], n[1]), (1.0, 0.0))),
+    "piShape": FunctionWord(
+        "a b", lambda n: PiCurve(n[0], n[1], n[1], n[1] + abs(n[1] - n[0]))
+    ),
+    "triangularShape": FunctionWord(
+        "a b c", lambda n: Trapezoid(n[0], n[1], n[1], n[2])
+    ),
+    "trapezoidShape": FunctionWord("a b c d", lambda n: Trapezoid(*n)),
+    "rightGaussianShape": FunctionWord(
+        "c s", lambda n: TwoGaussians(n[0], abs(n[1]), FML_FAR, 1.0)
+    ),
+    "leftGaussianShape": FunctionWord(
+        "c s", lambda n: TwoGaussians(-FML_FAR, 1.0, n[0], abs(n[1]))
+    ),
+    "singletonShape": FunctionWord("a", lambda n: Singleton(n[0])),
+    "rectangularShape": FunctionWord(
+        "a b", lambda n: Trapezoid(n[0], n[0], n[1], n[1])
+    ),
+    "sShape": FunctionWord("a b", lambda n: SCurve(n[0], n[1])),
+    "zShape": FunctionWord("a b", lambda n: SCurve(n[1], n[0])),
+    **function_words("fml"),
 }
+
+
+def shape_in_words(curve: Curve) -> tuple[str, Sequence[float]] | None:
+    """Return the shape of a curve and its parameters; None if it must be points."""
+    match curve:
+        case Points(values=(a, b), degrees=(0.0, 1.0)):
+            return "rightLinearShape", (a, b)
+        case Points(values=(a, b), degrees=(1.0, 0.0)):
+            return "leftLinearShape", (a, b)
+        case Trapezoid(a=float(a), b=b, c=c, d=float(d)) if a < b and c < d:
+            is_peak = b == c
+            numbers = (a, b, d) if is_peak else (a, b, c, d)
+            return "triangularShape" if is_peak else "trapezoidShape", numbers
+        case Singleton(value=value):
+            return "singletonShape", (value,)
+        case TwoGaussians(left=c, left_deviation=s, right=right) if right >= FML_FAR:
+            return "rightGaussianShape", (c, s)
+        case TwoGaussians(left=left, right=c, right_deviation=s) if left <= -FML_FAR:
+            return "leftGaussianShape", (c, s)
+        case SCurve(start=a, end=b) if a != b:
+            return ("sShape", (a, b)) if a < b else ("zShape", (b, a))
+        case _:
+            return in_words(curve, SHAPES)
+
+
 POINTS: Final = ("pointSetShape", "pointSetMonotonicShape")
 CIRCULAR: Final = "circularDefinition"
 
@@ -126,11 +131,11 @@ def curve_of(term: FmlElement, where: str, notes: ReaderNotes) -> Curve | None:
     if shape.name in POINTS:
         curve: Curve = _points(shape, where, notes)
     elif shape.name in SHAPES:
-        count, make = SHAPES[shape.name]
-        numbers = [number(shape, f"param{k + 1}", notes) for k in range(count)]
+        word = SHAPES[shape.name]
+        numbers = [number(shape, f"param{k + 1}", notes) for k in range(word.arity)]
         if len(notes.mistakes) > before:
             return None
-        curve = make(numbers)
+        curve = word.make(numbers)
         if shape.name == "piShape":
             what = "a piShape falls behind its second number as it rose before it"
             notes.remark(f"{where}: {what}, as in the reference implementation")
