@@ -68,7 +68,7 @@ _DOTS = Marker(
     "44 4F 54 53",
     bits=16,
     byte_order="big",
-    sizes=True,
+    sizes="rows and columns",
     skip=4,
     checksum="crc16",
 )
@@ -356,7 +356,7 @@ def _marks(board: Board) -> tuple[int, int]:
             return 2, 0
         case Text():
             return 4, 0
-        case Marker(checksum="none" | "sum8" | "xor8", tail="", sizes=False):
+        case Marker(checksum="none" | "sum8" | "xor8", tail="", sizes="none"):
             return 0, len(bytes.fromhex(protocol.marker))
         case _:
             return 0, 0

@@ -53,7 +53,7 @@ def _explained_marker(
     marker, tail = bytes.fromhex(protocol.marker), bytes.fromhex(protocol.tail)
     payload = _payload(board, protocol, cells)
     sizes = b""
-    if protocol.sizes:
+    if protocol.sizes != "none":
         pair = (board.sensor.rows, board.sensor.columns)
         sizes = b"".join(side.to_bytes(2, protocol.byte_order) for side in pair)
     behind = len(checksum(protocol.checksum, payload)) + len(tail)

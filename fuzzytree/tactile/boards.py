@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
-from msgspec import Meta
+from msgspec import Meta, field
 
 from fuzzytree.errors import InvalidModelError
+from fuzzytree.formats import FileRecord
 from fuzzytree.model import Mistake, Value
 from fuzzytree.tactile.sensor import Sensor, limit_mistakes
 
@@ -47,7 +48,7 @@ Pressure = Literal["rises", "falls"]
 ByteOrder = Literal["little", "big"]
 
 
-class Marker(Value, frozen=True, tag="marker"):
+class Marker(Value, FileRecord, frozen=True, tag="marker"):
     """A marker, then a fixed number of bytes.
 
     The marker can occur among the cells, so a beginning is believed only where the
@@ -58,23 +59,24 @@ class Marker(Value, frozen=True, tag="marker"):
         bits: 8 or 16 for each cell.
         byte_order: Of 16 bits.
         sizes: Whether two numbers of 16 bits, rows and columns, in the same byte
-            order, follow the marker.
+            order, follow the marker, or none.
         skip: Bytes between these and the cells that are ignored (time stamps).
         checksum: Of sizes, skipped bytes and cells, behind the cells; `crc16` is that
             of Modbus, low byte first.
         tail: Bytes at the end, in hexadecimal.
     """
 
-    marker: Hexadecimal
+    noun: ClassVar[str] = "a marker"
+    marker: Hexadecimal = field(name="bytes")
     bits: Literal[8, 16] = 8
-    byte_order: ByteOrder = "little"
-    sizes: bool = False
+    byte_order: ByteOrder = field(name="byte order", default="little")
+    sizes: Literal["none", "rows and columns"] = "none"
     skip: Skip = 0
     checksum: Checksum = "none"
     tail: Tail = ""
 
 
-class Sentinel(Value, frozen=True, tag="sentinel"):
+class Sentinel(Value, FileRecord, frozen=True, tag="sentinel"):
     """One byte a cell; runs of zeros are packed; a byte of its own ends a frame.
 
     Attributes:
@@ -83,11 +85,12 @@ class Sentinel(Value, frozen=True, tag="sentinel"):
             No cell has this value, unless it is 0.
     """
 
+    noun: ClassVar[str] = "a sentinel"
     end: Byte = 255
     zero: Byte = 0
 
 
-class Request(Value, frozen=True, tag="request"):
+class Request(Value, FileRecord, frozen=True, tag="request"):
     """The host sends a request, the board responds with a fixed number of bytes.
 
     Attributes:
@@ -99,15 +102,16 @@ class Request(Value, frozen=True, tag="request"):
         timeout_s: Seconds before the host repeats a request without a response.
     """
 
+    noun: ClassVar[str] = "a request"
     ask: Hexadecimal
     bits: Literal[8, 16] = 8
-    byte_order: ByteOrder = "little"
+    byte_order: ByteOrder = field(name="byte order", default="little")
     skip: Skip = 0
     checksum: Checksum = "none"
-    timeout_s: Seconds = 0.5
+    timeout_s: Seconds = field(name="timeout", default=0.5)
 
 
-class Text(Value, frozen=True, tag="text"):
+class Text(Value, FileRecord, frozen=True, tag="text"):
     """Numbers in lines of text.
 
     Attributes:
@@ -121,6 +125,7 @@ class Text(Value, frozen=True, tag="text"):
         skip: Numbers before the cells of each line that are ignored (time stamps).
     """
 
+    noun: ClassVar[str] = "text"
     frame: Literal["line", "block"] = "line"
     separator: Literal["space", "comma", "semicolon"] = "space"
     prefix: Prefix = ""
@@ -130,7 +135,7 @@ class Text(Value, frozen=True, tag="text"):
 Protocol = Marker | Sentinel | Request | Text
 
 
-class Port(Value, frozen=True):
+class Port(Value, FileRecord, frozen=True):
     """How the serial port is set.
 
     Attributes:
@@ -140,10 +145,11 @@ class Port(Value, frozen=True):
         stop_bits: 1 or 2.
     """
 
+    noun: ClassVar[str] = "a port"
     baud: Baud = 115200
-    data_bits: Literal[7, 8] = 8
+    data_bits: Literal[7, 8] = field(name="data bits", default=8)
     parity: Literal["none", "even", "odd"] = "none"
-    stop_bits: Literal[1, 2] = 1
+    stop_bits: Literal[1, 2] = field(name="stop bits", default=1)
 
     @property
     def bits_of_a_byte(self) -> int:
@@ -156,7 +162,7 @@ class Port(Value, frozen=True):
         return 1 + self.data_bits + (self.parity != "none") + self.stop_bits
 
 
-class Start(Value, frozen=True):
+class Start(Value, FileRecord, frozen=True):
     """What is measured before the first frame counts.
 
     Attributes:
@@ -165,6 +171,7 @@ class Start(Value, frozen=True):
         hot: A cell whose baseline is above this share of full is masked.
     """
 
+    noun: ClassVar[str] = "a start"
     frames: StartFrames = 30
     hot: Share = 0.5
 

@@ -40,8 +40,12 @@ FAMILIES: Final = {
     "marker, little": _board(Marker("AA 55", 16), 1023),
     "marker, big, few": _board(Marker("AA 55", 16, "big", skip=3), 200),
     "marker, sum8": _board(Marker("AA", checksum="sum8"), pressure="falls"),
-    "marker, xor8, sizes": _board(Marker("AA 55", sizes=True, checksum="xor8")),
-    "marker, crc16": _board(Marker("AA 55", 16, "big", True, 2, "crc16"), 4095),
+    "marker, xor8, sizes": _board(
+        Marker("AA 55", sizes="rows and columns", checksum="xor8")
+    ),
+    "marker, crc16": _board(
+        Marker("AA 55", 16, "big", "rows and columns", 2, "crc16"), 4095
+    ),
     "marker, tail": _board(Marker("02", tail="0D 0A"), 200, pressure="falls"),
     "sentinel": _board(Sentinel(), 254),
     "sentinel, odd": _board(Sentinel(end=250, zero=2), order="columns", lines=2),

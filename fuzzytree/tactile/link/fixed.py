@@ -77,7 +77,7 @@ def layout_of(board: Board, protocol: Marker | Request) -> Layout:
     if isinstance(protocol, Marker):
         head = bytes.fromhex(protocol.marker)
         checked_from = len(head)
-        if protocol.sizes:
+        if protocol.sizes != "none":
             sizes = np.array([sensor.rows, sensor.columns], f"{sign}u2")
             head += sizes.tobytes()
         tail = bytes.fromhex(protocol.tail)

@@ -47,7 +47,7 @@ class MarkerDecoder(Decoder):
         self._layout = layout_of(board, protocol)
         self._size = self._layout.size
         self._is_proven = self._layout.proof_bytes >= _SURE
-        self._is_confirmed = self._is_proven or protocol.sizes
+        self._is_confirmed = self._is_proven or protocol.sizes != "none"
         self._restart()
 
     def _restart(self) -> None:

@@ -148,9 +148,10 @@ def _wrong_cells(board: Board, cells: int) -> str:
 
 def _wrong_around(protocol: Marker) -> str:
     """Return what remains to be wrong where the length is right."""
-    has_checksum = protocol.checksum != "none"
-    parts = {"sizes": protocol.sizes, "checksum": has_checksum, "tail": protocol.tail}
-    names = [f"the {name}" for name, is_there in parts.items() if is_there]
+    parts = ("sizes", "checksum", "tail")
+    names = [
+        f"the {one}" for one in parts if getattr(protocol, one) not in ("none", "")
+    ]
     return f", as expected, but {' or '.join(names)} did not fit" if names else ""
 
 

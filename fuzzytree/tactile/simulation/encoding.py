@@ -49,7 +49,7 @@ def encoded(board: Board, cells: Cells, number: int = 0) -> bytes:
     match protocol:
         case Marker():
             sizes = b""
-            if protocol.sizes:
+            if protocol.sizes != "none":
                 pair = np.array([board.sensor.rows, board.sensor.columns])
                 sizes = packed(pair, 16, protocol.byte_order)
             stamp = _stamp(number, protocol.skip)

@@ -117,7 +117,9 @@ def test_what_a_tail_proves_is_refused_where_a_byte_is_lost() -> None:
 
 
 def test_frames_of_another_size_are_never_given_out() -> None:
-    board = Board("b", Sensor(2, 3), Marker("AA", sizes=True, byte_order="big"))
+    board = Board(
+        "b", Sensor(2, 3), Marker("AA", sizes="rows and columns", byte_order="big")
+    )
     good = bytes.fromhex("AA 0002 0003 010203040506")
     other = bytes.fromhex("AA 0003 0002 010203040506")
     decoder = decoder_of(board)

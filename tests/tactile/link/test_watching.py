@@ -156,7 +156,17 @@ def test_two_bytes_are_enough_to_say_something() -> None:
 @pytest.mark.parametrize(
     ("protocol", "count"),
     [
-        (Marker("AA 55", bits=16, sizes=True, skip=3, checksum="crc16", tail="0D"), 60),
+        (
+            Marker(
+                "AA 55",
+                bits=16,
+                sizes="rows and columns",
+                skip=3,
+                checksum="crc16",
+                tail="0D",
+            ),
+            60,
+        ),
         (Sentinel(), 25),
         (Request("41", checksum="xor8"), 25),
         (Text(), 96),

@@ -30,7 +30,14 @@ def _board(protocol: Protocol, full: int = 1023, order: Order = "rows") -> Board
     [
         (Marker("AA 55", bits=16), "aa55 0100 0000 0201 0000 0000 1000"),
         (
-            Marker("FE", bits=16, byte_order="big", sizes=True, skip=2, tail="0D 0A"),
+            Marker(
+                "FE",
+                bits=16,
+                byte_order="big",
+                sizes="rows and columns",
+                skip=2,
+                tail="0D 0A",
+            ),
             "fe 0002 0003 0700 0001 0000 0102 0000 0000 0010 0d0a",
         ),
         (
