@@ -37,9 +37,13 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import simplified
-from fuzzytree.auditing.findings.codes import finding, note
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.domains import inputs_of
-from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    AuditSettings,
+    FactValue,
+)
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.model import (
@@ -168,48 +172,43 @@ def _same_everywhere(pair: RulePair) -> AuditAnswer | None:
     if faults or old.inputs != new.inputs:
         return None
     how = "both take the same curves of the same inputs in the same rules, on any input"
-    return note("FT801", "decisions", _EQUAL, Proved(how))
-
-
-_EQUAL = "both models decide alike"
+    facts = {"where": ""}
+    return audit_answer("FT801.alike", "decisions", Proved(how), facts=facts)
 
 
 def _equal_answer(pair: RulePair, state: State) -> AuditAnswer:
-    sentence = f"{_EQUAL} everywhere on the domain"
-    old, new = pair.old, pair.new
-    if old.semantics.missing != new.semantics.missing or unguarded(old, new):
-        sentence += ", where no value is missing"
     if isinstance(state, Bracket):
-        sentence = (
-            "no decision was seen to differ, and where both margins are larger than "
-            f"{state.high:.3g} none does"
-        )
-    return note("FT801", "decisions", sentence, state)
+        margin = {"margin": state.high}
+        return audit_answer("FT801.margin", "decisions", state, facts=margin)
+    old, new = pair.old, pair.new
+    where = " everywhere on the domain"
+    if old.semantics.missing != new.semantics.missing or unguarded(old, new):
+        where += ", where no value is missing"
+    return audit_answer("FT801.alike", "decisions", state, facts={"where": where})
 
 
 def _on_rows(rows: AuditRows, differences: _Differences) -> AuditAnswer:
     hits, count = differences.add(rows.values, name="row")
-    of = f"{count} rows"
-    if count < rows.values.shape[1]:
-        of = f"the first {count} of {rows.values.shape[1]} rows"
-    sentence = f"{hits} of {of} of {rows.name} are classified differently"
+    total = rows.values.shape[1]
     state = sampled_share(
         "rows that are classified differently", hits, count, rows.name
     )
-    return AuditAnswer("FT801", "rows", sentence, state, hits > 0, severity="error")
+    facts: dict[str, FactValue] = {"table": rows.name}
+    if count < total:
+        facts["total"] = total
+    return audit_answer("FT801.rows", "rows", state, is_finding=hits > 0, facts=facts)
 
 
 def _drawn_answer(hits: int, rows: int, seed: int) -> AuditAnswer:
     how = f"{rows} points drawn evenly from the domain, seed {seed}"
     state = sampled_share("the domain that is classified differently", hits, rows, how)
-    text = f"{hits} of {rows} points drawn from the domain are classified differently"
-    return AuditAnswer("FT801", "domain", text, state, hits > 0)
+    return audit_answer("FT801.domain", "domain", state, is_finding=hits > 0)
 
 
 def left_out(points: str, reason: str = "the budget was spent") -> AuditAnswer:
     """Return that some points were not compared."""
-    text = f"{points} were not looked at: {reason}"
-    return note("FT801", "points", text, Declined("FTD03", reason))
+    state, facts = Declined("FTD03", reason), {"points": points}
+    return audit_answer("FT801.not-compared", "points", state, facts=facts)
 
 
 def _witness_answers(
@@ -226,18 +225,16 @@ def _witness_answers(
         if number < _MOST_REGIONS:
             spans = difference_region(pair.old, pair.new, pair.domain, point)
         state = msgspec.structs.replace(state, region=spans)
-        sentence = f"{name}: " if name else ""
-        sentence += f"the old model answers {_answered(one)}, the new one "
-        sentence += _answered(other)
+        facts = {"row": name} if name else {}
+        facts |= {"old": _answered(one), "new": _answered(other)}
         title = " -> ".join(map(answer_text, labels))
-        yield finding("FT801", title, sentence, state, region=spans)
+        yield audit_answer("FT801.differs", title, state, region=spans, facts=facts)
     if len(known) > _MOST_LISTED:
         left = len(known) - _MOST_LISTED
-        sentence = f"{left} more pairs of classes are answered one for the other"
         point = known[_MOST_LISTED][1][2]
         state = difference_at(pair.old, pair.new, point)
         assert state is not None
-        yield AuditAnswer("FT801", "more", sentence, state, True)
+        yield audit_answer("FT801.more", "more", state, facts={"count": left})
 
 
 def _simple(

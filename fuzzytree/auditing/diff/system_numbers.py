@@ -31,8 +31,13 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
 )
 from fuzzytree.auditing.engine.witnesses import simplified
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, Measure
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    AuditSettings,
+    FactValue,
+    Measure,
+)
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.model import FloatArray, FuzzySystem, SystemRun
@@ -44,7 +49,6 @@ _PROBES = 2_000  # of each system
 _DRAWN = 4_000  # at most, for numbers take longer than decisions
 _ROUNDING = 1e-9  # relative; what one function of real numbers may differ by
 _MOST_SHOWN = 0.9  # of the largest difference, at a witness of fewer digits
-_ALIKE = "both systems compute alike"
 
 
 class SystemPair(NamedTuple):
@@ -71,19 +75,20 @@ def number_answers(
             hows = _hows(pair)
             open_ = [name for name, how in hows.items() if how is not _SAME]
             if not open_:
-                return [_proved(pair, _ALIKE, _SAME.how)] if hows else []
+                return [_proved(pair, "", _SAME.how)] if hows else []
             runs = [run_system(system) for system in (pair.old, pair.new)]
     except OutOfTimeError:
         reason = "the budget was spent"
-        text = f"the numbers of the two were not compared: {reason}"
-        return [note("FT801", "numbers", text, Declined("FTD03", reason))]
+        facts = {"points": "the numbers of the two"}
+        state = Declined("FTD03", reason)
+        return [audit_answer("FT801.not-compared", "numbers", state, facts=facts)]
     rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
     differences = _Differences(pair, open_, rounded, runs)
     answers = [*_sampled(differences, rows, settings, clock)]
     if differences.differing:
         answers = [*map(differences.witness, differences.differing), *answers]
     elif None not in hows.values():
-        text = f"{_ALIKE} everywhere on the domain"
+        text = " everywhere on the domain"
         if not rounded:
             return [_proved(pair, text, _SAME.how), *answers]
         whole = _proved(pair, f"{text}, but for rounding", _ROUNDED.how)
@@ -91,8 +96,8 @@ def number_answers(
         return [msgspec.structs.replace(whole, measures=(most,)), *answers]
     for name, known in hows.items():
         if known is not None and name not in differences.largest:
-            text = f"both systems compute {name!r} alike{known.where}"
-            answers.append(note("FT801", name, text, Proved(known.how)))
+            facts, how = {"where": known.where}, Proved(known.how)
+            answers.append(audit_answer("FT801.output-alike", name, how, facts=facts))
     answers += [differences.bound(name) for name, how in hows.items() if how is None]
     return answers
 
@@ -128,10 +133,11 @@ def _hows(pair: SystemPair) -> dict[str, _Alike | None]:
     }
 
 
-def _proved(pair: SystemPair, sentence: str, how: str) -> AuditAnswer:
+def _proved(pair: SystemPair, where: str, how: str) -> AuditAnswer:
     if {*pair.old.columns} != {*pair.new.columns}:
-        sentence += ", where no value is missing"
-    return note("FT801", "decisions", sentence, Proved(how))
+        where += ", where no value is missing"
+    facts = {"where": where}
+    return audit_answer("FT801.numbers-alike", "decisions", Proved(how), facts=facts)
 
 
 def _sampled(
@@ -175,12 +181,12 @@ def _counted(
     state = sampled_share(
         "rows in which an output differs", hits, rows, f"{rows} {how}"
     )
-    sentence = f"no output differs on {rows} {how}"
-    if hits:
-        sentence = f"an output differs on {hits} of {rows} {how}"
-    elif differences.rounding:
-        sentence += ", but for rounding"
-    return (finding if hits else note)("FT801", subject, sentence, state)
+    facts: dict[str, FactValue] = {"from": how}
+    if not hits and differences.rounding:
+        facts["rounding"] = differences.rounding
+    return audit_answer(
+        "FT801.outputs", subject, state, is_finding=hits > 0, facts=facts
+    )
 
 
 def _probes(
@@ -271,7 +277,7 @@ class _Differences:
         largest = self.largest[name]
         point = {key: Fraction(value) for key, value in largest.row.items()}
         how = "as the reference computes it"
-        said = f"{name!r} is {_shown(largest.now)}, and was {_shown(largest.was)}"
+        facts = {"now": _shown(largest.now), "was": _shown(largest.was)}
         measure = Measure("largest difference", largest.gap)
         try:
             point = self._simple(name, point)
@@ -279,7 +285,7 @@ class _Differences:
             apart = None if was is None or now is None else abs(now - was)
             if apart != 0:
                 how = "in fractions"
-                said = f"{name!r} is {_shown(now)}, and was {_shown(was)}"
+                facts = {"now": _shown(now), "was": _shown(was)}
                 exact = None if apart is None else str(apart)
                 gap = math.inf if apart is None else float(apart)
                 measure = Measure("largest difference", gap, exact)
@@ -288,7 +294,13 @@ class _Differences:
         except NotExactError:
             pass
         state = Witness(coordinates(point), ())
-        return finding("FT801", name, f"{said}, {how}", state, measures=(measure,))
+        return audit_answer(
+            "FT801.output-differs",
+            name,
+            state,
+            measures=(measure,),
+            facts={**facts, "how": how},
+        )
 
     def _exact(
         self, name: str, point: Mapping[str, Fraction]
@@ -317,8 +329,8 @@ class _Differences:
         title = f"bound of {name}"
         if known is None:
             reason = "nothing bounds what its rules conclude"
-            text = f"how far {name!r} can differ at most is not known: {reason}"
-            return note("FT801", title, text, Declined("FTD02", reason))
+            declined, facts = Declined("FTD02", reason), {"output": name}
+            return audit_answer("FT801.no-bound", title, declined, facts=facts)
         (bound, why), low = known, 0.0
         high, largest = outwards(bound)[1], self.largest.get(name)
         if largest is not None and math.isfinite(largest.gap):
@@ -328,8 +340,10 @@ class _Differences:
                 if side.variable in largest.row
             )
             low = min(largest.gap, high) if is_within else 0.0
-        text = f"{name!r} differs by at most {high:.6g} where both answer a number"
-        return note("FT801", title, text, Bracket(of, low, high, why))
+        state = Bracket(of, low, high, why)
+        return audit_answer(
+            "FT801.bound", title, state, facts={"output": name, "most": high}
+        )
 
 
 def _shown(number: Fraction | float | None) -> str:

@@ -27,8 +27,13 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    FactValue,
+    Measure,
+    TermName,
+)
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.auditing.findings.support import sample_points
 from fuzzytree.model import Clause, FloatArray, IntArray, Rule, RuleBase, clause_text
@@ -89,19 +94,15 @@ def clause_answers(subject: Subject) -> Iterator[AuditAnswer]:
             if needed > MOST_SHOWN:
                 continue
         yield _answer(subject, one, state)
-    yield from slices.rest("FT107", "clause", "whether they are needed")
+    yield from slices.rest("FT107", "clause")
     for number in silent:
         name = subject.rule_name(number)
-        text = f"{name} never fires, so its clauses are not tested one by one"
         proof = Proved("one of its clauses is 0 on all of the domain")
-        yield note("FT107", name, text, proof, rules=(number,))
+        yield audit_answer("FT107.silent", name, proof, rules=(number,))
     if needed > MOST_SHOWN:
-        rest = needed - MOST_SHOWN
-        text = "clause matters: it" if rest == 1 else "clauses matter: each"
-        text = f"{rest} more {text} decides some input"
         proof = Proved("an input was found for each, and evaluated in fractions")
-        measures = (Measure("clauses", rest),)
-        yield note("FT107", "clauses", text, proof, measures=measures)
+        measures = (Measure("clauses", needed - MOST_SHOWN),)
+        yield audit_answer("FT107.more", "clauses", proof, measures=measures)
 
 
 def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
@@ -226,18 +227,17 @@ class _Sample:
 
 
 def _answer(subject: Subject, one: _Dropped, state: State) -> AuditAnswer:
-    name = subject.rule_name(one.rule)
-    text = f"{clause_text(one.clause)!r}"
-    sentence = f"{name} decides the same without {text}"
+    name, text = subject.rule_name(one.rule), clause_text(one.clause)
+    facts: dict[str, FactValue] = {"rule": name, "clause": text}
+    message = "FT107.irrelevant" if isinstance(state, Proved) else "FT107.open"
     if isinstance(state, Witness):
-        label = state.claims[0].label
-        before = "no class" if label is None else f"{label!r}"
-        sentence = (
-            f"{name} needs {text}: without it {before} becomes {one.shorter.then!r} "
-            "at some input"
-        )
-    elif not isinstance(state, Proved):
-        sentence = f"whether {name} needs {text} is open"
-    terms = tuple(TermName(one.clause.variable, term) for term in one.clause.terms)
-    build, title = finding if isinstance(state, Proved) else note, f"{name}, {text}"
-    return build("FT107", title, sentence, state, rules=(one.rule,), terms=terms)
+        message = "FT107.needed"
+        facts |= {"before": state.claims[0].label, "then": one.shorter.then}
+    return audit_answer(
+        message,
+        f"{name}, {text!r}",
+        state,
+        rules=(one.rule,),
+        terms=tuple(TermName(one.clause.variable, term) for term in one.clause.terms),
+        facts=facts,
+    )

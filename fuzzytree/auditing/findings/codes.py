@@ -9,12 +9,19 @@ import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from types import MappingProxyType
-from typing import Final, Literal, TypedDict, Unpack
+from typing import Final, Literal, TypedDict, Unpack, cast
 
 import msgspec
 
-from fuzzytree.auditing.engine.states import Span, State
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity, TermName
+from fuzzytree.auditing.engine.states import Declined, Span, State
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    FactValue,
+    Measure,
+    Severity,
+    TermName,
+)
+from fuzzytree.auditing.recheck.sentences import MESSAGES, names_in, sentence_of
 from fuzzytree.model import Value
 
 
@@ -61,19 +68,48 @@ class Details(TypedDict, total=False):
     measures: tuple[Measure, ...]
 
 
-def finding(
-    code: str, subject: str, sentence: str, state: State, **details: Unpack[Details]
+def audit_answer(
+    message: str,
+    subject: str,
+    state: State,
+    *,
+    facts: Mapping[str, FactValue] = MappingProxyType({}),
+    is_finding: bool = True,
+    **details: Unpack[Details],
 ) -> AuditAnswer:
-    """Return a finding, of the severity of its code."""
-    severity = CODES[code].severity
-    return AuditAnswer(code, subject, sentence, state, True, severity, **details)
+    """Return an answer with the sentence of a message.
 
+    Args:
+        message: Its name; see `fuzzytree.auditing.recheck.sentences`. It says of which
+            code and severity the answer is, and whether it is a finding.
+        subject: The subject of the question.
+        state: How the answer is known; of messages `FTD` a `Declined` with the code.
+        facts: Those that the message says are kept.
+        is_finding: Where the message leaves it open whether it is one.
+        details: See `AuditAnswer`.
 
-def note(
-    code: str, subject: str, sentence: str, state: State, **details: Unpack[Details]
-) -> AuditAnswer:
-    """Return what was checked or declined, and is no finding."""
-    return AuditAnswer(code, subject, sentence, state, False, **details)
+    Raises:
+        KeyError: If there is no such message, or it needs another fact.
+
+    Example:
+        >>> state = Declined("FTD06", "rows are needed")
+        >>> audit_answer("FT701.needs-rows", "rows", state).sentence
+        'what rows say about the rules is not known: rows are needed'
+    """
+    code, grade = message.partition(".")[0], MESSAGES[message].grade
+    if code == "FTD":
+        assert isinstance(state, Declined)
+        code = state.code
+    is_finding = is_finding and grade != "note"
+    severity = cast("Severity", grade.rstrip("?") if is_finding else "info")
+    said = names_in(message)
+    result = AuditAnswer(
+        *(code, subject, "", state, is_finding, severity),
+        message=message,
+        facts={name: fact for name, fact in facts.items() if name in said},
+        **details,
+    )
+    return msgspec.structs.replace(result, sentence=sentence_of(result))
 
 
 class Family(Value, frozen=True):

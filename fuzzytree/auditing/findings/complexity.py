@@ -19,8 +19,8 @@ from fuzzytree.auditing.engine.polynomials import (
     roots,
     value_at,
 )
-from fuzzytree.auditing.engine.states import Proved, counted, short
-from fuzzytree.auditing.findings.codes import note
+from fuzzytree.auditing.engine.states import Proved
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges, used_terms
@@ -42,9 +42,6 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     if subject.tree is not None:
         measures.append(Measure("depth of the tree", depth(subject.tree)))
     index = nauck(subject)
-    text = f"{counted(len(clauses), 'rule')} with {counted(sum(clauses), 'clause')}"
-    if subject.system is not None and subject.policy.decision == "all":
-        text = f"audited as {text}"  # ways count, and rules left out do not
     if index is not None:
         names = ("complexity", "coverage", "partition")
         measures += [
@@ -57,9 +54,11 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
             size.high * covered.high * partition.high,
         )
         measures.append(measure("index of Nauck", product))
-        text += f", index of Nauck {short(product.nearest)}"
+    # Of a view ways count, and rules left out do not.
+    is_view = subject.system is not None and subject.policy.decision == "all"
+    message = "FT501.size-of-view" if is_view else "FT501.size"
     proof = Proved("counted, and integrated in fractions")
-    yield note("FT501", "the rule base", text, proof, measures=tuple(measures))
+    yield audit_answer(message, "the rule base", proof, measures=tuple(measures))
 
 
 def depth(tree: FuzzyTree) -> int:

@@ -22,7 +22,7 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.auditing.findings.codes import finding, note
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import rows_outside, sample_points
@@ -205,21 +205,28 @@ def _decision(run: ModelRun, *, has_ties: bool) -> ModelRun:
 
 def _alike(question: Convention, titles: Sequence[str]) -> AuditAnswer:
     name, count = question.name, question.values.shape[1]
-    text = f"{name}: {len(titles)} representations answer {count} probes alike"
-    if not count:
-        text = f"{name}: no probe of it was met"
     how = f"each probe was answered by {', '.join(titles)}"
     if question.left_out:
         how += f"; {question.left_out} more probes were left out"
-    return note("FT602", name, text, Proved(how))
+    message = "FT602.alike" if count else "FT602.none"
+    facts = {"count": len(titles), "probes": count}
+    return audit_answer(message, name, Proved(how), facts=facts)
 
 
 def _differing(question: Convention, title: str, fact: str, count: int) -> AuditAnswer:
     """Return that a representation differs in some probes, and the first of them."""
-    sentence = f"{question.name}: {title} differs in {count} of "
-    sentence += f"{question.values.shape[1]} probes: {fact}"
-    proof = Proved(f"both were run; {fact}")
-    return finding("FT602", f"{question.name}, {title}", sentence, proof)
+    return audit_answer(
+        "FT602.differs",
+        f"{question.name}, {title}",
+        Proved(f"both were run; {fact}"),
+        facts={
+            "convention": question.name,
+            "representation": title,
+            "count": count,
+            "probes": question.values.shape[1],
+            "detail": fact,
+        },
+    )
 
 
 # --- systems

@@ -19,15 +19,14 @@ from fuzzytree.auditing.engine.states import (
     Proved,
     State,
     Witness,
-    counted,
 )
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,
     bounded_arrangement,
 )
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.model import BoolArray
 
@@ -72,15 +71,12 @@ def _firing(subject: Subject, sides: BoundedArrangement) -> Iterator[AuditAnswer
             if isinstance(states[-1], Witness):
                 break
         state = next((s for s in states if not isinstance(s, Proved)), states[0])
-        is_dead = isinstance(state, Proved)
-        sentence = f"it is open whether {name} ever fires"
-        if is_dead:
-            sentence = f"{name} never fires: no value of the domain makes its condition"
-            sentence += " hold"
+        message = "FT101.fires-open"
+        if isinstance(state, Proved):
+            message = "FT101.never-fires"
         elif isinstance(state, Witness):
-            sentence = f"{name} fires"
-        rules = (numbers[0],)
-        yield AuditAnswer("FT101", name, sentence, state, is_dead, "error", rules)
+            message = "FT101.fires"
+        yield audit_answer(message, name, state, rules=(numbers[0],))
 
 
 def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
@@ -115,11 +111,10 @@ def _winning(
         if subject.tree is None:
             yield _won(subject, arrangement, number, state)
         if not isinstance(state, Proved | Witness):
-            sentence = f"how far {name} leads is open, for it is open whether it wins"
-            yield note("FT102", name, sentence, state, rules=(number,))
-    yield from slices.rest("FT101", "rule", "whether they ever win")
+            yield audit_answer("FT102.open", name, state, rules=(number,))
+    yield from slices.rest("FT101", "rule")
     # Only rules that are known to win have a lead.
-    yield from slices.rest("FT102", "rule", "how far they lead")
+    yield from slices.rest("FT102", "rule")
 
 
 def _leading(
@@ -140,21 +135,18 @@ def _leading(
             slices.left_out += 1
             continue
         yield answer
-    yield from slices.rest("FT102", "rule", "how far they lead")
+    yield from slices.rest("FT102", "rule")
 
 
 def _won(
     subject: Subject, arrangement: Arrangement, number: int, state: State
 ) -> AuditAnswer:
-    name = subject.rule_name(number)
+    name, rules = subject.rule_name(number), (number,)
     if isinstance(state, Witness):
-        sentence = f"{name} wins somewhere"
-        return note(
-            "FT101", name, sentence, state, rules=(number,), region=state.region
-        )
+        region = state.region
+        return audit_answer("FT101.wins", name, state, rules=rules, region=region)
     if not isinstance(state, Proved):
-        sentence = f"it is open whether {name} ever wins"
-        return note("FT101", name, sentence, state, rules=(number,))
+        return audit_answer("FT101.open", name, state, rules=rules)
     rivals = _rivals(subject, number)
     order = decides_by_order(
         arrangement,
@@ -164,28 +156,13 @@ def _won(
         subject.clock.share(_PART),
     )
     if isinstance(order, Witness):
-        sentence = (
-            f"{name} decides by its place in the list alone: where it is strongest, a "
-            "rule of another class further down is exactly as strong"
-        )
-        return AuditAnswer(
-            "FT101", name, sentence, order, True, severity="warning", rules=(number,)
-        )
+        return audit_answer("FT101.decides-by-place", name, order, rules=rules)
     fires = wins(arrangement, number, (), subject.clock.share(_PART))
     if isinstance(fires, Proved):
-        sentence = f"{name} never fires on the domain"
-        return finding("FT101", name, sentence, fires, rules=(number,))
-    sentence = (
-        f"{name} never wins: wherever it fires, a rule of another class is at least "
-        "as strong"
-    )
-    severity: Severity = "error"
-    if not isinstance(order, Proved):
-        sentence += "; whether it decides by its place in the list is open"
-        severity = "warning"
-    return AuditAnswer(
-        "FT101", name, sentence, state, True, severity=severity, rules=(number,)
-    )
+        return audit_answer("FT101.never-fires", name, fires, rules=rules)
+    is_last = isinstance(order, Proved)
+    message = "FT101.never-wins" if is_last else "FT101.may-decide-by-place"
+    return audit_answer(message, name, state, rules=rules)
 
 
 def _led(
@@ -205,22 +182,21 @@ def _led(
         Measure("largest lead, at least", bracket.low),
         Measure("largest lead, at most", bracket.high),
     )
-    if bracket.low >= subject.settings.lead:
+    lead, rules = subject.settings.lead, (number,)
+    if bracket.low >= lead:
         state = Witness(bracket.point, bracket.claims)
-        sentence = f"{name} leads by {bracket.low:.4g} at least somewhere"
-        return note(
-            "FT102", name, sentence, state, rules=(number,), measures=measures[:1]
+        return audit_answer(
+            "FT102.leads", name, state, rules=rules, measures=measures[:1]
         )
-    lead, is_marginal = subject.settings.lead, bracket.high < subject.settings.lead
-    sentence = f"{name} never leads by {lead:g}: at most by {bracket.high:.3g}"
-    if not is_marginal:
-        sentence = (
-            f"no lead of {name} above {bracket.low:.3g} was found, and one above "
-        )
-        sentence += f"{bracket.high:.3g} is excluded"
-    facts = "FT102", name, sentence, bracket
-    rules, region = (number,), won.region
-    return AuditAnswer(*facts, is_marginal, "warning", rules, (), region, measures)
+    return audit_answer(
+        "FT102.marginal" if bracket.high < lead else "FT102.between",
+        name,
+        bracket,
+        rules=rules,
+        region=won.region,
+        measures=measures,
+        facts={"lead": lead},
+    )
 
 
 class _Ties:
@@ -276,25 +252,21 @@ class _Ties:
             Measure("pairs listed", min(tie_count, MOST_SHOWN)),
             Measure("pairs left open", len(left_open) + untested),
         )
-        sentence = (
-            f"of {len(pairs)} pairs of rules of different classes, {tie_count} tie as "
-            "the strongest on more than a surface"
-        )
         state = left_open[0] if left_open else Proved(how)
         if untested:
-            sentence += f"; {counted(untested, 'pair')} were not tested"
             state = Declined("FTD03", "the budget was spent")
-        yield note("FT202", "pairs of rules", sentence, state, measures=measures)
+        yield audit_answer(
+            "FT202.others",
+            "pairs of rules",
+            state,
+            measures=measures,
+            facts={"untested": untested} if untested else {},
+        )
 
     def _tied(self, one: int, other: int, state: Witness) -> AuditAnswer:
         first, second = self.subject.rule_name(one), self.subject.rule_name(other)
-        sentence = (
-            f"{first} and {second} are equally strong, and the strongest, on more than "
-            "a surface: the order of the rules alone decides there"
-        )
-        return finding(
-            "FT202", f"{first} and {second}", sentence, state, rules=(one, other)
-        )
+        both = f"{first} and {second}"
+        return audit_answer("FT202.tie", both, state, rules=(one, other))
 
 
 def _needed(
@@ -315,13 +287,9 @@ def _needed(
         if state is None:
             slices.left_out += 1
             continue
-        if isinstance(state, Witness):
-            sentence = f"{name} is somewhere stronger than every other rule"
-            yield note("FT103", name, sentence, state, rules=(number,))
-            continue
         if not isinstance(state, Proved):
-            sentence = f"it is open whether {name} is needed"
-            yield note("FT103", name, sentence, state, rules=(number,))
+            message = "FT103.alone" if isinstance(state, Witness) else "FT103.open"
+            yield audit_answer(message, name, state, rules=(number,))
             continue
         later = [n for n in _rivals(subject, number) if n > number]
         known = [ties.of(number, n, len(later)) for n in later]
@@ -330,16 +298,10 @@ def _needed(
             continue
         tied = [one for one in known if one and not isinstance(one, Proved)]
         if tied:
-            sentence = (
-                f"{name} is nowhere stronger than all others, and where it ties with "
-                "another class it may decide by its place"
-            )
-            yield note("FT103", name, sentence, tied[0], rules=(number,))
+            yield audit_answer("FT103.by-place", name, tied[0], rules=(number,))
             continue
-        sentence = (
-            f"{name} is superfluous: nowhere is it stronger than all other rules, and "
-            "without it no decision changes"
-            + (", but where strengths only touch" if later else "")
+        facts = {"later": len(later)} if later else {}
+        yield audit_answer(
+            "FT103.superfluous", name, state, rules=(number,), facts=facts
         )
-        yield finding("FT103", name, sentence, state, rules=(number,))
-    yield from slices.rest("FT103", "rule", "whether they are needed")
+    yield from slices.rest("FT103", "rule")

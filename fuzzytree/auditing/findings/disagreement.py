@@ -31,17 +31,14 @@ from fuzzytree.auditing.engine.states import (
     Proved,
     State,
     Witness,
-    answer_text,
-    percent,
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.leaves import NOT_LOOKED_AT, too_many_boxes
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.robustness import CrispDecider
 from fuzzytree.auditing.findings.rows import (
-    OF_RANGES,
     DomainRows,
     distance_measure,
     narrowed_state,
@@ -315,30 +312,37 @@ def _nearest_answer(
 ) -> AuditAnswer:
     measures = [Measure("rows that differ already", differ)]
     measures.append(Measure("rows evaluated", len(search.settled)))
-    before = f"of {points.text} {differ} differ already"
+    facts = points.facts
     count = len(search.settled)
     if not count:
         why = "no row of the domain is decided alike by both"
         if alike:
             why = "the budget was spent before the first row"
         declined = Declined("FTD03" if alike else "FTD06", why)
-        text = f"{before}; the nearest disagreement to others is not sought"
-        return note("FT203", "rows", text, declined, measures=tuple(measures))
-    some = f"{count} of {alike}" if count < alike else str(alike)
+        return audit_answer(
+            "FT203.not-sought",
+            "rows",
+            declined,
+            measures=tuple(measures),
+            facts=facts,
+        )
+    if count < alike:
+        facts["others"] = alike
     best, low = search.best, search.low or Fraction(0)
     if best is None or best.point is None or best.high is None:
         state = _no_nearest(search, low)
-        text = f"{before}; no disagreement is known around {some} others"
-        return note("FT203", "rows", text, state, measures=tuple(measures))
+        return audit_answer(
+            "FT203.none-known", "rows", state, measures=tuple(measures), facts=facts
+        )
     measures.append(distance_measure("certified distance", low))
     measures.append(distance_measure("distance of the witness", best.high))
     measures.append(Measure("row", search.row))
     state = narrowed_state(
         "the distance of the nearest disagreement", low, best, search.claims, search.why
     )
-    text = f"{before}; around {some} others the nearest disagreement is "
-    text += f"{percent(best.high)} {OF_RANGES} from row {search.row}"
-    return note("FT203", "rows", text, state, measures=tuple(measures))
+    return audit_answer(
+        "FT203.nearest", "rows", state, measures=tuple(measures), facts=facts
+    )
 
 
 def _no_nearest(search: _Search, low: Fraction) -> State:
@@ -359,7 +363,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     leaf_regions = regions(tree)
     declined = too_many_boxes(leaf_regions)
     if declined is not None:
-        yield note("FT203", "leaves", NOT_LOOKED_AT, declined)
+        yield audit_answer("FT203.leaves-declined", "leaves", declined)
         return
     known: list[AuditAnswer] = []
     for answer in leaf_differences(subject, raw, tree, leaf_regions):
@@ -397,23 +401,23 @@ def leaf_differences(
             alike += 1
         else:
             yield _difference(arrangement, region, state)
-    text = f"in {alike} of {len(leaf_regions)} leaves "
-    text += "the raw rules decide as the tree does"
     how = f"all other decisions were sought in {count} boxes of the leaves"
-    yield note("FT203", "leaves", text, Proved(how))
+    facts = {"alike": alike, "leaves": len(leaf_regions)}
+    yield audit_answer("FT203.leaves", "leaves", Proved(how), facts=facts)
 
 
 def _difference(arrangement: Arrangement, region: Region, state: State) -> AuditAnswer:
     name = f"leaf {region.leaf}"
     rules: tuple[int, ...] = (region.leaf,)
     if not isinstance(state, Witness):
-        text = f"whether the raw rules decide differently in {name} is left open"
-        return note("FT203", name, text, state, rules=rules)
+        return audit_answer("FT203.open", name, state, rules=rules)
     strengths = strengths_at(arrangement, point_of(state.point))
     best = max(strengths)
     winner = strengths.index(best) + 1
     if best and winner != region.leaf:
         rules = (*rules, winner)
-    text = f"in {name} the tree answers {region.label!r}, and somewhere there "
-    text += f"the raw rules answer {answer_text(state.claims[-1].label)}"
-    return finding("FT203", name, text, state, rules=rules, region=state.region)
+    facts = {"then": region.label, "other": state.claims[-1].label}
+    span = state.region
+    return audit_answer(
+        "FT203.differs", name, state, rules=rules, region=span, facts=facts
+    )

@@ -19,8 +19,8 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,
     bounded_arrangement,
 )
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.rows import rank_by_distance
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics import outwards
@@ -29,7 +29,6 @@ MOST_GAPS: Final = 8
 """The most gaps that are listed one by one."""
 
 _MOST_BOXES = 64  # parts of the domain in which a gap is looked for
-_MOST_SIDES = 3  # of a gap in a sentence
 _PART = 0.3  # of the time that is left, for one question
 
 
@@ -37,8 +36,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Answer whether some input is covered by no rule, or by less than epsilon."""
     if not subject.is_whole:
         reason = "rules that are left out of the view may cover what the others do not"
-        sentence = "whether an input is covered by no rule is not decided"
-        yield note("FT301", "cover", sentence, Declined("FTD07", reason))
+        yield audit_answer("FT301.not-decided", "cover", Declined("FTD07", reason))
         return
     sides = bounded_arrangement(subject)
     if sides.lower.is_empty:
@@ -47,10 +45,8 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     if isinstance(bare, Witness):
         yield from _gaps(subject, sides.upper, bare)
         return
-    sentence = "some rule fires everywhere on the domain"
-    if not isinstance(bare, Proved):
-        sentence = "it is open whether some rule fires everywhere"
-    yield note("FT301", "cover", sentence, bare)
+    message = "FT301.fires" if isinstance(bare, Proved) else "FT301.open"
+    yield audit_answer(message, "cover", bare)
     yield _weak(subject, sides)
 
 
@@ -63,20 +59,15 @@ def _weak(subject: Subject, sides: BoundedArrangement) -> AuditAnswer:
         Measure("strength where it is least, at least", least.low),
         Measure("strength where it is least, at most", least.high),
     )
-    subject_of = f"cover of {epsilon:g}"
-    if isinstance(state, Proved):
-        sentence = f"some rule has a strength of at least {epsilon:g} everywhere"
-        return note("FT301", subject_of, sentence, state, measures=measures)
-    if isinstance(state, Witness):
-        sentence = (
-            f"no rule has a strength of {epsilon:g} {_place(state.region)}; where it "
-            f"is least, the strongest rule has {least.high:.3g}"
-        )
-        return finding(
-            "FT301", subject_of, sentence, state, region=state.region, measures=measures
-        )
-    sentence = f"it is open whether some rule reaches {epsilon:g} everywhere"
-    return note("FT301", subject_of, sentence, state, measures=measures)
+    message = "FT301.reaches" if isinstance(state, Proved) else "FT301.reaches-open"
+    return audit_answer(
+        "FT301.weak" if isinstance(state, Witness) else message,
+        f"cover of {epsilon:g}",
+        state,
+        region=state.region if isinstance(state, Witness) else (),
+        measures=measures,
+        facts={"epsilon": epsilon},
+    )
 
 
 def _gaps(
@@ -95,39 +86,21 @@ def _gaps(
         replace(one, subject=f"gap {place}") for place, one in enumerate(gaps, 1)
     )
     if not is_all:
-        sentence = f"there may be more gaps than the {len(witnesses)} that are listed"
         reason = f"{MOST_GAPS} gaps at most are looked for, within the budget"
-        state = Declined("FTD05", reason)
-        yield note("FT301", "more gaps", sentence, state)
+        state, facts = Declined("FTD05", reason), {"count": len(witnesses)}
+        yield audit_answer("FT301.more", "more gaps", state, facts=facts)
 
 
 def _gap(subject: Subject, state: Witness) -> AuditAnswer:
-    answer = subject.policy.uncovered
-    what = "no class" if answer is None else f"{answer!r}"
-    if subject.policy.decision == "all":
-        what = "what the outputs have by default"
-    sentence = f"no rule fires {_place(state.region)}: the answer is {what}"
-    severity: Severity = "warning" if answer is None else "info"
-    return AuditAnswer(
-        "FT301", "gap", sentence, state, True, severity=severity, region=state.region
-    )
-
-
-def _place(region: tuple[Span, ...]) -> str:
-    """Return where a gap is, for a sentence."""
-    texts = [f"{one.variable!r} is {_stretch(one)}" for one in region[:_MOST_SIDES]]
-    if len(region) > _MOST_SIDES:
-        texts.append("so on")
-    return f"where {' and '.join(texts)}" if texts else "here"
-
-
-def _stretch(side: Span) -> str:
-    low, high = (None if end is None else f"{end:.6g}" for end in (side.low, side.high))
-    if low is None or high is None:
-        return f"at most {high}" if low is None else f"at least {low}"
-    if low == high:  # equal in six digits
-        return f"about {low}" if side.low != side.high else low
-    return f"{low} to {high}"
+    label, region = subject.policy.uncovered, state.region
+    if label is not None:
+        facts = {"then": label}
+        return audit_answer(
+            "FT301.gap-with-class", "gap", state, region=region, facts=facts
+        )
+    is_system = subject.policy.decision == "all"
+    message = "FT301.gap-of-system" if is_system else "FT301.gap"
+    return audit_answer(message, "gap", state, region=region)
 
 
 def _separate(

@@ -24,11 +24,11 @@ from fuzzytree.auditing.engine.states import (
     Span,
     Witness,
     coordinates,
-    number_text,
 )
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.recheck.sentences import open_interval
 from fuzzytree.model import FuzzyTree
 
 MOST_BOXES = 20_000
@@ -36,8 +36,6 @@ MOST_BOXES = 20_000
 
 MOST_LISTED = 1000
 """Boxes beyond which the regions of leaves are not listed."""
-
-NOT_LOOKED_AT = "the regions of the leaves are not looked at"
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
@@ -52,7 +50,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     declined = too_many_boxes(tree_regions)
     if declined is not None:
         for code in ("FT101", "FT205"):
-            yield note(code, "leaves", NOT_LOOKED_AT, declined)
+            yield audit_answer(f"{code}.leaves-declined", "leaves", declined)
         return
     yield from leaf_regions(subject, tree, tree_regions)
 
@@ -73,8 +71,7 @@ def leaf_regions(
     live, count = 0, sum(map(box_count, tree_regions))
     if count > MOST_LISTED:
         why = f"the leaves are made of {count} boxes, more than {MOST_LISTED}"
-        text = "the regions of the leaves are not listed"
-        yield note("FT205", "leaves", text, Declined("FTD05", why))
+        yield audit_answer("FT205.not-listed", "leaves", Declined("FTD05", why))
     for region in tree_regions:
         subject.clock.check()
         inside = [*boxes(region, tree, subject.domain)]
@@ -89,9 +86,9 @@ def leaf_regions(
             if len(parts) > 1:
                 name += f", part {number} of {len(parts)}"
             yield _region(subject, tree, region, name, box, point)
-    text = f"{live} of {len(tree_regions)} leaves are reached"
     how = "a point in each of their regions was found and evaluated in fractions"
-    yield note("FT101", "leaves", text, Proved(how))
+    facts = {"live": live, "leaves": len(tree_regions)}
+    yield audit_answer("FT101.leaves", "leaves", Proved(how), facts=facts)
 
 
 def _region(
@@ -106,20 +103,19 @@ def _region(
     unions = dict(region.sides)
     cut_sides = [side for side in box.sides if side.variable in unions]
     spans = tuple(Span(side.variable, side.low, side.high) for side in cut_sides)
-    ends = [(side.variable, _ends(side, unions[side.variable])) for side in cut_sides]
-    texts = [
-        f"{variable!r} is {values_text((interval,))}"
-        for variable, interval in ends
-        if interval != (None, None)
-    ]
-    where = f"where {' and '.join(texts)}" if texts else "everywhere"
+    ends = [(side.variable, *_ends(side, unions[side.variable])) for side in cut_sides]
     claim = Claim("decides", of="tree", label=region.label)
     share = share_of(box, tree, subject.domain)
     measures = () if share is None else (Measure("share of the domain", share),)
     state = Witness(coordinates(point), (claim,), spans)
-    text, rules = f"{name} decides {region.label!r} {where}", (region.leaf,)
-    return note(
-        "FT205", name, text, state, rules=rules, region=spans, measures=measures
+    return audit_answer(
+        "FT205.region",
+        name,
+        state,
+        rules=(region.leaf,),
+        region=spans,
+        measures=measures,
+        facts={"then": region.label, "ends": tuple(ends)},
     )
 
 
@@ -160,25 +156,30 @@ def _unreached(
     how = "the intervals on its path have nothing in common with the domain"
     if count:
         how = f"{count} boxes of combinations tested: no point of the inputs is in them"
-    text = f"{name} (rule {region.leaf}) is never reached: "
-    text += _reason(tree, region, subject.domain)
-    return finding("FT101", name, text, Proved(how), rules=(region.leaf,))
+    message, facts = _reason(tree, region, subject.domain)
+    facts["leaf"] = region.leaf
+    return audit_answer(message, name, Proved(how), rules=(region.leaf,), facts=facts)
 
 
-def _reason(tree: FuzzyTree, region: Region, domain: Domain) -> str:
-    """Return why no input reaches a leaf."""
+def _reason(
+    tree: FuzzyTree, region: Region, domain: Domain
+) -> tuple[str, dict[str, FactValue]]:
+    """Return why no input reaches a leaf: the message, and what it says."""
     for variable, union in region.sides:
         if not union:
-            return f"the nodes for {variable!r} on its path exclude each other"
+            return "FT101.leaf-excluded", {"variable": variable}
         side = domain.side(variable)
         if side is not None and not any(cut_side(side, one) for one in union):
-            return (
-                f"its path needs {variable!r} {values_text(union)}, and the domain "
-                f"is {number_text(side.low)} to {number_text(side.high)}"
-            )
+            ends = {"low": side.low, "high": side.high}
+            values = values_text(union)
+            return "FT101.leaf-outside", {
+                "variable": variable,
+                "values": values,
+                **ends,
+            }
     combined = {variable.name for variable in tree.variables if variable.parts}
     names = [repr(name) for name, _ in region.sides if name in combined]
-    return f"no input of the domain meets what its path needs of {' and '.join(names)}"
+    return "FT101.leaf-unmet", {"variables": " and ".join(names)}
 
 
 def values_text(union: Union) -> str:
@@ -188,9 +189,4 @@ def values_text(union: Union) -> str:
         >>> values_text(((None, 0.5), (1.0, 2.0)))
         'at most 0.5 or above 1 and at most 2'
     """
-    texts: list[str] = []
-    for low, high in union:
-        above = [] if low is None else [f"above {number_text(low)}"]
-        below = [] if high is None else [f"at most {number_text(high)}"]
-        texts.append(" and ".join([*above, *below]) or "any value")
-    return " or ".join(texts)
+    return " or ".join(open_interval(low, high) for low, high in union)

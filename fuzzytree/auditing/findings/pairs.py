@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from msgspec.structs import replace
-
 from fuzzytree.auditing.engine.dominance import Dominance, JointMaximum
 from fuzzytree.auditing.engine.factors import RuleDistance
 from fuzzytree.auditing.engine.states import (
@@ -17,7 +15,6 @@ from fuzzytree.auditing.engine.states import (
     State,
     Witness,
     counted,
-    short,
 )
 from fuzzytree.auditing.engine.witnesses import coupled
 from fuzzytree.auditing.findings.bounded_arrangement import (
@@ -25,8 +22,8 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     bounded_arrangement,
 )
 from fuzzytree.auditing.findings.clauses import clause_answers
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure, Severity
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
 from fuzzytree.model import FloatArray
@@ -104,22 +101,22 @@ def _hidden(
         elif back == "always":
             hiding.setdefault(first, []).append(second)
     for weak, strong in sorted(hiding.items()):
-        name, by = subject.rule_name(weak), subject.rule_name(strong[0])
-        code, verb = "FT104", "subsume"
-        text = f"is subsumed by {by}: wherever it fires, {by} of the same "
-        text += f"{_noun(subject)} is at least as strong"
+        message, verb = "FT104.subsumed", "subsume"
         if not is_alike:
-            code, verb = "FT105", "mask"
-            text = f"is never answered: wherever it fires, {by} of class "
-            text += f"{_then(subject, strong[0])!r} is "
-            is_before = strong[0] < weak
-            text += (
-                "at least as strong and stands before it" if is_before else "stronger"
-            )
-        count = Measure(f"rules that {verb} it", len(strong))
-        proof, rules = Proved(_how(compared)), (weak, *strong)
-        text = f"{name} {text}"
-        yield finding(code, name, text, proof, rules=rules, measures=(count,))
+            is_before, verb = strong[0] < weak, "mask"
+            message = "FT105.masked" if is_before else "FT105.weaker"
+        yield audit_answer(
+            message,
+            subject.rule_name(weak),
+            Proved(_how(compared)),
+            rules=(weak, *strong),
+            measures=(Measure(f"rules that {verb} it", len(strong)),),
+            facts={
+                "by": subject.rule_name(strong[0]),
+                "noun": _noun(subject),
+                "then": _then(subject, strong[0]),
+            },
+        )
     if tested:
         counts = tested, len(hiding), undecided
         yield _rest_of_strengths(subject, compared, counts, is_alike=is_alike)
@@ -142,26 +139,24 @@ def _rest_of_strengths(
     """Return what is known of all pairs of which nothing is found."""
     tested, hidden, undecided = counts
     silent = len(compared.fires) - int(compared.fires.sum())
-    code, word, kind = "FT105", "masked", "two classes"
-    if is_alike:
-        code, word, kind = "FT104", "subsumed", f"one {_noun(subject)}"
-    among = f"{word}, among {counted(tested, 'pair')} of {kind}"
-    rest = "no other rule is" if hidden else "no rule is"
+    facts: dict[str, FactValue] = {"noun": _noun(subject)}
+    if hidden:
+        facts["listed"] = hidden
     state: State = Proved(_how(compared))
-    sentence = f"{rest} {among}"
     if coupled(compared.lower):
         state = Declined("FTD04", "the inputs of variables depend on each other")
     elif undecided:
         pairs = counted(undecided, "pair")
         state = Declined("FTD02", f"{pairs} of strengths are too near to compare")
-    if isinstance(state, Declined):
-        sentence = f"{rest} shown to be {among}: {state.reason}"
     measures = (
         Measure("pairs", tested),
         Measure("pairs too near to compare", undecided),
         Measure("rules that never fire", silent),
     )
-    return note(code, "pairs of rules", sentence, state, measures=measures)
+    message = "FT104.others" if is_alike else "FT105.others"
+    return audit_answer(
+        message, "pairs of rules", state, measures=measures, facts=facts
+    )
 
 
 # --- FT106: do two rules have the same antecedent?
@@ -185,49 +180,49 @@ def _copied(subject: Subject, compared: BoundedArrangement) -> Iterator[AuditAns
             near += 1
     decides = subject.policy.decision == "strongest"
     for pair, distance in copies:
-        first, second = (subject.rule_name(number) for number in pair)
-        one, other = (_then(subject, number) for number in pair)
-        is_exact = not distance.each.high
-        nearly = "the same antecedent" if is_exact else "nearly the same antecedent"
-        if one == other:
-            text = f"and the same {_noun(subject)} {one!r}"
-        elif decides:
-            text = f"and contradict each other: {one!r} and {other!r}"
-        else:
-            text = f"and different conclusions: {one!r} and {other!r}"
+        facts = _facts(subject, pair)
+        message = "FT106.contradiction" if decides else "FT106.different"
         measures: tuple[Measure, ...] = (measure("largest distance", distance.each),)
-        if not is_exact:
+        if distance.each.high:
             variable = compared.lower.axes[distance.axis].variable
-            text += (
-                f"; degrees differ by at most {short(distance.each.high)}, "
-                f"at {variable.name!r} = {short(distance.at)}"
-            )
+            facts["variable"] = variable.name
             measures += (
                 Measure("place of it", float(distance.at), unit=variable.unit),
             )
-        severity: Severity = "warning"
-        if one != other:  # a contradiction; in a system two rules for two outputs
-            severity = "error" if decides else "info"
-        both = f"{first} and {second}"
-        proof = Proved("their curves were compared piece by piece in fractions")
-        same = finding("FT106", both, f"{both} have {nearly} {text}", proof, rules=pair)
-        yield replace(same, severity=severity, measures=measures)
+        yield audit_answer(
+            "FT106.same" if facts["then"] == facts["other"] else message,
+            _both(subject, pair),
+            Proved("their curves were compared piece by piece in fractions"),
+            rules=pair,
+            measures=measures,
+            facts=facts,
+        )
     if not pairs:
         return
-    among = counted(pairs, "pair")
-    rest = "no two rules" if not copies else "no other two rules"
-    sentence = f"{rest} have nearly the same antecedent, among {among}"
     state: State = Proved(
-        f"somewhere their degrees differ by more than {short(NEARLY)}"
+        f"somewhere their degrees differ by more than {float(NEARLY):g}"
     )
     if near:
         reason = f"{counted(near, 'pair')} of degrees are too near to compare"
-        sentence = f"{rest} are shown to have nearly the same antecedent, among "
-        sentence += f"{among}: {reason}"
         state = Declined("FTD02", reason)
-    yield note(
-        "FT106", "pairs of rules", sentence, state, measures=(Measure("pairs", pairs),)
+    yield audit_answer(
+        "FT106.others",
+        "pairs of rules",
+        state,
+        measures=(Measure("pairs", pairs),),
+        facts={"listed": len(copies)} if copies else {},
     )
+
+
+def _both(subject: Subject, pair: Pair) -> str:
+    first, second = (subject.rule_name(number) for number in pair)
+    return f"{first} and {second}"
+
+
+def _facts(subject: Subject, pair: Pair) -> dict[str, FactValue]:
+    """Return what two rules conclude, and what that is called."""
+    one, other = (_then(subject, number) for number in pair)
+    return {"noun": _noun(subject), "then": one, "other": other}
 
 
 # --- FT201: do rules of different classes reach a level together?
@@ -288,58 +283,53 @@ def _may_conflict(subject: Subject, one: int, other: int) -> bool:
 
 
 def _conflict(subject: Subject, pair: Pair, joint: JointMaximum) -> AuditAnswer:
-    first, second = (subject.rule_name(number) for number in pair)
-    one, other = (_then(subject, number) for number in pair)
     low, high = joint.level
-    both, state = f"{first} and {second}", joint.state
+    both, state, facts = _both(subject, pair), joint.state, _facts(subject, pair)
     most = Measure("highest common level at most", float(high))
     if not isinstance(state, Witness):
-        text = f"{both} may conflict, on {one!r} and {other!r}: no more than "
-        text += f"{short(high)} is reached by both"
-        return note("FT201", both, text, state, rules=pair, measures=(most,))
-    text = f"{both} conflict: both reach {level_reached(joint)} at one input, "
-    text += f"and say {one!r} and {other!r}"
+        return audit_answer(
+            "FT201.may", both, state, rules=pair, measures=(most,), facts=facts
+        )
+    # A point in fractions may fall a little short of a level that is irrational.
+    shown = [Fraction(one.level or 0) for one in state.claims]
+    facts["level"] = float(low)
+    if max(shown, default=low) < low:
+        facts["falls short"] = float(low - max(shown))
     exact = str(low) if low == high else None
     measures: tuple[Measure, ...]
     measures = (Measure("highest common level", float(low), exact),)
     if high - low > NEARLY:
         measures = (Measure("highest common level at least", float(low)), most)
-    conflict = finding("FT201", both, text, state, rules=pair, measures=measures)
-    return replace(conflict, region=state.region)
-
-
-def level_reached(joint: JointMaximum) -> str:
-    """Return the level that two rules both reach, as their sentence says it.
-
-    A point in fractions may fall a little short of a level that is irrational.
-    """
-    low = joint.level.low
-    if not isinstance(joint.state, Witness):
-        return short(low)
-    shown = [Fraction(one.level or 0) for one in joint.state.claims]
-    is_short = max(shown, default=low) < low or (low < 1 and short(low) == "1")
-    return f"{'nearly ' if is_short else ''}{short(low)}"
+    return audit_answer(
+        "FT201.conflict",
+        both,
+        state,
+        rules=pair,
+        region=state.region,
+        measures=measures,
+        facts=facts,
+    )
 
 
 def _rest_of_conflicts(
     subject: Subject, compared: BoundedArrangement, counts: tuple[int, int], hidden: int
 ) -> AuditAnswer:
     clean, touching = counts
-    level, noun = short(subject.settings.level), _noun(subject)
-    kind = "classes" if noun == "class" else "conclusions"
-    pairs, reach = counted(clean, "pair"), "reaches" if clean == 1 else "reach"
-    never = f"{pairs} of rules of different {kind} never {reach} {level} together"
-    parts = [never] if clean else []
+    is_one = _noun(subject) == "class"
+    facts: dict[str, FactValue] = {
+        "level": subject.settings.level,
+        "nouns": "classes" if is_one else "conclusions",
+    }
     if touching:
-        parts.append(f"{touching} of them at most touch it, at irrational values")
-    if hidden:
-        more = counted(hidden, "more pair")
-        parts.append(f"{more} of rules may reach {level}, not listed")
+        facts["touching"] = touching
     means = "products" if compared.is_product else "minima"
-    proof = Proved(f"the largest {means} of degrees were found on each axis")
-    measures = (
-        Measure("pairs that never do", clean),
-        Measure("pairs not listed", hidden),
+    return audit_answer(
+        "FT201.unlisted" if hidden else "FT201.never",
+        "pairs of rules",
+        Proved(f"the largest {means} of degrees were found on each axis"),
+        measures=(
+            Measure("pairs that never do", clean),
+            Measure("pairs not listed", hidden),
+        ),
+        facts=facts,
     )
-    build = finding if hidden else note
-    return build("FT201", "pairs of rules", "; ".join(parts), proof, measures=measures)

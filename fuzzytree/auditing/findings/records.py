@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final, Literal
 
 import msgspec
@@ -19,6 +19,9 @@ INTERRUPTED: Final = "interrupted"
 """How a sentence of `Audit.unasked` ends where Ctrl-C is the reason."""
 
 Severity = Literal["error", "warning", "info"]
+Scalar = str | int | float | None
+FactValue = Scalar | tuple[tuple[Scalar, ...], ...]
+"""A text, a number, None for no class, or rows of these."""
 
 
 class FileLocation(Value, frozen=True):
@@ -76,6 +79,10 @@ class AuditAnswer(Value, frozen=True):
         repeat: The command that finds it again.
         id: Names the finding across releases: the code and a hash of what the rules
             and terms concerned say, whatever their order in the file is.
+        message: What kind of sentence it is; see
+            `fuzzytree.auditing.recheck.sentences`.
+        facts: What the sentence says besides the subject, the measures, the region
+            and the state.
     """
 
     code: str
@@ -91,6 +98,8 @@ class AuditAnswer(Value, frozen=True):
     places: tuple[FileLocation, ...] = ()
     repeat: str = ""
     id: str = ""
+    message: str = ""
+    facts: Mapping[str, FactValue] = {}
 
 
 class AuditSelection(msgspec.Struct, frozen=True, kw_only=True):

@@ -17,8 +17,8 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State
 from fuzzytree.auditing.findings import conventions
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.checking import check, probed
@@ -109,17 +109,12 @@ def agreement_answers(
         if text.startswith("all cells"):  # a proof covers them
             continue
         name = text.partition(" is not installed")[0].partition(": ")[0]
-        sentence = f"{name} is not compared: {text}"
-        yield note("FT601", name, sentence, Declined("FTD08", text))
+        yield audit_answer("FT601.not-compared", name, Declined("FTD08", text))
 
 
 def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> AuditAnswer:
     noun = "probes and rows" if one.basis == "rows" else "ways"
     facts = "; ".join(one.detail[:2])
-    sentence = (
-        f"{one.representation} disagrees with {one.against} in {one.differing} of "
-        f"{one.rows} {noun}"
-    )
     state: State = Proved(f"both were run or read; {facts}")
     if subject.system is None and one.row_numbers:
         model = _model(subject)
@@ -133,8 +128,15 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Audi
         Measure("rows of another class", one.flips),
         Measure("largest difference", one.largest_difference),
     )
-    sentence += f": {facts}" if facts else ""
-    return finding("FT601", one.representation, sentence, state, measures=measures)
+    known: dict[str, FactValue]
+    known = {"against": one.against, "rows": one.rows, "noun": noun}
+    return audit_answer(
+        "FT601.disagrees",
+        one.representation,
+        state,
+        measures=measures,
+        facts=known | ({"detail": facts} if facts else {}),
+    )
 
 
 def _form(one: Comparison) -> str:
@@ -148,18 +150,13 @@ def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> AuditAnswer:
     how = "; ".join(
         f"{c.representation} and {c.against}: {c.rows}, {c.origin}" for c in ones
     )
-    match basis:
-        case "rows":
-            rows = max(one.rows for one in ones)
-            count = len(ones)
-            text = (
-                f"{count} representations answer alike on up to {rows} probes and rows"
-            )
-        case "calls":
-            text = f"{len(ones)} representations answer alike however they are called"
-        case _:
-            text = f"{len(ones)} representations are equal on every input"
-    return note("FT601", f"representations, by {basis}", text, Proved(how))
+    messages = {"rows": "FT601.alike", "calls": "FT601.alike-by-calls"}
+    return audit_answer(
+        messages.get(basis, "FT601.equal"),
+        f"representations, by {basis}",
+        Proved(how),
+        facts={"count": len(ones), "rows": max(one.rows for one in ones)},
+    )
 
 
 # --- what a number type can change
@@ -171,10 +168,9 @@ def _certified(
     """Yield the bound of a number type's error, and where it leaves a class open."""
     name = one.representation
     if one.verdict == "DISAGREES":
-        facts = "; ".join(one.detail[:2])
-        text = f"{name} errs by more than its certified bound: {facts}"
+        facts = {"detail": "; ".join(one.detail[:2])}
         proof = Proved("each row was compared with its exact answer")
-        yield finding("FT601", name, text, proof)
+        yield audit_answer("FT601.exceeds", name, proof, facts=facts)
     bound = certify(_within(form, subject.domain), _DTYPES[one.dtype])
     measures = []
     if bound.delta is not None:
@@ -182,16 +178,24 @@ def _certified(
         measures.append(Measure("margin that is certain", 2.0 * bound.delta))
     if one.largest is not None:
         measures.append(Measure("largest error seen", one.largest))
-    sentence = f"{name}: {bound.sentence}"
-    state = _bounded(bound, one)
-    yield note("FT601", name, sentence, state, measures=tuple(measures))
+    yield audit_answer(
+        "FT601.certified",
+        name,
+        _bounded(bound, one),
+        measures=tuple(measures),
+        facts={"bound": bound.sentence},
+    )
     if one.on == "data" and one.rows:
         noun = "rows" if subject.rows is not None else "points"
-        text = f"{name}: the class is open on {one.in_band} of {one.rows} {noun}"
         share = sampled_share(
             f"{noun} within the band of {name}", one.in_band, one.rows, how
         )
-        yield note("FT601", f"{name}, its band", text, share)
+        yield audit_answer(
+            "FT601.band",
+            f"{name}, its band",
+            share,
+            facts={"representation": name, "noun": noun},
+        )
 
 
 def _bounded(bound: Certificate, one: Certified) -> State:

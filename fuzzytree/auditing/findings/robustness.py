@@ -36,17 +36,14 @@ from fuzzytree.auditing.engine.states import (
     Representation,
     State,
     Witness,
-    answer_text,
     coordinates,
     number_text,
-    percent,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.auditing.findings.codes import note
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure
+from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.rows import (
-    OF_RANGES,
     DomainRows,
     distance_measure,
     narrowed_state,
@@ -206,9 +203,6 @@ MOST_ROWS_OF_TREE = 1000
 SHOWN_ROWS = 5
 """Rows of the smallest radius that have an answer of their own."""
 
-ASIDE = ", places where strengths only touch aside"
-"""What a sentence adds where rules of other classes go first in a tie."""
-
 _PART = 0.9  # of the time, to seek; the rest is for the answers
 _MOST_NAMED = 4  # inputs in a sentence
 
@@ -236,21 +230,18 @@ def row_answers(subject: Subject, row: Mapping[str, float]) -> Iterator[AuditAns
     """
     declined = _declined(subject)
     if declined is not None:
-        yield note("FT204", "row", NOT_SOUGHT, declined)
+        yield audit_answer("FT204.not-sought", "row", declined)
         return
     point = _point(subject, row)
     label, by = decider_of(subject).decided(point)
     claim = Claim("decides", of=decider_of(subject).of, label=label)
-    yield note(
-        "FT204",
+    yield audit_answer(
+        "FT204.decided",
         "row",
-        f"the row is decided as {answer_text(label)} by {by}",
         Witness(coordinates(point), (claim,)),
+        facts={"then": label, "by": by},
     )
     yield radius(subject, row)
-
-
-NOT_SOUGHT = "the nearest other decision is not sought"
 
 
 def _declined(subject: Subject) -> Declined | None:
@@ -281,30 +272,30 @@ def _answer(
     decider: Decider, name: str, point: Mapping[str, Fraction], result: Nearest
 ) -> AuditAnswer:
     own, _ = decider.decided(point)
-    aside = ASIDE if decider.leaves_out(own) else ""
+    facts: dict[str, FactValue] = {"name": name, "then": own}
+    if decider.leaves_out(own):  # rules of other classes go first in a tie
+        facts["aside"] = 1
+    title = name.removeprefix("the ")
     what = f"the distance from {name} to another decision"
     state: State
     if result.point is None or result.high is None:
         if result.is_none:
-            text = f"all of the domain is decided as {name}, {answer_text(own)}{aside}"
             state = Proved("other decisions were sought on the whole domain")
-        else:
-            text = f"no decision other than {answer_text(own)} is known around {name}"
-            state = Bracket(what, outwards(result.low)[0], 1.0, result.why)
-        return note("FT204", name.removeprefix("the "), text, state)
+            return audit_answer("FT204.alike", title, state, facts=facts)
+        state = Bracket(what, outwards(result.low)[0], 1.0, result.why)
+        return audit_answer("FT204.none-known", title, state, facts=facts)
     other, _ = decider.decided(result.point)
     claim = Claim("decides", of=decider.of, label=other)
     moved = [axis for axis, value in result.point.items() if value != point[axis]]
     values = _short_values(decider, point, result.point, moved)
-    changed = " and ".join(f"{axis!r} is {values[axis]}" for axis in moved)
+    facts |= {"other": other, "moved": tuple((axis, values[axis]) for axis in moved)}
+    message = "FT204.nearest"
     if len(moved) > _MOST_NAMED:
-        changed = f"{len(moved)} inputs move by no more than {percent(result.high)}"
-    text = f"{name} stays {answer_text(own)} within {percent(result.low)} {OF_RANGES}"
-    text += f"{aside}; where {changed} it is {answer_text(other)}"
+        message, facts["moved"] = "FT204.nearest-of-many", len(moved)
     state = narrowed_state(what, result.low, result, [claim], result.why)
     low = distance_measure("certified radius", result.low)
     measures = low, distance_measure("distance of the witness", result.high)
-    return note("FT204", name.removeprefix("the "), text, state, measures=measures)
+    return audit_answer(message, title, state, measures=measures, facts=facts)
 
 
 def _short_values(
@@ -346,7 +337,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     declined = _declined(subject)
     if declined is not None or subject.rows is None:
         needed = Declined("FTD06", "rows are needed (--data TABLE)")
-        yield note("FT204", "rows", NOT_SOUGHT, declined or needed)
+        yield audit_answer("FT204.not-sought", "rows", declined or needed)
         return
     points = points_of(subject, subject.rows)
     decider = decider_of(subject)
@@ -389,19 +380,21 @@ def _in_all(points: DomainRows, radii: Sequence[_RowRadius]) -> AuditAnswer:
             if points.at
             else Declined("FTD06", "no row lies in the domain")
         )
-        return note("FT204", "rows", NOT_SOUGHT, state, measures=(count,))
+        return audit_answer("FT204.not-sought", "rows", state, measures=(count,))
     first = radii[0]
     least = first.low
-    aside = ASIDE if any(one.is_aside for one in radii) else ""
-    of_all = "" if len(radii) == len(points.at) else "with the smallest margins "
+    facts = points.facts
+    if any(one.is_aside for one in radii):
+        facts["aside"] = 1
+    if len(radii) < len(points.at):
+        facts["different"] = len(points.at)
     median = statistics.median_low([one.low for one in radii])
-    text = f"of {points.text} {len(radii)} different ones {of_all}were evaluated: "
-    text += f"each keeps its decision within at least {percent(least)} {OF_RANGES}, "
-    text += f"half of them within {percent(median)}{aside}"
     measures = (
         count,
         distance_measure("smallest certified radius", least),
         distance_measure("median certified radius", median),
         Measure("row", first.number),
     )
-    return note("FT204", "rows", text, first.answer.state, measures=measures)
+    return audit_answer(
+        "FT204.rows", "rows", first.answer.state, measures=measures, facts=facts
+    )

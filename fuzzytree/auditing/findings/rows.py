@@ -22,14 +22,11 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
     point_of,
 )
-from fuzzytree.auditing.findings.codes import note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import Variable
 from fuzzytree.numerics import decide, outwards
-
-OF_RANGES = "of each input's range"
-"""The unit of distances: the largest difference of an input, in its range's width."""
 
 _MOST_DIGITS = 80  # of an exact number beside a double
 
@@ -50,12 +47,10 @@ class DomainRows(msgspec.Struct, frozen=True, eq=False):
     total: int
 
     @property
-    def text(self) -> str:
+    def facts(self) -> dict[str, FactValue]:
         """Which rows these are, as sentences show it."""
-        text = f"{self.total} rows"
-        if self.left_out:
-            text += f" ({self.left_out} incomplete or outside the domain)"
-        return text
+        facts: dict[str, FactValue] = {"total": self.total}
+        return {**facts, "incomplete": self.left_out} if self.left_out else facts
 
 
 def points_of(subject: Subject, rows: AuditRows) -> DomainRows:
@@ -235,8 +230,8 @@ def box_distance(
 def rows_left_out(code: str, count: int) -> AuditAnswer:
     """Return an answer that says how many rows the budget left out."""
     declined = Declined("FTD03", "the budget was spent")
-    text = f"{count} more rows are not evaluated"
-    return note(code, "more rows", text, declined)
+    facts = {"count": count}
+    return audit_answer(f"{code}.more-rows", "more rows", declined, facts=facts)
 
 
 def narrowed_state(

@@ -10,7 +10,7 @@ import msgspec
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, counted
-from fuzzytree.auditing.findings.codes import note
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
     AuditSettings,
@@ -144,10 +144,12 @@ class TimeSlices:
         except OutOfTimeError:
             return None
 
-    def rest(self, code: str, noun: str, what: str) -> Iterator[AuditAnswer]:
+    def rest(self, code: str, noun: str) -> Iterator[AuditAnswer]:
         """Yield that some questions are open, if there are any."""
         if self.left_out:
-            reason = "the budget was spent"
-            of = counted(self.left_out, noun)
-            sentence = f"{what} is not known for {of}: {reason}"
-            yield note(code, f"{of} left open", sentence, Declined("FTD03", reason))
+            yield audit_answer(
+                f"{code}.left-open",
+                f"{counted(self.left_out, noun)} left open",
+                Declined("FTD03", "the budget was spent"),
+                facts={"count": self.left_out},
+            )

@@ -17,8 +17,8 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, Sampled
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model import BoolArray, Clause, FloatArray, IntArray, RuleBase, shapes_of
 from fuzzytree.numerics import (
@@ -257,8 +257,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     """Count what the rows show about each rule, and estimate shares of the domain."""
     if subject.rows is None:
         reason = "rows are needed (--data TABLE)"
-        text = f"what rows say about the rules is not known: {reason}"
-        yield note("FT701", "rows", text, Declined("FTD06", reason))
+        yield audit_answer("FT701.needs-rows", "rows", Declined("FTD06", reason))
     else:
         yield from _of_rows(subject, subject.rows)
     yield from _of_domain(subject)
@@ -270,20 +269,17 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
     lower, most = _both(subject, rows.values, codes)
     how = f"every row of {rows.name}"
     total = lower.rows
-    for name, hits, text in (
-        ("rows with a missing value", lower.missing, "a value is missing"),
-        ("rows outside the domain", lower.outside, "a value is outside the domain"),
+    for message, name, hits in (
+        ("FT701.missing", "rows with a missing value", lower.missing),
+        ("FT701.outside", "rows outside the domain", lower.outside),
     ):
         state = sampled_share(name, hits, total, how)
-        sentence = f"on {hits} of {total} rows {text}"
-        yield AuditAnswer("FT701", name, sentence, state, hits > 0)
+        yield audit_answer(message, name, state, is_finding=hits > 0)
     if not lower.known:
         return
     if lower.missing:
         how += " without a missing value"
-    for answer in _shares(subject, (lower, most), "rows", how):
-        is_finding = isinstance(answer.state, Sampled) and answer.state.hits > 0
-        yield msgspec.structs.replace(answer, is_finding=is_finding)
+    yield from _shares(subject, (lower, most), "rows", how)
     for number in range(1, len(subject.rules.rules) + 1):
         least, fired = (int(one.fired[number - 1]) for one in (lower, most))
         if fired == least:
@@ -293,8 +289,7 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
         reason = (
             f"it fires on {least} of {lower.known} at least, and on {fired} at most"
         )
-        text = f"on how many rows {name} fires is not decided: {reason}"
-        yield note("FT701", name, text, Declined("FTD02", reason))
+        yield audit_answer("FT701.rule-open", name, Declined("FTD02", reason))
 
 
 def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
@@ -305,8 +300,7 @@ def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
     points = sample_points(subject.rules, subject.domain, rows, settings.seed)
     if not points.shape[1]:
         reason = "no drawn point lies within the sides of the combinations"
-        text = f"shares of the domain are not known: {reason}"
-        yield note("FT701", "domain", text, Declined("FTD04", reason))
+        yield audit_answer("FT701.no-points", "domain", Declined("FTD04", reason))
         return
     lower, most = _both(subject, points)
     how = f"points drawn evenly from the domain, seed {settings.seed}"
@@ -334,30 +328,32 @@ def _shares(
     """Yield in which share of some rows or points the rules are weak or undecided."""
     lower, most = counts
     settings, total = subject.settings, lower.known
-    questions: list[tuple[str, int, str]] = []
-    weak = f"no rule reaches {settings.epsilon!r}"
-    for name, hits, fewest, text in (
-        ("uncovered", lower.uncovered, most.uncovered, "no rule fires"),
-        ("weak", lower.weak, most.weak, weak),
+    questions: list[tuple[str, int]] = []
+    for name, hits, fewest in (
+        ("uncovered", lower.uncovered, most.uncovered),
+        ("weak", lower.weak, most.weak),
     ):
         if fewest >= hits and subject.is_whole:
-            questions.append((name, hits, text))
+            questions.append((name, hits))
         elif subject.is_whole:
             reason = f"there are {fewest} at least, and {hits} at most"
-            text = f"how many {noun} are {name} is not decided: {reason}"
-            yield note("FT701", f"{name} {noun}", text, Declined("FTD02", reason))
+            state = Declined("FTD02", reason)
+            yield audit_answer("FT701.not-known", f"{name} {noun}", state)
     if not subject.is_whole:
         reason = "rules are left out, and they may cover what the others do not"
-        text = f"how many {noun} are covered is not known: {reason}"
-        yield note("FT701", f"covered {noun}", text, Declined("FTD07", reason))
+        state = Declined("FTD07", reason)
+        yield audit_answer("FT701.not-known", f"covered {noun}", state)
     if subject.policy.decision == "strongest":
-        margin = f"the two strongest classes are at most {settings.margin!r} apart"
-        questions.append(("tied", lower.tied, "rules of two classes tie"))
-        questions.append(("close", lower.close, margin))
-    for name, hits, text in questions:
-        state = sampled_share(f"{name} {noun}", hits, total, how)
-        sentence = f"on {hits} of {total} {noun} {text}"
-        yield note("FT701", f"{name} {noun}", sentence, state)
+        questions += [("tied", lower.tied), ("close", lower.close)]
+    limits = {"epsilon": settings.epsilon, "margin": settings.margin}
+    for name, hits in questions:
+        yield audit_answer(
+            f"FT701.{name}",
+            f"{name} {noun}",
+            sampled_share(f"{name} {noun}", hits, total, how),
+            is_finding=hits > 0 and noun == "rows",
+            facts={"noun": noun, **limits},
+        )
 
 
 def _of_rule(
@@ -367,7 +363,7 @@ def _of_rule(
     name, total = subject.rule_name(number), counts.known
     fired, won = int(counts.fired[number - 1]), int(counts.won[number - 1])
     label = subject.rules.rules[number - 1].then
-    sentence = f"{name} fires on {fired or 'none'} of {total} rows"
+    facts: dict[str, FactValue] = {"known": total}
     measures = [Measure("rows fired", fired)]
     state = sampled_share(f"rows on which {name} fires", fired, total, how)
     is_finding = not fired
@@ -375,13 +371,18 @@ def _of_rule(
         is_finding = not won
         measures.append(Measure("rows won", won))
         state = sampled_share(f"rows that {name} wins", won, total, how)
-        sentence += f" and wins {won or 'none'}" if fired else ""
         if counts.right is not None and won:
             right = int(counts.right[number - 1])
             measures.append(Measure("rows won rightly", right))
             of = f"rows that {name} wins and that have its class"
             state = sampled_share(of, right, won, f"of {how}, those that it wins")
-            sentence += f"; {right} of these have its class {label!r}"
-    build = finding if is_finding else note
-    facts = "FT701", name, sentence, state
-    return build(*facts, rules=(number,), measures=tuple(measures))
+            facts["then"] = label
+    return audit_answer(
+        "FT701.rule",
+        name,
+        state,
+        is_finding=is_finding,
+        rules=(number,),
+        measures=tuple(measures),
+        facts=facts,
+    )

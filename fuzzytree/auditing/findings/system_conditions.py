@@ -16,7 +16,7 @@ from typing import Final, Literal, NoReturn
 
 from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.codes import note
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.curve_bounds import (
     CurveBounds,
     Interval,
@@ -174,7 +174,8 @@ def _answer(
     users: str,
 ) -> AuditAnswer:
     """Return what becomes of a term, and why."""
-    name, what = f"term {label.name!r} of {one.name!r}", "is left out"
+    name, message = f"term {label.name!r} of {one.name!r}", "FTD.left-out"
+    facts: dict[str, float] = {}
     kind = str(label.curve.__struct_config__.tag)
     reason = f"its curve ({kind}) has no exact method"
     if one.parts and one.clips:
@@ -182,12 +183,12 @@ def _answer(
     if lines is not None:
         if of is None and isinstance(lines.lower, Points):
             of = Fraction(lines.lower.values[0]), Fraction(lines.lower.values[-1])
-        apart = f" {float(gap(lines, of)):.2g} apart" if of else ""
-        what = f"is bounded by two lines{apart} at most"
+        message = "FTD.bounded"
+        facts = {"apart": float(gap(lines, of))} if of else {}
         reason += "; its shape and its overlaps are not checked"
     state = Declined("FTD02", f"{reason}; {users}")
     terms = (TermName(one.name, label.name),)
-    return note("FTD02", name, f"{name} {what}: {state.reason}", state, terms=terms)
+    return audit_answer(message, name, state, terms=terms, facts=facts)
 
 
 MOST_WAYS: Final = 64

@@ -6,7 +6,7 @@ The ranges of variables serve other questions too.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
 
@@ -36,10 +36,14 @@ from fuzzytree.auditing.engine.states import (
     Span,
     State,
     counted,
-    short,
 )
-from fuzzytree.auditing.findings.codes import finding, note
-from fuzzytree.auditing.findings.records import AuditAnswer, Measure, TermName
+from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.records import (
+    AuditAnswer,
+    FactValue,
+    Measure,
+    TermName,
+)
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import Points, RuleBase, Shape, Term, Variable, questions
 from fuzzytree.numerics import outwards
@@ -149,11 +153,12 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Audit
             else:
                 yield _low_term(of, term, height, at, len(axis.cells.rank))
     if clean:
-        terms = "1 term reaches" if clean == 1 else f"{clean} terms reach"
-        text = f"{terms} a degree of {short(level)} or more"
         proof = Proved(f"the height of {clean} terms was found")
         measures = (Measure("lowest height", float(lowest), str(lowest)),)
-        yield note("FT401", "terms", text, proof, measures=measures)
+        facts = {"count": clean, "level": float(level)}
+        yield audit_answer(
+            "FT401.reached", "terms", proof, measures=measures, facts=facts
+        )
 
 
 def _is_full(of: VariableRange, term: Term) -> bool:
@@ -172,17 +177,11 @@ def _is_full(of: VariableRange, term: Term) -> bool:
 def _low_term(
     of: VariableRange, term: Term, height: Bounds, at: Fraction, cells: int
 ) -> AuditAnswer:
-    name = term_name(of.variable, term)
-    where = f"from {short(of.low)} to {short(of.high)}"
-    text = f"its largest degree {where} is {short(height.nearest)}, at {short(at)}"
-    sentence = f"{name} is hardly reached: {text}"
-    if not height.high:
-        sentence = f"{name} is empty: its degree is 0 {where}"
     how = f"its curve was visited in {counted(cells, 'stretch', 'stretches')}, in each "
     how += "of which it is monotone"
-    terms, measures = labels_of(of, term), (measure("height", height),)
-    low = finding("FT401", name, sentence, Proved(how), terms=terms, measures=measures)
-    return replace(low, severity="warning") if height.high else low
+    message = "FT401.low" if height.high else "FT401.empty"
+    facts, height_of = {"at": float(at)}, measure("height", height)
+    return _of_term(message, of, term, Proved(how), facts, height_of)
 
 
 def _low_curve(
@@ -191,16 +190,30 @@ def _low_curve(
     """Return that a curve between bounds is hardly reached, or may be."""
     name = term_name(of.variable, term)
     low, high = outwards(height.low)[0], outwards(height.high)[1]
-    where = f"from {short(of.low)} to {short(of.high)}"
-    begins = "is hardly reached" if is_low else "may hardly be reached"
-    largest = f"its largest degree {where}"
     why = "its curve is known between two lines of points"
-    text = f"{name} {begins}: {largest} lies between {short(low)} and {short(high)}"
     state = Bracket(f"the largest degree of {name}", low, high, why)
     measures = Measure("height at least", low), Measure("height at most", high)
-    facts = "FT401", name, text, state
-    terms = labels_of(of, term)
-    return AuditAnswer(*facts, is_low, "warning", terms=terms, measures=measures)
+    message = "FT401.low-curve" if is_low else "FT401.open"
+    return _of_term(message, of, term, state, {}, *measures)
+
+
+def _of_term(
+    message: str,
+    of: VariableRange,
+    term: Term,
+    state: State,
+    facts: Mapping[str, FactValue],
+    *measures: Measure,
+) -> AuditAnswer:
+    """Return an answer about a term on its range."""
+    return audit_answer(
+        message,
+        term_name(of.variable, term),
+        state,
+        terms=labels_of(of, term),
+        measures=measures,
+        facts={"low": float(of.low), "high": float(of.high), **facts},
+    )
 
 
 # --- FT404: is it used?
@@ -216,18 +229,16 @@ def _unused(subject: Subject) -> Iterator[AuditAnswer]:
     proof = Proved(f"{counted(len(clauses), 'proposition')} of all rules read")
     for name in variables:
         if name not in needed:
-            title = f"variable {name!r}"
             own = tuple(TermName(name, term) for of, term in terms if of == name)
-            yield finding("FT404", title, f"no rule uses {title}", proof, terms=own)
+            yield audit_answer("FT404.unused", f"variable {name!r}", proof, terms=own)
     idle = [one for one in terms if one[0] in needed and one not in used]
     for name, term in idle:
         title, own = f"term {term!r} of {name!r}", (TermName(name, term),)
-        yield finding("FT404", title, f"no rule uses {title}", proof, terms=own)
+        yield audit_answer("FT404.unused", title, proof, terms=own)
     count = sum(name in needed for name in variables)
     of_terms = sum(one in used for one in terms)
-    text = f"rules use {counted(count, 'variable')} and {counted(of_terms, 'term')}"
     measures = Measure("variables in use", count), Measure("terms in use", of_terms)
-    yield note("FT404", "terms and variables", text, proof, measures=measures)
+    yield audit_answer("FT404.used", "terms and variables", proof, measures=measures)
 
 
 def _inventory(
@@ -283,11 +294,12 @@ def shape_answers(subject: Subject) -> Iterator[AuditAnswer]:
             yield from defects
     if not sound and not shallow:
         return
-    shapes = "1 term has" if sound == 1 else f"{sound} terms have"
-    text = f"{shapes} no defect of shape of {short(SHALLOW)} or more"
     how = "turning points and crossings of 0 and 1 were found for each piece"
     measures = (Measure("smaller excesses and dips", shallow),)
-    yield note("FT402", "terms", text, Proved(how), measures=measures)
+    facts = {"count": sound}
+    yield audit_answer(
+        "FT402.sound", "terms", Proved(how), measures=measures, facts=facts
+    )
 
 
 def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
@@ -302,23 +314,14 @@ def _defects(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
         yield _outlying(of, term, share)
 
 
-def _defect(
-    of: VariableRange, term: Term, text: str, how: str, *measures: Measure
-) -> AuditAnswer:
-    name, terms = term_name(of.variable, term), labels_of(of, term)
-    text = f"{name} {text}"
-    return finding("FT402", name, text, Proved(how), terms=terms, measures=measures)
-
-
 def _excess(of: VariableRange, term: Term, excess: Excess) -> AuditAnswer:
-    end = "above 1" if excess.is_above else "below 0"
-    text = f"is clipped: its polynomial goes {short(excess.depth)} {end} "
-    text += f"between {short(excess.low)} and {short(excess.high)}"
-    how = "the polynomial's turning points and crossings were isolated"
+    message = "FT402.above" if excess.is_above else "FT402.below"
+    how = Proved("the polynomial's turning points and crossings were isolated")
     depth = Measure("excess", float(excess.depth))
     at = Measure("place of the excess", float(excess.at), unit=of.variable.unit)
-    span = Span(of.variable.name, float(excess.low), float(excess.high))
-    return replace(_defect(of, term, text, how, depth, at), region=(span,))
+    ends = {"low": float(excess.low), "high": float(excess.high)}
+    span = Span(of.variable.name, ends["low"], ends["high"])
+    return replace(_of_term(message, of, term, how, ends, depth, at), region=(span,))
 
 
 def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
@@ -332,8 +335,6 @@ def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
     depths = [min(a.low, c.low) - b.high for (a, _), (b, _), (c, _) in deep]
     depth = max(depths)
     (_, left), (bottom, valley), (_, right) = deep[depths.index(depth)]
-    text = f"has {len(deep) + 1} peaks: between {short(left)} and {short(right)} "
-    text += f"its degree falls to {short(bottom.nearest)}, at {short(valley)}"
     how = f"its curve was visited in {len(axis.cells.rank)} stretches, in each of "
     how += "which it is monotone"
     measures = (
@@ -341,22 +342,23 @@ def _dips(of: VariableRange, term: Term) -> Iterator[AuditAnswer | None]:
         Measure("depth of the deepest dip", float(depth)),
         Measure("place of the deepest dip", float(valley), unit=of.variable.unit),
     )
-    span = Span(of.variable.name, float(left), float(right))
-    yield replace(_defect(of, term, text, how, *measures), region=(span,))
+    ends = {"low": float(left), "high": float(right)}
+    span = Span(of.variable.name, ends["low"], ends["high"])
+    facts = {**ends, "bottom": bottom.nearest}
+    answer = _of_term("FT402.peaks", of, term, Proved(how), facts, *measures)
+    yield replace(answer, region=(span,))
 
 
 def _subnormal(of: VariableRange, term: Term, most: float) -> AuditAnswer:
-    text = f"has no point of degree 1: its largest degree anywhere is {short(most)}"
     largest = Measure("largest degree", most, str(Fraction(most)))
-    return _defect(of, term, text, "the largest degree of its points", largest)
+    how = Proved("the largest degree of its points")
+    return _of_term("FT402.subnormal", of, term, how, {}, largest)
 
 
 def _outlying(of: VariableRange, term: Term, share: Bounds) -> AuditAnswer:
-    text = f"lies outside of the domain for the most part: {short(share.nearest)} of "
-    text += f"its area is from {short(of.low)} to {short(of.high)}"
-    how = "its area was integrated in fractions, on the domain and in all"
+    how = Proved("its area was integrated in fractions, on the domain and in all")
     inside = measure("share of its area on the domain", share)
-    return _defect(of, term, text, how, inside)
+    return _of_term("FT402.outside", of, term, how, {}, inside)
 
 
 def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
@@ -443,15 +445,13 @@ def _overlapping(
     limit: Fraction,
 ) -> AuditAnswer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
-    relation = ""
+    message, facts = "FT403.similar", dict[str, str]()
     if shared.is_within and shared.is_around:
-        relation = "; they are equal"
+        message = "FT403.equal"
     elif shared.is_within or shared.is_around:
+        message = "FT403.within"
         inner, outer = (one, other) if shared.is_within else (other, one)
-        relation = f"; {inner.name!r} is nowhere above {outer.name!r}"
-    elif shared.crossings:
-        at, height = max(shared.crossings, key=lambda pair: pair[1].low)
-        relation = f"; they cross at {short(at)} with degree {short(height.nearest)}"
+        facts = {"inner": inner.name, "outer": outer.name}
     state: State = Proved("the areas were integrated in fractions, piece by piece")
     if jaccard.low < limit:
         state = Bracket(
@@ -468,38 +468,34 @@ def _overlapping(
         at, height = max(shared.crossings, key=lambda pair: pair[1].low)
         measures.append(measure("crossing height", height))
         measures.append(Measure("crossing", float(at), unit=of.variable.unit))
-    text = f"{name} are hard to distinguish: they share {_share(jaccard)} of their "
-    text += f"area{relation}"
-    terms = labels_of(of, one, other)
-    return finding("FT403", name, text, state, terms=terms, measures=tuple(measures))
-
-
-def _share(jaccard: Bounds) -> str:
-    text = short(jaccard.nearest)
-    return "more than 0.9999" if text == "1" and jaccard.low < 1 else text
+    return audit_answer(
+        message,
+        name,
+        state,
+        terms=labels_of(of, one, other),
+        measures=tuple(measures),
+        facts=facts,
+    )
 
 
 def _too_large(of: VariableRange, one: Term, other: Term) -> AuditAnswer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
-    reason = f"their curves have more than {_MOST_PIECES} pieces"
-    text, terms = f"{name} were not compared: {reason}", labels_of(of, one, other)
-    return note("FT403", name, text, Declined("FTD05", reason), terms=terms)
+    state = Declined("FTD05", f"their curves have more than {_MOST_PIECES} pieces")
+    terms = labels_of(of, one, other)
+    return audit_answer("FT403.declined", name, state, terms=terms)
 
 
 def _other_pairs(count: int, apart: int, points: int, limit: float) -> AuditAnswer:
-    fewer, more = (counted(n, "pair") for n in (apart, count - MOST_SHOWN))
-    parts = [f"{fewer} of terms share less than {short(limit)} of their area"]
-    if count > MOST_SHOWN:
-        parts.append(f"{more} besides those listed share more")
-    if points:
-        parts.append(f"{counted(points, 'pair')} have no area on the domain")
+    more = max(count - MOST_SHOWN, 0)
+    facts = {"overlap": limit} | ({"more": more} if more else {})
+    facts |= {"points": points} if points else {}
     how = "areas were enclosed on cells, and integrated in fractions where near"
     measures = (
         Measure("pairs apart", apart),
-        Measure("pairs not listed", max(count - MOST_SHOWN, 0)),
+        Measure("pairs not listed", more),
         Measure("pairs without area", points),
     )
-    build = finding if count > MOST_SHOWN else note
-    return build(
-        "FT403", "pairs of terms", "; ".join(parts), Proved(how), measures=measures
+    message, proof = "FT403.unlisted" if more else "FT403.others", Proved(how)
+    return audit_answer(
+        message, "pairs of terms", proof, measures=measures, facts=facts
     )

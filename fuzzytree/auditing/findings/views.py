@@ -21,7 +21,7 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Declined, Proved
-from fuzzytree.auditing.findings.codes import finding, note
+from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Policy
 from fuzzytree.auditing.findings.rule_bounds import bounded_rules
 from fuzzytree.auditing.findings.subject import AuditView
@@ -172,8 +172,7 @@ def _moved(one: SystemInput, value: float) -> float:
 
 
 def _declined(code: str, subject: str, reason: str) -> AuditAnswer:
-    sentence = f"{subject} is left out: {reason}"
-    return note(code, subject, sentence, Declined(code, reason))
+    return audit_answer("FTD.left-out", subject, Declined(code, reason))
 
 
 class _Taken:
@@ -207,7 +206,7 @@ class _Taken:
 
     def _take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
         if rule.weight == 0.0:
-            self._never(name, "its weight is 0")
+            self._never("FT101.weight-0", name)
             return
         try:
             if sum(1 for _ in questions(rule.when)) > MOST_QUESTIONS:
@@ -222,7 +221,7 @@ class _Taken:
             self.answers.append(_declined(error.code, name, error.reason))
             return
         if not ways:
-            self._never(name, "its condition is never true")
+            self._never("FT101.never-true", name)
         for position, way in enumerate(ways, 1):
             self.rules.append(Rule(way, _text(rule.then)))
             self.weights.append(rule.weight)
@@ -245,10 +244,9 @@ class _Taken:
                     )
                     decline("FTD07", f"the curve of {text}")
 
-    def _never(self, name: str, why: str) -> None:
-        sentence = f"{name} never fires: {why}"
+    def _never(self, message: str, name: str) -> None:
         proof = Proved("read off the rule; no input was needed")
-        self.answers.append(finding("FT101", name, sentence, proof))
+        self.answers.append(audit_answer(message, name, proof))
 
 
 def _text(then: Iterable[Conclusion]) -> str:

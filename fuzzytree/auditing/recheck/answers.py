@@ -33,6 +33,7 @@ from fuzzytree.auditing.recheck.outcomes import (
     UndecidedError,
     require,
 )
+from fuzzytree.auditing.recheck.sentences import sentence_of
 
 
 def check_answer(case: Case, report: Report, answer: Answer, where: str) -> None:
@@ -67,7 +68,11 @@ def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     if is_stated is None:
         text = "sentences of a form that is not known here"
         report.undecided["SENTENCE", text].append(answer.code)
-    expect(is_stated is not False, f"{where}: its sentence says other than its facts")
+    try:
+        is_stated = is_stated is not False and sentence_of(answer) == answer.sentence
+    except (ArithmeticError, LookupError, TypeError, ValueError):
+        is_stated = False  # not the facts of its message
+    expect(is_stated, f"{where}: its sentence says other than its facts")
     report.counts["sentences compared with facts"] += bool(is_stated)
     count = len(case.rules.rules)
     for number in answer.rules:

@@ -106,6 +106,8 @@ class Answer(NamedTuple):
     places: tuple[Place, ...]
     repeat: str
     id: str
+    message: str
+    facts: dict[str, object]
 
 
 class DomainSide(NamedTuple):

@@ -19,7 +19,7 @@ from fuzzytree.auditing.recheck.model_records import Clause
 TABLE = """
 FT101 W -info | {1}
   {1} wins somewhere
-FT101 W -error | {1}
+FT101 W -info | {1}
   {1} fires
 FT101 P +error | {1}
   {1} never <fires on the domain|wins: wherever it fires, a rule of another class is at
@@ -34,7 +34,7 @@ FT101 P +error | {subject}
   {subject} never fires: {...}
 FT101 BD -info | {1}
   it is open whether {1} ever wins
-FT101 BD -error | {1}
+FT101 BD -info | {1}
   it is open whether {1} ever fires
 FT101 P -info | leaves
   {live} of {rules} leaves are reached
@@ -46,7 +46,7 @@ FT102 W -info | {1} | largest lead, at least
   {1} leads by {largest lead, at least:.4g} at least somewhere
 FT102 B +warning | {1} | largest lead, at least; largest lead, at most
   {1} never leads by {lead:g}: at most by {largest lead, at most:.3g}
-FT102 B -warning | {1} | largest lead, at least; largest lead, at most
+FT102 B -info | {1} | largest lead, at least; largest lead, at most
   no lead of {1} above {largest lead, at least:.3g} was found, and one above
   {largest lead, at most:.3g} is excluded
 FT102 BD -info | {1}
@@ -101,12 +101,11 @@ FT201 B -info | {1} and {2} | highest common level at most
   {1} and {2} may conflict, on {then1} and {then2}: no more than
   {highest common level at most:s} is reached by both
 FT201 P -info | pairs of rules | pairs that never do; pairs not listed
-  {pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
-  {level:s} together[; {...}]
+  {level:s} is never reached together by {pairs that never do:n pair} of rules of
+  different {nouns}[; {...}]
 FT201 P +info | pairs of rules | pairs that never do; pairs not listed
-  [{pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
-  {level:s} together; [{...}; ]]{pairs not listed:n more pair} of rules may
-  reach {level:s}, not listed
+  {pairs not listed:n more pair} of rules may reach {level:s}, not listed;
+  {pairs that never do:n pair} never do[; {...}]
 FT202 W +warning | {1} and {2}
   {1} and {2} are equally strong, and the strongest, on more than a surface: the order
   of the rules alone decides there
@@ -200,14 +199,14 @@ FT701 S {hit}info | <uncovered|weak|tied|close> rows
 FT701 S -info | <uncovered|weak|tied|close> points
   on {hits:d} of {rows:d} points {...}
 FT701 S {idle}info | {1} | rows fired; rows won; rows won rightly
-  {1} fires on <none|{rows fired:d}> of {_} rows[ and wins <none|{rows won:d}>[;
+  {1} fires on {rows fired:d} of {_} rows[ and wins {rows won:d}[;
   {rows won rightly:d} of these have its class {then1}]]
 FT701 D -info | rows
   what rows say about the rules is not known: {reason}
 FT701 D -info | domain
   shares of the domain are not known: {reason}
-FT701 D -info | covered <rows|points>
-  how many {...} are covered is not known: {reason}
+FT701 D -info | {...}
+  the number of {subject} is not known: {reason}
 FTD D -info | {subject}
   {subject} is <left out|bounded {...}>: {reason}
 """

@@ -177,6 +177,8 @@ def built(kind: Any, value: Any, where: str) -> Any:
         return tuple(built(choices[0], one, f"{where} {n}") for n, one in every)
     if origin is Literal and isinstance(value, str) and value in choices:
         return value
+    if origin is dict and isinstance(value, dict):
+        return value  # their kinds are those of the message
     if hasattr(kind, "_fields") and isinstance(value, dict):
         return _record(kind, value, where)
     is_real = isinstance(value, int | float) and not isinstance(value, bool)

@@ -330,7 +330,7 @@ def test_points_that_a_spent_budget_leaves_out_are_reported() -> None:
     assert isinstance(left.state, Declined)
     assert left.state.code == "FTD03"
     assert left.sentence.endswith(
-        " points were not looked at: the budget for single points was spent"
+        " points were not compared: the budget for single points was spent"
     )
     assert int(left.sentence.split()[0]) > 5000 - rows.state.rows
 

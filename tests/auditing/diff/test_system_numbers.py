@@ -279,7 +279,7 @@ def test_the_budget_ends_the_comparison_of_numbers() -> None:
 
     found = results(tipper(), new, Clock(99.0, now=now, report=tell))
     (left,) = (a for a in found.answers if a.subject == "points")
-    assert left.sentence == "36 points were not looked at: the budget was spent"
+    assert left.sentence == "36 points were not compared: the budget was spent"
     assert left.state == Declined("FTD03", "the budget was spent")
     assert found.verdict == "changed"
     whole = results(tipper(), new, Clock(99.0, now=now))

@@ -100,7 +100,9 @@ def test_a_rule_that_only_a_union_hides_never_wins() -> None:
 
 def test_a_rule_out_of_the_domain_never_fires() -> None:
     found = _found(_asked(*CLEAN, ("never", "c")), "FT101")
-    assert found[3,].sentence == "rule 3 never fires on the domain"
+    assert found[3,].sentence == (
+        "rule 3 never fires: no value of the domain makes its condition hold"
+    )
 
 
 def test_a_rule_that_wins_by_its_place_alone_is_reported_as_that() -> None:

@@ -94,7 +94,7 @@ def test_equal_rows_stand_once_and_those_outside_are_counted() -> None:
     assert subject.rows is not None
     points = points_of(subject, subject.rows)
     assert sorted(number for number, _ in points.at) == [1, 5]
-    assert points.text == "5 rows (2 incomplete or outside the domain)"
+    assert points.facts == {"total": 5, "incomplete": 2}
 
 
 def test_close_calls_come_first() -> None:
@@ -105,7 +105,7 @@ def test_close_calls_come_first() -> None:
     margins = [decide(subject.rules, np.array([row]).T).margin[0] for row in rows]
     wanted = sorted(range(1, 5), key=lambda number: margins[number - 1])
     assert [number for number, _ in points.at] == wanted
-    assert points.text == "4 rows"
+    assert points.facts == {"total": 4}
 
 
 def test_a_long_exact_number_is_left_out_and_its_double_is_no_larger() -> None:

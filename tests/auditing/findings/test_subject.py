@@ -41,9 +41,9 @@ def test_many_questions_without_end_each_take_a_small_part() -> None:
 
 def test_open_questions_are_reported_in_one_answer() -> None:
     slices = TimeSlices(ticking(), 0.5)
-    assert not [*slices.rest("FT101", "rule", "whether they ever win")]
+    assert not [*slices.rest("FT101", "rule")]
     slices.left_out = 12
-    (answer,) = slices.rest("FT101", "rule", "whether they ever win")
+    (answer,) = slices.rest("FT101", "rule")
     assert answer.sentence == (
         "whether they ever win is not known for 12 rules: the budget was spent"
     )

@@ -159,7 +159,7 @@ def test_a_rule_without_rows_is_found_and_gone_when_it_is_removed() -> None:
     values = np.array([[0.5, 2.0, 3.0]])
     found = queries(subject_of(planted, AuditRows("grips.csv", values)))
     assert found["rule 3"].is_finding
-    assert found["rule 3"].sentence == "rule 3 fires on none of 3 rows"
+    assert found["rule 3"].sentence == "rule 3 fires on 0 of 3 rows and wins 0"
     assert found["rule 3"].rules == (3,)
     clean = queries(subject_of(RULES, AuditRows("grips.csv", values)))
     assert not any(one.is_finding for one in clean.values())
@@ -170,7 +170,7 @@ def test_a_rule_that_fires_and_never_wins_is_found() -> None:
     values = np.array([[0.5, 2.0]])
     found = queries(subject_of(planted, AuditRows("grips.csv", values)))["rule 3"]
     assert found.is_finding
-    assert found.sentence == "rule 3 fires on 1 of 2 rows and wins none"
+    assert found.sentence == "rule 3 fires on 1 of 2 rows and wins 0"
     assert [(one.name, one.value) for one in found.measures] == [
         ("rows fired", 1),
         ("rows won", 0),
@@ -279,7 +279,7 @@ def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> No
     found = queries(subject_of(part, AuditRows("pump", values)))
     assert "uncovered rows" not in found
     assert found["covered rows"].sentence == (
-        "how many rows are covered is not known: rules are left out, and they may "
+        "the number of covered rows is not known: rules are left out, and they may "
         "cover what the others do not"
     )
 
@@ -299,8 +299,7 @@ def test_counts_for_a_bounded_curve_are_reported_where_both_bounds_agree() -> No
         "and on 2 at most"
     )
     assert found["uncovered rows"].sentence == (
-        "how many rows are uncovered is not decided: there are 0 at least, and 1 at "
-        "most"
+        "the number of uncovered rows is not known: there are 0 at least, and 1 at most"
     )
     assert all(
         isinstance(found[name].state, Declined) for name in ("rule 1", "uncovered rows")
