@@ -2,19 +2,13 @@
 
 Rules that begin with the same clauses form a tree, and a T-norm never grows along a
 path: in floating point too, neither the minimum nor a product of numbers in [0, 1]
-exceeds its smallest operand, and both are monotone. So whatever lies below a strength
-that is already exceeded need not be looked at; what is equal must be, for a tie is part
-of the answer. Most of it is decided by bounds of the clauses' degrees in the cells of
-their axes (`envelope.py`), which are looked up and not computed:
+exceeds its smallest operand, and both are monotone. So bounds of the clauses' degrees
+in the cells of their axes (`envelope.py`), which are looked up and not computed, bound
+the strengths of all rules below a branch.
 
-1. Each row follows its best branches down to a rule. The lower bounds met are a lower
-   bound of that rule's strength; the largest upper bound left aside bounds all others.
-   Where that is smaller, the rule is the winner.
-2. For the other rows all branches are followed whose upper bounds reach that. Where
-   only one rule is left, it is the winner.
-3. Else the strengths of those rules are computed, from the few terms that can be the
-   largest of their clause in the row's cell, and compared. Rows with too many such
-   branches are fired.
+Each row follows its best branches down to a rule. The lower bounds that it met are a
+lower bound of that rule's strength; the largest upper bound left aside bounds all
+others. Where that is smaller, the rule is the winner; the other rows are fired.
 
 Where the plateaus of each node's branches are disjoint and cover the axis (relative
 rules), nothing can reach the branch with degree 1: the search is a descent.
@@ -48,22 +42,12 @@ from fuzzytree.model import (
     shapes_of,
 )
 from fuzzytree.runtimes.descent import AxisSplit, descend_by, plan_descent
-from fuzzytree.runtimes.envelope import (
-    Envelope,
-    cells_of,
-    exact_degrees,
-    plan_envelope,
-    spread,
-)
+from fuzzytree.runtimes.envelope import Envelope, cells_of, plan_envelope
 from fuzzytree.runtimes.native_rules import fire_plan, firing_cost, plan_rules
 from fuzzytree.runtimes.rows import axis_lines, checked, missing_rows, plan_axes
 
 _CHUNK = 1 << 16  # rows: short steps would keep threads waiting for each other
-_PAIRS = 1 << 11  # rows and rules whose strengths are computed together
-_WIDEST = 1 << 20  # branches that are followed together
 _LEAST_COST = 300.0  # of firing a row, in ns, from which bounds pay
-_FOLLOW_COST = 1000.0  # from which it pays to follow the rows that bounds leave open
-_BRANCH_COST = 150.0  # of following a branch, in ns
 _CALL_COST = 2.5e6  # of firing all rows of a call, in ns, from which a search pays
 _CROWD = 0.5  # the share of rows to be fired from which all the others are fired too
 _ALWAYS = Clause("", ())
@@ -95,14 +79,8 @@ class Net:
         target: The fork behind each branch.
         line: The axis of its clause.
         entry: The first entry of its clause in the envelope.
-        paths: The branches to each rule, one after another.
-        begin: Where each rule's path begins, from rule 1.
-        length: Its length.
-        envelope: Bounds and degrees of the clauses.
-        is_split: Whether all branches of each fork test the same axis.
+        envelope: Bounds of the clauses.
         is_product: Whether degrees are multiplied.
-        limit: The most branches of a row that are followed at once; rows with more
-            are fired.
     """
 
     first: IntArray
@@ -111,54 +89,8 @@ class Net:
     target: IntArray
     line: IntArray
     entry: IntArray
-    paths: IntArray
-    begin: IntArray
-    length: IntArray
     envelope: Envelope
-    is_split: bool
     is_product: bool
-    limit: int
-
-
-@dataclass(frozen=True, slots=True)
-class CellRows:
-    """Values of the variables, and their cells, of some rows without missing ones."""
-
-    lines: FloatArray
-    values: FloatArray
-    cells: IntArray
-
-    def places(self, net: Net, branch: IntArray, row: IntArray) -> IntArray:
-        """Return where the value of each branch's variable stands."""
-        result = net.line.take(branch)
-        result *= self.lines.shape[1]
-        result += row
-        return result
-
-    def entries(self, net: Net, branch: IntArray, row: IntArray) -> IntArray:
-        """Return the entry of each branch's clause for a row."""
-        result = self.cells.take(self.places(net, branch, row))
-        result += net.entry.take(branch)
-        return result
-
-
-@dataclass(frozen=True, slots=True)
-class Frontier:
-    """Rows at forks, and bounds of the strength of the way there."""
-
-    row: IntArray
-    fork: IntArray
-    low: FloatArray
-    high: FloatArray
-
-    def take(self, which: IntArray) -> Frontier:
-        """Return some of them."""
-        return Frontier(
-            self.row.take(which),
-            self.fork.take(which),
-            self.low.take(which),
-            self.high.take(which),
-        )
 
 
 def search(rules: RuleBase) -> Run:
@@ -187,10 +119,9 @@ def search(rules: RuleBase) -> Run:
     if cost < _LEAST_COST:
         return fired
     fewest = 1 + int(_CALL_COST / cost)
-    limit = int(cost / _BRANCH_COST) if cost >= _FOLLOW_COST else 0
     pays: bool | None = None  # unknown until some rows were searched
 
-    planned = functools.cache(lambda: _net(rules, forks, axes.line, limit))
+    planned = functools.cache(lambda: _net(rules, forks, axes.line))
     planning = threading.Lock()
 
     def run(values: FloatArray) -> Outcome:
@@ -202,7 +133,7 @@ def search(rules: RuleBase) -> Run:
         with planning:  # not before: calls of few rows do without it
             net = planned()
         rule, status = np.zeros((2, count), np.int64)
-        crowded: list[IntArray] = []
+        left_open: list[IntArray] = []
         stop, size = 0, _CHUNK if pays else max(fewest, count >> 5)
         with np.errstate(all="ignore"):
             while stop < count:
@@ -216,12 +147,12 @@ def search(rules: RuleBase) -> Run:
                     whole = np.flatnonzero(~missing)
                     lines = lines.take(whole, axis=1)
                 whole += start
-                rule[whole], status[whole], many = _search(net, lines)
-                crowded.append(whole[many])
-                pays, size = len(many) <= _CROWD * len(whole), _CHUNK
+                rule[whole], is_open = _run_down(net, lines)
+                left_open.append(whole[is_open])
+                pays, size = bool(is_open.sum() <= _CROWD * len(whole)), _CHUNK
                 if not pays:
                     break
-        many = np.concatenate([*crowded, np.arange(min(stop, count), count)])
+        many = np.concatenate([*left_open, np.arange(min(stop, count), count)])
         if len(many):
             outcome = fired(array.take(many, axis=1))
             rule[many], status[many] = outcome.rule, outcome.status
@@ -325,9 +256,7 @@ def _plateau(shape: Shape) -> tuple[float | None, float | None] | None:
             )
 
 
-def _net(
-    rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int], limit: int
-) -> Net:
+def _net(rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int]) -> Net:
     """Return the forks as arrays; rules that end at no leaf get a branch."""
     ends = [list(fork.rules) for fork in forks]
     branches = [list(zip(f.clauses, f.targets, strict=True)) for f in forks]
@@ -343,238 +272,52 @@ def _net(
     number = {clause: position for position, clause in enumerate(clauses)}
     envelope = plan_envelope(rules, clauses, at_line)
     count = np.array([len(part) for part in branches], np.int64)
-    target = np.array([target for _, target in flat], np.int64)
     place = np.array([number[clause] for clause, _ in flat], np.int64)
-    ending = np.array([part[0] if part else 0 for part in ends], np.int64)
-    paths = _paths(ending, target, np.repeat(np.arange(len(count)), count))
-    length = np.array([len(path) for path in paths], np.int64)
     return Net(
         np.cumsum(count) - count,
         count,
-        ending,
-        target,
+        np.array([part[0] if part else 0 for part in ends], np.int64),
+        np.array([target for _, target in flat], np.int64),
         envelope.line.take(place),
         place * envelope.grid.count,
-        np.concatenate(paths),
-        np.cumsum(length) - length,
-        length,
         envelope,
-        all(len({c.variable for c, _ in part}) <= 1 for part in branches),
         rules.semantics.conjunction == "product",
-        limit,
     )
 
 
-def _paths(rule: IntArray, target: IntArray, source: IntArray) -> list[IntArray]:
-    """Return the branches from the first fork to the end of each rule."""
-    into = {int(fork): branch for branch, fork in enumerate(target)}
-    result: dict[int, IntArray] = {}
-    for fork in np.flatnonzero(rule).tolist():
-        path: list[int] = []
-        here = fork
-        while here:
-            path.append(into[here])
-            here = int(source[into[here]])
-        result[int(rule[fork])] = np.array(path[::-1], np.int64)
-    return [result[number] for number in sorted(result)]
-
-
-def _search(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return rule and status of rows without missing values, and those to be fired."""
-    rows = CellRows(lines, lines.ravel(), cells_of(net.envelope.grid, lines).ravel())
-    rule, floor, rival = _run_down(net, rows)
-    status = np.zeros(lines.shape[1], np.int64)
-    unsure = np.flatnonzero(rival >= floor)
-    if not net.limit:
-        return rule, status, unsure
-    vague = unsure[floor.take(unsure) == 0]
-    floor[vague] = _strengths(net, rows, vague, rule.take(vague))
-    rule[unsure], status[unsure] = 0, 2
-    crowded: list[IntArray] = [unsure[:0]]
-    size = max(_WIDEST // len(net.length), 1)
-    for start in range(0, len(unsure), size):
-        part = unsure[start : start + size]
-        crowded.append(_follow(net, rows, (rule, status, floor), part))
-    return rule, status, np.concatenate(crowded)
-
-
-def _run_down(net: Net, rows: CellRows) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Follow each row's best branches to a rule.
+def _run_down(net: Net, lines: FloatArray) -> tuple[IntArray, BoolArray]:
+    """Follow each row's best branches to a rule; no value is missing.
 
     Returns:
-        The rule, a lower bound of its strength, and an upper bound of all others'.
+        The rule, and whether another one may be as strong.
     """
-    lower = net.envelope.lower
-    rule = np.zeros(rows.lines.shape[1], np.int64)
-    floor, rival = np.zeros(len(rule)), np.zeros(len(rule))
+    join = np.multiply if net.is_product else np.minimum
+    upper, lower = net.envelope.upper, net.envelope.lower
+    cells = cells_of(net.envelope.grid, lines)
+    rule, is_open = np.zeros(lines.shape[1], np.int64), np.ones(lines.shape[1], bool)
     row, fork = np.arange(len(rule)), np.zeros(len(rule), np.int64)
-    low, high, other = np.ones(len(rule)), np.ones(len(rule)), np.zeros(len(rule))
+    low, high, rival = np.ones(len(rule)), np.ones(len(rule)), np.zeros(len(rule))
     while len(row):
-        branch, entry, best, second = _best(net, rows, row, fork)
-        np.maximum(other, _join(net, high, second), out=other)
-        high = _join(net, high, best)
-        low = _join(net, low, lower.take(entry).astype(np.float64))
+        first, last = net.first.take(fork), net.count.take(fork) - 1
+        branch, entry = first, cells[net.line.take(first), row] + net.entry.take(first)
+        best = upper.take(entry)
+        for position in range(1, int(last.max()) + 1):
+            other = first + np.minimum(last, position)
+            cell = cells[net.line.take(other), row] + net.entry.take(other)
+            bound = np.where(last < position, 0.0, upper.take(cell))
+            is_better = bound > best
+            beaten = join(high, np.minimum(best, bound))
+            rival = np.maximum(rival, beaten)
+            best = np.maximum(best, bound)
+            branch = np.where(is_better, other, branch)
+            entry = np.where(is_better, cell, entry)
+        low, high = join(low, lower.take(entry)), join(high, best)
         fork = net.target.take(branch)
         ended = net.rule.take(fork)
-        if ended.any():
-            done = np.flatnonzero(ended)
-            where = row.take(done)
-            rule[where], floor[where] = ended.take(done), low.take(done)
-            rival[where] = other.take(done)
-            stay = np.flatnonzero(ended == 0)
-            row, fork = row.take(stay), fork.take(stay)
-            low, high, other = low.take(stay), high.take(stay), other.take(stay)
-    return rule, floor, rival
-
-
-def _best(
-    net: Net, rows: CellRows, row: IntArray, fork: IntArray
-) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """Return the branch with the largest bound, its entry, the bound and the next."""
-    upper = net.envelope.upper
-    first, last = net.first.take(fork), net.count.take(fork) - 1
-    cell = rows.cells.take(rows.places(net, first, row))
-    branch, entry = first.copy(), cell + net.entry.take(first)
-    best = upper.take(entry).astype(np.float64)
-    second = np.zeros(len(row))
-    fewest = int(last.min())
-    for position in range(1, int(last.max()) + 1):
-        other = first + np.minimum(last, position)
-        if not net.is_split:
-            cell = rows.cells.take(rows.places(net, other, row))
-        other_entry = cell + net.entry.take(other)
-        bound = upper.take(other_entry)
-        if position > fewest:
-            bound[last < position] = 0.0
-        is_better = bound > best
-        np.maximum(second, np.minimum(best, bound), out=second)
-        np.maximum(best, bound, out=best)
-        np.copyto(branch, other, where=is_better)
-        np.copyto(entry, other_entry, where=is_better)
-    return branch, entry, best, second
-
-
-def _join(net: Net, before: FloatArray, degree: FloatArray) -> FloatArray:
-    return before * degree if net.is_product else np.minimum(before, degree)
-
-
-def _follow(
-    net: Net,
-    rows: CellRows,
-    result: tuple[IntArray, IntArray, FloatArray],
-    unsure: IntArray,
-) -> IntArray:
-    """Enter rule and status of some rows; return those to be fired.
-
-    `result` has the rule and the status of each row, and a lower bound of its strength,
-    which is raised; `unsure` are the rows to do.
-    """
-    rule, status, floor = result
-    ends, crowded = _reachable(net, rows, floor, unsure)
-    np.maximum.at(floor, ends.row, ends.low)
-    ends = ends.take(np.flatnonzero(ends.high >= floor.take(ends.row)))
-    count = np.bincount(ends.row, minlength=len(floor))
-    is_sure = (count.take(ends.row) == 1) & (ends.low > 0)
-    sure, others = (ends.take(np.flatnonzero(part)) for part in (is_sure, ~is_sure))
-    rule[sure.row], status[sure.row] = net.rule.take(sure.fork), 0
-    numbers = net.rule.take(others.fork)
-    strength = _strengths(net, rows, others.row, numbers)
-    _compare(rule, status, others.row, numbers, strength)
-    return crowded
-
-
-def _reachable(
-    net: Net, rows: CellRows, floor: FloatArray, unsure: IntArray
-) -> tuple[Frontier, IntArray]:
-    """Return the ends that some rows may reach with their floor at least.
-
-    Rows with too many branches at once come second, and are at no end.
-    """
-    is_crowded = np.zeros(len(floor), np.bool_)
-    ones = np.ones(len(unsure))
-    here = Frontier(unsure, np.zeros(len(unsure), np.int64), ones, ones)
-    ends = [here.take(unsure[:0])]
-    while len(here.row):
-        owner, offset, _ = spread(net.count.take(here.fork))
-        here = here.take(owner)
-        branch = net.first.take(here.fork) + offset
-        entry = rows.entries(net, branch, here.row)
-        high = _join(net, here.high, net.envelope.upper.take(entry).astype(np.float64))
-        stay = np.flatnonzero((high >= floor.take(here.row)) & (high > 0))
-        low = net.envelope.lower.take(entry.take(stay)).astype(np.float64)
-        low = _join(net, here.low.take(stay), low)
-        fork = net.target.take(branch.take(stay))
-        here = Frontier(here.row.take(stay), fork, low, high.take(stay))
-        is_crowded |= np.bincount(here.row, minlength=len(floor)) > net.limit
-        is_end = net.rule.take(fork) > 0
-        ends.append(here.take(np.flatnonzero(is_end)))
-        here = here.take(np.flatnonzero(~is_end & ~is_crowded.take(here.row)))
-    joined = Frontier(
-        np.concatenate([part.row for part in ends]),
-        np.concatenate([part.fork for part in ends]),
-        np.concatenate([part.low for part in ends]),
-        np.concatenate([part.high for part in ends]),
-    )
-    stay = np.flatnonzero(~is_crowded.take(joined.row))
-    return joined.take(stay), np.flatnonzero(is_crowded)
-
-
-def _compare(
-    rule: IntArray,
-    status: IntArray,
-    row: IntArray,
-    ends: IntArray,
-    strength: FloatArray,
-) -> None:
-    """Enter the strongest rule of each row, the first on a tie; none if all are 0."""
-    order = np.lexsort((ends, -strength, row))
-    row, ends, strength = row.take(order), ends.take(order), strength.take(order)
-    is_first = _begins(row)
-    first = np.flatnonzero(is_first & (strength > 0))
-    rule[row.take(first)], status[row.take(first)] = ends.take(first), 0
-    tied = ~is_first & (strength > 0)
-    tied[1:] &= (strength[1:] == strength[:-1]) & is_first[:-1]
-    status[row[tied]] = 1
-
-
-def _strengths(net: Net, rows: CellRows, row: IntArray, rule: IntArray) -> FloatArray:
-    """Return the strength of a rule in each row, bit-equal to firing."""
-    result = np.empty(len(row))
-    for start in range(0, len(row), _PAIRS):
-        part = slice(start, start + _PAIRS)
-        result[part] = _part_strengths(net, rows, row[part], rule[part] - 1)
-    return result
-
-
-def _part_strengths(
-    net: Net, rows: CellRows, row: IntArray, path: IntArray
-) -> FloatArray:
-    """Return strengths; what is never the smallest degree of a path is left out."""
-    envelope = net.envelope
-    owner, offset, begin = spread(net.length.take(path))
-    branch = net.paths.take(net.begin.take(path).take(owner) + offset)
-    row = row.take(owner)
-    entry = rows.entries(net, branch, row)
-    if not net.is_product:
-        highest = np.minimum.reduceat(envelope.upper.take(entry), begin)
-        needed = np.flatnonzero(envelope.lower.take(entry) <= highest.take(owner))
-        owner, row = owner.take(needed), row.take(needed)
-        branch, entry = branch.take(needed), entry.take(needed)
-        begin = np.flatnonzero(_begins(owner))
-    x = rows.values.take(rows.places(net, branch, row))
-    degree = exact_degrees(envelope, entry, x)
-    if not net.is_product:
-        least: FloatArray = np.minimum.reduceat(degree, begin)
-        return least
-    result, length = np.ones(len(path)), net.length.take(path)
-    for position in range(int(length.max())):
-        longer = np.flatnonzero(length > position)
-        result[longer] *= degree.take(begin.take(longer) + position)
-    return result
-
-
-def _begins(owner: IntArray) -> BoolArray:
-    """Return where a new owner begins among sorted ones."""
-    result = np.ones(len(owner), np.bool_)
-    np.not_equal(owner[1:], owner[:-1], out=result[1:])
-    return result
+        done = np.flatnonzero(ended)
+        rule[row.take(done)] = ended.take(done)
+        is_open[row.take(done)] = rival.take(done) >= low.take(done)
+        stay = np.flatnonzero(ended == 0)
+        row, fork = row.take(stay), fork.take(stay)
+        low, high, rival = low.take(stay), high.take(stay), rival.take(stay)
+    return rule, is_open

@@ -9,7 +9,6 @@ from fuzzytree.runtimes import best_first
 
 @pytest.fixture(autouse=True)
 def _searched(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("_LEAST_COST", "_FOLLOW_COST", "_CALL_COST"):
+    for name in ("_LEAST_COST", "_CALL_COST"):
         monkeypatch.setattr(best_first, name, 0.0)
-    monkeypatch.setattr(best_first, "_BRANCH_COST", 5.0)
     monkeypatch.setattr(best_first, "_CROWD", 1.0)
