@@ -137,6 +137,7 @@ class OnnxGraph:
         self._taken: dict[str, int] = dict.fromkeys(_ENDS, 1)
         self._results: dict[tuple[str, ...], str] = {}
         self._mistaken: dict[str, Constant] = {}
+        self._ones: dict[str, Constant] = {}
 
     def node(
         self,
@@ -167,6 +168,11 @@ class OnnxGraph:
             turned = self._turned(op, inputs)
             if turned:
                 return self.node("Neg", turned, named=named, hint=hint)
+        if op == "Div" and inputs[0] in self._ones:
+            # onnxruntime makes `y / x` of `(1 / x) * y`, which rounds once less.
+            minus = self.constant(np.negative(self._ones[inputs[0]]), "minus")
+            turned = self.node("Div", minus, inputs[1])
+            return self.node("Neg", turned, named=named, hint=hint)
         result = named or self._fresh(hint or f"{self.topic}_{op.lower()}".strip("_"))
         if not (named or attributes or domain):
             self._results[key] = result
@@ -191,6 +197,8 @@ class OnnxGraph:
             self._known[key] = name
             if _is_mistaken(value):
                 self._mistaken[name] = value
+            if value.size == 1 and value.dtype.kind == "f" and value.item() == 1.0:
+                self._ones[name] = value
         return self._known[key]
 
     def _turned(self, op: str, inputs: Sequence[str]) -> str:

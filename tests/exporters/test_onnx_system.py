@@ -15,11 +15,14 @@ from fuzzytree.exporters import onnx_steps
 from fuzzytree.exporters.onnx import OPSETS, Output, write_onnx
 from fuzzytree.exporters.onnx_compare import contents, differences
 from fuzzytree.exporters.onnx_steps import is_wide
+from fuzzytree.formats.formulas import parse
 from fuzzytree.model import (
     And,
     Conclusion,
+    Curve,
     Defuzzifier,
     DefuzzifierMethod,
+    Formula,
     FuzzySystem,
     Is,
     Points,
@@ -63,6 +66,29 @@ def test_nodes_bear_the_names_of_propositions_rules_and_outputs() -> None:
     assert {"rule_1_strength", "rule_3_strength", "tip"} <= names
     constants = {tensor.name for tensor in found.graph.initializer}
     assert {"number_1_5", "number_minus_0_5", "whole_0"} <= constants
+
+
+def test_a_degree_of_one_by_something_is_rounded_before_it_is_multiplied() -> None:
+    # onnxruntime would divide the other degree by it, and round once instead of twice.
+    curves: list[Curve] = [
+        Formula(parse("1 / (1 + x * x)")),
+        Points((0.0, 9.0), (0.0, 1.0)),
+    ]
+    inputs = tuple(
+        SystemInput(n, (SystemTerm("t", c),)) for n, c in zip("ab", curves, strict=True)
+    )
+    one = SystemTerm("o", Singleton(1.0))
+    output = SystemOutput("y", (one,), None, None, Defuzzifier("weighted sum"))
+    rule = SystemRule(And((Is("a", "t"), Is("b", "t"))), (Conclusion("y", "o"),))
+    system = FuzzySystem("s", inputs, (output,), (RuleBlock((rule,), "product"),))
+    columns = np.random.default_rng(0).uniform(0.0, 9.0, (2, 500))
+    content = write_onnx(system, outputs=("outputs", "activations")).content
+    opened = open_onnx(content, "s.onnx")
+    assert opened.run_system is not None
+    right = infer_rows(system, activations=True)(columns).activations
+    found = opened.run_system(columns).activations
+    assert found is not None
+    np.testing.assert_array_equal(found, right)
 
 
 def test_hostile_names_become_short_unique_identifiers() -> None:
