@@ -40,9 +40,9 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import (
-    Clause,
     Conjunction,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -175,11 +175,11 @@ def shared(
     inputs: int,
     terms: int,
     classes: int,
-    clauses: int,
+    propositions: int,
     conjunction: Conjunction = "minimum",
 ) -> RuleBase:
     """Return rules over the same few triangles of each input, on [0, 1]."""
-    chance = random.Random(f"{rules} {inputs} {terms} {classes} {clauses}")
+    chance = random.Random(f"{rules} {inputs} {terms} {classes} {propositions}")
     step = 1.0 / (terms - 1)
     of = tuple(
         Term(
@@ -191,8 +191,8 @@ def shared(
     made = [
         Rule(
             tuple(
-                Clause(name, (f"t{chance.randrange(terms)}",))
-                for name in sorted(chance.sample(names, clauses))
+                Proposition(name, (f"t{chance.randrange(terms)}",))
+                for name in sorted(chance.sample(names, propositions))
             ),
             f"c{number % classes}",
         )
@@ -224,7 +224,8 @@ def long_curves(points: int) -> RuleBase:
 
     ways = (("a", "a", "c"), ("a", "b", "d"), ("b", "a", "d"), ("b", "b", "c"))
     rules = tuple(
-        Rule((Clause("x", (a,)), Clause("y", (b,))), label) for a, b, label in ways
+        Rule((Proposition("x", (a,)), Proposition("y", (b,))), label)
+        for a, b, label in ways
     )
     return RuleBase("long", ("c", "d"), (variable("x"), variable("y")), rules)
 
@@ -232,7 +233,7 @@ def long_curves(points: int) -> RuleBase:
 LARGE: dict[str, Callable[[], RuleBase]] = {
     "20 x 11, curves of their own": lambda: random_base(1, 20, 11),
     "200 x 60, 5 triangles an input": lambda: shared(200, 60, 5, 4, 60),
-    "200 x 60, 6 clauses a rule": lambda: shared(200, 60, 5, 4, 6),
+    "200 x 60, 6 propositions a rule": lambda: shared(200, 60, 5, 4, 6),
     "the same, product": lambda: shared(200, 60, 5, 4, 6, "product"),
     "200 x 60, curves of their own": lambda: random_base(1, 200, 60, classes=5),
     "500 x 2, 25 triangles an input": lambda: shared(500, 2, 25, 3, 2),

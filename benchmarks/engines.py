@@ -170,7 +170,7 @@ def seven_rules() -> FuzzySystem:
 
 
 def _seed() -> int:
-    """Return the first seed whose rules ask for one term in each clause."""
+    """Return the first seed whose rules ask for one term in each proposition."""
     return next(s for s in range(1000) if _is_plain(_straight(s)))
 
 
@@ -181,8 +181,8 @@ def _straight(seed: int) -> RuleBase:
 
 
 def _is_plain(rules: RuleBase) -> bool:
-    clauses = [clause for rule in rules.rules for clause in rule.when]
-    return len(rules.inputs) == 4 and all(len(c.terms) == 1 for c in clauses)
+    propositions = [proposition for rule in rules.rules for proposition in rule.when]
+    return len(rules.inputs) == 4 and all(len(c.terms) == 1 for c in propositions)
 
 
 def _trapezoid(shape: object) -> Trapezoid:

@@ -109,7 +109,7 @@ def floor(rows: int) -> Callable[[], object]:
 def study_graph(tree: FuzzyTree) -> bytes:
     """Return the study's own graph for the same memberships: `f32 clip slots [M,N]`.
 
-    Smoothsteps on clipped ramps, one `Gather` for each clause position, `Min`,
+    Smoothsteps on clipped ramps, one `Gather` for each proposition position, `Min`,
     `ArgMax`; reciprocals, no cap below 1, no guard: faster operations, other bits.
     """
     rules = rules_from_tree(tree)

@@ -1,8 +1,8 @@
-"""Rules as C: tables of terms, clauses and rules, and functions that fire them.
+"""Rules as C: tables of terms, propositions and rules, and functions that fire them.
 
-Rules that begin with the same clauses share places of a tree. All are fired by going
-through the places in order. The winner alone is found by leaving out what lies below a
-strength that is exceeded already: minimum and product never grow along a path.
+Rules that begin with the same propositions share places of a tree. All are fired by
+going through the places in order. The winner alone is found by leaving out what lies
+below a strength that is exceeded already: minimum and product never grow along a path.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fuzzytree.exporters.c_text import (
 )
 
 _MANY_RULES = 16  # from which a first guess at the winner pays
-_MOST_KEPT = 512  # clauses whose degrees are kept while rules are evaluated
+_MOST_KEPT = 512  # propositions whose degrees are kept while rules are evaluated
 
 _HELPERS = """
 static name_real name_held(name_real value, name_real low, name_real high)
@@ -124,20 +124,21 @@ static name_real name_atom(AT atom, name_real x)
 }
 """
 
-_CLAUSE = """
-/* The largest degree of a clause's terms; of a term the smallest of its atoms. */
-static name_real name_degree(AT clause, const name_real *value)
+_PROPOSITION = """
+/* The largest degree of a proposition's terms; of a term the smallest of its atoms. */
+static name_real name_degree(AT proposition, const name_real *value)
 {
     name_real largest = 0;
-    AT part = name_clause_first[clause], end = name_clause_first[clause + 1];
+    AT part = name_proposition_first[proposition];
+    AT end = name_proposition_first[proposition + 1];
     if (part == end)
         return 1;
     for (; part < end; part++) {
-        AT term = name_clause_term[part];
+        AT term = name_proposition_term[part];
         AT atom = name_term_first[term], last = name_term_first[term + 1];
         name_real least = 1;
         for (; atom < last && least > largest; atom++) {
-            name_real one = name_atom(atom, value[name_clause_line[clause]]);
+            name_real one = name_atom(atom, value[name_proposition_line[proposition]]);
             least = one < least ? one : least;
         }
         largest = least > largest ? least : largest;
@@ -154,17 +155,17 @@ static name_real name_join(name_real a, name_real b)
 """
 
 _KEPT = """
-/* The same; each clause is looked at once, and kept is below 0 until it was. */
-static name_real name_once(AT clause, const name_real *value, name_real *kept)
+/* The same; each proposition is looked at once, and kept is below 0 until it was. */
+static name_real name_once(AT proposition, const name_real *value, name_real *kept)
 {
-    if (kept[clause] < 0)
-        kept[clause] = name_degree(clause, value);
-    return kept[clause];
+    if (kept[proposition] < 0)
+        kept[proposition] = name_degree(proposition, value);
+    return kept[proposition];
 }
 """
 
 _FORGET = """\
-    for (place = 0; place < NAME_CLAUSES; place++)
+    for (place = 0; place < NAME_PROPOSITIONS; place++)
         kept[place] = -1;
 """
 
@@ -209,7 +210,7 @@ FORGET
     for (place = 0; place < NAME_PLACES; place++) {
         unsigned depth = name_depth[place];
         long rule = (long)name_rule[place];
-        name_real one = name_join(path[depth - 1], DEGREE(name_clause[place]));
+        name_real one = name_join(path[depth - 1], DEGREE(name_proposition[place]));
         path[depth] = one;
         if (rule == 0)
             continue;
@@ -229,7 +230,7 @@ _GUESS = """
         name_real most = -1;
         AT best_place = place;
         for (; place < end; place = name_skip[place]) {
-            name_real one = name_join(path[0], DEGREE(name_clause[place]));
+            name_real one = name_join(path[0], DEGREE(name_proposition[place]));
             if (one > most) {
                 most = one;
                 best_place = place;
@@ -259,7 +260,7 @@ GUESS
     for (place = 0; place < NAME_PLACES;) {
         unsigned depth = name_depth[place];
         long rule = (long)name_rule[place];
-        name_real one = name_join(path[depth - 1], DEGREE(name_clause[place]));
+        name_real one = name_join(path[depth - 1], DEGREE(name_proposition[place]));
         if (!(one > 0 && one >= best)) { /* nor are those that begin with it */
             place = name_skip[place];
             continue;
@@ -281,8 +282,8 @@ def rules_code(
 ) -> Iterator[str]:
     """Yield the tables of a rule base and the functions that fire it."""
     yield from _data(tables, numbers)
-    tallest = max(len(tables.number), len(tables.clause_term), len(tables.label))
-    kind = place_type(max(tallest, len(tables.places.clause)))
+    tallest = max(len(tables.number), len(tables.proposition_term), len(tables.label))
+    kind = place_type(max(tallest, len(tables.places.proposition)))
     for template in _functions(tables, numbers):
         text = template.replace("JOIN", "a * b" if is_product else "b < a ? b : a")
         yield text.replace("TAKE_AXES\n", axes).replace("AT ", f"{kind} ")
@@ -290,9 +291,9 @@ def rules_code(
 
 def _data(tables: Tables, numbers: CNumbers) -> Iterator[str]:
     places = tables.places
-    yield f"#define NAME_PLACES {len(places.clause)}u\n"
+    yield f"#define NAME_PLACES {len(places.proposition)}u\n"
     yield f"#define NAME_DEPTH {max(places.depth)}u\n"
-    yield f"#define NAME_CLAUSES {len(tables.negated)}u\n"
+    yield f"#define NAME_PROPOSITIONS {len(tables.negated)}u\n"
     about = "The numbers of ends of plateaus, of sides of sets, and of points."
     yield "\n"
     if tables.kind:
@@ -302,11 +303,23 @@ def _data(tables: Tables, numbers: CNumbers) -> Iterator[str]:
         ("count", tables.count or None, "How many coefficients or points it has."),
         ("first", tables.first or None, "Where its numbers begin."),
         ("term_first", tables.term_first, "Where each term begins among them."),
-        ("clause_first", tables.clause_first, "Where the terms of a clause begin."),
-        ("clause_term", tables.clause_term, "The terms of all clauses."),
-        ("clause_line", tables.clause_line, "The value that each clause tests."),
+        (
+            "proposition_first",
+            tables.proposition_first,
+            "Where the terms of a proposition begin.",
+        ),
+        ("proposition_term", tables.proposition_term, "The terms of all propositions."),
+        (
+            "proposition_line",
+            tables.proposition_line,
+            "The value that each proposition tests.",
+        ),
         ("negated", tables.negated if any(tables.negated) else None, "1: is not."),
-        ("clause", places.clause, "Beginnings of rules, in order: the last clause,"),
+        (
+            "proposition",
+            places.proposition,
+            "Beginnings of rules, in order: the last proposition,",
+        ),
         ("depth", places.depth, "how many there are,"),
         ("skip", places.skip, "the place behind all rules that begin so,"),
         ("rule", places.rule, "and the number of the rule that it is, or 0."),
@@ -329,12 +342,14 @@ def _functions(tables: Tables, numbers: CNumbers) -> Iterator[str]:
     yield _SIDE if has_side else ""
     yield _LINES if POINTS in kinds else ""
     yield _atom(sorted(kinds)) if kinds else _NO_ATOM
-    is_negated = "name_negated[clause] ? 1 - largest : largest"
-    yield _CLAUSE.replace("NEGATED", is_negated if any(tables.negated) else "largest")
+    is_negated = "name_negated[proposition] ? 1 - largest : largest"
+    yield _PROPOSITION.replace(
+        "NEGATED", is_negated if any(tables.negated) else "largest"
+    )
     yield _JOIN
     yield _CONCLUDE
-    clauses, places = len(tables.negated), len(tables.places.clause)
-    is_kept = clauses <= _MOST_KEPT and 2 * places >= 3 * clauses
+    propositions, places = len(tables.negated), len(tables.places.proposition)
+    is_kept = propositions <= _MOST_KEPT and 2 * places >= 3 * propositions
     yield _KEPT if is_kept else ""
     is_double = numbers.name == "double"
     quiet = _NO_NUMBER.replace("UINT", "uint64_t" if is_double else "uint32_t")
@@ -354,12 +369,12 @@ def _atom(kinds: list[int]) -> str:
 
 
 def _settled(function: str, *, is_kept: bool) -> str:
-    """Return a function that keeps the degrees of clauses, or does not."""
-    look = "name_clause[place], value"
+    """Return a function that keeps the degrees of propositions, or does not."""
+    look = "name_proposition[place], value"
     text = function.replace(
-        "DEGREE(name_clause[place])",
+        "DEGREE(name_proposition[place])",
         f"name_once({look}, kept)" if is_kept else f"name_degree({look})",
     )
-    declared = "    name_real kept[NAME_CLAUSES];\n" if is_kept else ""
+    declared = "    name_real kept[NAME_PROPOSITIONS];\n" if is_kept else ""
     text = text.replace("DECLARE_KEPT\n", declared)
     return text.replace("FORGET\n", _FORGET if is_kept else "")

@@ -212,31 +212,33 @@ def _strengths(
     path = [one] * (max(places.depth) + 1)
     result = [one] * len(tables.label)
     degrees: dict[int, Real] = {}
-    for clause, depth, rule in zip(
-        places.clause, places.depth, places.rule, strict=True
+    for proposition, depth, rule in zip(
+        places.proposition, places.depth, places.rule, strict=True
     ):
-        if clause not in degrees:
-            degrees[clause] = _clause(tables, clause, values, file.numbers)
-        degree, before = degrees[clause], path[depth - 1]
+        if proposition not in degrees:
+            degrees[proposition] = _proposition(
+                tables, proposition, values, file.numbers
+            )
+        degree, before = degrees[proposition], path[depth - 1]
         path[depth] = before * degree if is_product else min(before, degree)
         if rule:
             result[rule - 1] = path[depth]
     return tuple(map(float, result))
 
 
-def _clause(
-    tables: Tables, clause: int, values: Sequence[Real], numbers: CNumbers
+def _proposition(
+    tables: Tables, proposition: int, values: Sequence[Real], numbers: CNumbers
 ) -> Real:
-    first, last = tables.clause_first[clause : clause + 2]
+    first, last = tables.proposition_first[proposition : proposition + 2]
     one = numbers.kind(1)
     if first == last:
         return one
-    x = values[tables.clause_line[clause]]
+    x = values[tables.proposition_line[proposition]]
     degrees: list[Real] = []
-    for term in tables.clause_term[first:last]:
+    for term in tables.proposition_term[first:last]:
         atoms = range(*tables.term_first[term : term + 2])
         degrees.append(min((_atom(tables, a, x, numbers) for a in atoms), default=one))
-    return one - max(degrees) if tables.negated[clause] else max(degrees)
+    return one - max(degrees) if tables.negated[proposition] else max(degrees)
 
 
 def _atom(tables: Tables, atom: int, x: Real, numbers: CNumbers) -> Real:

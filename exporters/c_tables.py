@@ -10,11 +10,11 @@ from fuzzytree.exporters.program_text import places_of
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     FuzzyTree,
     Model,
     Node,
     Points,
+    Proposition,
     RuleBase,
     Shape,
     Side,
@@ -29,13 +29,13 @@ class RulePrefixes:
     """The beginnings of all rules, each once, in the order of a walk.
 
     Attributes:
-        clause: The last clause of each.
+        proposition: The last proposition of each.
         skip: The place behind all that begin with it.
         rule: The rule that it is the whole of, from 1, or 0.
-        depth: How many clauses it has.
+        depth: How many propositions it has.
     """
 
-    clause: list[int] = field(default_factory=list[int])
+    proposition: list[int] = field(default_factory=list[int])
     skip: list[int] = field(default_factory=list[int])
     rule: list[int] = field(default_factory=list[int])
     depth: list[int] = field(default_factory=list[int])
@@ -46,7 +46,7 @@ class Tables:
     """A rule base as lists of numbers, which C and Python read alike.
 
     An atom is one end of a band, one side of an LR set, or points; the degree of a term
-    is the smallest of its atoms, of a clause the largest of its terms.
+    is the smallest of its atoms, of a proposition the largest of its terms.
 
     Attributes:
         number: The numbers of all atoms.
@@ -54,10 +54,10 @@ class Tables:
         count: How many numbers, coefficients or points it has.
         first: Where its numbers begin.
         term_first: Where the atoms of each term begin; one more entry than terms.
-        clause_line: The value that each clause tests.
-        clause_first: Where the terms of each clause begin; one more entry.
-        clause_term: The terms of all clauses.
-        negated: 1 where a clause is negated.
+        proposition_line: The value that each proposition tests.
+        proposition_first: Where the terms of each proposition begin; one more entry.
+        proposition_term: The terms of all propositions.
+        negated: 1 where a proposition is negated.
         places: The rules.
         label: The class of each rule.
     """
@@ -67,75 +67,83 @@ class Tables:
     count: list[int]
     first: list[int]
     term_first: list[int]
-    clause_line: list[int]
-    clause_first: list[int]
-    clause_term: list[int]
+    proposition_line: list[int]
+    proposition_first: list[int]
+    proposition_term: list[int]
     negated: list[int]
     places: RulePrefixes
     label: list[int]
 
 
-_ALWAYS = Clause("", ())
+_ALWAYS = Proposition("", ())
 
 
 def tables_of(rules: RuleBase, line: Mapping[str, int], numbers: CNumbers) -> Tables:
     """Return a rule base as lists of numbers of a type."""
     shapes = shapes_of(rules.variables)
-    places, clauses = _places(rules)
-    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    places, propositions = _places(rules)
+    keys = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     at = {key: place for place, key in enumerate(keys)}
     labels = {label: place for place, label in enumerate(rules.classes)}
     result = Tables([], [], [], [], [0], [], [0], [], [], places, [])
     for key in keys:
         _add_term(result, shapes[key], numbers)
-    for clause in clauses:
-        result.clause_line.append(line.get(clause.variable, 0))
-        result.clause_term += [at[clause.variable, term] for term in clause.terms]
-        result.clause_first.append(len(result.clause_term))
-        result.negated.append(int(clause.negated))
+    for proposition in propositions:
+        result.proposition_line.append(line.get(proposition.variable, 0))
+        result.proposition_term += [
+            at[proposition.variable, term] for term in proposition.terms
+        ]
+        result.proposition_first.append(len(result.proposition_term))
+        result.negated.append(int(proposition.negated))
     result.label = [labels[rule.then] for rule in rules.rules]
     return result
 
 
-def _places(rules: RuleBase) -> tuple[RulePrefixes, list[Clause]]:
-    """Return the tree of the rules' beginnings, and the distinct clauses.
+def _places(rules: RuleBase) -> tuple[RulePrefixes, list[Proposition]]:
+    """Return the tree of the rules' beginnings, and the distinct propositions.
 
-    A rule whose clauses are another's beginning gets a place of its own below, whose
-    clause always holds.
+    A rule whose propositions are another's beginning gets a place of its own below,
+    whose proposition always holds.
     """
-    children: list[dict[Clause, int]] = [{}]
+    children: list[dict[Proposition, int]] = [{}]
     ending: list[list[int]] = [[]]
     for number, one in enumerate(rules.rules, 1):
         here = 0
-        for clause in one.when:
-            if clause not in children[here]:
-                children[here][clause] = len(children)
+        for proposition in one.when:
+            if proposition not in children[here]:
+                children[here][proposition] = len(children)
                 children.append({})
                 ending.append([])
-            here = children[here][clause]
+            here = children[here][proposition]
         ending[here].append(number)
-    clauses: dict[Clause, int] = {}
+    propositions: dict[Proposition, int] = {}
     result = RulePrefixes()
-    todo: list[tuple[Clause, int, int, int]] = []  # clause, fork or -1, rule, depth
+    todo: list[
+        tuple[Proposition, int, int, int]
+    ] = []  # proposition, fork or -1, rule, depth
 
     def expand(fork: int, depth: int) -> None:
         own = ending[fork] if fork == 0 or children[fork] else ending[fork][1:]
         below = [(_ALWAYS, -1, rule, depth) for rule in own]
-        for clause, child in children[fork].items():
+        for proposition, child in children[fork].items():
             is_whole = not children[child]
-            below.append((clause, child, ending[child][0] if is_whole else 0, depth))
+            below.append(
+                (proposition, child, ending[child][0] if is_whole else 0, depth)
+            )
         todo.extend(reversed(below))
 
     expand(0, 1)
     while todo:
-        clause, fork, rule, depth = todo.pop()
-        result.clause.append(clauses.setdefault(clause, len(clauses)))
+        proposition, fork, rule, depth = todo.pop()
+        result.proposition.append(
+            propositions.setdefault(proposition, len(propositions))
+        )
         result.rule.append(rule)
         result.depth.append(depth)
         if fork >= 0:
             expand(fork, depth + 1)
     _add_skips(result)
-    return result, list(clauses)
+    return result, list(propositions)
 
 
 def _add_skips(places: RulePrefixes) -> None:

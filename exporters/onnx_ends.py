@@ -95,7 +95,9 @@ def flat_guard(graph: OnnxGraph, model: Model, columns: Sequence[str]) -> InputB
 def _direct(model: Model) -> tuple[str, ...]:
     """Return the inputs that are used, or that no combination guards."""
     if isinstance(model, RuleBase):
-        used = {clause.variable for rule in model.rules for clause in rule.when}
+        used = {
+            proposition.variable for rule in model.rules for proposition in rule.when
+        }
     else:
         used = {node.variable for node in model.nodes}
     guarded = {part.input for variable in model.variables for part in variable.parts}

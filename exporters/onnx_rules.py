@@ -30,7 +30,7 @@ from fuzzytree.exporters.onnx_ends import (
     is_known,
 )
 from fuzzytree.exporters.onnx_graph import DegreeRows, OnnxGraph, np_to_onnx
-from fuzzytree.model import LR, Clause, Points, RuleBase, Shape, Side, shapes_of
+from fuzzytree.model import LR, Points, Proposition, RuleBase, Shape, Side, shapes_of
 from fuzzytree.numerics import RealArray, RealKind, Segments, rounded, segments_of
 
 if TYPE_CHECKING:
@@ -136,31 +136,33 @@ def _degrees(
     rules: RuleBase,
     frame: InputBlock,
 ) -> Sequences:
-    """Add the degrees of all clauses.
+    """Add the degrees of all propositions.
 
     Returns:
         The rows whose AND is the strength of no rule, of the first rule, and so on.
     """
     shapes = shapes_of(rules.variables)
-    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
-    used = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    propositions = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
+    used = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     parts = {key: _parts(key[0], shapes[key]) for key in used}
-    # A term without ends is always 1: so is its clause, and its negation always 0.
-    constant = {c for c in clauses if any(not parts[c.variable, t] for t in c.terms)}
-    true = {clause for clause in constant if not clause.negated}
+    # A term without ends is always 1: so is its proposition, and its negation always 0.
+    constant = {
+        c for c in propositions if any(not parts[c.variable, t] for t in c.terms)
+    }
+    true = {proposition for proposition in constant if not proposition.negated}
     kept = [[c for c in rule.when if c not in true] for rule in rules.rules]
     live = [[c for c in when if c not in constant] for when in kept]
     wanted = {NOTHING: None} if all(kept) else {NOTHING: None, ALWAYS: None}
     result: dict[Part, None] = dict.fromkeys(
         part
-        for clause in clauses
-        if clause not in constant
-        for term in clause.terms
-        for part in parts[clause.variable, term]
+        for proposition in propositions
+        if proposition not in constant
+        for term in proposition.terms
+        for part in parts[proposition.variable, term]
     )
     row = _primitives(graph, table, [*wanted, *result], frame)
     with graph.about("terms"):
-        rows_of = _clauses(graph, table, live, parts, row)
+        rows_of = _propositions(graph, table, live, parts, row)
     rows_of |= dict.fromkeys(constant - true, (row[NOTHING],))
     always = (row[ALWAYS],) if ALWAYS in row else ()
     sequences = [tuple(r for c in when for r in rows_of[c]) for when in kept]
@@ -412,25 +414,25 @@ def _line_body(graph: OnnxGraph, inputs: Sequence[str], named: str) -> str:
     return graph.node("Min", degree, graph.node("Max", near, far), named=named)
 
 
-def _clauses(
+def _propositions(
     graph: OnnxGraph,
     table: DegreeRows,
-    rules: Sequence[Sequence[Clause]],
+    rules: Sequence[Sequence[Proposition]],
     parts: dict[Key, list[Part]],
     row: dict[Part, int],
-) -> dict[Clause, tuple[int, ...]]:
+) -> dict[Proposition, tuple[int, ...]]:
     """Add terms of two parts, OR and negation where there are any.
 
     Returns:
-        The rows whose AND is the degree of each clause: two if its only term has two
-        parts and it costs less to let the rules take both.
+        The rows whose AND is the degree of each proposition: two if its only term has
+        two parts and it costs less to let the rules take both.
     """
-    clauses = dict.fromkeys(clause for when in rules for clause in when)
-    terms = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    propositions = dict.fromkeys(proposition for when in rules for proposition in when)
+    terms = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     of_term = {key: row[parts[key][0]] for key in terms}
     pairs = {
         c: (row[result[0]], row[result[1]])
-        for c in clauses
+        for c in propositions
         if len(c.terms) == 1 and not c.negated
         for result in [parts[c.variable, c.terms[0]]]
         if len(result) == 2
@@ -438,7 +440,7 @@ def _clauses(
     flat = [[part for c in when for part in pairs.get(c, (c,))] for when in rules]
     if _cost(flat) > _cost(rules) + 3 * len(pairs) + 20:
         pairs = {}
-    single = [clause for clause in clauses if clause not in pairs]
+    single = [proposition for proposition in propositions if proposition not in pairs]
     joined = dict.fromkeys((c.variable, term) for c in single for term in c.terms)
     ends = {
         key: (row[parts[key][0]], row[parts[key][1]])
@@ -456,36 +458,42 @@ def _clauses(
         c: list(dict.fromkeys(of_term[c.variable, term] for term in c.terms))
         for c in single
     }
-    of_clause = _largest(graph, table, lists)
-    negated = [clause for clause in clauses if clause.negated]
+    of_proposition = _largest(graph, table, lists)
+    negated = [proposition for proposition in propositions if proposition.negated]
     if negated:
-        degrees = table.take([of_clause[clause] for clause in negated])
+        degrees = table.take([of_proposition[proposition] for proposition in negated])
         one = graph.number(1.0, graph.types.degree)
         block = graph.node("Sub", one, degrees, hint="negations")
         first = table.append(block, len(negated))
-        of_clause |= {clause: first + number for number, clause in enumerate(negated)}
-    return pairs | {clause: (result,) for clause, result in of_clause.items()}
+        of_proposition |= {
+            proposition: first + number for number, proposition in enumerate(negated)
+        }
+    return pairs | {
+        proposition: (result,) for proposition, result in of_proposition.items()
+    }
 
 
 def _largest(
-    graph: OnnxGraph, table: DegreeRows, lists: dict[Clause, list[int]]
-) -> dict[Clause, int]:
+    graph: OnnxGraph, table: DegreeRows, lists: dict[Proposition, list[int]]
+) -> dict[Proposition, int]:
     """Add the maxima of lists of rows, halving all lists at once until one is left."""
     lists = dict(lists)
-    while active := [clause for clause, rows in lists.items() if len(rows) > 1]:
-        left = [row for clause in active for row in lists[clause][::2]]
+    while active := [
+        proposition for proposition, rows in lists.items() if len(rows) > 1
+    ]:
+        left = [row for proposition in active for row in lists[proposition][::2]]
         right: list[int] = []
-        for clause in active:
-            rows = lists[clause]
+        for proposition in active:
+            rows = lists[proposition]
             right += rows[1::2] + rows[-1:] * (len(rows) % 2)
         either = table.take(left), table.take(right)
         block = graph.node("Max", *either, hint="alternatives")
         first = table.append(block, len(left))
-        for clause in active:
-            half = (len(lists[clause]) + 1) // 2
-            lists[clause] = list(range(first, first + half))
+        for proposition in active:
+            half = (len(lists[proposition]) + 1) // 2
+            lists[proposition] = list(range(first, first + half))
             first += half
-    return {clause: rows[0] for clause, rows in lists.items()}
+    return {proposition: rows[0] for proposition, rows in lists.items()}
 
 
 def _levels(

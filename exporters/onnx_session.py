@@ -81,7 +81,7 @@ def first_line(error: Exception) -> str:
 MOST_ROWS = 24
 """Rows on which a written file is run, at the most."""
 
-_MOST_CLAUSES = 50_000  # what the reference does in well under a second
+_MOST_PROPOSITIONS = 50_000  # what the reference does in well under a second
 
 
 def prove(
@@ -143,7 +143,7 @@ def _sample_rows(model: Model) -> Iterator[dict[str, float]]:
         for v in model.variables
         if not v.parts
     }
-    for number in range(max(1, min(MOST_ROWS, _MOST_CLAUSES // size))):
+    for number in range(max(1, min(MOST_ROWS, _MOST_PROPOSITIONS // size))):
         yield {
             name: values[(number * (3 + 2 * position) + position) % len(values)]
             for position, (name, values) in enumerate(points.items())

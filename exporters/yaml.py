@@ -45,7 +45,6 @@ from fuzzytree.model import (
     Band,
     Binary,
     Branch,
-    Clause,
     Curve,
     Defuzzifier,
     Document,
@@ -59,6 +58,7 @@ from fuzzytree.model import (
     Node,
     PiCurve,
     Points,
+    Proposition,
     RuleBase,
     RuleBlock,
     Semantics,
@@ -73,11 +73,11 @@ from fuzzytree.model import (
     Trapezoid,
     Variable,
     Written,
-    clause_text,
+    proposition_text,
 )
 
 _TITLES: Final = {
-    "rule base": "# A fuzzy rule base of fuzzytree: IF clauses THEN class.",
+    "rule base": "# A fuzzy rule base of fuzzytree: IF propositions THEN class.",
     "tree": "# A fuzzy decision tree of fuzzytree: node 1 is the root.",
     "system": "# A fuzzy system of fuzzytree: rules whose conclusions become numbers.",
 }
@@ -157,14 +157,14 @@ def _rule_base(rules: RuleBase) -> dict[str, Entry]:
         entries["terms"] = Noted(rules.kind, _ORIGINS[rules.kind])
     entries |= _body(rules)
     vocabulary = vocabulary_of(rules.variables)
-    clauses: dict[int, Entry] = {}  # rules share clauses
+    propositions: dict[int, Entry] = {}  # rules share propositions
     listed: list[Entry] = []
     for rule in rules.rules:
-        for clause in rule.when:
-            if id(clause) not in clauses:
-                clauses[id(clause)] = _clause(clause, vocabulary)
+        for proposition in rule.when:
+            if id(proposition) not in propositions:
+                propositions[id(proposition)] = _proposition(proposition, vocabulary)
         whole: dict[str, Entry] = {
-            "if": Short([clauses[id(clause)] for clause in rule.when]),
+            "if": Short([propositions[id(proposition)] for proposition in rule.when]),
             "then": rule.then,
         }
         if rule.support is not None:
@@ -246,14 +246,14 @@ def _term(term: Term) -> dict[str, Entry]:
     return named_shape(term.name, term.shape)
 
 
-def _clause(clause: Clause, vocabulary: Vocabulary) -> Entry:
-    """Return a clause as a sentence if that has one reading, else with its parts."""
-    text = clause_text(clause)
-    if len(text) <= LONGEST_SENTENCE and readings(text, vocabulary) == (clause,):
+def _proposition(proposition: Proposition, vocabulary: Vocabulary) -> Entry:
+    """Return a sentence if it has one reading, otherwise the parts."""
+    text = proposition_text(proposition)
+    if len(text) <= LONGEST_SENTENCE and readings(text, vocabulary) == (proposition,):
         return text
-    verb = "is not" if clause.negated else "is"
-    terms = Short([*clause.terms], is_run_on=True)
-    return Short({"variable": clause.variable, verb: terms})
+    verb = "is not" if proposition.negated else "is"
+    terms = Short([*proposition.terms], is_run_on=True)
+    return Short({"variable": proposition.variable, verb: terms})
 
 
 def _node(number: int, node: Node) -> dict[str, Entry]:

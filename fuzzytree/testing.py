@@ -24,7 +24,6 @@ from fuzzytree.model import (
     LR,
     Band,
     Branch,
-    Clause,
     Conclusion,
     Defuzzifier,
     Document,
@@ -36,6 +35,7 @@ from fuzzytree.model import (
     Node,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     RuleBlock,
@@ -153,7 +153,7 @@ def _named_rules(names: Sequence[str]) -> RuleBase:
         tuple(names),
         tuple(Variable(name, terms, unit=name) for name in names),
         tuple(
-            Rule(tuple(Clause(one, (other,)) for one in names), other)
+            Rule(tuple(Proposition(one, (other,)) for one in names), other)
             for other in names
         ),
     )
@@ -190,8 +190,8 @@ def _extreme_rules() -> RuleBase:
     mix = Variable("mix", terms, parts=(Part("a", 5e-324), Part("b", -1e300, 1e308)))
     inputs = (Variable("a", terms, low=-1e308, high=1e308), Variable("b", terms))
     rules = (
-        Rule((Clause("a", ("wide",)), Clause("mix", ("all",))), "one", 2**53),
-        Rule((Clause("b", ("wide", "all"), negated=True),), "two", 0),
+        Rule((Proposition("a", ("wide",)), Proposition("mix", ("all",))), "one", 2**53),
+        Rule((Proposition("b", ("wide", "all"), negated=True),), "two", 0),
         Rule((), "one"),
     )
     return RuleBase("extreme", ("one", "two"), (*inputs, mix), rules)

@@ -220,11 +220,13 @@ def test_every_leaf_of_a_multiway_tree_is_equally_likely(leaves: int) -> None:
     assert len(rules_from_tree(tree, "raw").rules) == leaves
 
 
-def test_clauses_are_n_times_the_questions_where_leaves_are_equally_likely() -> None:
+def test_propositions_are_n_times_the_questions_where_leaves_are_equally_likely() -> (
+    None
+):
     rules = rules_from_tree(multiway_tree(40)).rules
-    clauses = sum(len(rule.when) for rule in rules)
+    propositions = sum(len(rule.when) for rule in rules)
     path = sum(len(rule.when) / 40 for rule in rules)
-    assert clauses / path == pytest.approx(40)
+    assert propositions / path == pytest.approx(40)
 
 
 @pytest.fixture

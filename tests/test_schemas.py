@@ -12,7 +12,7 @@ import yaml
 
 from fuzzytree.exporters.yaml import write
 from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.schemas.generation import FILES, generate, write_all
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
@@ -46,7 +46,9 @@ def models() -> list[Document]:
         tree = random_tree(seed, leaves=1 + 3 * seed)
         found += [tree, rules_from_tree(tree), rules_from_tree(tree, "raw")]
     terms = (Term("b", Band()), Term("not b", Band(low=1.0)))
-    trap = Rule((Clause("a", ("b",), negated=True), Clause("a", ("b", "not b"))), "no")
+    trap = Rule(
+        (Proposition("a", ("b",), negated=True), Proposition("a", ("b", "not b"))), "no"
+    )
     found.append(RuleBase("12:30", ("no",), (Variable("a", terms),), (trap,)))
     return found
 

@@ -108,8 +108,8 @@ def growth(law: Power) -> str:
 
 
 def counted(size: Size) -> tuple[float, float]:
-    """Return clauses over questions: of every rule by itself, and each clause once."""
-    return size.clauses / size.path, size.distinct / size.path
+    """Return propositions over questions: of every rule alone, and each one once."""
+    return size.propositions / size.path, size.distinct / size.path
 
 
 class Verdict(NamedTuple):

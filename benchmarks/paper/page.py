@@ -97,11 +97,12 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
     yield from _growth(found)
     yield paragraph(
         "**What is counted.** If rows reach all leaves equally often and every rule "
-        "computes all of its clauses, the work is exactly n times the questions of the "
-        "tree: the clauses of all rules are n times the mean length of a path. What "
-        "is timed differs from it for three reasons: rules share clauses; a raw "
-        "clause is the union of the sets of all patterns below its branch, so it costs "
-        "more the higher it stands; and a call has a price of its own."
+        "computes all of its propositions, the work is exactly n times the questions "
+        "of the tree: the propositions of all rules are n times the mean length of a "
+        "path. What is timed differs from it for three reasons: rules share "
+        "propositions; a raw proposition is the union of the sets of all patterns "
+        "below its branch, so it costs more the higher it stands; and a call has a "
+        "price of its own."
     )
     yield _counts(claims.sizes)
 
@@ -222,7 +223,7 @@ def _counts(sizes: Sequence[Size]) -> str:
             size.family,
             f"{size.rules:,}",
             f"{size.path:.2f}",
-            f"{size.clauses:,}",
+            f"{size.propositions:,}",
             three(counted(size)[0]),
             f"{size.distinct:,}",
             three(counted(size)[1]),
@@ -233,9 +234,9 @@ def _counts(sizes: Sequence[Size]) -> str:
         "trees",
         "n",
         "questions of a row",
-        "clauses",
+        "propositions",
         "times the questions",
-        "different clauses",
+        "different propositions",
         "times the questions",
     ]
     return table(head, rows)

@@ -66,7 +66,7 @@ class Size(msgspec.Struct, frozen=True):
         family: How the tree was made.
         rules: Its leaves, which are the rules of its rule base: the paper's n.
         path: Questions that a row meets on its way, on average.
-        clauses: Clauses of all rules together.
+        propositions: Propositions of all rules together.
         distinct: Different ones among them.
         checked: Rows on which all representations gave the answers that they must give.
         prices: What a row costs.
@@ -75,7 +75,7 @@ class Size(msgspec.Struct, frozen=True):
     family: Family
     rules: int
     path: float
-    clauses: int
+    propositions: int
     distinct: int
     checked: int
     prices: tuple[Price, ...]

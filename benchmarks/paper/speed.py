@@ -107,14 +107,16 @@ class Bench:
             *self._prices(representations, rows, left / 2, is_batch=False),
             *self._prices(representations, rows, left / 2, is_batch=True),
         ]
-        clauses = [clause for rule in rules["raw"].rules for clause in rule.when]
+        propositions = [
+            proposition for rule in rules["raw"].rules for proposition in rule.when
+        ]
         return Size(
             family,
             len(tree.leaves),
             path,
-            len(clauses),
-            # Rules of one tree share the values of their clauses.
-            len({id(clause) for clause in clauses}),
+            len(propositions),
+            # Rules of one tree share the values of their propositions.
+            len({id(proposition) for proposition in propositions}),
             checked,
             tuple(prices),
         )

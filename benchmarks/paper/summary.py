@@ -31,10 +31,11 @@ def _counted_in_short(sizes: Sequence[Size]) -> str:
     is_right = all(1 / ABOUT <= share <= ABOUT for share in alone)
     head = "is right" if is_right else "is not right"
     return (
-        f'**Counted, "n times" {head}.** The clauses of all rules are {spanned(alone)} '
+        f'**Counted, "n times" {head}.** The propositions of all rules are '
+        f"{spanned(alone)} "
         "times n the questions that a row meets on its way down the tree. But rules "
-        f"share clauses: at {last.rules:,} rules, computing each different one once is "
-        f"{three(counted(last)[1])} times the tree's questions."
+        f"share propositions: at {last.rules:,} rules, computing each different one "
+        f"once is {three(counted(last)[1])} times the tree's questions."
     )
 
 

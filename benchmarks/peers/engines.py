@@ -17,9 +17,14 @@ from fuzzytree.benchmarking.candidates import found_of
 from fuzzytree.benchmarking.records import CandidateOutput, LoadedCandidate
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Outcome
-from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape
+from fuzzytree.model.rulebase import Proposition, Rule, RuleBase, Shape
 from fuzzytree.runtimes.rows import checked, plan_axes, winners
-from fuzzytree.runtimes.sampling import clause_shapes, line_error, samples, universe
+from fuzzytree.runtimes.sampling import (
+    line_error,
+    proposition_shapes,
+    samples,
+    universe,
+)
 from peers.crisp import lines_of
 
 if TYPE_CHECKING:
@@ -70,19 +75,19 @@ def knots(shape: Shape, points: int) -> Knots:
 
 
 Terms = Mapping[tuple[str, str], Knots]
-"""The points of the terms that clauses name, by variable and term."""
+"""The points of the terms that propositions name, by variable and term."""
 
 
 def names_of(rules: RuleBase) -> dict[tuple[str, str], tuple[str, str]]:
-    """Return plain words for variables and terms that clauses ask: v1 and t1 ..."""
+    """Return plain words for variables and terms of propositions: v1 and t1 ..."""
     variables = {v.name: f"v{n}" for n, v in enumerate(rules.variables, 1)}
-    names = enumerate(clause_shapes(rules), 1)
+    names = enumerate(proposition_shapes(rules), 1)
     return {key: (variables[key[0]], f"t{number}") for number, key in names}
 
 
 def sampled_terms(rules: RuleBase, points: int) -> dict[tuple[str, str], Knots]:
-    """Return the points of every term that a clause names."""
-    shapes = clause_shapes(rules).items()
+    """Return the points of every term that a proposition names."""
+    shapes = proposition_shapes(rules).items()
     return {key: knots(shape, points) for key, shape in shapes}
 
 
@@ -101,7 +106,7 @@ def is_steep(terms: Terms) -> bool:
 def row_seconds(rules: RuleBase, terms: Terms) -> float:
     """Return roughly what simpful takes for a row.
 
-    For every term that a clause names, it computes all terms of the variable, and
+    For every term that a proposition names, it computes all terms of the variable, and
     for each of them looks at one point after another.
     """
     sizes: dict[str, int] = {}
@@ -115,13 +120,15 @@ def load_fuzzylite(rules: RuleBase, threads: int) -> LoadedCandidate:
     """Prepare a pyfuzzylite engine; its antecedents take whole columns.
 
     Raises:
-        LossError: If a rule has no clause, or negates several terms under a product;
-            or if it would take minutes to read the rules.
+        LossError: If a rule has no proposition, or negates several terms under a
+            product; or if it would take minutes to read the rules.
     """
     import fuzzylite as fl
 
     _refuse(rules, "pyfuzzylite")
-    names = sum(len(clause.terms) for rule in rules.rules for clause in rule.when)
+    names = sum(
+        len(proposition.terms) for rule in rules.rules for proposition in rule.when
+    )
     if names > _MOST_NAMES:
         raise LossError(
             f"cannot run {rules.name} as pyfuzzylite: its rules name terms {names} "
@@ -159,22 +166,23 @@ def load_fuzzylite(rules: RuleBase, threads: int) -> LoadedCandidate:
 
 
 def _fll(rule: Rule, words: dict[tuple[str, str], tuple[str, str]]) -> str:
-    def clause_text(clause: Clause) -> str:
-        pairs = [words[clause.variable, term] for term in clause.terms]
-        verb = "is not" if clause.negated else "is"
+    def proposition_text(proposition: Proposition) -> str:
+        pairs = [words[proposition.variable, term] for term in proposition.terms]
+        verb = "is not" if proposition.negated else "is"
         parts = [f"{variable} {verb} {term}" for variable, term in pairs]
         if len(parts) == 1:
             return parts[0]
-        return f"( {(' and ' if clause.negated else ' or ').join(parts)} )"
+        return f"( {(' and ' if proposition.negated else ' or ').join(parts)} )"
 
-    return " and ".join(map(clause_text, rule.when))
+    return " and ".join(map(proposition_text, rule.when))
 
 
 def load_simpful(rules: RuleBase, threads: int) -> LoadedCandidate:
     """Prepare a simpful system; it answers one row after another.
 
     Raises:
-        LossError: If a rule has no clause, or one row would take more than a second.
+        LossError: If a rule has no proposition, or one row would take more than a
+            second.
     """
     _refuse(rules, "simpful")
     terms, words = sampled_terms(rules, COARSE), names_of(rules)
@@ -214,16 +222,18 @@ def load_simpful(rules: RuleBase, threads: int) -> LoadedCandidate:
     return _loaded(rules, list(sets), fire)
 
 
-def _sentence(clause: Clause, words: dict[tuple[str, str], tuple[str, str]]) -> str:
-    """Return a clause as simpful reads it, in one pair of parentheses or more."""
-    pairs = [words[clause.variable, term] for term in clause.terms]
+def _sentence(
+    proposition: Proposition, words: dict[tuple[str, str], tuple[str, str]]
+) -> str:
+    """Return a proposition as simpful reads it, in one pair of parentheses or more."""
+    pairs = [words[proposition.variable, term] for term in proposition.terms]
     either = _joined([f"({variable} IS {term})" for variable, term in pairs], "OR")
     # Its parser strips an outer pair from whatever begins with "(NOT": one pair more.
-    return f"((NOT {either}))" if clause.negated else either
+    return f"((NOT {either}))" if proposition.negated else either
 
 
 def _joined(parts: Sequence[str], word: str) -> str:
-    """Join clauses as a balanced tree: simpful walks it by recursion."""
+    """Join propositions as a balanced tree: simpful walks it by recursion."""
     if len(parts) == 1:
         return parts[0]
     middle = len(parts) // 2
@@ -237,7 +247,7 @@ def _refuse(rules: RuleBase, peer: str) -> None:
     for number, rule in enumerate(rules.rules, 1):
         if not rule.when:
             raise LossError(
-                f"cannot run {rules.name} as {peer}: rule {number} has no clause"
+                f"cannot run {rules.name} as {peer}: rule {number} has no proposition"
             )
         several = [c for c in rule.when if c.negated and len(c.terms) > 1]
         if peer == "pyfuzzylite" and is_product and several:

@@ -31,7 +31,6 @@ from fuzzytree.model import (
     Agreement,
     Band,
     BoolArray,
-    Clause,
     Comparison,
     Dtype,
     FloatArray,
@@ -40,6 +39,7 @@ from fuzzytree.model import (
     ModelKind,
     Outcome,
     Points,
+    Proposition,
     RuleBase,
     Runtime,
     Shape,
@@ -244,8 +244,10 @@ def _without_combinations(model: Model) -> Model:
     return free_axes(model) if has_any else model
 
 
-def _with_rules(rules: RuleBase, change: Callable[[Clause], Clause]) -> RuleBase:
-    """Return a rule base with other clauses."""
+def _with_rules(
+    rules: RuleBase, change: Callable[[Proposition], Proposition]
+) -> RuleBase:
+    """Return a rule base with other propositions."""
     changed = [replace(r, when=tuple(map(change, r.when))) for r in rules.rules]
     return replace(rules, rules=tuple(changed))
 
@@ -273,10 +275,10 @@ COMBINATIONS = "combinations"
 _FEATURES: Mapping[str, Callable[[RuleBase], RuleBase]] = MappingProxyType(
     {
         "negation": lambda rules: _with_rules(
-            rules, lambda clause: replace(clause, negated=False)
+            rules, lambda proposition: replace(proposition, negated=False)
         ),
         "OR of terms": lambda rules: _with_rules(
-            rules, lambda clause: replace(clause, terms=clause.terms[:1])
+            rules, lambda proposition: replace(proposition, terms=proposition.terms[:1])
         ),
         "product as AND": lambda rules: replace(
             rules, semantics=replace(rules.semantics, conjunction="minimum")

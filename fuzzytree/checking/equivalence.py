@@ -13,7 +13,6 @@ from fuzzytree.model import (
     And,
     Band,
     Call,
-    Clause,
     Conclusion,
     Condition,
     Curve,
@@ -30,6 +29,7 @@ from fuzzytree.model import (
     Or,
     Part,
     Points,
+    Proposition,
     Reading,
     Rule,
     RuleBase,
@@ -310,10 +310,10 @@ def _renamed(part: Any, names: _NewNames) -> Any:
             return Part(names.variables[part.input], part.weight, part.centre)
         case Rule():
             return Rule(new(part.when), names.classes[part.then] or "")
-        case Clause(variable=name):
+        case Proposition(variable=name):
             known = names.terms[name]
             alternatives = tuple(known[term] for term in part.terms)
-            return Clause(names.variables[name], alternatives, part.negated)
+            return Proposition(names.variables[name], alternatives, part.negated)
         case Node(variable=name):
             known, sets = names.terms[name], names.sets.get(name)
             branches = tuple(

@@ -2,8 +2,8 @@
 
 No representation is trusted: each is loaded and run. Kinds of evidence are kept
 apart: *file* (two contents are equal), *proof* and *all cells* (statements about every
-input), *rows* (probes aimed at every clause, and the user's data: a sample, however
-well aimed) and *calls* (ways of calling that break programs).
+input), *rows* (probes aimed at every proposition, and the user's data: a sample,
+however well aimed) and *calls* (ways of calling that break programs).
 """
 
 from __future__ import annotations

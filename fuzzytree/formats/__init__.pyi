@@ -65,9 +65,6 @@ from .yaml.binding import find as find
 from .yaml.binding import located as located
 from .yaml.binding import record as record
 from .yaml.binding import value_of as value_of
-from .yaml.clauses import Vocabulary as Vocabulary
-from .yaml.clauses import readings as readings
-from .yaml.clauses import vocabulary_of as vocabulary_of
 from .yaml.conditions import conclusions_text as conclusions_text
 from .yaml.conditions import condition_text as condition_text
 from .yaml.layout import LARGEST_COUNT as LARGEST_COUNT
@@ -82,5 +79,8 @@ from .yaml.nodes import MOST_NODES as MOST_NODES
 from .yaml.nodes import MappingNode as MappingNode
 from .yaml.nodes import Scalar as Scalar
 from .yaml.nodes import compose as compose
+from .yaml.propositions import Vocabulary as Vocabulary
+from .yaml.propositions import readings as readings
+from .yaml.propositions import vocabulary_of as vocabulary_of
 from .yaml.yaml_reader import mapping_of_format as mapping_of_format
 from .yaml.yaml_reader import read_yaml as read_yaml

@@ -90,7 +90,7 @@ class Variable(Value, frozen=True):
     parts: tuple[Part, ...] = ()
 
 
-class Clause(Value, frozen=True):
+class Proposition(Value, frozen=True):
     """`variable is term`, `variable is term or term`, or the negation of either."""
 
     variable: str
@@ -99,15 +99,15 @@ class Clause(Value, frozen=True):
 
 
 class Rule(Value, frozen=True):
-    """IF all clauses hold THEN the class is `then`; no clause holds always.
+    """IF all propositions hold THEN the class is `then`; no proposition holds always.
 
     Attributes:
-        when: The clauses, joined by AND in this order.
+        when: The propositions, joined by AND in this order.
         then: The class.
         support: How many training rows reached it, if known.
     """
 
-    when: tuple[Clause, ...]
+    when: tuple[Proposition, ...]
     then: str
     support: int | None = None
 
@@ -127,7 +127,7 @@ class Semantics(Value, frozen=True):
     The class is that of the strongest rule, of the first of them on a tie.
 
     Attributes:
-        conjunction: How the degrees of a rule's clauses become its strength.
+        conjunction: How the degrees of a rule's propositions become its strength.
         uncovered: The answer where no rule fires; None answers "no class".
         missing: The answer where a needed value is missing or not finite, or a
             combination overflows; None answers "no class".
@@ -206,19 +206,21 @@ def sentence(rule: Rule) -> str:
     """Return a rule as people read it.
 
     Example:
-        >>> sentence(Rule((Clause("grip", ("firm", "hard")),), "hand"))
+        >>> sentence(Rule((Proposition("grip", ("firm", "hard")),), "hand"))
         'IF grip is firm or hard THEN hand'
     """
     if not rule.when:
         return f"ALWAYS {rule.then}"
-    clauses = " AND ".join(clause_text(clause) for clause in rule.when)
-    return f"IF {clauses} THEN {rule.then}"
+    propositions = " AND ".join(
+        proposition_text(proposition) for proposition in rule.when
+    )
+    return f"IF {propositions} THEN {rule.then}"
 
 
-def clause_text(clause: Clause) -> str:
-    """Return a clause as people read it, such as `grip is not soft or loose`."""
-    verb = "is not" if clause.negated else "is"
-    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
+def proposition_text(proposition: Proposition) -> str:
+    """Return a proposition as people read it, such as `grip is not soft or loose`."""
+    verb = "is not" if proposition.negated else "is"
+    return f"{proposition.variable} {verb} {' or '.join(proposition.terms)}"
 
 
 def shapes_of(variables: Iterable[Variable]) -> dict[tuple[str, str], Shape]:
@@ -411,31 +413,34 @@ def term_names(variables: Iterable[Variable]) -> dict[str, dict[str, None]]:
     return {v.name: dict.fromkeys(term.name for term in v.terms) for v in variables}
 
 
-def clause_mistakes(
-    path: Path, where: str, clause: Clause, terms: Mapping[str, Collection[str]]
+def proposition_mistakes(
+    path: Path,
+    where: str,
+    proposition: Proposition,
+    terms: Mapping[str, Collection[str]],
 ) -> Iterator[Mistake]:
-    """Yield what is wrong with a clause, given the term names of each variable."""
-    if clause.variable not in terms:
+    """Yield what is wrong with a proposition, given the term names of each variable."""
+    if proposition.variable not in terms:
         yield (
             (*path, "variable"),
-            f"{where}: no variable {clause.variable!r}; "
-            f"{name_choice(clause.variable, list(terms))}",
+            f"{where}: no variable {proposition.variable!r}; "
+            f"{name_choice(proposition.variable, list(terms))}",
         )
         return
-    if not clause.terms:
+    if not proposition.terms:
         yield (
             (*path, "terms"),
-            f"{where}: the clause on {clause.variable!r} names no term",
+            f"{where}: the proposition on {proposition.variable!r} names no term",
         )
-    known = terms[clause.variable]
-    for index, term in enumerate(clause.terms):
+    known = terms[proposition.variable]
+    for index, term in enumerate(proposition.terms):
         if term not in known:
             yield (
                 (*path, "terms", index),
-                f"{where}: {clause.variable!r} has no term {term!r}; "
+                f"{where}: {proposition.variable!r} has no term {term!r}; "
                 f"{name_choice(term, known)}",
             )
-    yield from name_mistakes((*path, "terms"), f"term in {where}", clause.terms)
+    yield from name_mistakes((*path, "terms"), f"term in {where}", proposition.terms)
 
 
 def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
@@ -443,7 +448,7 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
         yield ("rules",), "a rule base needs at least one rule"
     classes = dict.fromkeys(rules.classes)
     terms = term_names(rules.variables)
-    checked: set[int] = set()  # clauses are shared between rules of one tree
+    checked: set[int] = set()  # propositions are shared between rules of one tree
     for number, rule in enumerate(rules.rules, 1):
         path: Path = ("rules", number - 1)
         if rule.then not in classes:
@@ -454,11 +459,11 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
             )
         if rule.support is not None and rule.support < 0:
             yield (*path, "support"), f"rule {number}: the support cannot be below 0"
-        for index, clause in enumerate(rule.when):
-            if id(clause) not in checked:
-                checked.add(id(clause))
-                yield from clause_mistakes(
-                    (*path, "when", index), f"rule {number}", clause, terms
+        for index, proposition in enumerate(rule.when):
+            if id(proposition) not in checked:
+                checked.add(id(proposition))
+                yield from proposition_mistakes(
+                    (*path, "when", index), f"rule {number}", proposition, terms
                 )
 
 

@@ -18,16 +18,16 @@ import msgspec
 
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     LabelType,
     Mistake,
     Path,
+    Proposition,
     Semantics,
     Term,
     Value,
     Variable,
-    clause_mistakes,
     naming_mistakes,
+    proposition_mistakes,
     refuse,
     shapes_of,
     summary,
@@ -280,11 +280,13 @@ def node_mistakes(
         yield from _cut_mistakes(path, where, node)
         for index, branch in enumerate(node.branches):
             step = (*path, "branches", index)
-            clause = Clause(node.variable, branch.terms)
-            yield from clause_mistakes(step, where, clause, terms)
+            proposition = Proposition(node.variable, branch.terms)
+            yield from proposition_mistakes(step, where, proposition, terms)
             if groups is not None and (branch.sets or groups):
-                clause = Clause(node.variable, branch.sets)
-                yield from clause_mistakes(step, f"{where}, sets", clause, sets)
+                proposition = Proposition(node.variable, branch.sets)
+                yield from proposition_mistakes(
+                    step, f"{where}, sets", proposition, sets
+                )
             if (branch.node is None) == (branch.leaf is None):
                 yield step, f"{where}: a branch leads to one node or to one leaf"
 

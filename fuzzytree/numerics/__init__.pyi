@@ -17,8 +17,8 @@ from .enclosures import EnclosedValue as EnclosedValue
 from .enclosures import Enclosure as Enclosure
 from .enclosures import U as U
 from .enclosures import axis_value as axis_value
-from .enclosures import clause_enclosure as clause_enclosure
 from .enclosures import degree_enclosure as degree_enclosure
+from .enclosures import proposition_enclosure as proposition_enclosure
 from .enclosures import strength_enclosure as strength_enclosure
 from .exact import CAP as CAP
 from .exact import MISSING as MISSING

@@ -5,14 +5,14 @@ can be from the original's, at any real value of the axis and without rounding: 
 formulas of `fuzzytree.model.rulebase` over the stored doubles.
 
 **Decisions of relative rules stay.** In a relative rule base every term is a band, and
-a rule wins where all its clauses have degree exactly 1
+a rule wins where all its propositions have degree exactly 1
 (`fuzzytree.semantics.lowering`). Both functions keep, for every band, the set of values
 at which the degree is 1. `by_degree` keeps the plateau itself. `by_points` ends it with
 two points at one value, which are a
 step: `(low, p), (low, 1)` and `(high, 1), (high, r)` with p and r below 1. So at `low`
 itself the degree is p, on the line from `(low, 1)` to `(high, 1)` it is 1, and beyond
 `high` it is r or less than 1: all other points are below 1, and a line is clamped
-between its ends, in every number type. Every clause is then exactly 1 where it was
+between its ends, in every number type. Every proposition is then exactly 1 where it was
 and less where it was less, so the same rule wins, alone.
 """
 
@@ -371,11 +371,18 @@ def _strength_bound(model: RuleBase, errors: Sequence[TermError]) -> float:
     known = {(error.variable, error.term): error.bound for error in errors}
     worst = 0.0
     for rule in model.rules:
-        clauses = [
-            max(known.get((clause.variable, term), 0.0) for term in clause.terms)
-            for clause in rule.when
+        propositions = [
+            max(
+                known.get((proposition.variable, term), 0.0)
+                for term in proposition.terms
+            )
+            for proposition in rule.when
         ]
         is_product = model.semantics.conjunction == "product"
-        total = sum(clauses) * _ROUNDING if is_product else max(clauses, default=0.0)
+        total = (
+            sum(propositions) * _ROUNDING
+            if is_product
+            else max(propositions, default=0.0)
+        )
         worst = max(worst, total)
     return min(worst, 1.0)

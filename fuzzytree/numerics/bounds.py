@@ -25,12 +25,12 @@ import numpy as np
 
 from fuzzytree.model import (
     BoolArray,
-    Clause,
     Dtype,
     FloatArray,
     FuzzyTree,
     Model,
     ModelKind,
+    Proposition,
     RuleBase,
     Variable,
 )
@@ -105,8 +105,8 @@ Key = tuple[str, str]
 def _term_bounds(rules: RuleBase, dtype: Dtype) -> dict[Key, DegreeBound]:
     """Return the bound of each term that a rule names."""
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
-    clauses = (clause for rule in rules.rules for clause in rule.when)
-    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    propositions = (proposition for rule in rules.rules for proposition in rule.when)
+    keys = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     return {key: degree_bound(shapes[key], dtype) for key in keys}
 
 
@@ -134,10 +134,12 @@ def _term_errors(
 def _joined(rules: RuleBase, dtype: Dtype, errors: Mapping[Key, Reals]) -> Reals:
     """Return the largest error of a strength from those of the terms' degrees."""
     unit = TYPES[dtype].degree
-    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
-    if not clauses:
+    propositions = dict.fromkeys(
+        proposition for rule in rules.rules for proposition in rule.when
+    )
+    if not propositions:
         return np.zeros(())
-    degrees = {c: _clause_error(c, unit, errors) for c in clauses}
+    degrees = {c: _proposition_error(c, unit, errors) for c in propositions}
     if rules.semantics.conjunction == "minimum":
         worst = _largest(degrees.values())
     else:
@@ -146,9 +148,11 @@ def _joined(rules: RuleBase, dtype: Dtype, errors: Mapping[Key, Reals]) -> Reals
     return np.minimum(worst * MORE, 1.0)
 
 
-def _clause_error(clause: Clause, unit: float, errors: Mapping[Key, Reals]) -> Reals:
-    worst = _largest(errors[clause.variable, term] for term in clause.terms)
-    return worst + unit if clause.negated else worst
+def _proposition_error(
+    proposition: Proposition, unit: float, errors: Mapping[Key, Reals]
+) -> Reals:
+    worst = _largest(errors[proposition.variable, term] for term in proposition.terms)
+    return worst + unit if proposition.negated else worst
 
 
 def _largest(parts: Iterable[Reals]) -> Reals:

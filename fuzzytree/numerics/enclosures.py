@@ -19,8 +19,8 @@ the exact one, 0 included.
   to the fourth power, in three roundings. It is exactly 1 where u is below 1 for sure.
 - **Points.** The quotient and the product make 4 U |p - r|, the sum one rounding more;
   what x is off by counts with the steepest line.
-- **Clauses and rules.** The larger or smaller of two intervals' ends is exact. `1 - d`
-  and products are moved outwards by their roundings.
+- **Propositions and rules.** The larger or smaller of two intervals' ends is exact. `1
+  - d` and products are moved outwards by their roundings.
 - Where x is as close to a step as its slack, both sides of it are taken.
 - Numbers below 2**-1000 are 0 as a lower end and 2**-1000 as an upper one, unless they
   are exactly 0: so no underflow can reach a result, and every other rounding is
@@ -40,9 +40,9 @@ import numpy as np
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     FloatArray,
     Points,
+    Proposition,
     Shape,
     Side,
     Variable,
@@ -261,15 +261,17 @@ def _horner(curve: Sequence[float], x: FloatArray) -> FloatArray:
     return total
 
 
-def clause_enclosure(clause: Clause, terms: Sequence[Enclosure]) -> Enclosure:
-    """Return intervals that hold the exact degrees of a clause.
+def proposition_enclosure(
+    proposition: Proposition, terms: Sequence[Enclosure]
+) -> Enclosure:
+    """Return intervals that hold the exact degrees of a proposition.
 
     Args:
-        clause: The clause.
+        proposition: The proposition.
         terms: Those of its terms' degrees, in its order.
     """
     low, high = _merged(np.maximum, terms)
-    return _negated(low, high) if clause.negated else Enclosure(low, high)
+    return _negated(low, high) if proposition.negated else Enclosure(low, high)
 
 
 def _negated(low: FloatArray, high: FloatArray) -> Enclosure:
@@ -290,20 +292,20 @@ def _merged(
 
 
 def strength_enclosure(
-    before: Enclosure, clause: Enclosure, *, is_product: bool
+    before: Enclosure, proposition: Enclosure, *, is_product: bool
 ) -> Enclosure:
-    """Return intervals for the strength of a rule's clauses, with one more of them.
+    """Return intervals for the strength of propositions, with one more of them.
 
     Args:
         before: The strength of those before it.
-        clause: The degree of the next one.
+        proposition: The degree of the next one.
         is_product: Whether AND is the product; the minimum otherwise.
     """
     if not is_product:
-        return _merged(np.minimum, (before, clause))
-    low, high = before.low * clause.low, before.high * clause.high
+        return _merged(np.minimum, (before, proposition))
+    low, high = before.low * proposition.low, before.high * proposition.high
     low = np.where(low < 1.0, low * (1.0 - 2 * U), low)
-    high = np.minimum(high * (1.0 + 2 * U), np.minimum(before.high, clause.high))
+    high = np.minimum(high * (1.0 + 2 * U), np.minimum(before.high, proposition.high))
     low[low < LEAST] = 0.0
-    is_zero = (before.high == 0.0) | (clause.high == 0.0)
+    is_zero = (before.high == 0.0) | (proposition.high == 0.0)
     return Enclosure(low, np.where(is_zero, 0.0, np.maximum(high, LEAST)))

@@ -29,10 +29,10 @@ import msgspec
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     FuzzyTree,
     Model,
     Points,
+    Proposition,
     RuleBase,
     Shape,
     Side,
@@ -80,7 +80,7 @@ def exact_answer(model: Model, row: Mapping[str, float]) -> Exact:
         >>> low = Term("low", Band(high=1.0, right=4.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
-        ...     (Rule((Clause("force", ("low",)),), "soft"),),
+        ...     (Rule((Proposition("force", ("low",)),), "soft"),),
         ... )
         >>> exact_answer(rules, {"force": 2.0}).strengths
         (Fraction(2, 3),)
@@ -206,21 +206,27 @@ def _integers(curve: tuple[float, ...]) -> tuple[tuple[int, ...], int]:
     return tuple(top * (common // bottom) for top, bottom in ratios), common
 
 
-def _clause_degree(
-    clause: Clause, shapes: Mapping[tuple[str, str], Shape], value: Fraction
+def _proposition_degree(
+    proposition: Proposition, shapes: Mapping[tuple[str, str], Shape], value: Fraction
 ) -> Fraction:
-    degrees = (exact_degree(shapes[clause.variable, t], value) for t in clause.terms)
+    degrees = (
+        exact_degree(shapes[proposition.variable, t], value) for t in proposition.terms
+    )
     highest = max(degrees)
-    return 1 - highest if clause.negated else highest
+    return 1 - highest if proposition.negated else highest
 
 
 def _fired(rules: RuleBase, row: Mapping[str, float]) -> Exact:
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
-    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
+    propositions = dict.fromkeys(
+        proposition for rule in rules.rules for proposition in rule.when
+    )
     variables = {v.name: v for v in rules.variables}
-    names = dict.fromkeys(clause.variable for clause in clauses)
+    names = dict.fromkeys(proposition.variable for proposition in propositions)
     axes = {name: exact_axis(variables[name], row) for name in names}
-    degrees = {c: _clause_degree(c, shapes, axes[c.variable]) for c in clauses}
+    degrees = {
+        c: _proposition_degree(c, shapes, axes[c.variable]) for c in propositions
+    }
     is_product = rules.semantics.conjunction == "product"
     strengths = tuple(
         _joined((degrees[c] for c in rule.when), is_product=is_product)

@@ -7,9 +7,9 @@ to fractions what the intervals leave open:
 - The strongest rules are among those whose upper end reaches the largest lower end. If
   there is one, it wins. If all intervals there are points, the first of them wins.
 - No rule fires if all upper ends are 0, and some rule does if a lower end is above 0.
-- Under the minimum, rules of a tree often tie because they share their weakest clause.
-  Where all the strongest have the same term as their weakest, for sure, they are equal
-  in exact arithmetic too, whatever its degree above 0 is.
+- Under the minimum, rules of a tree often tie because they share their weakest
+  proposition. Where all the strongest have the same term as their weakest, for sure,
+  they are equal in exact arithmetic too, whatever its degree above 0 is.
 - A tree takes the same path exactly as in doubles wherever no value that a node tests
   is as close to one of its cuts as its slack.
 """
@@ -25,11 +25,11 @@ import numpy as np
 
 from fuzzytree.model import (
     BoolArray,
-    Clause,
     FloatArray,
     FuzzyTree,
     IntArray,
     Model,
+    Proposition,
     RuleBase,
 )
 from fuzzytree.numerics.enclosures import (
@@ -37,8 +37,8 @@ from fuzzytree.numerics.enclosures import (
     Enclosure,
     U,
     axis_value,
-    clause_enclosure,
     degree_enclosure,
+    proposition_enclosure,
     strength_enclosure,
 )
 from fuzzytree.numerics.exact import (
@@ -141,8 +141,12 @@ def _chunks(model: Model, rows: int) -> Iterator[slice]:
     """Yield parts of the rows, at least one, that need a bounded memory each."""
     size = len(model.variables) + 1
     if isinstance(model, RuleBase):
-        clauses = {clause for rule in model.rules for clause in rule.when}
-        size += len(model.rules) + sum(len(clause.terms) + 1 for clause in clauses)
+        propositions = {
+            proposition for rule in model.rules for proposition in rule.when
+        }
+        size += len(model.rules) + sum(
+            len(proposition.terms) + 1 for proposition in propositions
+        )
     step = min(max(_NUMBERS // size, _FEWEST), _MOST)
     for start in range(0, max(rows, 1), step):
         yield slice(start, start + step)
@@ -166,11 +170,11 @@ def _concatenated(parts: Sequence[Decisions]) -> Decisions:
 
 
 class _Enclosed(msgspec.Struct, frozen=True):
-    """Rows in intervals: degrees of terms and clauses, strengths of rules."""
+    """Rows in intervals: degrees of terms and propositions, strengths of rules."""
 
     missing: BoolArray
     terms: dict[tuple[str, str], Enclosure]
-    clauses: dict[Clause, Enclosure]
+    propositions: dict[Proposition, Enclosure]
     rules: Enclosure
 
 
@@ -224,12 +228,14 @@ def _axes(
 def _enclosed(rules: RuleBase, values: FloatArray) -> _Enclosed:
     axes, missing = _axes(rules, values)
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
-    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
-    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    propositions = dict.fromkeys(
+        proposition for rule in rules.rules for proposition in rule.when
+    )
+    keys = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     terms = {key: degree_enclosure(shapes[key], axes[key[0]]) for key in keys}
     degrees = {
-        c: clause_enclosure(c, [terms[c.variable, term] for term in c.terms])
-        for c in clauses
+        c: proposition_enclosure(c, [terms[c.variable, term] for term in c.terms])
+        for c in propositions
     }
     count = values.shape[1]
     low, high = (np.empty((len(rules.rules), count)) for _ in range(2))
@@ -239,11 +245,11 @@ def _enclosed(rules: RuleBase, values: FloatArray) -> _Enclosed:
 
 
 def _strengths(
-    rules: RuleBase, degrees: Mapping[Clause, Enclosure], rows: int
+    rules: RuleBase, degrees: Mapping[Proposition, Enclosure], rows: int
 ) -> Iterator[Enclosure]:
     """Yield the strength of each rule; what it shares with the last one is kept."""
     is_product = rules.semantics.conjunction == "product"
-    path: list[Clause] = []
+    path: list[Proposition] = []
     stack = [Enclosure(np.ones(rows), np.ones(rows))]
     for rule in rules.rules:
         shared = 0
@@ -253,9 +259,9 @@ def _strengths(
             shared += 1
         del stack[shared + 1 :]
         path = list(rule.when)
-        for clause in rule.when[shared:]:
+        for proposition in rule.when[shared:]:
             found = strength_enclosure(
-                stack[-1], degrees[clause], is_product=is_product
+                stack[-1], degrees[proposition], is_product=is_product
             )
             stack.append(found)
         yield stack[-1]
@@ -309,36 +315,43 @@ def _share_weakest(
 
 
 class _Sources:
-    """Which term gives a clause its degree, and a rule its strength, for sure."""
+    """Which term gives a proposition its degree, and a rule its strength, for sure."""
 
     def __init__(self, enclosed: _Enclosed, rows: IntArray) -> None:
         self.enclosed = enclosed
         self.rows = rows
         self.number = {key: 2 * k for k, key in enumerate(enclosed.terms)}
         start = 2 * len(self.number)
-        self.joined = {clause: start + k for k, clause in enumerate(enclosed.clauses)}
-        self.known: dict[Clause, IntArray] = {}
+        self.joined = {
+            proposition: start + k
+            for k, proposition in enumerate(enclosed.propositions)
+        }
+        self.known: dict[Proposition, IntArray] = {}
 
-    def weakest(self, when: Sequence[Clause]) -> IntArray:
-        """Return the source of the smallest degree of some clauses; -1 if unsure."""
+    def weakest(self, when: Sequence[Proposition]) -> IntArray:
+        """Return the source of the smallest degree; -1 if unsure."""
         if not when:
             return np.full(self.rows.shape, -1)
-        low, high = self._ends([self.enclosed.clauses[clause] for clause in when])
-        source = np.stack([self.of(clause) for clause in when])
+        low, high = self._ends(
+            [self.enclosed.propositions[proposition] for proposition in when]
+        )
+        source = np.stack([self.of(proposition) for proposition in when])
         top, mine = self._at(high.argmin(axis=0), high, source)
         is_sure = ((low >= top) | (source == mine)).all(axis=0)
         return np.where(is_sure, mine, -1)
 
-    def of(self, clause: Clause) -> IntArray:
-        """Return the number of the largest of a clause's terms, or of the clause."""
-        if clause not in self.known:
-            keys = [(clause.variable, term) for term in clause.terms]
+    def of(self, proposition: Proposition) -> IntArray:
+        """Return the number of the largest of some terms, or of their proposition."""
+        if proposition not in self.known:
+            keys = [(proposition.variable, term) for term in proposition.terms]
             low, high = self._ends([self.enclosed.terms[key] for key in keys])
-            numbers = np.array([[self.number[key] + clause.negated] for key in keys])
+            numbers = np.array(
+                [[self.number[key] + proposition.negated] for key in keys]
+            )
             bottom, mine = self._at(low.argmax(axis=0), low, numbers + 0 * self.rows)
             is_sure = ((high <= bottom) | (numbers == mine)).all(axis=0)
-            self.known[clause] = np.where(is_sure, mine, self.joined[clause])
-        return self.known[clause]
+            self.known[proposition] = np.where(is_sure, mine, self.joined[proposition])
+        return self.known[proposition]
 
     def _ends(self, parts: Sequence[Enclosure]) -> tuple[FloatArray, FloatArray]:
         low = np.stack([part.low[self.rows] for part in parts])

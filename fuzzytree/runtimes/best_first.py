@@ -1,10 +1,11 @@
 """The winner of a rule base by search, without firing every rule.
 
-Rules that begin with the same clauses form a tree, and a T-norm never grows along a
+Rules that begin with the same propositions form a tree, and a T-norm never grows along
+a
 path: in floating point too, neither the minimum nor a product of numbers in [0, 1]
-exceeds its smallest operand, and both are monotone. So bounds of the clauses' degrees
-in the cells of their axes (`envelope.py`), which are looked up and not computed, bound
-the strengths of all rules below a branch.
+exceeds its smallest operand, and both are monotone. So bounds of the propositions'
+degrees in the cells of their axes (`envelope.py`), which are looked up and not
+computed, bound the strengths of all rules below a branch.
 
 Each row follows its best branches down to a rule. The lower bounds that it met are a
 lower bound of that rule's strength; the largest upper bound left aside bounds all
@@ -31,11 +32,11 @@ from fuzzytree.model import (
     LR,
     Band,
     BoolArray,
-    Clause,
     FloatArray,
     IntArray,
     Outcome,
     Points,
+    Proposition,
     RuleBase,
     Run,
     Shape,
@@ -50,7 +51,7 @@ _CHUNK = 1 << 16  # rows: short steps would keep threads waiting for each other
 _LEAST_COST = 300.0  # of firing a row, in ns, from which bounds pay
 _CALL_COST = 2.5e6  # of firing all rows of a call, in ns, from which a search pays
 _CROWD = 0.5  # the share of rows to be fired from which all the others are fired too
-_ALWAYS = Clause("", ())
+_ALWAYS = Proposition("", ())
 
 
 @dataclass(slots=True)
@@ -58,12 +59,12 @@ class PrefixNode:
     """A common beginning of rules.
 
     Attributes:
-        clauses: What may follow.
-        targets: The fork behind each clause.
+        propositions: What may follow.
+        targets: The fork behind each proposition.
         rules: The rules that end here, from 1.
     """
 
-    clauses: list[Clause] = field(default_factory=list[Clause])
+    propositions: list[Proposition] = field(default_factory=list[Proposition])
     targets: list[int] = field(default_factory=list[int])
     rules: list[int] = field(default_factory=list[int])
 
@@ -77,9 +78,9 @@ class Net:
         count: The number of its branches.
         rule: The rule that ends there, from 1; 0 at a fork with branches.
         target: The fork behind each branch.
-        line: The axis of its clause.
-        entry: The first entry of its clause in the envelope.
-        envelope: Bounds of the clauses.
+        line: The axis of its proposition.
+        entry: The first entry of its proposition in the envelope.
+        envelope: Bounds of the propositions.
         is_product: Whether degrees are multiplied.
     """
 
@@ -164,14 +165,14 @@ def search(rules: RuleBase) -> Run:
 def _forks(rules: RuleBase) -> list[PrefixNode]:
     """Return the tree of the rules' beginnings; the first fork is the empty one."""
     forks = [PrefixNode()]
-    known: dict[tuple[int, Clause], int] = {}
+    known: dict[tuple[int, Proposition], int] = {}
     for number, rule in enumerate(rules.rules, 1):
         here = 0
-        for clause in rule.when:
-            key = (here, clause)
+        for proposition in rule.when:
+            key = (here, proposition)
             if key not in known:
                 known[key] = len(forks)
-                forks[here].clauses.append(clause)
+                forks[here].propositions.append(proposition)
                 forks[here].targets.append(len(forks))
                 forks.append(PrefixNode())
             here = known[key]
@@ -184,7 +185,7 @@ def _splits(
 ) -> list[AxisSplit] | None:
     """Return the forks as splits if the plateaus of each divide its axis, or None."""
     shapes = shapes_of(rules.variables)
-    inner = [number for number, fork in enumerate(forks) if fork.clauses]
+    inner = [number for number, fork in enumerate(forks) if fork.propositions]
     place = {number: position for position, number in enumerate(inner)}
     splits: list[AxisSplit] = []
     for number, fork in enumerate(forks):
@@ -200,7 +201,7 @@ def _splits(
             for _, target in plateaus
         )
         cuts = tuple(high for high, _ in plateaus if high is not None)
-        splits.append(AxisSplit(line[fork.clauses[0].variable], cuts, targets))
+        splits.append(AxisSplit(line[fork.propositions[0].variable], cuts, targets))
     return splits
 
 
@@ -212,11 +213,11 @@ def _plateaus(
     None if they do not follow one another from end to end of one axis.
     """
     result: list[tuple[float, float | None, int]] = []
-    for clause, target in zip(fork.clauses, fork.targets, strict=True):
-        if clause.negated or clause.variable != fork.clauses[0].variable:
+    for proposition, target in zip(fork.propositions, fork.targets, strict=True):
+        if proposition.negated or proposition.variable != fork.propositions[0].variable:
             return None
-        for term in clause.terms:
-            ends = _plateau(shapes[clause.variable, term])
+        for term in proposition.terms:
+            ends = _plateau(shapes[proposition.variable, term])
             if ends is None:
                 return None
             result.append((-np.inf if ends[0] is None else ends[0], ends[1], target))
@@ -259,7 +260,7 @@ def _plateau(shape: Shape) -> tuple[float | None, float | None] | None:
 def _net(rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int]) -> Net:
     """Return the forks as arrays; rules that end at no leaf get a branch."""
     ends = [list(fork.rules) for fork in forks]
-    branches = [list(zip(f.clauses, f.targets, strict=True)) for f in forks]
+    branches = [list(zip(f.propositions, f.targets, strict=True)) for f in forks]
     for fork in range(len(forks)):
         if fork == 0 or branches[fork] or len(ends[fork]) > 1:
             for rule in ends[fork]:
@@ -268,11 +269,13 @@ def _net(rules: RuleBase, forks: Sequence[PrefixNode], at_line: dict[str, int]) 
                 ends.append([rule])
             ends[fork] = []
     flat = [branch for part in branches for branch in part]
-    clauses = list(dict.fromkeys(clause for clause, _ in flat))
-    number = {clause: position for position, clause in enumerate(clauses)}
-    envelope = plan_envelope(rules, clauses, at_line)
+    propositions = list(dict.fromkeys(proposition for proposition, _ in flat))
+    number = {
+        proposition: position for position, proposition in enumerate(propositions)
+    }
+    envelope = plan_envelope(rules, propositions, at_line)
     count = np.array([len(part) for part in branches], np.int64)
-    place = np.array([number[clause] for clause, _ in flat], np.int64)
+    place = np.array([number[proposition] for proposition, _ in flat], np.int64)
     return Net(
         np.cumsum(count) - count,
         count,

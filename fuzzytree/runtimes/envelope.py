@@ -1,7 +1,7 @@
-"""Bounds of clauses on cells of their axes.
+"""Bounds of propositions on cells of their axes.
 
 Each axis is cut into cells that cover all numbers, narrow where its terms are. For each
-clause and cell an upper and a lower bound of its degree there are computed once.
+proposition and cell an upper and a lower bound of its degree there are computed once.
 
 The bounds hold for the degrees as computed, not only for the formula:
 
@@ -25,9 +25,9 @@ import numpy as np
 
 from fuzzytree.model import (
     LR,
-    Clause,
     FloatArray,
     IntArray,
+    Proposition,
     RuleBase,
     Shape,
     Side,
@@ -63,11 +63,11 @@ class AxisCells:
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """What is known of each clause in each cell; entry `clause * cells + cell`.
+    """What is known of each proposition in each cell.
 
     Attributes:
         grid: The cells.
-        line: The axis of each clause.
+        line: The axis of each proposition.
         lower: A lower bound of the degree, in each entry.
         upper: An upper bound.
     """
@@ -79,21 +79,23 @@ class Envelope:
 
 
 def plan_envelope(
-    rules: RuleBase, clauses: Sequence[Clause], at_line: Mapping[str, int]
+    rules: RuleBase, propositions: Sequence[Proposition], at_line: Mapping[str, int]
 ) -> Envelope:
-    """Return the envelope of some clauses.
+    """Return the envelope of some propositions.
 
-    `at_line` is the line of each variable's values. A clause without terms is always
-    true.
+    `at_line` is the line of each variable's values. A proposition without terms is
+    always true.
     """
     shapes = shapes_of(rules.variables)
-    line = np.array([at_line[c.variable] if c.terms else 0 for c in clauses], np.int64)
-    members = [[shapes[c.variable, term] for term in c.terms] for c in clauses]
+    line = np.array(
+        [at_line[c.variable] if c.terms else 0 for c in propositions], np.int64
+    )
+    members = [[shapes[c.variable, term] for term in c.terms] for c in propositions]
     used: list[list[Shape]] = [[] for _ in at_line]
     for axis, mine in zip(line.tolist(), members, strict=True):
         used[axis] += mine
-    count = min(max(_ENTRIES // max(len(clauses), 1), _FEWEST), _MOST)
-    lower, upper = np.ones((2, len(clauses), count))
+    count = min(max(_ENTRIES // max(len(propositions), 1), _FEWEST), _MOST)
+    lower, upper = np.ones((2, len(propositions), count))
     with np.errstate(all="ignore"):
         grid = _grid(used, count)
         for axis, every in enumerate(used):
@@ -104,7 +106,7 @@ def plan_envelope(
                 if at:
                     lower[number] = low[at].max(axis=0)
                     upper[number] = high[at].max(axis=0)
-    negated = np.array([clause.negated for clause in clauses])
+    negated = np.array([proposition.negated for proposition in propositions])
     lower[negated], upper[negated] = 1.0 - upper[negated], 1.0 - lower[negated]
     return Envelope(grid, line, lower.ravel(), upper.ravel())
 

@@ -1,8 +1,8 @@
 """Firing all rules of a rule base on many rows, in numpy.
 
 Rows come features first and go through in chunks. Each distinct edge and slope is
-computed once (`degrees.py`), each distinct clause once, and rules that begin with the
-same clauses share the strength of what they have in common.
+computed once (`degrees.py`), each distinct proposition once, and rules that begin with
+the same propositions share the strength of what they have in common.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import Clause, Dtype, Outcome, RuleBase, Run, shapes_of
+from fuzzytree.model import Dtype, Outcome, Proposition, RuleBase, Run, shapes_of
 from fuzzytree.runtimes.degrees import (
     NUMBERS,
     Atom,
@@ -40,15 +40,15 @@ if TYPE_CHECKING:
 
 _SMALLEST_CHUNK, _LARGEST_CHUNK = 256, 1 << 14
 _WORKING_SET = 1 << 19  # numbers: what a chunk's degrees and strengths may take
-_WIDE = 8  # terms of a clause from which each clause is reduced by itself
+_WIDE = 8  # terms of a proposition from which each proposition is reduced by itself
 
 
 @dataclass(frozen=True, slots=True)
 class PrefixLevel:
-    """Prefixes of one length: the shorter prefix and the last clause of each."""
+    """Prefixes of one length: the shorter prefix and the last proposition of each."""
 
     parents: IntArray
-    clauses: IntArray
+    propositions: IntArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Prefixes:
     """The beginnings of all rules, each once, shorter ones first.
 
     Attributes:
-        levels: The prefixes of one clause, of two, ...; number 0 is the empty one.
+        levels: The prefixes of one proposition, of two, ...; number 0 is the empty one.
         rules: The number of the prefix that is the whole of each rule.
     """
 
@@ -71,7 +71,7 @@ class Prefixes:
 
 @dataclass(frozen=True, slots=True)
 class JoinedTerms:
-    """Clauses with equally many terms: the line of each term, position by position."""
+    """Propositions of equally many terms: the line of each term, by position."""
 
     terms: IntArray
     first: int
@@ -79,10 +79,10 @@ class JoinedTerms:
 
 @dataclass(frozen=True, slots=True)
 class Degrees:
-    """How to compute the degrees of all clauses, a line each.
+    """How to compute the degrees of all propositions, a line each.
 
-    Lines 0 to `terms` are terms, two-sided ones first; then clauses that join several
-    terms; then clauses that are negated.
+    Lines 0 to `terms` are terms, two-sided ones first; then propositions that join
+    several terms; then propositions that are negated.
     """
 
     blocks: tuple[AtomBlock, ...]
@@ -91,7 +91,7 @@ class Degrees:
     right: IntArray
     choices: tuple[JoinedTerms, ...]
     negated: IntArray
-    line: dict[Clause, int]
+    line: dict[Proposition, int]
     count: int
     numbers: NumberTypes
 
@@ -169,12 +169,12 @@ def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> RulePlan:
     """Return what firing a rule base needs, computed once."""
     numbers = NUMBERS[dtype]
     axes = plan_axes(rules.variables, numbers.axis)
-    clauses = list(
-        dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
+    propositions = list(
+        dict.fromkeys(proposition for rule in rules.rules for proposition in rule.when)
     )
-    size = len(clauses) + len(rules.rules)
+    size = len(propositions) + len(rules.rules)
     rows = min(max(_WORKING_SET // size, _SMALLEST_CHUNK), _LARGEST_CHUNK)
-    degrees = plan_degrees(rules, clauses, axes.line, numbers, rows)
+    degrees = plan_degrees(rules, propositions, axes.line, numbers, rows)
     return RulePlan(
         axes,
         degrees,
@@ -186,17 +186,17 @@ def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> RulePlan:
 
 def plan_degrees(
     rules: RuleBase,
-    clauses: Sequence[Clause],
+    propositions: Sequence[Proposition],
     at_line: Mapping[str, int],
     numbers: NumberTypes,
     rows: int,
 ) -> Degrees:
-    """Return how to compute the degrees of some clauses.
+    """Return how to compute the degrees of some propositions.
 
     `at_line` is the line of each variable's values.
     """
     shapes = shapes_of(rules.variables)
-    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    keys = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     atoms = {key: atoms_of(at_line[key[0]], shapes[key]) for key in keys}
     wanted = dict.fromkeys(atom for key in keys for atom in atoms[key])
     ordered, blocks = plan_blocks(list(wanted), numbers, rows)
@@ -206,11 +206,13 @@ def plan_degrees(
     }
     terms = sorted(keys, key=lambda key: -len(sides[key]))
     at = {key: line for line, key in enumerate(terms)}
-    line, choices = _plan_choices(clauses, at)
+    line, choices = _plan_choices(propositions, at)
     count = len(terms) + sum(len(choice.terms) for choice in choices)
-    negated = [clause for clause in clauses if clause.negated]
-    below = [line[Clause(c.variable, c.terms)] for c in negated]
-    line |= {clause: count + position for position, clause in enumerate(negated)}
+    negated = [proposition for proposition in propositions if proposition.negated]
+    below = [line[Proposition(c.variable, c.terms)] for c in negated]
+    line |= {
+        proposition: count + position for position, proposition in enumerate(negated)
+    }
     return Degrees(
         blocks,
         len(ordered),
@@ -225,28 +227,30 @@ def plan_degrees(
 
 
 def _plan_choices(
-    clauses: Sequence[Clause], at: dict[tuple[str, str], int]
-) -> tuple[dict[Clause, int], tuple[JoinedTerms, ...]]:
-    """Return the line of each clause without its negation, and how terms are joined."""
-    plain = dict.fromkeys(Clause(c.variable, c.terms) for c in clauses)
+    propositions: Sequence[Proposition], at: dict[tuple[str, str], int]
+) -> tuple[dict[Proposition, int], tuple[JoinedTerms, ...]]:
+    """Return the line of each proposition before negation, and how terms join."""
+    plain = dict.fromkeys(Proposition(c.variable, c.terms) for c in propositions)
     line = {c: at[c.variable, c.terms[0]] for c in plain if len(c.terms) == 1}
-    joined: dict[int, list[Clause]] = {}
-    for clause in plain:
-        if clause not in line:
-            joined.setdefault(len(clause.terms), []).append(clause)
+    joined: dict[int, list[Proposition]] = {}
+    for proposition in plain:
+        if proposition not in line:
+            joined.setdefault(len(proposition.terms), []).append(proposition)
     choices: list[JoinedTerms] = []
     first = len(at)
     for group in joined.values():
         lines = [[at[c.variable, term] for term in c.terms] for c in group]
         choices.append(JoinedTerms(np.array(lines, np.int64), first))
-        line |= {clause: first + position for position, clause in enumerate(group)}
+        line |= {
+            proposition: first + position for position, proposition in enumerate(group)
+        }
         first += len(group)
     return line, tuple(choices)
 
 
-def _plan_prefixes(rules: RuleBase, line: dict[Clause, int]) -> Prefixes:
+def _plan_prefixes(rules: RuleBase, line: dict[Proposition, int]) -> Prefixes:
     """Return the distinct beginnings of the rules, level by level."""
-    current: list[tuple[Clause, ...]] = [rule.when for rule in rules.rules]
+    current: list[tuple[Proposition, ...]] = [rule.when for rule in rules.rules]
     number = [0] * len(current)
     levels: list[PrefixLevel] = []
     used = 1
@@ -264,7 +268,7 @@ def _plan_prefixes(rules: RuleBase, line: dict[Clause, int]) -> Prefixes:
 
 def strengths_of(plan: RulePlan, lines: Reals) -> Reals:
     """Return the strength of every rule, of shape (rules, rows)."""
-    degrees = clause_degrees(plan.degrees, lines)
+    degrees = proposition_degrees(plan.degrees, lines)
     prefixes = plan.prefixes
     strengths = np.empty((prefixes.count, lines.shape[1]), degrees.dtype)
     strengths[0] = 1
@@ -272,7 +276,7 @@ def strengths_of(plan: RulePlan, lines: Reals) -> Reals:
     start = 1
     for depth, level in enumerate(prefixes.levels):
         part = strengths[start : start + len(level.parents)]
-        degrees.take(level.clauses, axis=0, out=part, mode="clip")
+        degrees.take(level.propositions, axis=0, out=part, mode="clip")
         if depth:
             before = strengths[:start].take(level.parents, axis=0)
             combine(before, part, out=part)
@@ -280,8 +284,8 @@ def strengths_of(plan: RulePlan, lines: Reals) -> Reals:
     return strengths.take(prefixes.rules, axis=0)
 
 
-def clause_degrees(degrees: Degrees, lines: Reals) -> Reals:
-    """Return the degree of every clause, a line each (see `Degrees`)."""
+def proposition_degrees(degrees: Degrees, lines: Reals) -> Reals:
+    """Return the degree of every proposition, a line each (see `Degrees`)."""
     rows = lines.shape[1]
     atoms = _atom_degrees(degrees, lines)
     result = np.empty((degrees.count, rows), degrees.numbers.degree)
@@ -313,10 +317,10 @@ def _atom_degrees(degrees: Degrees, lines: Reals) -> Reals:
 
 
 def _join(terms: Reals, lines: IntArray, out: Reals) -> None:
-    """Put the largest degree of each clause's terms into its line."""
+    """Put the largest degree of each proposition's terms into its line."""
     if lines.shape[1] >= _WIDE:
-        for clause, line in zip(lines, out, strict=True):
-            np.maximum.reduce(terms.take(clause, axis=0), axis=0, out=line)
+        for proposition, line in zip(lines, out, strict=True):
+            np.maximum.reduce(terms.take(proposition, axis=0), axis=0, out=line)
         return
     terms.take(lines[:, 0], axis=0, out=out, mode="clip")
     for position in range(1, lines.shape[1]):

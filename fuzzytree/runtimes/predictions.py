@@ -17,12 +17,12 @@ from fuzzytree.model import (
     Model,
     RuleBase,
     Shape,
-    clause_text,
     label_of,
+    proposition_text,
     shapes_of,
     summary,
 )
-from fuzzytree.semantics import Status, axis_values, clause_degree, evaluate
+from fuzzytree.semantics import Status, axis_values, evaluate, proposition_degree
 from fuzzytree.tables import pandas_frame
 
 if TYPE_CHECKING:
@@ -250,17 +250,17 @@ def predictions_of(
 
 
 def reasons(rules: RuleBase, values: FloatArray, predictions: Predictions) -> list[str]:
-    """Return, for each row, its rule as a sentence with the degree of each clause.
+    """Return, for each row, its rule as a sentence with the degree of each proposition.
 
     `values` has shape (inputs, rows), in the order of `rules.inputs`.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Band, Clause, Rule
+        >>> from fuzzytree.model.rulebase import Band, Proposition, Rule
         >>> from fuzzytree.model.rulebase import Term, Variable
         >>> low = Term("low", Band(high=1.0, right=3.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
-        ...     (Rule((Clause("force", ("low",)),), "soft"),),
+        ...     (Rule((Proposition("force", ("low",)),), "soft"),),
         ... )
         >>> found = Predictions(("soft",), np.array([0]), np.array([1]), np.array([0]))
         >>> reasons(rules, np.array([[2.0]]), found)
@@ -293,11 +293,12 @@ def _reason(
     if status == Status.UNCOVERED:
         return "no rule fires"
     rule = rules.rules[number - 1]
-    clauses = [
-        f"{clause_text(c)} ({_short(clause_degree(c, shapes, axes[c.variable]))})"
-        for c in rule.when
+    propositions = [
+        f"{proposition_text(one)} "
+        f"({_short(proposition_degree(one, shapes, axes[one.variable]))})"
+        for one in rule.when
     ]
-    text = f"IF {' AND '.join(clauses)} THEN " if clauses else "ALWAYS "
+    text = f"IF {' AND '.join(propositions)} THEN " if propositions else "ALWAYS "
     if status == Status.DECIDED:
         return text + rule.then
     strengths = evaluate(rules, row).strengths

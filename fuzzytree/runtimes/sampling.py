@@ -29,11 +29,11 @@ HIGHEST = 1.0 - 2.0**-50
 _ROUNDING = 2.0**-40  # relative to a curve's coefficients; covers far more than it must
 
 
-def clause_shapes(rules: RuleBase) -> dict[tuple[str, str], Shape]:
-    """Return the shapes that clauses name, in the order of the rules."""
+def proposition_shapes(rules: RuleBase) -> dict[tuple[str, str], Shape]:
+    """Return the shapes that propositions name, in the order of the rules."""
     shapes = shapes_of(rules.variables)
-    clauses = (clause for rule in rules.rules for clause in rule.when)
-    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    propositions = (proposition for rule in rules.rules for proposition in rule.when)
+    keys = dict.fromkeys((c.variable, term) for c in propositions for term in c.terms)
     return {key: shapes[key] for key in keys}
 
 
@@ -85,15 +85,19 @@ def lines_bound(
 ) -> tuple[float, str]:
     """Return how far strengths can be from those of the terms themselves, and why.
 
-    The minimum passes on the largest error of a clause; a product adds them up.
+    The minimum passes on the largest error of a proposition; a product adds them up.
 
-    `errors` has the `line_error` of each term that a clause names.
+    `errors` has the `line_error` of each term that a proposition names.
     """
     is_product = rules.semantics.conjunction == "product"
     worst = 0.0
     for rule in rules.rules:
-        clauses = [max(errors[c.variable, term] for term in c.terms) for c in rule.when]
-        worst = max(worst, sum(clauses) if is_product else max(clauses, default=0.0))
+        propositions = [
+            max(errors[c.variable, term] for term in c.terms) for c in rule.when
+        ]
+        worst = max(
+            worst, sum(propositions) if is_product else max(propositions, default=0.0)
+        )
     how = "summed" if is_product else "largest"
     return min(worst, 1.0), f"{how} error of lines between the points of the terms"
 

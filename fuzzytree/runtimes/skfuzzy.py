@@ -20,10 +20,10 @@ import numpy as np
 
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
 from fuzzytree.model import (
-    Clause,
     FloatArray,
     Model,
     Outcome,
+    Proposition,
     RuleBase,
     Run,
     Runtime,
@@ -37,9 +37,9 @@ from fuzzytree.runtimes.rows import (
     winners,
 )
 from fuzzytree.runtimes.sampling import (
-    clause_shapes,
     line_error,
     lines_bound,
+    proposition_shapes,
     samples,
     universe,
 )
@@ -51,7 +51,7 @@ _MOST_RULES = 200
 
 _CANNOT = (
     "trees: it runs rule bases",
-    "rules without a clause: it needs a condition",
+    "rules without a proposition: it needs a condition",
     f"more than {_MOST_RULES} rules: each term is a list of many points",
     "curves: they are points joined by lines, within a stated bound",
     "missing values: they are answered before it is called",
@@ -63,7 +63,8 @@ def load(model: Model) -> Run:
     """Return a function that answers many rows by a scikit-fuzzy system.
 
     Raises:
-        LossError: If the model is a tree, has a rule without a clause, or is too large.
+        LossError: If the model is a tree, has a rule without a proposition, or is too
+            large.
         MissingExtraError: If scikit-fuzzy is not installed.
     """
     rules = _carried(model)
@@ -117,16 +118,16 @@ def _carried(model: Model) -> RuleBase:
         reason = f"it has {len(rules.rules)} rules, more than {_MOST_RULES}"
     for number, rule in enumerate(rules.rules, 1):
         if not rule.when:
-            reason = f"rule {number} has no clause"
+            reason = f"rule {number} has no proposition"
     if reason:
         raise LossError(f"cannot run {rules.name} as scikit-fuzzy: {reason}")
     return rules
 
 
-def _clause_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
-    """Return the shapes that clauses name: those of each variable, by term."""
+def _proposition_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
+    """Return the shapes that propositions name: those of each variable, by term."""
     result: dict[str, dict[str, Shape]] = {}
-    for (variable, term), shape in clause_shapes(rules).items():
+    for (variable, term), shape in proposition_shapes(rules).items():
         result.setdefault(variable, {})[term] = shape
     return result
 
@@ -144,7 +145,7 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
     is_product = rules.semantics.conjunction == "product"
     conjunction = np.multiply if is_product else np.fmin
     antecedents: dict[str, Any] = {}
-    for name, shapes in _clause_shapes(rules).items():
+    for name, shapes in _proposition_shapes(rules).items():
         points = _universe(list(shapes.values()))
         antecedents[name] = control.Antecedent(points, name)
         for term, shape in shapes.items():
@@ -160,8 +161,8 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
         answer[label] = (answer.universe == number).astype(np.float64)
     fired: list[Any] = []
     for number, rule in enumerate(rules.rules, 1):
-        clauses = [_condition(antecedents[c.variable], c) for c in rule.when]
-        condition = functools.reduce(operator.and_, clauses)
+        propositions = [_condition(antecedents[c.variable], c) for c in rule.when]
+        condition = functools.reduce(operator.and_, propositions)
         then = answer[rule.then]
         fired.append(control.Rule(condition, then, str(number), conjunction, np.fmax))
     return antecedents, fired
@@ -175,9 +176,9 @@ def _is_too_steep(points: FloatArray, degrees: FloatArray) -> bool:
     return bool((np.isinf(slopes) & ~is_step).any())
 
 
-def _condition(antecedent: Any, clause: Clause) -> Any:
-    either = _either([antecedent[term] for term in clause.terms])
-    return ~either if clause.negated else either
+def _condition(antecedent: Any, proposition: Proposition) -> Any:
+    either = _either([antecedent[term] for term in proposition.terms])
+    return ~either if proposition.negated else either
 
 
 def _either(terms: list[Any]) -> Any:
@@ -192,7 +193,7 @@ def bound(model: Model) -> tuple[float, str]:
     """Return how far strengths may be from the reference's, and why."""
     rules = _carried(model)
     errors: dict[tuple[str, str], float] = {}
-    for name, shapes in _clause_shapes(rules).items():
+    for name, shapes in _proposition_shapes(rules).items():
         points = _universe(list(shapes.values()))
         for term, shape in shapes.items():
             errors[name, term] = line_error(shape, points)

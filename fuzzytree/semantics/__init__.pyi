@@ -76,10 +76,10 @@ from .reference import BELOW_ONE as BELOW_ONE
 from .reference import Answer as Answer
 from .reference import Status as Status
 from .reference import axis_values as axis_values
-from .reference import clause_degree as clause_degree
 from .reference import degree as degree
 from .reference import descend as descend
 from .reference import evaluate as evaluate
+from .reference import proposition_degree as proposition_degree
 from .samples import all_samples as all_samples
 from .simplification import Pruned as Pruned
 from .simplification import Removed as Removed

@@ -16,15 +16,15 @@ from typing import TypeVar
 from msgspec.structs import replace
 
 from fuzzytree.model import (
-    Clause,
     FloatArray,
     FuzzyTree,
     Node,
+    Proposition,
     RuleBase,
     Variable,
     shapes_of,
 )
-from fuzzytree.semantics.reference import clause_degree
+from fuzzytree.semantics.reference import proposition_degree
 
 _Model = TypeVar("_Model", bound=FuzzyTree | RuleBase)
 
@@ -103,11 +103,13 @@ def node_faults(tree: FuzzyTree) -> Iterator[str]:
     """
     shapes = shapes_of(tree.variables)
     for number, node in enumerate(tree.nodes, 1):
-        clauses = [Clause(node.variable, branch.terms) for branch in node.branches]
+        propositions = [
+            Proposition(node.variable, branch.terms) for branch in node.branches
+        ]
         for point in node_points(node):
             owner = node.owners[sum(1 for cut in node.cuts if point > cut)]
-            for index, clause in enumerate(clauses):
-                result = clause_degree(clause, shapes, point)
+            for index, proposition in enumerate(propositions):
+                result = proposition_degree(proposition, shapes, point)
                 if (result == 1.0) != (index == owner):
                     yield (
                         f"node {number}: at {node.variable} = {point!r} branch "

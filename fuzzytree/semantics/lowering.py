@@ -1,7 +1,7 @@
-"""From a tree to rules: one rule for each path, one clause for each node on it.
+"""From a tree to rules: one rule for each path, one proposition for each node on it.
 
 **Relative rules equal the tree on every input.** On the path that the tree takes, each
-clause has degree exactly 1, for its terms' plateaus are the intervals of the taken
+proposition has degree exactly 1, for its terms' plateaus are the intervals of the taken
 branch. Any other path leaves that path at some node, by a branch that is not taken
 there, whose degree is below 1. Min and product never exceed their smallest operand, in
 floating point too, so every other rule is below 1 and the taken path's rule, with
@@ -18,10 +18,10 @@ import msgspec
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.model import (
     Branch,
-    Clause,
     Conjunction,
     FuzzyTree,
     Kind,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -126,7 +126,7 @@ def _variables(tree: FuzzyTree, kind: Kind) -> tuple[Variable, ...]:
 def _rules(tree: FuzzyTree, kind: Kind) -> tuple[Rule, ...]:
     rules: list[Rule] = []
     start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
-    todo: list[tuple[Branch, tuple[Clause, ...]]] = [(start, ())]
+    todo: list[tuple[Branch, tuple[Proposition, ...]]] = [(start, ())]
     while todo:
         branch, path = todo.pop()
         if branch.leaf is not None:
@@ -136,5 +136,5 @@ def _rules(tree: FuzzyTree, kind: Kind) -> tuple[Rule, ...]:
             node = tree.nodes[branch.node - 1]
             for step in reversed(node.branches):
                 names = step.terms if kind == "relative" else step.sets
-                todo.append((step, (*path, Clause(node.variable, names))))
+                todo.append((step, (*path, Proposition(node.variable, names))))
     return tuple(rules)

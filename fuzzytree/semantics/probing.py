@@ -1,9 +1,9 @@
 """Rows at which the representations of a model tend to part.
 
 Uniform rows almost never fall where two representations could differ: within rounding
-of a cut, of a support's end, of a mean. A probe puts one clause of one rule exactly
-there, or on a neighbouring float, while the other clauses of that rule hold as far as
-they can, so that a fault in the clause reaches the answer.
+of a cut, of a support's end, of a mean. A probe puts one proposition of one rule
+exactly there, or on a neighbouring float, while the other propositions of that rule
+hold as far as they can, so that a fault in the proposition reaches the answer.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from fuzzytree.model import (
     Band,
     Bell,
     Binary,
-    Clause,
     Condition,
     Cosine,
     Curve,
@@ -35,6 +34,7 @@ from fuzzytree.model import (
     Not,
     Or,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Shape,
@@ -78,11 +78,11 @@ Interval = tuple[float, float]
 def probes(
     model: FuzzyTree | RuleBase, *, limit: int = 20_000, seed: int = 0
 ) -> list[Row]:
-    """Return rows that put each distinct clause on its landmarks and beside them.
+    """Return rows that put each distinct proposition on its landmarks and beside them.
 
     Args:
         model: A rule base, or a tree, which is probed through its relative rules.
-        limit: The most rows to return. Above it, clauses' landmarks are drawn from
+        limit: The most rows to return. Above it, propositions' landmarks are drawn from
             the seed; random rows and special values always keep their place.
         seed: The same model, limit and seed give the same rows.
 
@@ -394,20 +394,21 @@ def neighbours(value: float) -> tuple[float, ...]:
 
 def _targets(
     rules: RuleBase, shapes: Mapping[tuple[str, str], Shape]
-) -> Iterator[tuple[Rule, Clause, float]]:
-    """Yield a rule, a clause of it and a value, once for each distinct clause."""
-    earlier: set[Clause] = set()
+) -> Iterator[tuple[Rule, Proposition, float]]:
+    """Yield a rule, a proposition and a value, once for each distinct proposition."""
+    earlier: set[Proposition] = set()
     for rule in rules.rules:
-        for clause in rule.when:
-            if clause in earlier:
+        for proposition in rule.when:
+            if proposition in earlier:
                 continue
-            earlier.add(clause)
+            earlier.add(proposition)
             values = itertools.chain.from_iterable(
-                landmarks(shapes[clause.variable, term]) for term in clause.terms
+                landmarks(shapes[proposition.variable, term])
+                for term in proposition.terms
             )
             for value in dict.fromkeys(values):
                 for near in neighbours(value):
-                    yield rule, clause, near
+                    yield rule, proposition, near
 
 
 class _Maker:
@@ -426,17 +427,17 @@ class _Maker:
             for name, (low, high) in self.ranges.items()
         }
 
-    def meet(self, rule: Rule, clause: Clause, value: float) -> Row:
-        """Return a row that holds a rule but puts one clause's variable on a value."""
+    def meet(self, rule: Rule, proposition: Proposition, value: float) -> Row:
+        """Return a row for which a rule holds, with one variable put on a value."""
         wanted = [
             (self.variables[other.variable], self._inside(other))
             for other in rule.when
-            if other.variable != clause.variable
+            if other.variable != proposition.variable
         ]
         # Inputs can be set at once; combinations have to be moved, round by round.
         wanted.sort(key=lambda entry: not entry[0].parts, reverse=True)
         row = self.draw()
-        target = self.variables[clause.variable]
+        target = self.variables[proposition.variable]
         for part in target.parts:  # small summands: no digits are lost in their sum
             row[part.input] = part.centre + self.chance.uniform(-0.5, 0.5) / part.weight
         for _ in range(_ROUNDS if any(v.parts for v, _ in wanted) else 1):
@@ -447,9 +448,9 @@ class _Maker:
         self._hit(row, target, value)
         return row
 
-    def _inside(self, clause: Clause) -> Interval:
-        """Return an interval on which a clause holds best."""
-        shape = self.shapes[clause.variable, self.chance.choice(clause.terms)]
+    def _inside(self, proposition: Proposition) -> Interval:
+        """Return an interval on which a proposition holds best."""
+        shape = self.shapes[proposition.variable, self.chance.choice(proposition.terms)]
         match shape:
             case Band(low=low, high=high):
                 width = max((abs(a - b) for a, b in shape.flanks), default=1.0)

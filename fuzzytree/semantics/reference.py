@@ -17,9 +17,9 @@ import msgspec
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     FuzzyTree,
     Points,
+    Proposition,
     RuleBase,
     Shape,
     Side,
@@ -71,7 +71,7 @@ def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
         >>> low = Term("low", Band(high=1.0, right=3.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
-        ...     (Rule((Clause("force", ("low",)),), "soft"),),
+        ...     (Rule((Proposition("force", ("low",)),), "soft"),),
         ... )
         >>> evaluate(rules, {"force": 2.0}).strengths
         (0.5,)
@@ -81,15 +81,19 @@ def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
         missing = (math.nan,) * len(rules.rules)
         return Answer(0, rules.semantics.missing, Status.MISSING, missing)
     shapes = shapes_of(rules.variables)
-    # The rules of a tree share their clauses: each is evaluated once.
-    clauses = {id(clause): clause for rule in rules.rules for clause in rule.when}
+    # The rules of a tree share their propositions: each is evaluated once.
+    propositions = {
+        id(proposition): proposition
+        for rule in rules.rules
+        for proposition in rule.when
+    }
     degrees = {
-        key: clause_degree(clause, shapes, axes[clause.variable])
-        for key, clause in clauses.items()
+        key: proposition_degree(proposition, shapes, axes[proposition.variable])
+        for key, proposition in propositions.items()
     }
     strengths = tuple(
         strength(
-            [degrees[id(clause)] for clause in rule.when],
+            [degrees[id(proposition)] for proposition in rule.when],
             is_product=rules.semantics.conjunction == "product",
         )
         for rule in rules.rules
@@ -142,16 +146,18 @@ def axis_values(
     return axes
 
 
-def clause_degree(
-    clause: Clause, shapes: Mapping[tuple[str, str], Shape], value: float
+def proposition_degree(
+    proposition: Proposition, shapes: Mapping[tuple[str, str], Shape], value: float
 ) -> float:
-    """Return how true a clause is: the largest degree of its terms, or 1 minus it."""
-    highest = max(degree(shapes[clause.variable, term], value) for term in clause.terms)
-    return 1.0 - highest if clause.negated else highest
+    """Return the degree of a proposition: the largest of its terms, or 1 minus it."""
+    highest = max(
+        degree(shapes[proposition.variable, term], value) for term in proposition.terms
+    )
+    return 1.0 - highest if proposition.negated else highest
 
 
 def strength(degrees: list[float], *, is_product: bool) -> float:
-    """Return the minimum, or the product from left to right; 1 without a clause."""
+    """Return the minimum, or the product from left to right; 1 without any."""
     if not is_product:
         return min(degrees, default=1.0)
     total = 1.0

@@ -17,7 +17,6 @@ from fuzzytree.model import (
     Band,
     Branch,
     Call,
-    Clause,
     Conclusion,
     Condition,
     Curve,
@@ -37,6 +36,7 @@ from fuzzytree.model import (
     Or,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     RuleBlock,
@@ -146,8 +146,8 @@ def _rules(*rules: Rule, semantics: Semantics | None = None) -> RuleBase:
 
 
 _PLAIN = (
-    Rule((Clause("force", ("low",)), Clause("slip", ("high",))), "soft"),
-    Rule((Clause("force", ("high",)),), "firm"),
+    Rule((Proposition("force", ("low",)), Proposition("slip", ("high",))), "soft"),
+    Rule((Proposition("force", ("high",)),), "firm"),
 )
 
 
@@ -272,11 +272,11 @@ SAMPLES: Mapping[str, Callable[[], Document]] = {
     "point lists": lambda: _rules(),
     "vertical edges": _stepped,
     "AND as product": lambda: _rules(semantics=Semantics("product")),
-    "several terms in a clause": lambda: _rules(
-        Rule((Clause("force", ("low", "high")),), "soft"), _PLAIN[1]
+    "several terms in a proposition": lambda: _rules(
+        Rule((Proposition("force", ("low", "high")),), "soft"), _PLAIN[1]
     ),
-    "negated clauses": lambda: _rules(
-        Rule((Clause("force", ("low",), negated=True),), "soft"), _PLAIN[0]
+    "negated propositions": lambda: _rules(
+        Rule((Proposition("force", ("low",), negated=True),), "soft"), _PLAIN[0]
     ),
     "a rule that always holds": lambda: _rules(_PLAIN[0], Rule((), "firm")),
     "answers where no rule fires": lambda: _rules(

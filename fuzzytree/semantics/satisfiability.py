@@ -1,6 +1,6 @@
-"""Tautologies and contradictions: clauses that are always true, rules that never fire.
+"""Tautologies and contradictions: what is always true, and rules that never fire.
 
-What is reported is certain, in rounded numbers of every type; a clause that is not
+What is reported is certain, in rounded numbers of every type; a proposition that is not
 reported may be always true all the same, and a rule may never fire.
 """
 
@@ -15,11 +15,11 @@ from functools import partial
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     Points,
+    Proposition,
     RuleBase,
     Shape,
-    clause_text,
+    proposition_text,
     shapes_of,
 )
 
@@ -31,15 +31,17 @@ Spans = tuple[tuple[float, float], ...]
 EVERYWHERE: Spans = ((-math.inf, math.inf),)
 
 
-def always_holds(clause: Clause, shapes: Mapping[tuple[str, str], Shape]) -> bool:
-    """Return whether a clause has degree 1 for every value.
+def always_holds(
+    proposition: Proposition, shapes: Mapping[tuple[str, str], Shape]
+) -> bool:
+    """Return whether a proposition has degree 1 for every value.
 
     Example:
-        >>> always_holds(Clause("x", ("any",)), {("x", "any"): Band()})
+        >>> always_holds(Proposition("x", ("any",)), {("x", "any"): Band()})
         True
     """
-    of = [shapes[clause.variable, term] for term in clause.terms]
-    if clause.negated:
+    of = [shapes[proposition.variable, term] for term in proposition.terms]
+    if proposition.negated:
         return not _union(span for shape in of for span in _support(shape))
     return _union(span for shape in of for span in _plateau(shape)) == EVERYWHERE
 
@@ -47,15 +49,15 @@ def always_holds(clause: Clause, shapes: Mapping[tuple[str, str], Shape]) -> boo
 def never_firing(rules: RuleBase) -> dict[int, str]:
     """Return the rules whose strength is 0 for every input, and why.
 
-    A clause has degree 0 outside its spans, in rounded numbers of every type; where
-    the spans of all clauses on one variable have no value in common, min and product
-    are 0. That is sufficient: a rule that relations between variables keep from firing
-    is not found.
+    A proposition has degree 0 outside its spans, in rounded numbers of every type;
+    where the spans of all propositions on one variable have no value in common, min and
+    product are 0. That is sufficient: a rule that relations between variables keep from
+    firing is not found.
 
     Example:
         >>> from fuzzytree.model.rulebase import Rule, Term, Variable
         >>> low, high = Term("low", Band(high=1.0)), Term("high", Band(low=1.0))
-        >>> both = (Clause("x", ("low",)), Clause("x", ("high",)))
+        >>> both = (Proposition("x", ("low",)), Proposition("x", ("high",)))
         >>> rules = (Rule(both, "a"), Rule((), "a"))
         >>> never_firing(RuleBase("r", ("a",), (Variable("x", (low, high)),), rules))
         {1: 'x is low AND x is high never hold together'}
@@ -63,25 +65,29 @@ def never_firing(rules: RuleBase) -> dict[int, str]:
     holding = functools.cache(partial(_holding, shapes=shapes_of(rules.variables)))
     results: dict[int, str] = {}
     for number, rule in enumerate(rules.rules, 1):
-        by_variable: dict[str, list[Clause]] = {}
-        for clause in rule.when:
-            by_variable.setdefault(clause.variable, []).append(clause)
-        for clauses in by_variable.values():
+        by_variable: dict[str, list[Proposition]] = {}
+        for proposition in rule.when:
+            by_variable.setdefault(proposition.variable, []).append(proposition)
+        for propositions in by_variable.values():
             left = EVERYWHERE
-            for clause in clauses:
-                left = _both(left, holding(clause))
+            for proposition in propositions:
+                left = _both(left, holding(proposition))
             if not left:
-                texts = " AND ".join(map(clause_text, clauses))
-                verb = "never holds" if len(clauses) == 1 else "never hold together"
+                texts = " AND ".join(map(proposition_text, propositions))
+                verb = (
+                    "never holds" if len(propositions) == 1 else "never hold together"
+                )
                 results[number] = f"{texts} {verb}"
                 break
     return results
 
 
-def _holding(clause: Clause, shapes: Mapping[tuple[str, str], Shape]) -> Spans:
-    """Return spans outside of which a clause has degree exactly 0."""
-    of = [shapes[clause.variable, term] for term in clause.terms]
-    if clause.negated:
+def _holding(
+    proposition: Proposition, shapes: Mapping[tuple[str, str], Shape]
+) -> Spans:
+    """Return spans outside of which a proposition has degree exactly 0."""
+    of = [shapes[proposition.variable, term] for term in proposition.terms]
+    if proposition.negated:
         return _others(_union(span for shape in of for span in _plateau(shape)))
     return _union(span for shape in of for span in _support(shape))
 

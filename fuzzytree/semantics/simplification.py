@@ -5,14 +5,16 @@ of a rule, or what can be made of a tree is left out only on request, and said.
 
 Why an answer keeps its bits:
 
-- *A term that no clause names* enters no operation.
+- *A term that no proposition names* enters no operation.
 - *Two terms of one curve* have equal degrees, and max of equal numbers is that number.
-- *A clause that always holds* has degree 1: `min(1, d)` and `1 * d` are d.
-- *A clause that stands twice* under min: `min(d, d)` is d. Under product it counts.
-- *A combination that no clause uses* still shows whether a value is missing. It
+- *A proposition that always holds* has degree 1: `min(1, d)` and `1 * d` are d.
+- *A proposition that stands twice* under min: `min(d, d)` is d. Under product it
+  counts.
+- *A combination that no proposition uses* still shows whether a value is missing. It
   may go where it cannot overflow: then it is finite wherever its inputs are.
-- *A rule whose clauses never hold together* has strength 0 for every input, and a rule
-  of strength 0 neither wins nor ties; but the rules behind it change their numbers.
+- *A rule whose propositions never hold together* has strength 0 for every input, and a
+  rule of strength 0 neither wins nor ties; but the rules behind it change their
+  numbers.
 - *An input that nothing uses* decides alone whether a row with a missing value is
   answered: leaving it out answers more rows.
 """
@@ -30,10 +32,10 @@ from msgspec.structs import replace
 from fuzzytree.model import (
     Band,
     Branch,
-    Clause,
     FuzzyTree,
     Model,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Sets,
@@ -42,7 +44,7 @@ from fuzzytree.model import (
     Use,
     Value,
     Variable,
-    clause_text,
+    proposition_text,
     shapes_of,
 )
 from fuzzytree.semantics.satisfiability import always_holds, never_firing
@@ -152,22 +154,26 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
         for name, other in names.items()
     ]
     is_min = rules.semantics.conjunction == "minimum"
-    # Rules of a tree share their clauses, and these may name thousands of terms.
+    # Rules of a tree share their propositions, and these may name thousands of terms.
     renamed = functools.cache(partial(_renamed, same=same))
     is_idle = functools.cache(partial(always_holds, shapes=shapes_of(rules.variables)))
     kept: list[Rule] = []
     for number in numbers:
         rule = rules.rules[number - 1]
-        when = [renamed(clause) for clause in rule.when]
-        needed = _needed_clauses(when, is_idle, is_min=is_min)
-        texts = [clause_text(c) for k, c in enumerate(when) if k not in needed]
+        when = [renamed(proposition) for proposition in rule.when]
+        needed = _needed_propositions(when, is_idle, is_min=is_min)
+        texts = [proposition_text(c) for k, c in enumerate(when) if k not in needed]
         removed += [
-            Removed(f"clause {text!r} of rule {number}", "it changes no strength")
+            Removed(f"proposition {text!r} of rule {number}", "it changes no strength")
             for text in texts
         ]
         kept.append(replace(rule, when=tuple(when[k] for k in needed)))
-    clauses = {clause for rule in kept for clause in rule.when}
-    named = {(clause.variable, t) for clause in clauses for t in clause.terms}
+    propositions = {proposition for rule in kept for proposition in rule.when}
+    named = {
+        (proposition.variable, t)
+        for proposition in propositions
+        for t in proposition.terms
+    }
     variables = _pruned_variables(
         _merged(rules.variables, same), named, removed, drops_inputs=drops_inputs
     )
@@ -175,14 +181,14 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
     return Pruned(left, tuple(removed), tuple(numbers))
 
 
-def _needed_clauses(
-    when: list[Clause], is_idle: Callable[[Clause], bool], *, is_min: bool
+def _needed_propositions(
+    when: list[Proposition], is_idle: Callable[[Proposition], bool], *, is_min: bool
 ) -> list[int]:
-    """Return the positions of the clauses that can lower a strength."""
-    needed: dict[Clause | int, int] = {}
-    for position, clause in enumerate(when):
-        if not is_idle(clause):
-            needed.setdefault(clause if is_min else position, position)
+    """Return the positions of the propositions that can lower a strength."""
+    needed: dict[Proposition | int, int] = {}
+    for position, proposition in enumerate(when):
+        if not is_idle(proposition):
+            needed.setdefault(proposition if is_min else position, position)
     return list(needed.values())
 
 
@@ -211,12 +217,14 @@ def curve_bytes(shape: Shape) -> bytes:
     return msgspec.json.encode(shape)
 
 
-def _renamed(clause: Clause, same: Mapping[str, Mapping[str, str]]) -> Clause:
-    of = same[clause.variable]
-    if not of.keys() & set(clause.terms):
-        return clause
-    names = dict.fromkeys(of.get(name, name) for name in clause.terms)
-    return replace(clause, terms=tuple(names))
+def _renamed(
+    proposition: Proposition, same: Mapping[str, Mapping[str, str]]
+) -> Proposition:
+    of = same[proposition.variable]
+    if not of.keys() & set(proposition.terms):
+        return proposition
+    names = dict.fromkeys(of.get(name, name) for name in proposition.terms)
+    return replace(proposition, terms=tuple(names))
 
 
 def _merged(
@@ -391,12 +399,12 @@ def proof_faults(
 ) -> Iterator[str]:
     """Yield what keeps two models from being the same function; nothing if they are.
 
-    Both are brought to a form in which a name stands for nothing but itself: a clause
-    becomes the curves that it takes the largest of, on the inputs and the chain of
-    sums that it looks at; what always holds is left out, and so is what cannot change
-    whether a value is missing. Equal forms perform equal operations on equal numbers,
-    whatever the input. Where `after` has fewer inputs or combinations the two are the
-    same for rows in which those left out are neither missing nor overflow.
+    Both are brought to a form in which a name stands for nothing but itself: a
+    proposition becomes the curves that it takes the largest of, on the inputs and the
+    chain of sums that it looks at; what always holds is left out, and so is what cannot
+    change whether a value is missing. Equal forms perform equal operations on equal
+    numbers, whatever the input. Where `after` has fewer inputs or combinations the two
+    are the same for rows in which those left out are neither missing nor overflow.
 
     This reads both models afresh and trusts no list of what was removed.
 
@@ -469,15 +477,15 @@ def _rule_forms(rules: RuleBase) -> list[object]:
     is_min = rules.semantics.conjunction == "minimum"
 
     @functools.cache
-    def form(clause: Clause) -> tuple[object, ...]:
-        if always_holds(clause, shapes):
+    def form(proposition: Proposition) -> tuple[object, ...]:
+        if always_holds(proposition, shapes):
             return ()
-        met = frozenset(curves[clause.variable, t] for t in clause.terms)
-        return axes[clause.variable], clause.negated, met
+        met = frozenset(curves[proposition.variable, t] for t in proposition.terms)
+        return axes[proposition.variable], proposition.negated, met
 
     forms: list[object] = []
     for rule in rules.rules:
-        when = [result for clause in rule.when if (result := form(clause))]
+        when = [result for proposition in rule.when if (result := form(proposition))]
         forms.append((rule.then, frozenset(when) if is_min else tuple(when)))
     return forms
 

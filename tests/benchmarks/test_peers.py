@@ -26,8 +26,8 @@ from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -344,16 +344,23 @@ def negated(semantics: Semantics, *terms: str) -> RuleBase:
     x, y = Variable("x", named), Variable("y", named)
     several = terms or ("low", "middle")
     rules = (
-        Rule((Clause("x", ("low",), negated=True), Clause("y", ("low",))), "a"),
-        Rule((Clause("y", ("high",)), Clause("x", several, negated=True)), "b"),
+        Rule(
+            (Proposition("x", ("low",), negated=True), Proposition("y", ("low",))), "a"
+        ),
+        Rule(
+            (Proposition("y", ("high",)), Proposition("x", several, negated=True)), "b"
+        ),
         Rule(
             (
-                Clause("x", ("high",), negated=True),
-                Clause("y", ("high",), negated=True),
+                Proposition("x", ("high",), negated=True),
+                Proposition("y", ("high",), negated=True),
             ),
             "c",
         ),
-        Rule((Clause("x", ("low", "high")), Clause("y", ("middle", "high"))), "a"),
+        Rule(
+            (Proposition("x", ("low", "high")), Proposition("y", ("middle", "high"))),
+            "a",
+        ),
     )
     return RuleBase("negated", ("a", "b", "c"), (x, y), rules, semantics)
 
@@ -446,12 +453,14 @@ def test_level_stretches_have_no_points_of_their_own() -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_rule_without_a_clause_is_refused(engine: str) -> None:
+def test_a_rule_without_a_proposition_is_refused(engine: str) -> None:
     x = Variable("x", (Term("low", Band(None, 0.0)),))
     rules = RuleBase("bare", ("a",), (x,), (Rule((), "a"),))
     with pytest.raises(LossError) as caught:
         candidate(rules, f"{engine}: rules").load(1)
-    assert str(caught.value) == f"cannot run bare as {engine}: rule 1 has no clause"
+    assert (
+        str(caught.value) == f"cannot run bare as {engine}: rule 1 has no proposition"
+    )
 
 
 def test_pyfuzzylite_refuses_a_negated_or_under_a_product() -> None:
@@ -491,7 +500,10 @@ def test_simpful_has_no_bound_where_a_slope_overflows(
         "zero",
         ("a", "b"),
         (x,),
-        (Rule((Clause("x", ("low",)),), "a"), Rule((Clause("x", ("high",)),), "b")),
+        (
+            Rule((Proposition("x", ("low",)),), "a"),
+            Rule((Proposition("x", ("high",)),), "b"),
+        ),
     )
     found, _ = peers(rules, lambda _rules, _dtype: (0.0, "the model"))
     bounds = {one.name: one.bound() for one in found if one.bound}

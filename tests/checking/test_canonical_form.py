@@ -20,7 +20,7 @@ from fuzzytree.model import (
     SystemTerm,
 )
 from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.random_systems import random_system
 from fuzzytree.testing import random_tree
@@ -58,7 +58,9 @@ def test_a_rule_base_with_other_names_is_equal_to_it() -> None:
         rules=tuple(
             Rule(
                 tuple(
-                    Clause(other(c.variable), tuple(map(other, c.terms)), c.negated)
+                    Proposition(
+                        other(c.variable), tuple(map(other, c.terms)), c.negated
+                    )
                     for c in rule.when
                 ),
                 other(rule.then),

@@ -103,7 +103,7 @@ def swapped_class(rules: RuleBase) -> RuleBase:
     return _with_rule(rules, 0, then=other)
 
 
-def dropped_clause(rules: RuleBase) -> RuleBase:
+def dropped_proposition(rules: RuleBase) -> RuleBase:
     return _with_rule(rules, 0, when=rules.rules[0].when[1:])
 
 
@@ -112,7 +112,7 @@ def swapped_rules(rules: RuleBase) -> RuleBase:
     return replace(rules, rules=(second, first, *rest))
 
 
-def negated_clause(rules: RuleBase) -> RuleBase:
+def negated_proposition(rules: RuleBase) -> RuleBase:
     first, *rest = rules.rules[0].when
     return _with_rule(rules, 0, when=(replace(first, negated=True), *rest))
 
@@ -156,9 +156,9 @@ def _with_band(rules: RuleBase, change: Callable[[Band], Band]) -> RuleBase:
     "plant",
     [
         swapped_class,
-        dropped_clause,
+        dropped_proposition,
         swapped_rules,
-        negated_clause,
+        negated_proposition,
         other_conjunction,
         edge_by_one_ulp,
         flank_by_one_ulp,

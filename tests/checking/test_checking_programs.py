@@ -12,7 +12,7 @@ import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
 from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.runtimes import written
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.samples import all_samples
@@ -24,7 +24,7 @@ ENDS = RuleBase(
     "ends",
     ("x", "y"),
     (Variable("v", (Term("falls", Band(high=1.0, right=3.0)),)),),
-    (Rule((Clause("v", ("falls",)),), "x"), Rule((), "y")),
+    (Rule((Proposition("v", ("falls",)),), "x"), Rule((), "y")),
 )
 
 

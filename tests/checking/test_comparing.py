@@ -17,7 +17,7 @@ from fuzzytree.model.agreement import Certified
 from fuzzytree.model.contracts import Dtype, Outcome
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -28,12 +28,12 @@ from fuzzytree.numerics.oracle import decide
 from fuzzytree.testing import random_tree
 
 LOW = Term("low", Band(high=1.0, right=3.0))
-CLAUSE = Clause("x", ("low",))
+PROPOSITION = Proposition("x", ("low",))
 RULES = RuleBase(
     "r",
     ("a", "b"),
     (Variable("x", (LOW,)),),
-    (Rule((CLAUSE,), "a"), Rule((CLAUSE,), "b"), Rule((CLAUSE,), "a")),
+    (Rule((PROPOSITION,), "a"), Rule((PROPOSITION,), "b"), Rule((PROPOSITION,), "a")),
     Semantics(uncovered="b"),
 )
 ROWS = RowSet(("x",), np.array([[1.0, 2.0, 3.0]]), np.arange(3), 1)
@@ -191,7 +191,7 @@ NARROW = RuleBase(
     "r",
     ("a", "b"),
     (Variable("x", (LOW, Term("high", Band(low=2.0)))),),
-    (Rule((CLAUSE,), "a"), Rule((Clause("x", ("high",)),), "b")),
+    (Rule((PROPOSITION,), "a"), Rule((Proposition("x", ("high",)),), "b")),
 )
 
 
@@ -247,7 +247,7 @@ def test_a_flip_beside_a_step_that_float32_cannot_tell_is_allowed() -> None:
 
 def test_cover_that_is_lost_and_gained_is_counted() -> None:
     near = math.nextafter(3.0, 0.0)
-    low = RuleBase("r", ("a",), (Variable("x", (LOW,)),), (Rule((CLAUSE,), "a"),))
+    low = RuleBase("r", ("a",), (Variable("x", (LOW,)),), (Rule((PROPOSITION,), "a"),))
     rows = RowSet(("x",), np.array([[near, 3.0]]), np.arange(2), 0)
     fired = np.array([[0.0, 1e-17]])
     actual = ModelRun("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))

@@ -15,7 +15,14 @@ from msgspec.structs import replace
 from fuzzytree.benchmarking import savings
 from fuzzytree.benchmarking.savings import report, stages, with_all_columns
 from fuzzytree.checking.dependencies import COMBINATIONS, Graph, needs, prove
-from fuzzytree.model.rulebase import Clause, Part, Rule, RuleBase, Semantics, Variable
+from fuzzytree.model.rulebase import (
+    Part,
+    Proposition,
+    Rule,
+    RuleBase,
+    Semantics,
+    Variable,
+)
 from fuzzytree.report.needs import report_lines
 from fuzzytree.semantics.lowering import forms, rules_from_tree
 from fuzzytree.semantics.simplification import USES, Pruned, pruned
@@ -50,7 +57,7 @@ def because(result: Graph) -> dict[str, dict[str, int]]:
 def test_an_input_that_no_rule_tests_is_listed_as_idle() -> None:
     mix = Variable("mix", (HARD,), parts=(Part("slip", 1.0), Part("speed", 2.0)))
     known = (FORCE, Variable("slip"), Variable("speed"), Variable("heat"), mix)
-    rules = base((force("soft"),), (Clause("mix", ("hard",)),), variables=known)
+    rules = base((force("soft"),), (Proposition("mix", ("hard",)),), variables=known)
     result = needs(rules)
     assert result.inputs == ("force", "slip", "speed")
     assert result.idle_inputs == ("heat",)
@@ -92,8 +99,8 @@ def test_the_operators_of_an_or_a_negation_and_a_missing_answer_are_listed() -> 
 def test_the_operators_of_a_product_and_of_combinations_are_listed() -> None:
     mix = Variable("mix", (SOFT,), parts=(Part("force", 1.0), Part("slip", 2.0)))
     rules = base(
-        (force("soft"), Clause("mix", ("soft",))),
-        (force("hard"), Clause("mix", ("soft",))),
+        (force("soft"), Proposition("mix", ("soft",))),
+        (force("hard"), Proposition("mix", ("soft",))),
         variables=(FORCE, Variable("slip"), mix),
         semantics=Semantics("product"),
     )

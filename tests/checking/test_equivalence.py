@@ -12,8 +12,8 @@ from fuzzytree.model import LR, FuzzySystem, Is, Side, SystemTerm, Trapezoid
 from fuzzytree.model.contracts import Document, Reading, Written
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Shape,
@@ -30,7 +30,7 @@ TREE = all_samples()["tree"]
 
 def _one(shape: Shape) -> RuleBase:
     variable = Variable("force", (Term("low", shape),))
-    rule = Rule((Clause("force", ("low",)),), "soft")
+    rule = Rule((Proposition("force", ("low",)),), "soft")
     return RuleBase("one", ("soft",), (variable,), (rule,))
 
 

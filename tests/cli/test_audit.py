@@ -17,7 +17,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.auditing.findings.records import LIMITS, Audit, digest_of
-from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 
@@ -75,7 +75,7 @@ def test_the_line_of_a_finding_is_shown_in_other_formats_too(
 def test_an_input_on_which_nothing_depends_may_be_any_number(call: Call) -> None:
     high = Term("high", Band(low=2.0))
     inputs = (Variable("free"), Variable("force", (high,), low=0.0, high=5.0))
-    rule = Rule((Clause("force", ("high",)),), "firm")
+    rule = Rule((Proposition("force", ("high",)),), "firm")
     ft.save(RuleBase("one", ("firm",), inputs, (rule,)), "one.yaml")
     words = ("--select", "FT204", "--row", "free=57,force=4")
     code, out, err = call("audit", "one.yaml", *words, "--verbose")

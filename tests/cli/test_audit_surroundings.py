@@ -16,7 +16,7 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree import AuditSelection
 from fuzzytree.api import verbs
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.report.audit_page import page
 from tests.cli.conftest import Call
 
@@ -45,7 +45,7 @@ def hostile(name: str) -> RuleBase:
         Variable(f"free {name}"),
     )
     kinds = ((low, f"c1 {name}"), (high, f"c2 {name}"), (high, f"c1 {name}"))
-    rules = tuple(Rule((Clause(inputs[0].name, (t.name,)),), c) for t, c in kinds)
+    rules = tuple(Rule((Proposition(inputs[0].name, (t.name,)),), c) for t, c in kinds)
     return RuleBase(f"m {name}", (f"c1 {name}", f"c2 {name}"), inputs, rules)
 
 

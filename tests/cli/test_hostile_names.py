@@ -14,7 +14,7 @@ import fuzzytree as ft
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.exporters.table import TABLE
 from fuzzytree.model import FuzzySystem
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from tests.cli.conftest import GRASPS, Call
 
 EVIL = "a\x1b[2J\x07\x7f\x9b1m\u202e"
@@ -113,7 +113,7 @@ def rules(name: str = "r", **names: str) -> RuleBase:
     term = Term(names.get("term", "low"), Points((0.0, 1.0), (0.0, 1.0)))
     label = names.get("label", "c")
     inputs = (Variable(names.get("column", "x"), (term,), names.get("unit", "")),)
-    when = (Clause(inputs[0].name, (term.name,)),)
+    when = (Proposition(inputs[0].name, (term.name,)),)
     return RuleBase(name, (label,), inputs, (Rule(when, label),))
 
 

@@ -14,7 +14,7 @@ from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import CModel, tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
 from fuzzytree.exporters.program_text import digest_of, places_of
-from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import Status, descend, evaluate
@@ -39,7 +39,7 @@ HOSTILE = (
 def hostile_rules() -> RuleBase:
     terms = tuple(Term(name, Band(high=1.0, right=2.0)) for name in HOSTILE)
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
-    rules = tuple(Rule((Clause(name, (name,)),), name) for name in HOSTILE)
+    rules = tuple(Rule((Proposition(name, (name,)),), name) for name in HOSTILE)
     return RuleBase("*/ # ??/", HOSTILE, inputs, rules)
 
 

@@ -38,7 +38,7 @@ from fuzzytree.model import (
     Trapezoid,
     TwoGaussians,
 )
-from fuzzytree.model.rulebase import Clause, Kind, Points, Rule
+from fuzzytree.model.rulebase import Kind, Points, Proposition, Rule
 from fuzzytree.semantics import pointed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
@@ -153,7 +153,7 @@ def test_rules_of_points_are_read_back_equal(seed: int, kind: Kind) -> None:
 def test_product_and_negated_clauses_are_read_back_equal() -> None:
     rules, _ = pointed(rules_from_tree(random_tree(3, combinations=0.0)), 1e-2)
     terms = tuple(term.name for term in rules.variables[0].terms)
-    clause = Clause(rules.variables[0].name, terms, negated=True)
+    clause = Proposition(rules.variables[0].name, terms, negated=True)
     other = replace(
         rules,
         semantics=replace(rules.semantics, conjunction="product"),

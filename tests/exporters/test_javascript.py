@@ -10,8 +10,8 @@ from fuzzytree.exporters.javascript import FORMAT, write
 from fuzzytree.exporters.js_text import literal, number_text, text_of
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -39,7 +39,10 @@ HOSTILE = (
 def grip() -> RuleBase:
     low = Term("low", Band(high=1.0, right=3.0))
     some = Term("some", Points((0.0, 0.1), (0.0, 1.0)))
-    rules = (Rule((Clause("force", ("low", "some"), True),), "soft"), Rule((), "hard"))
+    rules = (
+        Rule((Proposition("force", ("low", "some"), True),), "soft"),
+        Rule((), "hard"),
+    )
     inputs = (Variable("force", (low, some), unit="N"),)
     return RuleBase(
         "grip", ("soft", "hard"), inputs, rules, Semantics("minimum", "hard")

@@ -24,8 +24,8 @@ from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -85,8 +85,11 @@ def lr_rules() -> RuleBase:
     high = LR(20.0, Side(2.0, (0.4, 0.1)), Side(3.0, (0.5,), 4.0))
     slip = Variable("slip", (Term("low", low), Term("high", high)))
     rules = (
-        Rule((Clause("slip", ("low", "high")),), "hold"),
-        Rule((Clause("slip", ("high",)), Clause("slip", ("low",), True)), "drop"),
+        Rule((Proposition("slip", ("low", "high")),), "hold"),
+        Rule(
+            (Proposition("slip", ("high",)), Proposition("slip", ("low",), True)),
+            "drop",
+        ),
     )
     semantics = Semantics("product", uncovered="hold", missing="drop")
     return RuleBase("slips", ("hold", "drop"), (slip,), rules, semantics)
@@ -173,7 +176,7 @@ def test_the_metadata_says_what_the_file_is() -> None:
 def test_class_names_of_any_script_come_back() -> None:
     names = ("no", "1e-05", 'a"b', "élan ☂", "a\xa0b", "日本語", "🙂")
     rules = tuple(
-        Rule((Clause("x", (f"at {k}",)),), name) for k, name in enumerate(names)
+        Rule((Proposition("x", (f"at {k}",)),), name) for k, name in enumerate(names)
     )
     side = Side(0.5, (0.2,), 1.5)
     terms = tuple(Term(f"at {k}", LR(k, side, side)) for k in range(len(names)))
@@ -283,8 +286,8 @@ def test_a_model_takes_only_the_operators_that_it_needs() -> None:
 
     low = Term("low", Band(high=1.0, right=2.0))
     high = Term("high", Band(low=1.0))
-    clauses = (Clause("x", ("low",)), Clause("x", ("high",)))
-    rules = tuple(Rule((clause,), "a") for clause in clauses)
+    propositions = (Proposition("x", ("low",)), Proposition("x", ("high",)))
+    rules = tuple(Rule((proposition,), "a") for proposition in propositions)
     model = RuleBase("r", ("a",), (Variable("x", (low, high)),), rules)
     assert operators(model).isdisjoint({"Max", "Add", "Abs", "Cast", "Slice", "Min"})
     symmetric = operators(lr_rules())
@@ -344,7 +347,7 @@ def far_rules() -> RuleBase:
         Variable("x"),
         Variable("z", terms, parts=(Part("x", 1e-50, 1e39),)),
     )
-    rules = tuple(Rule((Clause("z", (term.name,)),), "a") for term in terms)
+    rules = tuple(Rule((Proposition("z", (term.name,)),), "a") for term in terms)
     return RuleBase("far", ("a",), variables, rules)
 
 

@@ -9,9 +9,9 @@ from fuzzytree.checking.comparing import unequal
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Shape,
@@ -43,7 +43,7 @@ def one_term(shape: Shape, parts: tuple[Part, ...] = ()) -> RuleBase:
     own = () if not parts else (Variable("x"),)
     name = "mix" if parts else "x"
     variable = Variable(name, (Term("t", shape),), parts=parts)
-    rule = Rule((Clause(name, ("t",)),), "yes")
+    rule = Rule((Proposition(name, ("t",)),), "yes")
     return RuleBase("one", ("yes",), (*own, variable), (rule,))
 
 

@@ -32,9 +32,9 @@ from fuzzytree.model import (
     SystemTerm,
 )
 from fuzzytree.model.rulebase import (
-    Clause,
     Kind,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -333,16 +333,18 @@ def odd(*names: str, **semantics: str) -> RuleBase:
         (label, "class 2"),
         (Variable(first, (low, high)), Variable(second, (low, high))),
         (
-            Rule((Clause(first, ("low", "high"), negated=True),), "class 2"),
-            Rule((Clause(first, ("low",)), Clause(second, ("high",))), label, 7),
-            Rule((Clause(second, ("high",), negated=True),), "class 2"),
+            Rule((Proposition(first, ("low", "high"), negated=True),), "class 2"),
+            Rule(
+                (Proposition(first, ("low",)), Proposition(second, ("high",))), label, 7
+            ),
+            Rule((Proposition(second, ("high",), negated=True),), "class 2"),
             Rule((), label),
         ),
         Semantics(**semantics),  # type: ignore[arg-type]
     )
 
 
-def test_clauses_of_all_kinds_are_written() -> None:
+def test_propositions_of_all_kinds_are_written() -> None:
     assert_alike(odd("a", "b", "class 1"))
 
 

@@ -15,8 +15,8 @@ import pytest
 from fuzzytree.exporters.python import FORMAT, parameters, write_python
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -54,7 +54,9 @@ def hostile_rules() -> RuleBase:
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
     mix = Variable("mix #", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
-        Rule((Clause(name, (name,)), Clause("mix #", HOSTILE[:2], True)), name)
+        Rule(
+            (Proposition(name, (name,)), Proposition("mix #", HOSTILE[:2], True)), name
+        )
         for name in HOSTILE
     )
     semantics = Semantics("product", HOSTILE[0], HOSTILE[1])

@@ -14,7 +14,7 @@ from fuzzytree.exporters.sql import MOST_RULES, write
 from fuzzytree.model.contracts import Model, Outcome
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -68,7 +68,7 @@ def test_sqlite_answers_with_the_bits_of_the_reference(seed: int) -> None:
 def test_classes_follow_from_the_rule_and_the_policies() -> None:
     low = Term("low", Band(high=1.0))
     variable = Variable("force", (low,))
-    when = (Clause("force", ("low",)),)
+    when = (Proposition("force", ("low",)),)
     for uncovered, missing in ((None, None), ("it's", "b\\c")):
         rules = RuleBase(
             "grip",
@@ -118,7 +118,7 @@ _FROM = "FROM (SELECT ? AS x UNION ALL SELECT ? UNION ALL SELECT ?)"
 
 def _one_cut(cut: float) -> RuleBase:
     low, high = Term("low", Band(high=cut)), Term("high", Band(low=cut))
-    rules = tuple(Rule((Clause("x", (n,)),), n) for n in ("low", "high"))
+    rules = tuple(Rule((Proposition("x", (n,)),), n) for n in ("low", "high"))
     return RuleBase("cut", ("low", "high"), (Variable("x", (low, high)),), rules)
 
 
@@ -126,7 +126,7 @@ def test_odd_names_are_quoted_and_comments_stay_comments() -> None:
     name = 'a`b" -- ]; DROP TABLE data'
     variable = Variable(name, (Term("t' 1", Band(high=1.0)),))
     rules = RuleBase(
-        "n */ ;", ("c",), (variable,), (Rule((Clause(name, ("t' 1",)),), "c"),)
+        "n */ ;", ("c",), (variable,), (Rule((Proposition(name, ("t' 1",)),), "c"),)
     )
     text = write(rules).content.decode()
     connection = sqlite3.connect(":memory:")
@@ -153,7 +153,7 @@ def test_the_same_model_gives_the_same_bytes() -> None:
 
 def test_what_engines_do_not_hold_is_refused() -> None:
     variable = Variable("x", (Term("low", Band(high=1.0)),))
-    rule = Rule((Clause("x", ("low",)),), "c")
+    rule = Rule((Proposition("x", ("low",)),), "c")
     rules = RuleBase("many", ("c",), (variable,), (rule,) * (MOST_RULES + 1))
     with pytest.raises(LossError, match="401 rules, and engines allow 400"):
         write(rules)

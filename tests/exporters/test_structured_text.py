@@ -13,7 +13,7 @@ from fuzzytree.exporters.st_text import LONG, RESERVED, SINGLE, identifiers, rem
 from fuzzytree.exporters.structured_text import write
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -29,7 +29,7 @@ from fuzzytree.testing import random_tree
 
 def grip() -> RuleBase:
     low = Term("low", Band(high=1.0, right=3.0))
-    rules = (Rule((Clause("grip force", ("low",)),), "soft"), Rule((), "hard"))
+    rules = (Rule((Proposition("grip force", ("low",)),), "soft"), Rule((), "hard"))
     inputs = (Variable("grip force", (low,), unit="N"),)
     return RuleBase(
         "grip", ("soft", "hard"), inputs, rules, Semantics("minimum", "hard")

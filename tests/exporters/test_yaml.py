@@ -21,8 +21,8 @@ from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -90,10 +90,10 @@ def named(names: list[str], *, kind: str = "rules") -> Model:
     terms = tuple(Term(name, Band()) for name in names)
     inputs = [Variable(name, terms, unit=last) for name in names]
     rules = [
-        Rule((Clause(name, tuple(names[:3]), bool(index % 2)),), name)
+        Rule((Proposition(name, tuple(names[:3]), bool(index % 2)),), name)
         for index, name in enumerate(names)
     ]
-    every = Rule(tuple(Clause(name, (last,)) for name in names), last)
+    every = Rule(tuple(Proposition(name, (last,)) for name in names), last)
     meant = Semantics("minimum", first, last)
     return RuleBase(
         first, tuple(names), tuple(inputs), (*rules, every), meant, columns=tuple(names)
@@ -177,7 +177,7 @@ def test_any_numbers_come_back(
         Variable("y", low=low),
         Variable("z", terms, high=high, parts=parts),
     )
-    rule = Rule((Clause("z", ("t0",)),), "a", support)
+    rule = Rule((Proposition("z", ("t0",)),), "a", support)
     assert_kept(RuleBase("any", ("a",), variables, (rule,)))
 
 
@@ -218,15 +218,15 @@ def test_a_symmetric_set_is_written_once() -> None:
     )
 
 
-def test_an_ambiguous_clause_is_written_with_its_parts() -> None:
+def test_an_ambiguous_proposition_is_written_with_its_parts() -> None:
     terms = tuple(Term(name, Band()) for name in ("b", "not b", "c"))
-    clauses = (
-        Clause("a", ("b",), negated=True),
-        Clause("a", ("not b",)),
-        Clause("a", ("b", "c")),
-        Clause("a", ("not b",), negated=True),
+    propositions = (
+        Proposition("a", ("b",), negated=True),
+        Proposition("a", ("not b",)),
+        Proposition("a", ("b", "c")),
+        Proposition("a", ("not b",), negated=True),
     )
-    rules = RuleBase("s", ("k",), (Variable("a", terms),), (Rule(clauses, "k"),))
+    rules = RuleBase("s", ("k",), (Variable("a", terms),), (Rule(propositions, "k"),))
     text = assert_kept(rules).decode()
     assert text[text.index("- if:") : text.index("  then:")] == (
         "- if:\n"
@@ -242,9 +242,13 @@ def test_no_line_is_long_where_it_can_be_broken() -> None:
     tree = random_tree(4, leaves=40, inputs=60)
     many = tuple(f"a somewhat long name {n}" for n in range(30))
     terms = tuple(Term(name, Band()) for name in many)
-    clauses = (Clause("x", many), Clause("x", many, negated=True))
+    propositions = (Proposition("x", many), Proposition("x", many, negated=True))
     wide = RuleBase(
-        "w", many, (Variable("x", terms),), (Rule(clauses, many[0]),), columns=("x",)
+        "w",
+        many,
+        (Variable("x", terms),),
+        (Rule(propositions, many[0]),),
+        columns=("x",),
     )
     for model in (tree, rules_from_tree(tree), rules_from_tree(tree, "raw"), wide):
         lines = assert_kept(model).decode().splitlines()
@@ -254,7 +258,7 @@ def test_no_line_is_long_where_it_can_be_broken() -> None:
 def test_a_file_begins_with_what_it_is() -> None:
     tree = random_tree(1)
     assert write(rules_from_tree(tree)).content.startswith(
-        b"# A fuzzy rule base of fuzzytree: IF clauses THEN class.\n"
+        b"# A fuzzy rule base of fuzzytree: IF propositions THEN class.\n"
         b"format: fuzzytree/1\n"
         b"kind: rule base\n"
     )

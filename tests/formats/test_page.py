@@ -37,11 +37,11 @@ def test_the_first_example_is_a_whole_file() -> None:
 
 
 def test_every_other_example_fits_the_layout() -> None:
-    _, size, points, clauses, nodes_and_leaves, sets = BLOCKS
+    _, size, points, propositions, nodes_and_leaves, sets = BLOCKS
     bound: list[tuple[Node, type[layout.FileRecord]]] = [
         *((item, layout.VariableOfModel) for item in items(size)),
         *((item, layout.TermOfVariable) for item in items(points)),
-        *((item, layout.WrittenOut) for item in items(clauses)),
+        *((item, layout.WrittenOut) for item in items(propositions)),
         *((item, layout.NodeOfTree) for item in items(nodes_and_leaves, "nodes")),
         *((item, layout.End) for item in items(nodes_and_leaves, "leaves")),
         *((item, layout.SetsOfVariable) for item in items(sets, "sets")),

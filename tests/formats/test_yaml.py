@@ -12,7 +12,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.exporters.yaml import write
 from fuzzytree.formats.yaml.yaml_reader import read_yaml
 from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Clause, RuleBase
+from fuzzytree.model.rulebase import Proposition, RuleBase
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 
@@ -58,10 +58,10 @@ def test_words_of_yaml_1_1_are_the_names_that_they_look_like() -> None:
     assert isinstance(rules, RuleBase)
     assert rules.classes == ("no", "yes", "~", "é")
     assert rules.name == "2026-11-21"
-    assert rules.rules[0].when == (Clause("switch", ("off",)),)
+    assert rules.rules[0].when == (Proposition("switch", ("off",)),)
     assert rules.rules[1].when == (
-        Clause("switch", ("off", "12:30"), negated=True),
-        Clause("load", ("heavy or so", "1_000")),
+        Proposition("switch", ("off", "12:30"), negated=True),
+        Proposition("load", ("heavy or so", "1_000")),
     )
     assert rules.semantics.uncovered == "no"
     assert rules.semantics.missing is None

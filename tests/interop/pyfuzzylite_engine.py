@@ -380,7 +380,7 @@ def activation(how: Activation) -> fl.Activation:
 
 
 def _sentence(rule: SystemRule) -> str:
-    then = " and ".join(map(_clause, rule.then))
+    then = " and ".join(map(_proposition, rule.then))
     when = _words(rule.when) if rule.when is not None else ""
     return f"if {when} then {then} with {rule.weight!r}"
 
@@ -388,7 +388,7 @@ def _sentence(rule: SystemRule) -> str:
 def _words(condition: Condition) -> str:
     match condition:
         case Is():
-            return _clause(condition)
+            return _proposition(condition)
         case And(parts=parts) | Or(parts=parts):
             word = "and" if isinstance(condition, And) else "or"
             found = _words(parts[0])
@@ -399,6 +399,6 @@ def _words(condition: Condition) -> str:
             raise TypeError("NOT is a hedge")
 
 
-def _clause(one: Is | Conclusion) -> str:
+def _proposition(one: Is | Conclusion) -> str:
     variable = one.variable if isinstance(one, Is) else one.output
     return " ".join([variable, "is", *one.hedges, one.label or ""])

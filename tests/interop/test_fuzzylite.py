@@ -15,9 +15,9 @@ from fuzzytree.exporters.fll import write
 from fuzzytree.formats.fll.fll_reader import read_fll
 from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import (
-    Clause,
     Kind,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -139,9 +139,9 @@ TIES = RuleBase(
         Variable("b", (Term("up", UP), Term("down", DOWN))),
     ),
     (
-        Rule((Clause("a", ("up",)), Clause("b", ("up",))), "right"),
-        Rule((Clause("b", ("up",)), Clause("a", ("up",))), "left"),
-        Rule((Clause("a", ("up",)), Clause("b", ("down",))), "other"),
+        Rule((Proposition("a", ("up",)), Proposition("b", ("up",))), "right"),
+        Rule((Proposition("b", ("up",)), Proposition("a", ("up",))), "left"),
+        Rule((Proposition("a", ("up",)), Proposition("b", ("down",))), "other"),
     ),
 )
 

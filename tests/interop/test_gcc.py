@@ -20,8 +20,8 @@ from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -69,7 +69,7 @@ def hostile_rules() -> RuleBase:
     inputs = tuple(Variable(name, terms, unit=name) for name in names)
     mix = Variable("mix */\\", terms, parts=tuple(Part(n, 0.5) for n in names[:3]))
     rules = tuple(
-        Rule((Clause(name, (name,)), Clause(mix.name, names[:2], True)), name)
+        Rule((Proposition(name, (name,)), Proposition(mix.name, names[:2], True)), name)
         for name in names
     )
     semantics = Semantics("product", names[0], names[1])
@@ -273,7 +273,7 @@ def ten_thousand_rules() -> RuleBase:
     rules: list[Rule] = []
     for places in itertools.product(range(10), repeat=4):
         pairs = zip("abcd", places, strict=True)
-        when = tuple(Clause(name, (f"t{place}",)) for name, place in pairs)
+        when = tuple(Proposition(name, (f"t{place}",)) for name, place in pairs)
         rules.append(Rule(when, "odd" if sum(places) % 2 else "even"))
     return RuleBase("grid", ("even", "odd"), inputs, tuple(rules))
 

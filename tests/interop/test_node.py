@@ -21,8 +21,8 @@ from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -91,7 +91,9 @@ def hostile_rules() -> RuleBase:
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
     mix = Variable("mix */", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
-        Rule((Clause(name, (name,)), Clause(mix.name, HOSTILE[:2], True)), name)
+        Rule(
+            (Proposition(name, (name,)), Proposition(mix.name, HOSTILE[:2], True)), name
+        )
         for name in HOSTILE
     )
     semantics = Semantics("product", HOSTILE[0], HOSTILE[1])
@@ -276,7 +278,9 @@ def test_inputs_are_given_by_name_and_what_is_no_number_is_refused(
 ) -> None:
     low = Term("low", Band(high=1.0, right=3.0))
     inputs = (Variable("force", (low,)), Variable("__proto__", (low,)))
-    rule = Rule((Clause("force", ("low",)), Clause("__proto__", ("low",))), "soft")
+    rule = Rule(
+        (Proposition("force", ("low",)), Proposition("__proto__", ("low",))), "soft"
+    )
     rules = RuleBase("grip", ("soft",), inputs, (rule,))
     module, opening = WAYS[way]
     kind: Kind = "es" if module == "es" else "script"

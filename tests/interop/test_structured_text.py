@@ -22,8 +22,8 @@ from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document, Model
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -71,7 +71,9 @@ def hostile_rules() -> RuleBase:
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
     mix = Variable("mix *)", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
-        Rule((Clause(name, (name,)), Clause(mix.name, HOSTILE[:2], True)), name)
+        Rule(
+            (Proposition(name, (name,)), Proposition(mix.name, HOSTILE[:2], True)), name
+        )
         for name in HOSTILE
     )
     semantics = Semantics("product", HOSTILE[0], HOSTILE[1])

@@ -4,9 +4,9 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -23,8 +23,8 @@ LOW = Term("low", Band(high=1.0, right=3.0))
 HIGH = Term("high", Band(low=1.0, left=-1.0))
 FORCE = Variable("force", (LOW, HIGH), unit="N", low=0.0, high=9.0)
 RULES = (
-    Rule((Clause("force", ("low",)),), "soft"),
-    Rule((Clause("force", ("high",)),), "firm", support=3),
+    Rule((Proposition("force", ("low",)),), "soft"),
+    Rule((Proposition("force", ("high",)),), "firm", support=3),
 )
 
 
@@ -44,12 +44,13 @@ def rule_base(
 
 def test_a_rule_reads_as_a_sentence() -> None:
     rule = Rule(
-        (Clause("force", ("low", "high")), Clause("slip", ("some",), True)), "a"
+        (Proposition("force", ("low", "high")), Proposition("slip", ("some",), True)),
+        "a",
     )
     assert sentence(rule) == "IF force is low or high AND slip is not some THEN a"
 
 
-def test_a_rule_without_clauses_always_holds() -> None:
+def test_a_rule_without_propositions_always_holds() -> None:
     assert sentence(Rule((), "soft")) == "ALWAYS soft"
 
 
@@ -62,7 +63,7 @@ def test_a_rule_base_shows_its_rules_with_their_numbers() -> None:
 
 def test_inputs_are_the_variables_that_combine_nothing() -> None:
     mix = Variable("mix", (LOW,), parts=(Part("force", 2.0),))
-    rules = (Rule((Clause("mix", ("low",)),), "soft"),)
+    rules = (Rule((Proposition("mix", ("low",)),), "soft"),)
     assert rule_base(variables=(FORCE, mix), rules=rules).inputs == ("force",)
 
 
@@ -84,8 +85,11 @@ def test_all_mistakes_of_a_rule_base_are_reported_at_once() -> None:
             ("soft", "soft"),
             (Variable("force", (LOW, LOW)),),
             (
-                Rule((Clause("froce", ("low",)), Clause("force", ("lwo",))), "firm"),
-                Rule((Clause("force", ()),), "soft", support=-1),
+                Rule(
+                    (Proposition("froce", ("low",)), Proposition("force", ("lwo",))),
+                    "firm",
+                ),
+                Rule((Proposition("force", ()),), "soft", support=-1),
             ),
             Semantics(uncovered="sotf"),
         )
@@ -99,7 +103,7 @@ def test_all_mistakes_of_a_rule_base_are_reported_at_once() -> None:
         "rule 1: no variable 'froce'; there is force (did you mean 'force'?)",
         "rule 1: 'force' has no term 'lwo'; there is low (did you mean 'low'?)",
         "rule 2: the support cannot be below 0",
-        "rule 2: the clause on 'force' names no term",
+        "rule 2: the proposition on 'force' names no term",
     ]
     assert caught.value.mistakes[4][0] == ("rules", 0, "then")
 
@@ -177,7 +181,7 @@ def test_all_mistakes_of_a_rule_base_are_reported_at_once() -> None:
 )
 def test_an_impossible_shape_is_refused(shape: Shape, sentence: str) -> None:
     variable = Variable("force", (Term("low", shape),))
-    rules = (Rule((Clause("force", ("low",)),), "soft"),)
+    rules = (Rule((Proposition("force", ("low",)),), "soft"),)
     with pytest.raises(InvalidModelError) as caught:
         rule_base(variables=(variable,), rules=rules)
     assert str(caught.value) == f"term 'low' of 'force': {sentence}"

@@ -14,9 +14,9 @@ from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -79,8 +79,8 @@ def model_of(*shapes: Shape, conjunction: Conjunction = "minimum") -> RuleBase:
         Variable(f"x{number}", (Term("t", shape),))
         for number, shape in enumerate(shapes)
     )
-    clauses = tuple(Clause(variable.name, ("t",)) for variable in variables)
-    rules = (Rule(clauses, "a"),)
+    propositions = tuple(Proposition(variable.name, ("t",)) for variable in variables)
+    rules = (Rule(propositions, "a"),)
     return RuleBase("one", ("a",), variables, rules, Semantics(conjunction))
 
 

@@ -11,9 +11,9 @@ import pytest
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -57,9 +57,9 @@ def ruled(
     if parts:
         mix = Variable("mix", terms[0], parts=parts)
         tested = [*(Variable(part.input) for part in parts), mix]
-    clauses = tuple(Clause(v.name, ("t",)) for v in tested if v.terms)
+    propositions = tuple(Proposition(v.name, ("t",)) for v in tested if v.terms)
     return RuleBase(
-        "one", ("a",), tuple(tested), (Rule(clauses, "a"),), Semantics(conjunction)
+        "one", ("a",), tuple(tested), (Rule(propositions, "a"),), Semantics(conjunction)
     )
 
 

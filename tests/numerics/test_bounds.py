@@ -10,10 +10,10 @@ import pytest
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Conjunction,
     Kind,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -42,7 +42,7 @@ def grip(*terms: Term, conjunction: Conjunction = "minimum") -> RuleBase:
         "grip",
         ("soft",),
         tuple(Variable(n, (t,)) for n, t in zip(names, terms, strict=True)),
-        (Rule(tuple(Clause(n, ("low",)) for n in names), "soft"),),
+        (Rule(tuple(Proposition(n, ("low",)) for n in names), "soft"),),
         Semantics(conjunction),
     )
 
@@ -99,7 +99,7 @@ def test_a_step_outside_the_declared_range_costs_nothing() -> None:
         "grip",
         ("soft",),
         (Variable("x1", (STEP,), low=2.0, high=3.0),),
-        (Rule((Clause("x1", ("low",)),), "soft"),),
+        (Rule((Proposition("x1", ("low",)),), "soft"),),
     )
     assert certify(rules, "float32").delta == 0.0
 
@@ -113,7 +113,7 @@ def test_a_combination_of_inputs_without_a_range_says_which() -> None:
             Variable("b"),
             Variable("mix", (LOW,), parts=(Part("a", 1.0), Part("b", 1.0))),
         ),
-        (Rule((Clause("mix", ("low",)),), "soft"),),
+        (Rule((Proposition("mix", ("low",)),), "soft"),),
     )
     found = certify(rules, "float64")
     assert found.sentence == "no bound: input 'b' of 'mix' has no declared range"
@@ -201,9 +201,9 @@ def test_no_observed_error_exceeds_its_bound(
 @pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
 def test_rows_far_from_all_curves_cost_no_more_than_near_ones(dtype: Dtype) -> None:
     mix = Variable("mix", (LOW,), parts=(Part("a", 0.3), Part("b", 0.7)))
-    clauses = (Clause("a", ("low",)), Clause("mix", ("low",)))
+    propositions = (Proposition("a", ("low",)), Proposition("mix", ("low",)))
     inputs = (Variable("a", (LOW,)), Variable("b"))
-    rules = RuleBase("grip", ("soft",), (*inputs, mix), (Rule(clauses, "soft"),))
+    rules = RuleBase("grip", ("soft",), (*inputs, mix), (Rule(propositions, "soft"),))
     near = np.random.default_rng(1).uniform(0.0, 4.0, (2, 50))
     far = near * np.repeat([1e3, 1e6, -1e9, 1e20, -1e30], 10)
     bounds = strength_bounds(rules, dtype, near)[0]

@@ -9,10 +9,10 @@ import pytest
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -124,13 +124,15 @@ def test_a_path_follows_the_exact_value_and_not_the_rounded_one() -> None:
 def answered(
     x: float, *terms: Shape, then: str, conjunction: Conjunction = "minimum"
 ) -> tuple[int, str | None, int, Fraction | int]:
-    """Ask rules with one clause each, of one variable, for the classes in `then`."""
+    """Ask rules with one proposition each, of one variable, for classes."""
     variable = Variable("x", tuple(Term(str(k), t) for k, t in enumerate(terms)))
     rules = RuleBase(
         "few",
         ("a", "b"),
         (variable,),
-        tuple(Rule((Clause("x", (str(k),)),), label) for k, label in enumerate(then)),
+        tuple(
+            Rule((Proposition("x", (str(k),)),), label) for k, label in enumerate(then)
+        ),
         Semantics(conjunction, uncovered="b", missing="a"),
     )
     found = exact_answer(rules, {"x": x})
@@ -160,15 +162,15 @@ def test_no_rule_and_no_value_answer_as_declared() -> None:
     assert answered(math.inf, FLAT, then="b") == (0, "a", MISSING, 1)
 
 
-def test_a_rule_without_a_clause_always_holds() -> None:
+def test_a_rule_without_a_proposition_always_holds() -> None:
     rules = RuleBase("one", ("a",), (), (Rule((), "a"),))
     assert exact_answer(rules, {}).strengths == (Fraction(1),)
 
 
 def test_is_not_is_one_minus_the_largest_of_the_terms() -> None:
     variable = Variable("x", (Term("low", RAMP), Term("flat", LESS)))
-    clause = Clause("x", ("low", "flat"), negated=True)
-    rules = RuleBase("not", ("a",), (variable,), (Rule((clause,), "a"),))
+    proposition = Proposition("x", ("low", "flat"), negated=True)
+    rules = RuleBase("not", ("a",), (variable,), (Rule((proposition,), "a"),))
     assert exact_answer(rules, {"x": 2.0}).strengths == (Fraction(1, 3),)
     assert exact_answer(rules, {"x": 4.0}).strengths == (Fraction(3, 4),)
 

@@ -14,11 +14,11 @@ from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
     Kind,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -111,17 +111,18 @@ def test_relative_rules_are_their_tree_in_exact_arithmetic(seed: int) -> None:
     assert not (rules.status == TIE).any()
 
 
-def test_a_tie_that_shares_its_weakest_clause_needs_no_fractions() -> None:
-    # Both rules are as strong as `x is low`, a third; the other clauses hold fully.
+def test_a_tie_that_shares_its_weakest_proposition_needs_no_fractions() -> None:
+    # Both rules are as strong as `x is low`, a third; the other propositions hold
+    # fully.
     wide = Term("wide", Band(high=9.0))
     variables = (Variable("x", (LOW,)), Variable("y", (wide, Term("all", Band()))))
-    shared = Clause("x", ("low",))
+    shared = Proposition("x", ("low",))
     rules = RuleBase(
         "tie",
         ("a", "b"),
         variables,
         tuple(
-            Rule((shared, Clause("y", (name,))), label)
+            Rule((shared, Proposition("y", (name,))), label)
             for name, label in (("wide", "a"), ("all", "b"))
         ),
     )
@@ -138,7 +139,10 @@ def test_a_tie_of_different_curves_is_settled_by_fractions() -> None:
         "tie",
         ("a", "b"),
         variables,
-        (Rule((Clause("x", ("low",)),), "a"), Rule((Clause("y", ("other",)),), "b")),
+        (
+            Rule((Proposition("x", ("low",)),), "a"),
+            Rule((Proposition("y", ("other",)),), "b"),
+        ),
     )
     above = math.nextafter(1.0, 2.0)
     found = decide(rules, np.array([[2.0, 2.0, 2.0], [1.0, above, 0.5]]))
@@ -160,7 +164,10 @@ def test_one_wins_by_less_than_doubles_can_tell() -> None:
         "close",
         ("a", "b"),
         (Variable("x", ends[:1]), Variable("y", ends[1:])),
-        (Rule((Clause("x", ("near",)),), "a"), Rule((Clause("y", ("far",)),), "b")),
+        (
+            Rule((Proposition("x", ("near",)),), "a"),
+            Rule((Proposition("y", ("far",)),), "b"),
+        ),
     )
     found = decide(rules, row)
     # y is 2**29 below 3 * 2**80, and its flank is 3 * 2**80 wide.
@@ -174,7 +181,7 @@ def test_cover_is_decided_at_the_very_end_of_a_support() -> None:
         "end",
         ("a",),
         (Variable("x", (Term("t", shape),)),),
-        (Rule((Clause("x", ("t",)),), "a"),),
+        (Rule((Proposition("x", ("t",)),), "a"),),
     )
     rows = [math.nextafter(5.0, 0.0), 5.0, math.nextafter(5.0, 6.0)]
     found = decide(rules, np.array([rows]))
@@ -186,7 +193,7 @@ def test_policies_answer_where_nothing_is_weighed() -> None:
         "end",
         ("a", "b", "c"),
         (Variable("x", (LOW,)),),
-        (Rule((Clause("x", ("low",)),), "a"),),
+        (Rule((Proposition("x", ("low",)),), "a"),),
         Semantics(uncovered="b", missing="c"),
     )
     found = decide(rules, np.array([[0.0, 5.0, math.nan, -math.inf]]))
@@ -337,7 +344,10 @@ def test_errors_are_bracketed_and_the_largest_is_known_closely() -> None:
 
 def test_a_missing_row_on_one_side_alone_is_one_off() -> None:
     rules = RuleBase(
-        "one", ("a",), (Variable("x", (LOW,)),), (Rule((Clause("x", ("low",)),), "a"),)
+        "one",
+        ("a",),
+        (Variable("x", (LOW,)),),
+        (Rule((Proposition("x", ("low",)),), "a"),),
     )
     values = np.array([[0.0, math.nan, math.nan, 0.0]])
     given = np.array([[1.0, math.nan, 1.0, math.nan]])
@@ -356,7 +366,10 @@ def test_strengths_of_another_shape_are_refused() -> None:
 def test_the_facts_of_answers_count_flips_band_and_cover() -> None:
     # x is low: 1, 2/3, 1/3, 0; the answers forget the third and invent the fourth.
     rules = RuleBase(
-        "one", ("a",), (Variable("x", (LOW,)),), (Rule((Clause("x", ("low",)),), "a"),)
+        "one",
+        ("a",),
+        (Variable("x", (LOW,)),),
+        (Rule((Proposition("x", ("low",)),), "a"),),
     )
     values = np.array([[0.0, 2.0, 3.0, 4.0]])
     given = np.array([[1.0, 0.75, 0.0, 0.125]])
@@ -402,7 +415,7 @@ def test_a_part_of_a_combination_is_not_lost_beside_larger_ones() -> None:
         "mix",
         ("a",),
         (*map(Variable, "abc"), Variable("mix", (LOW,), parts=parts)),
-        (Rule((Clause("mix", ("low",)),), "a"),),
+        (Rule((Proposition("mix", ("low",)),), "a"),),
     )
     # 2**60 + 2 - 2**60 is 0 in doubles and 2 in fact: a degree of 2/3, not of 1.
     found = decide(rules, np.array([[2.0**60], [2.0], [-(2.0**60)]]))

@@ -116,7 +116,7 @@ def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Aud
             "FT102 marginal rule: cut short: the budget of 60 s is spent",
             "FT103 redundant rule: left out by the user",
             "FT104 subsumed rule: left out by the user",
-            "FT107 irrelevant clause: not run: the budget of 60 s is spent",
+            "FT107 irrelevant proposition: not run: the budget of 60 s is spent",
         ),
         limits=LIMITS,
         is_complete=False,

@@ -33,8 +33,8 @@ from fuzzytree.auditing.findings.records import (
 )
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import (
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -57,11 +57,14 @@ def rule_base(pressure: str = "pressure", firm: str = "firm") -> RuleBase:
         Variable(pressure, (low, medium), "kPa", 0.0, 10.0),
         Variable("area", (small, large), "mm²", 0.0, 100.0),
     )
-    is_medium, is_small = Clause(pressure, ("medium",)), Clause("area", ("small",))
+    is_medium, is_small = (
+        Proposition(pressure, ("medium",)),
+        Proposition("area", ("small",)),
+    )
     rules = (
-        Rule((Clause(pressure, ("low",)),), "loose", 40),
+        Rule((Proposition(pressure, ("low",)),), "loose", 40),
         Rule((is_medium, is_small), firm, 31),
-        Rule((is_medium, Clause("area", ("large",))), "hard", 22),
+        Rule((is_medium, Proposition("area", ("large",))), "hard", 22),
         Rule((is_medium, is_small), "loose", 3),
     )
     return RuleBase("grip", ("loose", firm, "hard"), inputs, rules, Semantics())

@@ -16,8 +16,8 @@ def test_each_open_finding_is_a_command_and_an_incomplete_audit_another() -> Non
         "::warning file=grip.yaml,title=FT202 ambiguity::rules 1 and 2 are equally "
         "strong on a part of the domain (WITNESS, FT202-00000002)",
         "::notice title=audit not complete::FT102 marginal rule: cut short: the budget "
-        "of 60 s is spent; FT107 irrelevant clause: not run: the budget of 60 s is "
-        "spent",
+        "of 60 s is spent; FT107 irrelevant proposition: not run: the budget of 60 s "
+        "is spent",
     ]
 
 

@@ -63,7 +63,7 @@ all                  5      3      1       1        1        1        1
 not examined, or not to the end
 - FT102 marginal rule: cut short: the budget of 60 s is spent
 - FT103, FT104: left out by the user
-- FT107 irrelevant clause: not run: the budget of 60 s is spent
+- FT107 irrelevant proposition: not run: the budget of 60 s is spent
 
 """
 

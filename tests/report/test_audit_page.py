@@ -203,13 +203,13 @@ def test_what_else_is_known_is_reported_with_its_numbers() -> None:
     size = AuditAnswer(
         "FT501",
         "the rule base",
-        "4 rules with 7 clauses",
+        "4 rules with 7 propositions",
         Proved("all were counted"),
         is_finding=False,
-        measures=(Measure("clauses", 7.0), Measure("index", 0.5, "1/2")),
+        measures=(Measure("propositions", 7.0), Measure("index", 0.5, "1/2")),
     )
     found = shown(found=(size,))
-    said = "4 rules with 7 clauses all were counted clauses 7 index 0.5 = 1/2"
+    said = "4 rules with 7 propositions all were counted propositions 7 index 0.5 = 1/2"
     assert said in found.text
 
 

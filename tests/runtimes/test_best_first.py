@@ -12,8 +12,8 @@ import pytest
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -94,24 +94,26 @@ FAMILIES = families()
 def rules_of(shapes: list[Shape], conjunction: Conjunction = "minimum") -> RuleBase:
     """Return rules that ask a variable for all, some, one, and none of its terms."""
     names = tuple(f"t{number}" for number in range(len(shapes)))
-    clauses = [
-        Clause("x", names),
-        Clause("x", names, negated=True),
-        *(Clause("x", names[start::3]) for start in range(min(3, len(names)))),
-        *(Clause("x", (name,)) for name in names[:5]),
-        Clause("x", names[:1], negated=True),
+    propositions = [
+        Proposition("x", names),
+        Proposition("x", names, negated=True),
+        *(Proposition("x", names[start::3]) for start in range(min(3, len(names)))),
+        *(Proposition("x", (name,)) for name in names[:5]),
+        Proposition("x", names[:1], negated=True),
     ]
     terms = tuple(Term(name, shape) for name, shape in zip(names, shapes, strict=True))
-    rules = [Rule((clause,), "y") for clause in clauses]
-    rules += [Rule((clauses[0], clause), "z") for clause in clauses[1:]]
+    rules = [Rule((proposition,), "y") for proposition in propositions]
+    rules += [
+        Rule((propositions[0], proposition), "z") for proposition in propositions[1:]
+    ]
     return RuleBase(
         "x", ("y", "z"), (Variable("x", terms),), tuple(rules), Semantics(conjunction)
     )
 
 
-def envelope_of(rules: RuleBase) -> tuple[Envelope, list[Clause]]:
-    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
-    return plan_envelope(rules, clauses, {"x": 0}), clauses
+def envelope_of(rules: RuleBase) -> tuple[Envelope, list[Proposition]]:
+    propositions = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
+    return plan_envelope(rules, propositions, {"x": 0}), propositions
 
 
 def marks_of(shapes: list[Shape]) -> list[float]:
@@ -158,25 +160,25 @@ def test_a_value_lies_between_the_ends_of_its_cell(family: str) -> None:
 
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_bounds_of_a_clause_hold_to_the_bit(family: str) -> None:
+def test_the_bounds_of_a_proposition_hold_to_the_bit(family: str) -> None:
     rules = rules_of(FAMILIES[family])
-    envelope, clauses = envelope_of(rules)
+    envelope, propositions = envelope_of(rules)
     values = values_near(FAMILIES[family], envelope.grid)
     degrees = np.array(
         [[degree(shape, x) for x in values.tolist()] for shape in FAMILIES[family]]
     )
     with np.errstate(all="ignore"):
         cells = cells_of(envelope.grid, values[np.newaxis])[0]
-    for number, clause in enumerate(clauses):
-        mine = [int(name[1:]) for name in clause.terms]
+    for number, proposition in enumerate(propositions):
+        mine = [int(name[1:]) for name in proposition.terms]
         expected = degrees[mine].max(axis=0)
-        expected = 1.0 - expected if clause.negated else expected
+        expected = 1.0 - expected if proposition.negated else expected
         entries = number * envelope.grid.count + cells
         assert np.all(envelope.lower[entries] <= expected)
         assert np.all(envelope.upper[entries] >= expected)
 
 
-def test_bounds_of_a_clause_are_close_where_its_terms_are() -> None:
+def test_bounds_of_a_proposition_are_close_where_its_terms_are() -> None:
     rules = rules_of([sided(0.0, 1.0)])
     envelope, _ = envelope_of(rules)
     with np.errstate(all="ignore"):
@@ -227,7 +229,7 @@ def test_a_row_that_many_rules_reach_alike_is_a_tie_of_the_first(
     side = Side(1.0, (0.5,))
     terms = tuple(Term(f"t{n}", LR(0.0, side, side)) for n in range(60))
     rules = tuple(
-        Rule((Clause("x", (f"t{a}",)), Clause("x", (f"t{b}",))), "y")
+        Rule((Proposition("x", (f"t{a}",)), Proposition("x", (f"t{b}",))), "y")
         for a in range(10)
         for b in range(60)
     )
@@ -243,7 +245,7 @@ def test_a_row_that_many_rules_reach_alike_is_a_tie_of_the_first(
 def test_a_rule_may_end_where_another_goes_on() -> None:
     shapes: list[Shape] = [sided(0.0, 1.0), sided(1.0, 1.0)]
     terms = tuple(Term(f"t{n}", shape) for n, shape in enumerate(shapes))
-    first, second = Clause("x", ("t0",)), Clause("x", ("t1",))
+    first, second = Proposition("x", ("t0",)), Proposition("x", ("t1",))
     rules = (
         Rule((first, second), "y"),
         Rule((first,), "y"),
@@ -266,7 +268,7 @@ def grid(size: int, inputs: int) -> RuleBase:
     rules = tuple(
         Rule(
             tuple(
-                Clause(v.name, (term.name,))
+                Proposition(v.name, (term.name,))
                 for v, term in zip(variables, choice, strict=True)
             ),
             "y",

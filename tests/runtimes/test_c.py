@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError, MissingExtraError
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.runtimes.c import load, load_best_first
 from fuzzytree.runtimes.table import find_runtime, is_installed, needed_by
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -50,7 +50,7 @@ def grid_rules(count: int) -> RuleBase:
     rules: list[Rule] = []
     for three in itertools.product(range(count), repeat=3):
         pairs = zip("abc", three, strict=True)
-        rules.append(Rule(tuple(Clause(v, (f"t{n}",)) for v, n in pairs), "x"))
+        rules.append(Rule(tuple(Proposition(v, (f"t{n}",)) for v, n in pairs), "x"))
     return RuleBase("grid", ("x",), variables, tuple(rules))
 
 

@@ -16,10 +16,10 @@ from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -78,14 +78,14 @@ def random_rules(seed: int) -> RuleBase:
         variable("short", parts[1:2]),
     )
 
-    def clause() -> Clause:
+    def proposition() -> Proposition:
         names = chance.sample(
             [f"t{n}" for n in range(1, 5)], chance.choice((1, 1, 2, 4))
         )
         where = chance.choice(variables).name
-        return Clause(where, tuple(names), chance.random() < 0.3)
+        return Proposition(where, tuple(names), chance.random() < 0.3)
 
-    pool = [clause() for _ in range(12)]
+    pool = [proposition() for _ in range(12)]
     rules = [
         Rule(tuple(chance.choices(pool, k=chance.randint(1, 4))), chance.choice("xyz"))
         for _ in range(chance.randint(1, 12))
@@ -186,7 +186,7 @@ ENDS = RuleBase(
         ),
     ),
     tuple(
-        Rule((Clause("v", (name,)),), "x")
+        Rule((Proposition("v", (name,)),), "x")
         for name in ("falls", "bends", "dips", "points")
     ),
 )

@@ -12,8 +12,8 @@ from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -130,7 +130,7 @@ def test_an_overflowing_combination_is_missing() -> None:
         (Term("low", Band(high=0.0)),),
         parts=(Part("a", 1e300), Part("b", -1e300)),
     )
-    rule = Rule((Clause("mix", ("low",)),), "x")
+    rule = Rule((Proposition("mix", ("low",)),), "x")
     rules = RuleBase("r", ("x",), (Variable("a"), Variable("b"), mix), (rule,))
     values = np.array([[1.0, 1e10, 1e10], [2.0, 1e10, 1.0]])
     for name in ("native", "best-first"):
@@ -153,7 +153,7 @@ def overlapping(conjunction: str) -> RuleBase:
     rules = tuple(
         Rule(
             tuple(
-                Clause(name, (chance.choice(names),), chance.random() < 0.2)
+                Proposition(name, (chance.choice(names),), chance.random() < 0.2)
                 for name in "abc"[: chance.randint(0, 3)]
             ),
             chance.choice("xy"),
@@ -181,7 +181,10 @@ def test_best_first_sees_a_gap_between_plateaus() -> None:
     low = Term("low", Band(high=0.0))
     high = Term("high", Band(low=1.0, left=0.5))
     x = Variable("x", (low, high))
-    model = (Rule((Clause("x", ("low",)),), "l"), Rule((Clause("x", ("high",)),), "h"))
+    model = (
+        Rule((Proposition("x", ("low",)),), "l"),
+        Rule((Proposition("x", ("high",)),), "h"),
+    )
     result = load_best_first(RuleBase("gap", ("l", "h"), (x,), model))(
         np.array([[-1.0, 0.25, 0.75, 2.0]])
     )

@@ -21,9 +21,9 @@ from fuzzytree.model.contracts import Dtype, Model, Outcome
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -96,17 +96,18 @@ def random_rules(seed: int) -> RuleBase:
         )
         variables.append(Variable(f"z{number}", terms(), parts=parts))
 
-    def clause() -> Clause:
+    def proposition() -> Proposition:
         variable = chance.choice(variables)
         names = [term.name for term in variable.terms]
         some = tuple(chance.sample(names, chance.randint(1, len(names))))
-        return Clause(variable.name, some, chance.random() < 0.3)
+        return Proposition(variable.name, some, chance.random() < 0.3)
 
     classes = ("no", "ja", "élan ☂")
     sizes = range(5) if chance.random() < 0.5 else (1, 2, 3)
     rules = tuple(
         Rule(
-            tuple(clause() for _ in range(chance.choice(sizes))), chance.choice(classes)
+            tuple(proposition() for _ in range(chance.choice(sizes))),
+            chance.choice(classes),
         )
         for _ in range(chance.randint(1, 9))
     )
@@ -271,7 +272,10 @@ def test_a_shipped_file_describes_itself_and_predicts_alone() -> None:
 def test_a_file_without_status_separates_missing_from_uncovered() -> None:
     low = Term("low", Band(high=0.0))
     rules = RuleBase(
-        "r", ("a",), (Variable("x", (low,)),), (Rule((Clause("x", ("low",)),), "a"),)
+        "r",
+        ("a",),
+        (Variable("x", (low,)),),
+        (Rule((Proposition("x", ("low",)),), "a"),),
     )
     result = open_onnx(write_onnx(rules).content, "r.onnx")
     assert result.run(np.array([[-1.0, 1.0, np.nan]])).status.tolist() == [0, 2, 3]
@@ -444,7 +448,10 @@ def test_a_graph_that_onnxruntime_refuses_is_refused() -> None:
 def test_a_type_that_cannot_hold_the_model_is_refused_at_loading() -> None:
     low = Term("low", Band(high=1e300))
     rules = RuleBase(
-        "r", ("a",), (Variable("x", (low,)),), (Rule((Clause("x", ("low",)),), "a"),)
+        "r",
+        ("a",),
+        (Variable("x", (low,)),),
+        (Rule((Proposition("x", ("low",)),), "a"),),
     )
     with pytest.raises(LossError, match=r"high 1e\+300 lies beyond float32"):
         find_runtime("onnxruntime float32").load(rules)

@@ -12,7 +12,7 @@ import fuzzytree as ft
 from fuzzytree.errors import MissingExtraError
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -29,8 +29,8 @@ RULES = RuleBase(
     ("soft", "firm", "hard"),
     (Variable("force", (LOW,)),),
     (
-        Rule((Clause("force", ("low",)),), "soft"),
-        Rule((Clause("force", ("low",)),), "firm"),
+        Rule((Proposition("force", ("low",)),), "soft"),
+        Rule((Proposition("force", ("low",)),), "firm"),
     ),
     Semantics(uncovered="hard"),
 )
@@ -116,7 +116,7 @@ def test_a_degree_just_below_one_is_not_shown_as_one() -> None:
     assert reasons(RULES, values, answers) == ["IF force is low (<1) THEN soft"]
 
 
-def test_a_rule_without_clauses_always_holds() -> None:
+def test_a_rule_without_propositions_always_holds() -> None:
     rules = RuleBase("grip", ("soft",), (), (Rule((), "soft"),))
     answers = ft.run(rules, np.zeros((1, 1)), columns=["force"])
     assert reasons(rules, np.zeros((0, 1)), answers) == ["ALWAYS soft"]

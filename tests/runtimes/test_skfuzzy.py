@@ -9,8 +9,8 @@ from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Shape,
@@ -73,11 +73,13 @@ def test_a_tree_is_refused() -> None:
     )
 
 
-def test_a_rule_without_a_clause_is_refused() -> None:
+def test_a_rule_without_a_proposition_is_refused() -> None:
     rules = RuleBase("r", ("a",), (), (Rule((), "a"),))
     with pytest.raises(LossError) as caught:
         load(rules)
-    assert str(caught.value) == "cannot run r as scikit-fuzzy: rule 1 has no clause"
+    assert (
+        str(caught.value) == "cannot run r as scikit-fuzzy: rule 1 has no proposition"
+    )
 
 
 def test_too_many_rules_are_refused() -> None:
@@ -91,7 +93,7 @@ def test_too_many_rules_are_refused() -> None:
 
 def test_the_bound_says_where_it_comes_from() -> None:
     x = Variable("x", (Term("low", SHAPES[2]),))
-    rules = RuleBase("r", ("a",), (x,), (Rule((Clause("x", ("low",)),), "a"),))
+    rules = RuleBase("r", ("a",), (x,), (Rule((Proposition("x", ("low",)),), "a"),))
     assert bound(rules) == (
         2.0**-40,
         "largest error of lines between the points of the terms",
@@ -111,7 +113,7 @@ def test_a_second_run_forgets_the_first() -> None:
 
 def _falling(width: float) -> RuleBase:
     low = Term("low", Band(high=0.0, right=width))
-    rule = Rule((Clause("x", ("low",)),), "a")
+    rule = Rule((Proposition("x", ("low",)),), "a")
     return RuleBase("r", ("a",), (Variable("x", (low,)),), (rule,))
 
 

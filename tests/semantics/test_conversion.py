@@ -28,10 +28,10 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Kind,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -82,18 +82,20 @@ def grip(*rules: Rule, **semantics: object) -> RuleBase:
 
 
 ODD_RULES = (
-    Rule((Clause("force", ("low", "middle"), negated=True),), "firm", 12),
-    Rule((Clause("force", ("low", "high")), Clause("speed", ("low",))), "soft"),
+    Rule((Proposition("force", ("low", "middle"), negated=True),), "firm", 12),
+    Rule(
+        (Proposition("force", ("low", "high")), Proposition("speed", ("low",))), "soft"
+    ),
     Rule(
         (
-            Clause("speed", ("low",), negated=True),
-            Clause("sum", ("low", "high"), negated=True),
-            Clause("speed", ("high",), negated=True),
+            Proposition("speed", ("low",), negated=True),
+            Proposition("sum", ("low", "high"), negated=True),
+            Proposition("speed", ("high",), negated=True),
         ),
         "firm",
         0,
     ),
-    Rule((Clause("speed", ("high",)), Clause("force", ("middle",))), "soft"),
+    Rule((Proposition("speed", ("high",)), Proposition("force", ("middle",))), "soft"),
 )
 
 
@@ -334,7 +336,7 @@ def test_hostile_facts_give_no_rules(facts: str) -> None:
 def test_facts_that_stand_for_much_more_than_the_system_are_put_away_at_once() -> None:
     rules = grip()
     facts = json.loads(facts_of(rules, "winner"))
-    facts["clauses"] = [[0, [0] * 100_000, False]]
+    facts["propositions"] = [[0, [0] * 100_000, False]]
     facts["rules"] = [[[0] * 1000, 0, None]] * 1000
     assert as_rules(as_system(rules, "winner"), json.dumps(facts)) is None
 
@@ -372,7 +374,7 @@ def test_outputs_are_unlike_inputs_and_each_other() -> None:
         "names",
         ("a", "a 2"),
         (Variable("score a", (LOW,)), Variable("class", (LOW,))),
-        (Rule((Clause("class", ("low",)),), "a"), Rule((), "a 2")),
+        (Rule((Proposition("class", ("low",)),), "a"), Rule((), "a 2")),
     )
     names = [one.name for one in as_system(rules, "class").outputs]
     assert names == ["score a 2", "score a 2 2"]

@@ -21,8 +21,8 @@ from fuzzytree.formats.yaml.yaml_reader import read_yaml
 from fuzzytree.model.contracts import Dtype, Runtime
 from fuzzytree.model.rulebase import (
     MOST_POINTS,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -73,7 +73,7 @@ def points(draw: st.DrawFn) -> Points:
 def rules_of(*shapes: Points) -> RuleBase:
     """Return a rule for each shape, all on one variable."""
     terms = tuple(Term(f"t{number}", shape) for number, shape in enumerate(shapes))
-    rules = tuple(Rule((Clause("x", (term.name,)),), "a") for term in terms)
+    rules = tuple(Rule((Proposition("x", (term.name,)),), "a") for term in terms)
     return RuleBase("points", ("a",), (Variable("x", terms),), rules)
 
 
@@ -187,8 +187,8 @@ def test_numpy_and_best_first_have_the_bits_of_the_reference(
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(points())
 def test_the_bounds_of_a_cell_hold_in_it(shape: Points) -> None:
-    clause = Clause("x", ("t0",))
-    envelope = plan_envelope(rules_of(shape), [clause], {"x": 0})
+    proposition = Proposition("x", ("t0",))
+    envelope = plan_envelope(rules_of(shape), [proposition], {"x": 0})
     values = np.array([places_of(shape)])
     with np.errstate(over="ignore"):  # as where rows are answered
         cells = cells_of(envelope.grid, values)[0]

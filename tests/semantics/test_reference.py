@@ -7,8 +7,8 @@ import pytest
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -90,7 +90,7 @@ def test_a_combination_adds_weighted_distances_in_order() -> None:
 
 
 def rules(
-    *clauses: tuple[Clause, ...],
+    *propositions: tuple[Proposition, ...],
     product: bool = False,
     uncovered: str | None = None,
     missing: str | None = None,
@@ -99,12 +99,13 @@ def rules(
     y = Variable("y", (Term("low", RAMP),))
     semantics = Semantics("product" if product else "minimum", uncovered, missing)
     made = tuple(
-        Rule(when, label) for when, label in zip(clauses, ("a", "b", "c"), strict=False)
+        Rule(when, label)
+        for when, label in zip(propositions, ("a", "b", "c"), strict=False)
     )
     return RuleBase("r", ("a", "b", "c"), (x, y), made, semantics)
 
 
-LOW_X, LOW_Y = Clause("x", ("low",)), Clause("y", ("low",))
+LOW_X, LOW_Y = Proposition("x", ("low",)), Proposition("y", ("low",))
 
 
 def test_and_is_the_minimum_or_the_product() -> None:
@@ -114,8 +115,8 @@ def test_and_is_the_minimum_or_the_product() -> None:
 
 
 def test_or_is_the_maximum_and_not_is_one_minus() -> None:
-    either = Clause("x", ("low", "ten"))
-    neither = Clause("x", ("low", "ten"), negated=True)
+    either = Proposition("x", ("low", "ten"))
+    neither = Proposition("x", ("low", "ten"), negated=True)
     answer = evaluate(rules((either,), (neither,)), {"x": 11.0, "y": 0.0})
     assert answer.strengths == (0.8, 1.0 - 0.8)
 
@@ -144,7 +145,7 @@ def test_a_missing_value_counts_even_where_no_rule_asks_it() -> None:
     assert answer.status == Status.MISSING
 
 
-def test_a_rule_without_clauses_has_strength_one() -> None:
+def test_a_rule_without_propositions_has_strength_one() -> None:
     assert evaluate(rules(()), {"x": 0.0, "y": 0.0}).strengths == (1.0,)
 
 

@@ -13,9 +13,9 @@ from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -46,16 +46,18 @@ FORCE = Variable("force", (SOFT, FIRM, HARD))
 
 
 def base(
-    *when: tuple[Clause, ...],
+    *when: tuple[Proposition, ...],
     variables: tuple[Variable, ...] = (FORCE,),
     semantics: Semantics | None = None,
 ) -> RuleBase:
-    rules = tuple(Rule(clauses, "ab"[k % 2]) for k, clauses in enumerate(when))
+    rules = tuple(
+        Rule(propositions, "ab"[k % 2]) for k, propositions in enumerate(when)
+    )
     return RuleBase("grip", ("a", "b"), variables, rules, semantics or Semantics())
 
 
-def force(*terms: str, negated: bool = False) -> Clause:
-    return Clause("force", terms, negated)
+def force(*terms: str, negated: bool = False) -> Proposition:
+    return Proposition("force", terms, negated)
 
 
 ALL = ((force("soft", "hard"),), (force("firm"),))
@@ -71,7 +73,7 @@ def where(found: Pruned) -> list[str]:
 # --- rule bases
 
 
-def test_a_term_that_no_clause_names_goes() -> None:
+def test_a_term_that_no_proposition_names_goes() -> None:
     found = pruned(base((force("soft"),), (force("hard"),)))
     assert found.removed == (Removed("term 'firm' of 'force'", "nothing names it"),)
     assert [term.name for term in found.model.variables[0].terms] == ["soft", "hard"]
@@ -96,22 +98,24 @@ def test_of_two_terms_with_one_curve_the_first_stays() -> None:
 
 def test_curves_that_differ_in_the_sign_of_a_zero_stay_apart() -> None:
     one, two = Term("one", Band(high=0.0)), Term("two", Band(high=-0.0))
-    clauses = Clause("force", ("one",)), Clause("force", ("two",))
+    propositions = Proposition("force", ("one",)), Proposition("force", ("two",))
     rules = base(
-        (clauses[0],), (clauses[1],), variables=(Variable("force", (one, two)),)
+        (propositions[0],),
+        (propositions[1],),
+        variables=(Variable("force", (one, two)),),
     )
     assert pruned(rules).removed == ()
 
 
-def test_a_clause_that_always_holds_goes_and_its_variable_still_guards() -> None:
+def test_a_proposition_that_always_holds_goes_and_its_variable_still_guards() -> None:
     slip = Variable("slip", (ANY,))
     rules = base(
-        (Clause("slip", ("any",)), force("soft")), (force("hard"),),
+        (Proposition("slip", ("any",)), force("soft")), (force("hard"),),
         variables=(FORCE, slip),
     )  # fmt: skip
     found = pruned(rules)
     assert where(found) == [
-        "clause 'slip is any' of rule 1",
+        "proposition 'slip is any' of rule 1",
         "term 'firm' of 'force'",
         "term 'any' of 'slip'",
     ]
@@ -121,14 +125,17 @@ def test_a_clause_that_always_holds_goes_and_its_variable_still_guards() -> None
 def test_terms_that_together_cover_everything_always_hold() -> None:
     low, high = Term("low", Band(high=1.0)), Term("high", Band(low=0.5))
     rules = base(
-        (Clause("force", ("low", "high")),), variables=(Variable("force", (low, high)),)
+        (Proposition("force", ("low", "high")),),
+        variables=(Variable("force", (low, high)),),
     )
-    assert where(pruned(rules))[0] == "clause 'force is low or high' of rule 1"
+    assert where(pruned(rules))[0] == "proposition 'force is low or high' of rule 1"
 
 
-def test_a_clause_that_stands_twice_goes_under_min_and_counts_under_product() -> None:
+def test_a_proposition_that_stands_twice_goes_under_min_and_counts_under_product() -> (
+    None
+):
     twice = ((force("soft"), force("soft")), (force("firm", "hard"),))
-    assert where(pruned(base(*twice))) == ["clause 'force is soft' of rule 1"]
+    assert where(pruned(base(*twice))) == ["proposition 'force is soft' of rule 1"]
     product = base(*twice, semantics=Semantics("product"))
     assert pruned(product).removed == ()
 
@@ -211,7 +218,9 @@ def test_shapes_that_share_no_value_never_hold_together(
     assert bool(never_firing(rules)) == is_never
 
 
-def test_a_clause_and_its_negation_never_hold_together_on_a_plateau_alone() -> None:
+def test_a_proposition_and_its_negation_never_hold_together_on_a_plateau_alone() -> (
+    None
+):
     crisp = Variable("force", (Term("crisp", Band(0.0, 1.0)), FIRM))
     both = (force("crisp"), force("crisp", negated=True))
     assert never_firing(base(both, variables=(crisp,))) == {
@@ -223,8 +232,8 @@ def test_a_clause_and_its_negation_never_hold_together_on_a_plateau_alone() -> N
 
 def test_the_negation_of_what_never_holds_always_holds() -> None:
     shapes: dict[tuple[str, str], Shape] = {("x", "no"): Points((5.0,), (0.0,))}
-    assert always_holds(Clause("x", ("no",), negated=True), shapes)
-    assert not always_holds(Clause("x", ("no",)), shapes)
+    assert always_holds(Proposition("x", ("no",), negated=True), shapes)
+    assert not always_holds(Proposition("x", ("no",)), shapes)
 
 
 @pytest.mark.parametrize(
@@ -341,7 +350,7 @@ def test_a_member_missing_from_an_or_is_found() -> None:
     assert _faults(rules, other) == ["rule 1 is another rule"]
 
 
-def test_a_clause_missing_under_product_is_found() -> None:
+def test_a_proposition_missing_under_product_is_found() -> None:
     product = Semantics("product")
     rules = base((force("soft"), force("soft")), semantics=product)
     other = base((force("soft"),), semantics=product)
@@ -373,7 +382,7 @@ def test_a_weight_that_changed_is_found() -> None:
         )
         for weight in (0.5, 0.25)
     ]
-    one, two = (base((Clause("mix", ("soft",)),), variables=mix) for mix in mixes)
+    one, two = (base((Proposition("mix", ("soft",)),), variables=mix) for mix in mixes)
     assert _faults(one, two) == ["rule 1 is another rule"]
 
 

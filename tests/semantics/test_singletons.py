@@ -54,11 +54,11 @@ def fml(method: str, shape: str = "singletonShape") -> bytes:
         f'<fuzzyTerm name="{name}"><{shape} {SHAPES[shape].format(value)}/></fuzzyTerm>'
         for name, value in numbers.items()
     )
-    clause = "<clause><variable>{}</variable><term>{}</term></clause>"
+    proposition = "<clause><variable>{}</variable><term>{}</term></clause>"
     rules = "".join(
         f'<rule name="of {then}" connector="and" weight="1"><antecedent>'
-        f"{clause.format('petal', when)}</antecedent><consequent><then>"
-        f"{clause.format('class', then)}</then></consequent></rule>"
+        f"{proposition.format('petal', when)}</antecedent><consequent><then>"
+        f"{proposition.format('class', then)}</then></consequent></rule>"
         for when, then in zip(ends, numbers, strict=True)
     )
     return (

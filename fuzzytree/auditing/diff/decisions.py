@@ -103,7 +103,7 @@ def all_inputs(old: Document, new: Document) -> tuple[str, ...]:
 
 
 def union(old: Document, new: Document) -> RuleBase:
-    """Return a rule base with the inputs of both models, and no clause."""
+    """Return a rule base with the inputs of both models, and no proposition."""
     inputs = tuple(Variable(name) for name in all_inputs(old, new))
     return RuleBase("both", ("x",), inputs, (Rule((), "x"),))
 

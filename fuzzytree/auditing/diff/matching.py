@@ -1,9 +1,9 @@
 """Match the rules of two rule bases by what they mean, and not by their order.
 
-Rules are the same if their clauses have equal curves of the same inputs and their
+Rules are the same if their propositions have equal curves of the same inputs and their
 classes are equal, whatever terms are called. Others are matched, the nearest first:
-equal clauses and another class; equal words, with curves that changed; some clauses in
-common.
+equal propositions and another class; equal words, with curves that changed; some
+propositions in common.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from typing import Literal, NamedTuple
 
 from fuzzytree.auditing.engine.contenders import AxisKey
 from fuzzytree.auditing.engine.pieces import PolynomialPiece, pieces
-from fuzzytree.model import Clause, Rule, RuleBase, Shape, shapes_of
+from fuzzytree.model import Proposition, Rule, RuleBase, Shape, shapes_of
 
-How = Literal["same", "class", "curves", "clauses"]
+How = Literal["same", "class", "curves", "propositions"]
 
 _MOST_LEFT = 400  # rules on either side, of which each two are compared
 
-ClauseKey = tuple[AxisKey, bool, frozenset[int]]
+PropositionKey = tuple[AxisKey, bool, frozenset[int]]
 NamedKey = tuple[str, bool, frozenset[str]]
 
 
@@ -32,7 +32,8 @@ class Match(NamedTuple):
         old: Its number in the old rule base, from 1.
         new: Its number in the new one.
         how: `same`: it says the same. `class`: another class alone. `curves`: the same
-            words, of which some mean other curves. `clauses`: some clauses differ.
+            words, of which some mean other curves. `propositions`: some propositions
+            differ.
     """
 
     old: int
@@ -89,14 +90,22 @@ class RuleKeys:
         numbers = {place: curves.number(shape) for place, shape in shapes.items()}
         self.rules = rules.rules
         self.names = names or {}
-        self._clauses: dict[Clause, ClauseKey] = {}
-        for clause in {clause for rule in rules.rules for clause in rule.when}:
-            terms = frozenset(numbers[clause.variable, term] for term in clause.terms)
-            self._clauses[clause] = (keys[clause.variable], clause.negated, terms)
+        self._propositions: dict[Proposition, PropositionKey] = {}
+        for proposition in {
+            proposition for rule in rules.rules for proposition in rule.when
+        }:
+            terms = frozenset(
+                numbers[proposition.variable, term] for term in proposition.terms
+            )
+            self._propositions[proposition] = (
+                keys[proposition.variable],
+                proposition.negated,
+                terms,
+            )
 
-    def clause(self, clause: Clause) -> ClauseKey:
-        """Return the key of a clause."""
-        return self._clauses[clause]
+    def proposition(self, proposition: Proposition) -> PropositionKey:
+        """Return the key of a proposition."""
+        return self._propositions[proposition]
 
     def then(self, rule: Rule) -> str:
         """Return the class of a rule, as the other rule base calls it."""
@@ -108,7 +117,7 @@ class RuleKeys:
 
     def antecedent(self, rule: Rule) -> Hashable:
         """Return what rules have in common with the same antecedent."""
-        return frozenset(map(self.clause, rule.when))
+        return frozenset(map(self.proposition, rule.when))
 
     def words(self, rule: Rule) -> Hashable:
         """Return what rules have in common that read the same."""
@@ -129,17 +138,19 @@ def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
         said = RuleKeys(rules, curves)
         known: set[Hashable] = set()
         for rule in rules.rules:
-            counts = Counter(map(said.clause, rule.when))
-            if one.conjunction == "minimum":  # a clause that stands twice counts once
+            counts = Counter(map(said.proposition, rule.when))
+            if (
+                one.conjunction == "minimum"
+            ):  # a proposition that stands twice counts once
                 counts = Counter({*counts})
             known.add((frozenset(counts.items()), rule.then))
         keys.append(known)
     return keys[0] == keys[1]
 
 
-def words_of(clause: Clause) -> NamedKey:
-    """Return how a clause reads, whatever the order of its terms."""
-    return clause.variable, clause.negated, frozenset(clause.terms)
+def words_of(proposition: Proposition) -> NamedKey:
+    """Return how a proposition reads, whatever the order of its terms."""
+    return proposition.variable, proposition.negated, frozenset(proposition.terms)
 
 
 def matching(one: RuleKeys, other: RuleKeys) -> Matching:
@@ -162,7 +173,7 @@ def matching(one: RuleKeys, other: RuleKeys) -> Matching:
     left = len(old) + len(new) if max(len(old), len(new)) > _MOST_LEFT else 0
     if not left:
         for a, b in _nearest(one, old, other, new):
-            matches.append(Match(a, b, "clauses"))
+            matches.append(Match(a, b, "propositions"))
             del old[a], new[b]
     return Matching(tuple(sorted(matches)), tuple(old), tuple(new), left)
 
@@ -180,11 +191,13 @@ def paired(
 def _nearest(
     one: RuleKeys, old: Mapping[int, Rule], other: RuleKeys, new: Mapping[int, Rule]
 ) -> list[tuple[int, int]]:
-    """Return pairs of rules that have clauses in common, those with the most first."""
+    """Return pairs of rules with propositions in common, those with the most first."""
     scored: list[tuple[float, int, int]] = []
-    keys = {n: [(other.clause(c), words_of(c)) for c in r.when] for n, r in new.items()}
+    keys = {
+        n: [(other.proposition(c), words_of(c)) for c in r.when] for n, r in new.items()
+    }
     for a, rule in old.items():
-        mine = [(one.clause(c), words_of(c)) for c in rule.when]
+        mine = [(one.proposition(c), words_of(c)) for c in rule.when]
         for b, match in new.items():
             common = sum(
                 any(x == y or u == v for y, v in keys[b]) for x, u in mine

@@ -22,14 +22,14 @@ from fuzzytree.auditing.engine.measures import curve_distance
 from fuzzytree.auditing.engine.states import answer_text, listed
 from fuzzytree.auditing.findings.records import Measure
 from fuzzytree.model import (
-    Clause,
     FuzzyTree,
     Path,
+    Proposition,
     Rule,
     RuleBase,
     Term,
     Variable,
-    clause_text,
+    proposition_text,
     sentence,
 )
 from fuzzytree.numerics import outwards
@@ -166,7 +166,7 @@ def _rule_drafts(result: Matching, one: RuleKeys, other: RuleKeys) -> Iterator[D
 
 def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Draft:
     was, now = one.rules[match.old - 1], other.rules[match.new - 1]
-    texts = [*_clause_texts(was, now, one, other)]
+    texts = [*_proposition_texts(was, now, one, other)]
     if one.then(was) != now.then:
         texts.append(f"its class is {now.then!r}, and was {was.then!r}")
     place = "" if match.old == match.new else f" (now {match.new})"
@@ -175,31 +175,34 @@ def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Draft:
     return Draft("rule", text, "rules", *paths, (match.old,), (match.new,))
 
 
-def _clause_texts(
+def _proposition_texts(
     was: Rule, now: Rule, one: RuleKeys, other: RuleKeys
 ) -> Iterator[str]:
-    """Yield which clauses a rule has lost and gained."""
+    """Yield which propositions a rule has lost and gained."""
     gone = _unlike(was, one, now, other)
     come = _unlike(now, other, was, one)
-    for clause in gone:
-        match = next((c for c in come if c.variable == clause.variable), None)
+    for proposition in gone:
+        match = next((c for c in come if c.variable == proposition.variable), None)
         if match is None:
-            yield f"it no longer has {clause_text(clause)!r}"
+            yield f"it no longer has {proposition_text(proposition)!r}"
         else:
             come.remove(match)
-            yield f"it has {clause_text(match)!r} in place of {clause_text(clause)!r}"
-    for clause in come:
-        yield f"it also has {clause_text(clause)!r}"
+            before, after = proposition_text(proposition), proposition_text(match)
+            yield f"it has {after!r} in place of {before!r}"
+    for proposition in come:
+        yield f"it also has {proposition_text(proposition)!r}"
 
 
 def _unlike(
     rule: Rule, keys: RuleKeys, other: Rule, other_keys: RuleKeys
-) -> list[Clause]:
-    """Return the clauses of a rule that another one has neither by curve nor word."""
-    known = {other_keys.clause(c) for c in other.when}
+) -> list[Proposition]:
+    """Return propositions of a rule that another has neither by curve nor word."""
+    known = {other_keys.proposition(c) for c in other.when}
     words = {words_of(c) for c in other.when}
     return [
-        c for c in rule.when if keys.clause(c) not in known and words_of(c) not in words
+        c
+        for c in rule.when
+        if keys.proposition(c) not in known and words_of(c) not in words
     ]
 
 
@@ -312,7 +315,11 @@ def _users_of(variable: Variable, users: Users) -> tuple[int, ...]:
 def _users(rules: RuleBase) -> Users:
     uses: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
     for number, rule in enumerate(rules.rules, 1):
-        named = {(clause.variable, t) for clause in rule.when for t in clause.terms}
+        named = {
+            (proposition.variable, t)
+            for proposition in rule.when
+            for t in proposition.terms
+        }
         for term in named:
             uses[term].append(number)
     return {term: tuple(numbers) for term, numbers in uses.items()}

@@ -31,8 +31,8 @@ from fuzzytree.auditing.engine.pieces import ALWAYS, ChangePoint, RuleCurve, pla
 from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
 from fuzzytree.model import (
     BoolArray,
-    Clause,
     IntArray,
+    Proposition,
     Rule,
     RuleBase,
     Variable,
@@ -60,11 +60,11 @@ class RuleAxis(msgspec.Struct, frozen=True, eq=False, dict=True):
     """What the rules ask of one variable."""
 
     variable: Variable
-    # the distinct curves; the first is 1 everywhere: no clause
+    # the distinct curves; the first is 1 everywhere: no proposition
     elements: tuple[RuleCurve, ...]
-    # for each rule its clauses here, each as the elements of which it takes the
-    # largest; the rule takes the least of its clauses
-    clauses: tuple[tuple[tuple[int, ...], ...], ...]
+    # for each rule its propositions here, each as the elements of which it takes the
+    # largest; the rule takes the least of its propositions
+    propositions: tuple[tuple[tuple[int, ...], ...], ...]
 
     @functools.cached_property
     def places(self) -> tuple[ChangePoint, ...]:
@@ -74,7 +74,7 @@ class RuleAxis(msgspec.Struct, frozen=True, eq=False, dict=True):
     @property
     def width(self) -> int:
         """How many values are kept for each cell."""
-        return len(self.elements) + len(self.clauses)
+        return len(self.elements) + len(self.propositions)
 
 
 class AxisGrid(NamedTuple):
@@ -230,40 +230,40 @@ def _axes(rules: RuleBase) -> tuple[RuleAxis, ...]:
     items: list[RuleAxis] = []
     for variable in rules.variables:
         elements: dict[RuleCurve, int] = {RuleCurve(ALWAYS): 0}
-        clauses = tuple(
-            _clauses_on(variable.name, rule.when, shapes, elements)
+        propositions = tuple(
+            _propositions_on(variable.name, rule.when, shapes, elements)
             for rule in rules.rules
         )
         is_last = variable is rules.variables[-1]
-        if any(clauses) or (
+        if any(propositions) or (
             is_last and not items
         ):  # rules that ask nothing have one too
             of = tuple(elements)
-            items.append(RuleAxis(variable, of, clauses))
+            items.append(RuleAxis(variable, of, propositions))
     return tuple(items)
 
 
-def _clauses_on(
+def _propositions_on(
     variable: str,
-    when: Sequence[Clause],
+    when: Sequence[Proposition],
     shapes: Mapping[tuple[str, str], object],
     elements: dict[RuleCurve, int],
 ) -> tuple[tuple[int, ...], ...]:
-    """Return a rule's clauses on a variable: the least of the largest of elements."""
+    """Return what a rule tests of a variable: the least of the largest of elements."""
     checkpoint()
     groups: list[tuple[int, ...]] = []
-    for clause in when:
-        if clause.variable != variable:
+    for proposition in when:
+        if proposition.variable != variable:
             continue
         of = [
             elements.setdefault(
-                RuleCurve(shapes[variable, term], clause.negated),  # type: ignore[arg-type]
+                RuleCurve(shapes[variable, term], proposition.negated),  # type: ignore[arg-type]
                 len(elements),
             )
-            for term in clause.terms
+            for term in proposition.terms
         ]
         # 1 - max(a, b) is the least of 1 - a and 1 - b
-        groups += [(one,) for one in of] if clause.negated else [tuple(of)]
+        groups += [(one,) for one in of] if proposition.negated else [tuple(of)]
     return tuple(groups)
 
 
@@ -355,9 +355,9 @@ def _level(
 
 def _chosen(axis: RuleAxis, rank: IntArray) -> IntArray:
     """Return which element is each rule's degree, given the order in some cells."""
-    chosen = np.zeros((len(axis.clauses), len(rank)), dtype=np.int64)
+    chosen = np.zeros((len(axis.propositions), len(rank)), dtype=np.int64)
     every = np.arange(len(rank))
-    for number, groups in enumerate(axis.clauses):
+    for number, groups in enumerate(axis.propositions):
         checkpoint()
         best: IntArray | None = None
         for group in groups:
@@ -404,7 +404,7 @@ def strength_above(
 ) -> Fraction | None:
     """Return a rule's exact strength if it is above that of each of some others.
 
-    The clauses of a rival are evaluated until it is known to be weaker.
+    The propositions of a rival are evaluated until it is known to be weaker.
     """
     every, strength = base.rules.rules, _strength_at(base.rules, point)
     mine = strength(every[rule - 1], ZERO)
@@ -430,9 +430,9 @@ def _strength_at(
 
     def strength(rule: Rule, enough: Fraction) -> Fraction:
         result = Fraction(1)
-        for clause in rule.when:
-            one = max(degree(clause.variable, term) for term in clause.terms)
-            one = 1 - one if clause.negated else one
+        for proposition in rule.when:
+            one = max(degree(proposition.variable, term) for term in proposition.terms)
+            one = 1 - one if proposition.negated else one
             result = result * one if is_product else min(result, one)
             if result < enough or not result:
                 break

@@ -49,13 +49,20 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
     values_near,
 )
-from fuzzytree.model import BoolArray, Clause, FloatArray, IntArray, Shape, checkpoint
+from fuzzytree.model import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Proposition,
+    Shape,
+    checkpoint,
+)
 from fuzzytree.numerics import (
     EnclosedValue,
     Enclosure,
-    clause_enclosure,
     degree_enclosure,
     outwards,
+    proposition_enclosure,
 )
 
 if TYPE_CHECKING:
@@ -455,7 +462,9 @@ def _order(values: Sequence[Fraction]) -> list[int]:
 def _enclosed(element: RuleCurve, x: FloatArray, slack: FloatArray | None) -> Enclosure:
     checkpoint()
     result = degree_enclosure(element.shape, EnclosedValue(x, slack))
-    return clause_enclosure(Clause("", ("",), element.is_complement), [result])
+    return proposition_enclosure(
+        Proposition("", ("",), element.is_complement), [result]
+    )
 
 
 def _values(

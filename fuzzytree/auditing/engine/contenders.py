@@ -1,8 +1,9 @@
 """Which rules may win on a box: bounds of their strengths, and which beat which.
 
 Two models have common axes: an input's name, or the summands of a combination. On a
-stretch of an axis a clause has bounds of its degree, from Bernstein coefficients in
-fractions, and the number of a form: clauses of one form are the same function there.
+stretch of an axis a proposition has bounds of its degree, from Bernstein coefficients
+in fractions, and the number of a form: propositions of one form are the same function
+there.
 
 A rule is *beaten* on a box if another one is preferred to it wherever it fires there:
 certainly stronger, or as strong and before it. At a point this is an order of the
@@ -39,12 +40,12 @@ from fuzzytree.numerics import outwards
 AxisKey = str | tuple[Part, ...]
 """What an axis is known by in any model: an input, or the summands of a combination."""
 
-ClauseCurves = tuple[bool, tuple[Shape, ...]]
-"""A clause: whether it is negated, and the curves that it takes the largest of, each
+PropositionCurves = tuple[bool, tuple[Shape, ...]]
+"""A proposition: whether it is negated, and the curves of which it is the largest, each
 once and in an order that depends on nothing but them."""
 
-ClauseNumber = tuple[int, int]
-"""A clause in a rule: the number of its axis, and its number there."""
+PropositionNumber = tuple[int, int]
+"""A proposition in a rule: the number of its axis, and its number there."""
 
 Bounds = tuple[Fraction, Fraction]
 
@@ -62,41 +63,45 @@ class AxisPart(NamedTuple):
     is_closed: bool = False
 
 
-class ClauseBounds(NamedTuple):
-    """A clause on a stretch."""
+class PropositionBounds(NamedTuple):
+    """A proposition on a stretch."""
 
-    form: int  # clauses of one form are equal at every point of the stretch
+    form: int  # propositions of one form are equal at every point of the stretch
     low: float  # at most the degree
     high: float  # at least the degree
     is_below: bool = False  # whether the degree is below `high` at every point
 
 
 class SharedAxis:
-    """An axis with the clauses that two models ask of it."""
+    """An axis with the propositions that two models ask of it."""
 
     def __init__(self, key: AxisKey, whole: AxisPart) -> None:
         self.key = key
         self.whole = whole
-        self.clauses: dict[ClauseCurves, int] = {}
+        self.propositions: dict[PropositionCurves, int] = {}
         self._forms: dict[object, int] = {NEVER: NEVER, ALWAYS: ALWAYS}
-        self._known_bounds: dict[AxisPart, tuple[ClauseBounds, ...]] = {}
+        self._known_bounds: dict[AxisPart, tuple[PropositionBounds, ...]] = {}
         self._above: dict[tuple[AxisPart, int, int], bool] = {}
 
-    def number(self, clause: ClauseCurves) -> int:
-        """Return the number of a clause, which is new or known."""
-        return self.clauses.setdefault(clause, len(self.clauses))
+    def number(self, proposition: PropositionCurves) -> int:
+        """Return the number of a proposition, which is new or known."""
+        return self.propositions.setdefault(proposition, len(self.propositions))
 
-    def bounds_on(self, stretch: AxisPart) -> tuple[ClauseBounds, ...]:
-        """Return every clause on a stretch."""
+    def bounds_on(self, stretch: AxisPart) -> tuple[PropositionBounds, ...]:
+        """Return every proposition on a stretch."""
         result = self._known_bounds.get(stretch)
         if result is None:
-            result = tuple(self._see(clause, stretch) for clause in self.clauses)
+            result = tuple(
+                self._see(proposition, stretch) for proposition in self.propositions
+            )
             self._known_bounds[stretch] = result
         return result
 
-    def _see(self, clause: ClauseCurves, stretch: AxisPart) -> ClauseBounds:
+    def _see(
+        self, proposition: PropositionCurves, stretch: AxisPart
+    ) -> PropositionBounds:
         checkpoint()
-        is_negated, shapes = clause
+        is_negated, shapes = proposition
         parts = [_clipped(shape, stretch) for shape in shapes]
         bounds = [_bounds(part) for part in parts]
         low = max(one for one, _ in bounds)
@@ -121,31 +126,35 @@ class SharedAxis:
         elif low == high:
             form = low
         number = self._forms.setdefault(form, len(self._forms))
-        return ClauseBounds(number, outwards(low)[0], outwards(high)[1], is_below)
+        return PropositionBounds(number, outwards(low)[0], outwards(high)[1], is_below)
 
     def is_above(self, one: int, other: int, stretch: AxisPart) -> bool:
-        """Return whether a clause is at least as true as another on all of a stretch.
+        """Return whether one proposition is at least as true as another on a stretch.
 
         False where it is not known.
         """
         key = (stretch, one, other)
         if key not in self._above:
-            clause = list(self.clauses)
-            self._above[key] = _clause_is_above(clause[one], clause[other], stretch)
+            proposition = list(self.propositions)
+            self._above[key] = _proposition_is_above(
+                proposition[one], proposition[other], stretch
+            )
         return self._above[key]
 
     @functools.cached_property
     def edges(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Where the curves of each clause begin or cease to be constant."""
+        """Where the curves of each proposition begin or cease to be constant."""
         return tuple(
             self._inside(end for shape in curves for end in _edges(shape))
-            for _, curves in self.clauses
+            for _, curves in self.propositions
         )
 
     @functools.cached_property
     def marks(self) -> tuple[Fraction, ...]:
         """Where a curve changes its formula or crosses another, within the whole."""
-        shapes = list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
+        shapes = list(
+            dict.fromkeys(s for _, curves in self.propositions for s in curves)
+        )
         result = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
         for one, other in itertools.combinations(shapes, 2):
             if len(pieces(one)) * len(pieces(other)) <= _MOST_CROSSED:
@@ -166,27 +175,27 @@ def _edges(shape: Shape) -> Iterator[Fraction]:
 
 def common_axes(
     models: Iterable[RuleBase], ends: Iterable[tuple[AxisKey, AxisPart]]
-) -> tuple[tuple[SharedAxis, ...], list[list[tuple[ClauseNumber, ...]]]]:
+) -> tuple[tuple[SharedAxis, ...], list[list[tuple[PropositionNumber, ...]]]]:
     """Lay models on common axes.
 
     `ends`: the part of each axis that the models use.
 
     Returns:
-        The axes; and for each model the clauses of each of its rules.
+        The axes; and for each model the propositions of each of its rules.
     """
     axes = [SharedAxis(key, whole) for key, whole in ends]
     places = {axis.key: place for place, axis in enumerate(axes)}
-    rules: list[list[tuple[ClauseNumber, ...]]] = []
+    rules: list[list[tuple[PropositionNumber, ...]]] = []
     for model in models:
         keys = {v.name: v.parts or v.name for v in model.variables}
         shapes = shapes_of(model.variables)
         rules.append([])
         for rule in model.rules:
-            when: list[ClauseNumber] = []
-            for clause in rule.when:
-                place = places[keys[clause.variable]]
-                curves = {shapes[clause.variable, t] for t in clause.terms}
-                curves_of = (clause.negated, tuple(sorted(curves, key=repr)))
+            when: list[PropositionNumber] = []
+            for proposition in rule.when:
+                place = places[keys[proposition.variable]]
+                curves = {shapes[proposition.variable, t] for t in proposition.terms}
+                curves_of = (proposition.negated, tuple(sorted(curves, key=repr)))
                 when.append((place, axes[place].number(curves_of)))
             rules[-1].append(tuple(when))
     return tuple(axes), rules
@@ -287,7 +296,9 @@ def _bends(
     return bernstein(composed(polynomial, low, high - low))
 
 
-def _clause_is_above(one: ClauseCurves, other: ClauseCurves, stretch: AxisPart) -> bool:
+def _proposition_is_above(
+    one: PropositionCurves, other: PropositionCurves, stretch: AxisPart
+) -> bool:
     if one[0] != other[0]:
         return False
     uppers, lowers = (other[1], one[1]) if one[0] else (one[1], other[1])
@@ -351,12 +362,12 @@ class Contender(NamedTuple):
     """A rule on a box."""
 
     then: str  # its class
-    # the forms of its clauses that say something; rules of equal forms are equally
+    # the forms of its propositions that say something; rules of equal forms are equally
     # strong at every point of the box
-    form: tuple[ClauseNumber, ...]
-    clauses: tuple[ClauseNumber, ...]  # these clauses
+    form: tuple[PropositionNumber, ...]
+    propositions: tuple[PropositionNumber, ...]  # these propositions
     # the least and the largest degree of each
-    bounds: Mapping[ClauseNumber, tuple[float, float]]
+    bounds: Mapping[PropositionNumber, tuple[float, float]]
     low: float  # at most its strength
     high: float  # at least its strength
     is_below: bool  # whether its strength is below `high` at every point
@@ -373,7 +384,7 @@ class Remainder(NamedTuple):
 
 def contenders_on(
     rules: RuleBase,
-    clause: Sequence[tuple[ClauseNumber, ...]],
+    proposition: Sequence[tuple[PropositionNumber, ...]],
     axes: Sequence[SharedAxis],
     box: Box,
     among: Iterable[int] | None = None,
@@ -386,10 +397,10 @@ def contenders_on(
     conjunction = rules.semantics.conjunction
     bounds = [axis.bounds_on(s) for axis, s in zip(axes, box, strict=True)]
     items: list[Contender] = []
-    for place in range(len(clause)) if among is None else among:
+    for place in range(len(proposition)) if among is None else among:
         checkpoint()
         then = rules.rules[place].then
-        result = _on_box(then, clause[place], bounds, conjunction, place)
+        result = _on_box(then, proposition[place], bounds, conjunction, place)
         if result is not None and result.high > 0.0:
             items.append(result)
     top = max((rule.low for rule in items), default=0.0)
@@ -420,17 +431,17 @@ def contenders_on(
 
 def _on_box(
     then: str,
-    clauses: tuple[ClauseNumber, ...],
-    known: Sequence[Sequence[ClauseBounds]],
+    propositions: tuple[PropositionNumber, ...],
+    known: Sequence[Sequence[PropositionBounds]],
     conjunction: Conjunction,
     place: int,
 ) -> Contender | None:
     """Return a rule on a box, None if it never fires there."""
-    form: list[ClauseNumber] = []
-    kept: list[ClauseNumber] = []
-    bounds: dict[ClauseNumber, tuple[float, float]] = {}
+    form: list[PropositionNumber] = []
+    kept: list[PropositionNumber] = []
+    bounds: dict[PropositionNumber, tuple[float, float]] = {}
     short: list[float] = []
-    for axis, number in clauses:
+    for axis, number in propositions:
         kind, low, high, is_short = known[axis][number]
         if kind == NEVER:
             return None
@@ -440,8 +451,8 @@ def _on_box(
         kept.append((axis, number))
         bounds[axis, number] = (low, high)
         short.append(high if is_short else 2.0)
-    lows = [bounds[clause][0] for clause in kept]
-    highs = [bounds[clause][1] for clause in kept]
+    lows = [bounds[proposition][0] for proposition in kept]
+    highs = [bounds[proposition][1] for proposition in kept]
     high = _joined(highs, conjunction, up=True)
     return Contender(
         then,
@@ -475,7 +486,7 @@ def _beats(
 ) -> bool:
     """Return whether one rule is preferred to another wherever that one fires.
 
-    Clauses that both have cancel. Of two rules at most one is found to beat the
+    Propositions that both have cancel. Of two rules at most one is found to beat the
     other, so the winner at a point is never left out.
     """
     if conjunction == "product" and not (_is_plain(one) and _is_plain(other)):
@@ -493,21 +504,21 @@ def _beats(
 
 
 def _is_above(
-    mine: Sequence[ClauseNumber],
-    theirs: Sequence[ClauseNumber],
+    mine: Sequence[PropositionNumber],
+    theirs: Sequence[PropositionNumber],
     axes: Sequence[SharedAxis],
     box: Box,
     conjunction: Conjunction,
 ) -> bool:
-    """Return whether each of some clauses has one of others below it."""
+    """Return whether each of some propositions has one of others below it."""
     checkpoint()
     free = list(theirs)
-    for axis, clause in mine:
+    for axis, proposition in mine:
         below = next(
             (
                 (place, number)
                 for place, number in free
-                if place == axis and axes[axis].is_above(clause, number, box[axis])
+                if place == axis and axes[axis].is_above(proposition, number, box[axis])
             ),
             None,
         )
@@ -519,16 +530,16 @@ def _is_above(
 
 
 def _is_plain(rule: Contender) -> bool:
-    """Return whether no two clauses of a rule have one form."""
+    """Return whether no two propositions of a rule have one form."""
     return len({*rule.form}) == len(rule.form)
 
 
 def _split(
     one: Contender, other: Contender
-) -> tuple[list[ClauseNumber], list[ClauseNumber], list[ClauseNumber]]:
-    """Return the clauses of one rule alone, of the other alone, and of both."""
-    mine = dict(zip(one.form, one.clauses, strict=True))
-    theirs = dict(zip(other.form, other.clauses, strict=True))
+) -> tuple[list[PropositionNumber], list[PropositionNumber], list[PropositionNumber]]:
+    """Return the propositions of one rule alone, of the other alone, and of both."""
+    mine = dict(zip(one.form, one.propositions, strict=True))
+    theirs = dict(zip(other.form, other.propositions, strict=True))
     return (
         [c for f, c in mine.items() if f not in theirs],
         [c for f, c in theirs.items() if f not in mine],

@@ -171,11 +171,11 @@ def _maybe_bare(grid: AxisGrid) -> Iterator[tuple[int, AxisStretch]]:
 
 
 def _zero_at(grid: AxisGrid, is_zero: object) -> list[bool]:
-    """Return which rules are 0 where some elements are: a clause all of whose are."""
+    """Return which rules are 0 where some elements are, all those of a proposition."""
     zero = np.asarray(is_zero)
     return [
         any(all(bool(zero[one]) for one in group) for group in groups)
-        for groups in grid.axis.clauses
+        for groups in grid.axis.propositions
     ]
 
 

@@ -23,7 +23,7 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import uncovered
 from fuzzytree.auditing.engine.domain import Domain, Point
 from fuzzytree.auditing.engine.duels import wins
-from fuzzytree.auditing.engine.pieces import clause_ranges
+from fuzzytree.auditing.engine.pieces import proposition_ranges
 from fuzzytree.auditing.engine.probes import drawn_in, ends_of, near_strengths
 from fuzzytree.auditing.engine.states import (
     Claim,
@@ -38,8 +38,8 @@ from fuzzytree.auditing.engine.ties import decides_by_order
 from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.model import (
     BoolArray,
-    Clause,
     FloatArray,
+    Proposition,
     RuleBase,
     Variable,
     checkpoint,
@@ -88,20 +88,20 @@ class BoxBounds:
         """
         rules, count = self.rules.rules, low.shape[1]
         edges: dict[str, FloatArray] = {}
-        known: dict[Clause, Enclosure] = {}
+        known: dict[Proposition, Enclosure] = {}
         least, most = np.ones((len(rules), count)), np.ones((len(rules), count))
         for number, rule in enumerate(rules):
             checkpoint()
             whole = Enclosure(least[number], most[number])
-            for clause in rule.when:
-                if clause not in known:
-                    name = clause.variable
+            for proposition in rule.when:
+                if proposition not in known:
+                    name = proposition.variable
                     if name not in edges:
                         edges[name] = self._edges(self.variables[name], low, high)
-                    cells = clause_ranges(clause, self.shapes, edges[name])[1]
-                    known[clause] = Enclosure(cells.low[:, 0], cells.high[:, 0])
+                    cells = proposition_ranges(proposition, self.shapes, edges[name])[1]
+                    known[proposition] = Enclosure(cells.low[:, 0], cells.high[:, 0])
                 whole = strength_enclosure(
-                    whole, known[clause], is_product=self.is_product
+                    whole, known[proposition], is_product=self.is_product
                 )
             least[number], most[number] = whole
         return Enclosure(least, most)

@@ -474,7 +474,7 @@ def _witness(
         of = [rule - 1 for rule in rules]
         if axis in joined:
             parts[axis] = [(part, 0) for part in _parts(grid, of, goal, is_run=True)]
-        elif any(grid.axis.clauses[rule] for rule in of):
+        elif any(grid.axis.propositions[rule] for rule in of):
             first = next(_parts(grid, of, goal), None)
             if first is None:
                 return None

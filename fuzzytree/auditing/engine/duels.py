@@ -193,7 +193,7 @@ class Duel(msgspec.Struct, frozen=True, eq=False, dict=True):
     """Some rules, taken together as their minimum, against rivals."""
 
     base: Arrangement  # where
-    # the positions of the rules; without any, a rule without clauses
+    # the positions of the rules; without any, a rule without propositions
     ours: tuple[int, ...]
     rivals: tuple[int, ...]  # the positions of the rivals
     # whether lower ends are left out: these are surfaces, but where an axis is one
@@ -287,7 +287,7 @@ def _zones(duel: Duel, grid: AxisGrid) -> tuple[IntArray, IntArray, IntArray]:
     vague = np.flatnonzero(grid.cells.is_vague)
 
     def bands_of(rule: int) -> tuple[IntArray, IntArray]:
-        groups = grid.axis.clauses[rule]
+        groups = grid.axis.propositions[rule]
         at = grid.at[:, vague]
         low = high = np.full(len(vague), np.iinfo(np.int64).max - 1)
         if not groups:
@@ -611,7 +611,7 @@ class _Search:
         if not self.base.axes:
             point = point_with(self.base, {})
             result = None if point is None else self._checked(self.base, point)
-            return result or Proved("no rule has a clause")
+            return result or Proved("no rule has a proposition")
         try:
             result = self._sought() if self.groups else None
             if result is not None:
@@ -828,8 +828,8 @@ def wins(
     if base.rules.semantics.conjunction == "product" or not base.is_kept:
         return by_boxes(clock)
     question = LevelQuestion((rule,), others, None, f"the largest lead of rule {rule}")
-    # Half of the time for cells, the rest for boxes: they see that clauses cancel, and
-    # know inputs that depend on each other.
+    # Half of the time for cells, the rest for boxes: they see that propositions cancel,
+    # and know inputs that depend on each other.
     result = search_level(base, question, clock.share(0.5))
     if not isinstance(result, Bracket):
         return result

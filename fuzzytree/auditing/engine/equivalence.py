@@ -27,8 +27,8 @@ from fuzzytree.auditing.engine.contenders import (
     AxisKey,
     AxisPart,
     Box,
-    ClauseNumber,
     Contender,
+    PropositionNumber,
     Remainder,
     SharedAxis,
     common_axes,
@@ -221,14 +221,14 @@ class _Search:
 
     def __init__(self, old: RuleBase, new: RuleBase, domain: Domain) -> None:
         self.models = (old, new)
-        clauses = _variables_of(old, new)
+        propositions = _variables_of(old, new)
         ends = [
             (key, AxisPart(*span(variable, domain), True))
-            for key, variable in clauses.items()
+            for key, variable in propositions.items()
         ]
         self.is_empty = any(whole.low > whole.high for _, whole in ends)
         self.axes, self.rules = common_axes((old, new), ends)
-        self.places = BoxPoints(self.models, list(clauses), domain)
+        self.places = BoxPoints(self.models, list(propositions), domain)
 
     def run(self, clock: Clock, most: int) -> State:
         """Settle boxes: by turns the largest, and where the margin may be largest."""
@@ -274,8 +274,8 @@ class _Search:
         """Settle a box (None), find a witness in it, or say how to halve it."""
         _, box, depth, among = open_box
         one, other = (
-            contenders_on(model, clauses, self.axes, box, known)
-            for model, clauses, known in zip(
+            contenders_on(model, propositions, self.axes, box, known)
+            for model, propositions, known in zip(
                 self.models, self.rules, among, strict=True
             )
         )
@@ -304,8 +304,8 @@ class _Search:
     def answers(self, box: Box) -> tuple[set[str | None], set[str | None]] | None:
         """Return the one answer of each model on all of a box, None if one has more."""
         one, other = (
-            self._answers(number, contenders_on(model, clauses, self.axes, box))
-            for number, (model, clauses) in enumerate(
+            self._answers(number, contenders_on(model, propositions, self.axes, box))
+            for number, (model, propositions) in enumerate(
                 zip(self.models, self.rules, strict=True)
             )
         )
@@ -336,7 +336,7 @@ class _Search:
         votes: dict[tuple[int, Fraction], int] = {}
         top = max((rule.high for rule in rules), default=0.0)
         for rule in (one for one in rules if one.high == top):
-            for axis, number in rule.clauses:
+            for axis, number in rule.propositions:
                 low, high, is_closed = box[axis]
                 for edge in self.axes[axis].edges[number]:
                     if low < edge < high or (is_closed and edge == low < high):
@@ -349,22 +349,22 @@ class _Search:
     def _widest(self, box: Box, rules: Sequence[Contender]) -> int | None:
         """Return the axis on which a degree that matters varies most."""
         is_min = all(m.semantics.conjunction == "minimum" for m in self.models)
-        common: set[ClauseNumber] = set()
+        common: set[PropositionNumber] = set()
         if rules and not is_min:
             common = set.intersection(*({*rule.form} for rule in rules))
         doubt: dict[int, tuple[float, float]] = {}
         for rule in rules:
-            for clause, form in zip(rule.clauses, rule.form, strict=True):
-                low, high = rule.bounds[clause]
+            for proposition, form in zip(rule.propositions, rule.form, strict=True):
+                low, high = rule.bounds[proposition]
                 high = min(high, rule.high) if is_min else high
-                part, whole = box[clause[0]], self.axes[clause[0]].whole
+                part, whole = box[proposition[0]], self.axes[proposition[0]].whole
                 if part.low == part.high or low > high:
                     continue
                 # A factor of all rules says nothing of who is stronger.
                 width = 0.0 if form in common else high - low
                 length = float((part.high - part.low) / (whole.high - whole.low))
-                known = doubt.get(clause[0], (0.0, length))
-                doubt[clause[0]] = max(known, (width, length))
+                known = doubt.get(proposition[0], (0.0, length))
+                doubt[proposition[0]] = max(known, (width, length))
         return max(doubt, key=lambda one: (doubt[one], -one), default=None)
 
 
@@ -385,9 +385,11 @@ def _variables_of(old: RuleBase, new: RuleBase) -> dict[AxisKey, Variable]:
     """Return the variables that some rule of either model uses, by their keys."""
     result: dict[AxisKey, Variable] = {}
     for model in (old, new):
-        clauses = {clause.variable for rule in model.rules for clause in rule.when}
+        propositions = {
+            proposition.variable for rule in model.rules for proposition in rule.when
+        }
         for variable in model.variables:
-            if variable.name in clauses:
+            if variable.name in propositions:
                 result.setdefault(variable.parts or variable.name, variable)
     return result
 

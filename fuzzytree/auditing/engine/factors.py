@@ -1,8 +1,9 @@
 """A rule's degree on each axis as one polynomial in each cell.
 
 Under the minimum a rule's degree on an axis is in each cell one of its curves; under
-the product it is the product of its clauses there. Ratios and distances of two rules
-are then questions about quotients and differences of polynomials, decided in fractions.
+the product it is the product of its propositions there. Ratios and distances of two
+rules are then questions about quotients and differences of polynomials, decided in
+fractions.
 """
 
 from __future__ import annotations
@@ -33,13 +34,20 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
     values_near,
 )
-from fuzzytree.model import BoolArray, Clause, FloatArray, Shape, checkpoint, shapes_of
+from fuzzytree.model import (
+    BoolArray,
+    FloatArray,
+    Proposition,
+    Shape,
+    checkpoint,
+    shapes_of,
+)
 
 UNKNOWN: Final = Fraction(1 << 4096)
 """The upper bound of a ratio of which none was found."""
 
 Group = tuple[tuple[int, ...], bool]
-"""A clause: its elements, and whether the least of them counts, not the largest."""
+"""A proposition: its elements, and whether the least counts, not the largest."""
 
 
 class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
@@ -58,15 +66,15 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
         return self.base.grids
 
     @functools.cached_property
-    def clauses(self) -> tuple[tuple[tuple[Group, ...], ...], ...]:
-        """For each axis and rule, its clauses there."""
+    def propositions(self) -> tuple[tuple[tuple[Group, ...], ...], ...]:
+        """For each axis and rule, its propositions there."""
         shapes = shapes_of(self.base.rules.variables)
         return tuple(
             tuple(
                 tuple(
-                    _group(clause, axis.elements, shapes)
-                    for clause in rule.when
-                    if clause.variable == axis.variable.name
+                    _group(proposition, axis.elements, shapes)
+                    for proposition in rule.when
+                    if proposition.variable == axis.variable.name
                 )
                 for rule in self.base.rules.rules
             )
@@ -95,7 +103,7 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
         rank = grid.cells.rank[cell]
         return tuple(
             (min if is_least else max)(of, key=lambda one: int(rank[one]))
-            for of, is_least in self.clauses[axis][rule]
+            for of, is_least in self.propositions[axis][rule]
         )
 
     def is_below(self, axis: int, one: int, other: int, cell: int) -> bool:
@@ -125,7 +133,7 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
         grid = self.grids[axis]
         at = grid.cells.zones[0][0]
         result = ONE
-        for of, is_least in self.clauses[axis][rule]:
+        for of, is_least in self.propositions[axis][rule]:
             degrees = [grid.axis.elements[one].degree(at) for one in of]
             degree = min(degrees) if is_least else max(degrees)
             result = result * degree if self.is_product else min(result, degree)
@@ -165,7 +173,7 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def _joined(self, axis: int, degrees: FloatArray, towards: int) -> FloatArray:
         """Return rules' degrees from those of elements, rounded down or up."""
-        rules = self.clauses[axis]
+        rules = self.propositions[axis]
         result = np.ones((len(rules), degrees.shape[1]))
         for number, groups in enumerate(rules):
             for of, is_least in groups:
@@ -181,12 +189,15 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
 
 
 def _group(
-    clause: Clause,
+    proposition: Proposition,
     elements: tuple[RuleCurve, ...],
     shapes: Mapping[tuple[str, str], Shape],
 ) -> Group:
-    of = (RuleCurve(shapes[clause.variable, t], clause.negated) for t in clause.terms)
-    return tuple(elements.index(one) for one in of), clause.negated
+    of = (
+        RuleCurve(shapes[proposition.variable, t], proposition.negated)
+        for t in proposition.terms
+    )
+    return tuple(elements.index(one) for one in of), proposition.negated
 
 
 # --- ratios
@@ -232,7 +243,7 @@ def largest_ratio(of: Factored, strong: int, weak: int) -> Bounds | None:
 
 
 def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | None:
-    if of.clauses[axis][strong] == of.clauses[axis][weak]:
+    if of.propositions[axis][strong] == of.propositions[axis][weak]:
         return Bounds(ONE, ONE)
     zones = of.grids[axis].cells.zones
     low, high = ZERO, ZERO
@@ -276,7 +287,7 @@ def meets(of: Factored, strong: int, weak: int) -> bool:
 
 
 def _is_met(of: Factored, axis: int, one: int, other: int) -> bool:
-    if of.clauses[axis][one] == of.clauses[axis][other]:
+    if of.propositions[axis][one] == of.propositions[axis][other]:
         return True
     if of.has_start(axis) and of.at_start(axis, one) == of.at_start(axis, other) != 0:
         return True

@@ -38,9 +38,9 @@ from fuzzytree.auditing.engine.polynomials import (
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     FloatArray,
     Points,
+    Proposition,
     Shape,
     Side,
     Value,
@@ -50,9 +50,9 @@ from fuzzytree.numerics import (
     CAP,
     EnclosedValue,
     Enclosure,
-    clause_enclosure,
     degree_enclosure,
     outwards,
+    proposition_enclosure,
 )
 
 ZERO, ONE = Fraction(0), Fraction(1)
@@ -189,7 +189,7 @@ def _end(piece: PolynomialPiece) -> Fraction:
 _ENDS = ((ZERO,), (ONE,))
 
 ALWAYS = Band()
-"""The curve of a rule without a clause on a variable."""
+"""The curve of a rule without a proposition on a variable."""
 
 
 class RuleCurve(NamedTuple):
@@ -474,10 +474,14 @@ def shape_ranges(shape: Shape, edges: FloatArray) -> tuple[Enclosure, Enclosure]
     return at, Enclosure(low, high)
 
 
-def clause_ranges(
-    clause: Clause, shapes: Mapping[tuple[str, str], Shape], edges: FloatArray
+def proposition_ranges(
+    proposition: Proposition, shapes: Mapping[tuple[str, str], Shape], edges: FloatArray
 ) -> tuple[Enclosure, Enclosure]:
-    """Return which degrees a clause has at edges and on cells, as `shape_ranges`."""
-    result = [shape_ranges(shapes[clause.variable, t], edges) for t in clause.terms]
+    """Return the degrees of a proposition at edges and on cells, as `shape_ranges`."""
+    result = [
+        shape_ranges(shapes[proposition.variable, t], edges) for t in proposition.terms
+    ]
     at, cells = zip(*result, strict=True)
-    return clause_enclosure(clause, at), clause_enclosure(clause, cells)
+    return proposition_enclosure(proposition, at), proposition_enclosure(
+        proposition, cells
+    )

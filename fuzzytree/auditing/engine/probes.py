@@ -21,8 +21,8 @@ from fuzzytree.auditing.engine.witnesses import is_within, point_with
 from fuzzytree.model import FloatArray, IntArray, RuleBase, checkpoint, shapes_of
 from fuzzytree.numerics import (
     axis_value,
-    clause_enclosure,
     degree_enclosure,
+    proposition_enclosure,
 )
 
 _FIRST = 4096  # points drawn in the whole domain
@@ -45,18 +45,18 @@ def near_strengths(rules: RuleBase, values: FloatArray) -> FloatArray:
     strengths = np.ones((len(rules.rules), values.shape[1]))
     for number, rule in enumerate(rules.rules):
         checkpoint()
-        for clause in rule.when:
-            if clause not in known:
-                value = axis_value(variables[clause.variable], columns)
+        for proposition in rule.when:
+            if proposition not in known:
+                value = axis_value(variables[proposition.variable], columns)
                 of = [
-                    degree_enclosure(shapes[clause.variable, term], value)
-                    for term in clause.terms
+                    degree_enclosure(shapes[proposition.variable, term], value)
+                    for term in proposition.terms
                 ]
-                known[clause] = clause_enclosure(clause, of).low
+                known[proposition] = proposition_enclosure(proposition, of).low
             if rules.semantics.conjunction == "product":
-                strengths[number] *= known[clause]
+                strengths[number] *= known[proposition]
             else:
-                np.minimum(strengths[number], known[clause], out=strengths[number])
+                np.minimum(strengths[number], known[proposition], out=strengths[number])
     return strengths
 
 

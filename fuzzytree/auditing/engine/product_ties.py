@@ -145,7 +145,7 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
         return functools.cache(self._is_shared)
 
     def _is_shared(self, axis: int, one: int, other: int) -> bool:
-        question = self.factored.clauses[axis]
+        question = self.factored.propositions[axis]
         return sorted(question[one]) == sorted(question[other])
 
     def are_free(self, one: int, other: int) -> bool:

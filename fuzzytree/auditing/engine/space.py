@@ -1,10 +1,10 @@
 """Boxes of inputs, many at a time: what rules can reach on each, by doubles.
 
 A segment is an input's interval, halved again and again; a box is a row with the number
-of a part of each segment. What the clauses of a rule reach on a part is computed once
-and looked up by all boxes that use it. Two rules are compared cell by cell on a part:
-where one degree falls as the other does, their ratio says more than both ranges. A
-combination of inputs lies, on a box, between the sums of its summands' ends, rounded
+of a part of each segment. What the propositions of a rule reach on a part is computed
+once and looked up by all boxes that use it. Two rules are compared cell by cell on a
+part: where one degree falls as the other does, their ratio says more than both ranges.
+A combination of inputs lies, on a box, between the sums of its summands' ends, rounded
 outwards.
 """
 
@@ -22,8 +22,15 @@ import numpy as np
 from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.linear import feasible, row_of
-from fuzzytree.auditing.engine.pieces import bends, clause_ranges
-from fuzzytree.model import Clause, RuleBase, Shape, Variable, checkpoint, shapes_of
+from fuzzytree.auditing.engine.pieces import bends, proposition_ranges
+from fuzzytree.model import (
+    Proposition,
+    RuleBase,
+    Shape,
+    Variable,
+    checkpoint,
+    shapes_of,
+)
 from fuzzytree.numerics import LEAST, Enclosure, U, outwards
 
 if TYPE_CHECKING:
@@ -47,13 +54,13 @@ class RivalPair(NamedTuple):
 class BoundTable(NamedTuple):
     """What is known on each of some intervals."""
 
-    # shape (intervals, rules): at least this is the degree of a rule's clauses
+    # shape (intervals, rules): at least this is the degree of a rule's propositions
     low: FloatArray
     high: FloatArray  # at most this
     at: FloatArray  # about this at the interval's middle
     # shape (intervals, pairs). Under the product, at most this many times is `one` as
-    # large as `other`, clauses of both left out. Under the minimum, at least this is
-    # `other` where it is below `one`; infinite if it never is
+    # large as `other`, propositions of both left out. Under the minimum, at least this
+    # is `other` where it is below `one`; infinite if it never is
     most: FloatArray
     least: FloatArray  # at least this many times under the product; 0 under the minimum
     spread: FloatArray  # how far apart both are, for choosing which line to part
@@ -80,9 +87,9 @@ class VariableUse:
     """What some rules ask of one variable.
 
     Attributes:
-        clauses: The clauses that differ, by what they say.
-        rules: For each rule the positions of its clauses.
-        pairs: For each pair the clauses that only one of both has.
+        propositions: The propositions that differ, by what they say.
+        rules: For each rule the positions of its propositions.
+        pairs: For each pair the propositions that only one of both has.
         ordered: For each pair where `other` is at least as large, exactly known.
         steps: Where a curve jumps.
         marks: Where a curve turns or one of its pieces ends.
@@ -99,19 +106,19 @@ class VariableUse:
         self.is_product = rules.semantics.conjunction == "product"
         self.shapes = shapes_of([variable])
         known: dict[tuple[frozenset[Shape], bool], int] = {}
-        self.clauses: list[Clause] = []
+        self.propositions: list[Proposition] = []
         self.rules: list[tuple[int, ...]] = []
         for position in chosen:
             positions: list[int] = []
-            for clause in rules.rules[position].when:
-                if clause.variable == variable.name:
+            for proposition in rules.rules[position].when:
+                if proposition.variable == variable.name:
                     said = frozenset(
-                        self.shapes[variable.name, t] for t in clause.terms
+                        self.shapes[variable.name, t] for t in proposition.terms
                     )
-                    key = (said, clause.negated)
+                    key = (said, proposition.negated)
                     if key not in known:
                         known[key] = len(known)
-                        self.clauses.append(clause)
+                        self.propositions.append(proposition)
                     positions.append(known[key])
             self.rules.append(tuple(sorted(positions)))
         place = {position: n for n, position in enumerate(chosen)}
@@ -136,9 +143,11 @@ class VariableUse:
         lows: list[FloatArray] = []
         highs: list[FloatArray] = []
         ats: list[FloatArray] = []
-        for clause in self.clauses:
-            _, cells = clause_ranges(clause, self.shapes, edges)
-            here, _ = clause_ranges(clause, self.shapes, middle[:, np.newaxis])
+        for proposition in self.propositions:
+            _, cells = proposition_ranges(proposition, self.shapes, edges)
+            here, _ = proposition_ranges(
+                proposition, self.shapes, middle[:, np.newaxis]
+            )
             lows.append(cells.low)
             highs.append(cells.high)
             ats.append((here.low + here.high)[:, 0] / 2)
@@ -186,7 +195,7 @@ class VariableUse:
         size: tuple[int, ...],
         side: int,
     ) -> FloatArray:
-        """Return the degree of some clauses together, rounded down, up or not."""
+        """Return the degree of some propositions together, rounded down, up or not."""
         checkpoint()
         chosen = [degrees[place] for place in positions]
         if not self.is_product:
@@ -354,7 +363,7 @@ _MIX_CELLS = 4  # of a combination's values on one box
 class Combination(NamedTuple):
     """A combination of inputs."""
 
-    use: VariableUse  # the clauses of rules on it
+    use: VariableUse  # the propositions of rules on it
     # the summands' weights, each with the position of its line
     weights: tuple[tuple[int, float], ...]
     constant: tuple[float, float]  # bounds of what is added to them
@@ -364,7 +373,7 @@ class Combination(NamedTuple):
 class BoxReach(NamedTuple):
     """What is known of each of some boxes."""
 
-    table: BoundTable  # as of `lines.Table`, of all clauses together
+    table: BoundTable  # as of `lines.Table`, of all propositions together
     is_empty: npt.NDArray[np.bool_]  # whether a box has no point of the domain
     # for each line how far pairs are apart, shape (boxes, pairs)
     spreads: list[FloatArray]
@@ -380,7 +389,7 @@ class Space:
     Attributes:
         names: The inputs.
         lines: One for each.
-        mixes: The combinations with clauses or limits.
+        mixes: The combinations with propositions or limits.
         is_product: Whether AND is the product.
     """
 
@@ -507,7 +516,7 @@ class Space:
                 is_empty |= (high < mix.side.low) | (low > mix.side.high)
                 if mix.side.is_open:
                     is_empty |= high <= mix.side.low
-            if not mix.use.clauses:
+            if not mix.use.propositions:
                 continue
             table = mix.use.table(*_mix_cells(mix, low, high, middle))
             tables.append(table)
@@ -539,8 +548,11 @@ def _ordered(
     for grid in base.grids:
         of: list[Intervals] = []
         for pair in pairs:
-            clauses = (grid.axis.clauses[pair.one], grid.axis.clauses[pair.other])
-            if is_product and max(map(len, clauses)) > 1:
+            propositions = (
+                grid.axis.propositions[pair.one],
+                grid.axis.propositions[pair.other],
+            )
+            if is_product and max(map(len, propositions)) > 1:
                 of.append(Intervals(np.empty(0), np.empty(0)))
             else:
                 of.append(_spans(grid, grid.of[pair.one], grid.of[pair.other]))

@@ -1,7 +1,7 @@
 """Are rules equally strong, and the strongest, on a set with an interior?
 
-Under the minimum, rules tie on more than a surface where their weakest clause is the
-same curve on one axis, the *pivot*: there the level is that curve's value, all the
+Under the minimum, rules tie on more than a surface where their weakest proposition is
+the same curve on one axis, the *pivot*: there the level is that curve's value, all the
 rules reach it on the other axes, and every rival stays at or below it: on some other
 axis strictly below, or on the pivot as a curve that is below or equal. The level moves
 with the pivot's value, so levels between two critical ones suffice; a constant curve
@@ -95,7 +95,7 @@ def _result(base: Arrangement, question: TieQuestion, clock: Clock) -> State:
     if not base.axes:
         point = point_with(base, {})
         result = None if point is None else tie_witness(base, question, point)
-        return result or Proved("no rule has a clause")
+        return result or Proved("no rule has a proposition")
     try:
         if base.rules.semantics.conjunction == "product":
             return tie_of_products(base, question, clock)

@@ -366,7 +366,7 @@ def region_around(
         of = [element.degree(value) for element in axis.elements]
         degrees = [
             min((max(of[one] for one in group) for group in groups), default=ONE)
-            for groups in axis.clauses
+            for groups in axis.propositions
         ]
         low_at.append(
             {rule for rule in missing if degrees[rule] < level or not degrees[rule]}
@@ -516,7 +516,7 @@ def _holds(
     bound = sides.bound or math.ulp(0.0)
 
     def degree(rule: int, of: Sequence[float]) -> float:
-        groups = grid.axis.clauses[rule]
+        groups = grid.axis.propositions[rule]
         return min(
             (max(of[one] for one in group) for group in groups), default=math.inf
         )

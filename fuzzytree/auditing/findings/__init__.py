@@ -8,7 +8,7 @@ An audit
     - `subject`: the model and the settings, as each family receives them
     - `audit`: runs all families within the budget
     - `domains`, `views`, `system_conditions`: the domain; the rules of a model as a
-      rule base; terms and conditions of fuzzy systems as clauses
+      rule base; terms and conditions of fuzzy systems as propositions
     - `curve_bounds`, `rule_bounds`, `bounded_arrangement`: lower and upper bounds of
       curves that are not polynomial, and of rules with them or with weights
     - `locations`: where rules stand in a file; ids that do not depend on their order
@@ -18,8 +18,8 @@ An audit
 Families
     - `deciding`: does a rule ever win, by how much, does it tie
     - `gaps`: inputs that no rule covers, or none covers well
-    - `pairs`, `clauses`: two rules that hide, copy or contradict each other; clauses
-      without effect
+    - `pairs`, `propositions`: two rules that hide, copy or contradict each other;
+      propositions without effect
     - `terms`: terms that are not reached or not used, ill shaped, hard to distinguish
     - `complexity`: counts, and the index of Nauck
     - `leaves`: where each leaf of a tree decides

@@ -3,11 +3,11 @@
 The lower rules show what a rule does somewhere, the upper ones what it never does; what
 neither decides is a bracket. Without an inexact curve or a weight both are the same.
 
-Where two rules share a clause, its degree v is one number for both. If one rule is
+Where two rules share a proposition, its degree v is one number for both. If one rule is
 nowhere weaker than the other with the upper degree u in both, it is so with v <= u too:
 `min(u, a) >= min(w u, b)` makes `a >= min(w u, b) >= min(w v, b)` for a weight w of at
-most 1, and `u a >= u b` makes `a >= b` where u is above 0. So a shared clause is taken
-from above in both.
+most 1, and `u a >= u b` makes `a >= b` where u is above 0. So a shared proposition is
+taken from above in both.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ from fuzzytree.auditing.findings.rule_bounds import BoundedRules
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model import (
     BoolArray,
-    Clause,
     FloatArray,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -52,9 +52,9 @@ from fuzzytree.model import (
 from fuzzytree.numerics import (
     EnclosedValue,
     Enclosure,
-    clause_enclosure,
     degree_enclosure,
     outwards,
+    proposition_enclosure,
     strength_enclosure,
 )
 
@@ -104,7 +104,8 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
         most = wins(self.upper, number, (), clock)
         if isinstance(most, Proved):
             return most
-        # Where the lower strength is 0, a clause is, and its gap bounds the upper one.
+        # Where the lower strength is 0, a proposition is, and its gap bounds the upper
+        # one.
         high = self.bounds.gap if isinstance(state, Proved) else 1.0
         return Bracket(f"the strength of rule {number}", 0.0, high, self.bounds.why)
 
@@ -123,8 +124,10 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
         mine, theirs = below.rules[one - 1], above.rules[other - 1]
         known = [*theirs.when] if shares else []
         when = [
-            clause if self._is_shared(clause, mine, known) else _renamed(clause)
-            for clause in mine.when
+            proposition
+            if self._is_shared(proposition, mine, known)
+            else _renamed(proposition)
+            for proposition in mine.when
         ]
         variables = (
             replace(v, terms=(*v.terms, *_terms(w)))
@@ -137,15 +140,17 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
         )
         return RulePairs(arrange(rules, self.lower.domain))
 
-    def _is_shared(self, clause: Clause, rule: Rule, others: Sequence[Clause]) -> bool:
-        """Return whether other clauses have the key of one, with no more weight.
+    def _is_shared(
+        self, proposition: Proposition, rule: Rule, others: Sequence[Proposition]
+    ) -> bool:
+        """Return whether other propositions have the key of one, with no more weight.
 
         Under the product they must do so as often: `v b` is not below `v v a`.
         """
         assert self.bounds is not None
         if self.is_product:
-            return rule.when.count(clause) <= others.count(clause)
-        mine, weight, _ = self.bounds.weighted_key(clause)
+            return rule.when.count(proposition) <= others.count(proposition)
+        mine, weight, _ = self.bounds.weighted_key(proposition)
         keys = map(self.bounds.weighted_key, others)
         return any(theirs == mine and most <= weight for theirs, _, most in keys)
 
@@ -267,8 +272,10 @@ def bounded_arrangement(subject: Subject) -> BoundedArrangement:
     )
 
 
-def _renamed(clause: Clause) -> Clause:
-    return replace(clause, terms=tuple(f"{_BELOW}{term}" for term in clause.terms))
+def _renamed(proposition: Proposition) -> Proposition:
+    return replace(
+        proposition, terms=tuple(f"{_BELOW}{term}" for term in proposition.terms)
+    )
 
 
 def _terms(variable: Variable) -> Iterator[Term]:
@@ -293,17 +300,19 @@ def _places(variable: Variable, domain: Domain) -> FloatArray:
 def _degrees(rules: RuleBase, name: str, at: FloatArray) -> tuple[FloatArray, ...]:
     """Return bounds of each rule's degree at some values of a variable."""
     shapes, value = shapes_of(rules.variables), EnclosedValue(at, None)
-    known: dict[Clause, Enclosure] = {}
+    known: dict[Proposition, Enclosure] = {}
     low, high = (np.ones((len(rules.rules), len(at))) for _ in range(2))
     is_product = rules.semantics.conjunction == "product"
     for number, rule in enumerate(rules.rules):
         whole = Enclosure(low[number], high[number])
-        for clause in rule.when:
-            if clause.variable != name:
+        for proposition in rule.when:
+            if proposition.variable != name:
                 continue
-            if clause not in known:
-                of = [degree_enclosure(shapes[name, t], value) for t in clause.terms]
-                known[clause] = clause_enclosure(clause, of)
-            whole = strength_enclosure(whole, known[clause], is_product=is_product)
+            if proposition not in known:
+                of = [
+                    degree_enclosure(shapes[name, t], value) for t in proposition.terms
+                ]
+                known[proposition] = proposition_enclosure(proposition, of)
+            whole = strength_enclosure(whole, known[proposition], is_product=is_product)
         low[number], high[number] = whole
     return low, high

@@ -28,14 +28,17 @@ from fuzzytree.model import FuzzyTree
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
-    """Count rules, clauses and terms, and compute the index of Nauck."""
+    """Count rules, propositions and terms, and compute the index of Nauck."""
     rules = subject.rules
-    clauses, used = [len(rule.when) for rule in rules.rules], set(used_terms(rules))
+    propositions, used = (
+        [len(rule.when) for rule in rules.rules],
+        set(used_terms(rules)),
+    )
     measures = [
-        Measure("rules", len(clauses)),
-        Measure("clauses", sum(clauses)),
-        Measure("most clauses of a rule", max(clauses)),
-        Measure("clauses per rule", sum(clauses) / len(clauses)),
+        Measure("rules", len(propositions)),
+        Measure("propositions", sum(propositions)),
+        Measure("most propositions of a rule", max(propositions)),
+        Measure("propositions per rule", sum(propositions) / len(propositions)),
         Measure("distinct terms in use", len(used)),
         Measure("variables in use", len({variable for variable, _ in used})),
     ]

@@ -105,7 +105,9 @@ def questions(subject: Subject) -> Iterator[Convention]:
     """Yield the conventions with their probes, at most `MOST` of each."""
     rules = subject.rules
     yield _ties(subject)
-    aimed = few_probes(rules, 2 * MOST)[:MOST]  # the first half: ends of all clauses
+    aimed = few_probes(rules, 2 * MOST)[
+        :MOST
+    ]  # the first half: ends of all propositions
     bases = aimed[:: max(len(aimed) // _BASES, 1)][:_BASES]
     missing = ((name, math.nan) for name in rules.inputs)
     infinite = ((name, x) for name in rules.inputs for x in (math.inf, -math.inf))

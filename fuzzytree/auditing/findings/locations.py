@@ -153,17 +153,17 @@ def with_ids(
 
 
 def _rule_facts(rule: Rule, shapes: Mapping[tuple[str, str], object]) -> list[object]:
-    """Return what a rule says, with its clauses in an order of their own."""
+    """Return what a rule says, with its propositions in an order of their own."""
     curves = [
         [
-            clause.variable,
-            clause.negated,
+            proposition.variable,
+            proposition.negated,
             sorted(
-                msgspec.json.encode(shapes[clause.variable, term]).decode()
-                for term in clause.terms
+                msgspec.json.encode(shapes[proposition.variable, term]).decode()
+                for term in proposition.terms
             ),
         ]
-        for clause in rule.when
+        for proposition in rule.when
     ]
     text = sentence(
         msgspec.structs.replace(rule, when=tuple(sorted(rule.when, key=str)))

@@ -21,8 +21,8 @@ from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,
     bounded_arrangement,
 )
-from fuzzytree.auditing.findings.clauses import clause_answers
 from fuzzytree.auditing.findings.codes import audit_answer
+from fuzzytree.auditing.findings.propositions import proposition_answers
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
@@ -38,7 +38,7 @@ Pair = tuple[int, int]
 
 
 def answers(subject: Subject) -> Iterator[AuditAnswer]:
-    """Answer what is to be said of pairs of rules, and of single clauses."""
+    """Answer what is to be said of pairs of rules, and of single propositions."""
     compared = bounded_arrangement(subject)
     if compared.lower.is_empty:
         return
@@ -48,7 +48,7 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     yield from _copied(subject, compared)
     yield from _conflicts(subject, compared)
     if subject.policy.decision == "strongest":
-        yield from clause_answers(subject)
+        yield from proposition_answers(subject)
 
 
 def _then(subject: Subject, number: int) -> str:

@@ -1,8 +1,8 @@
 """Do all representations of a model, in every installed runtime, answer as the model?
 
-Bits are compared on probes of every clause, and on the rows. A certificate bounds what
-a number type can change on all of the domain, and a share of the rows, or of random
-points, shows how often that could matter.
+Bits are compared on probes of every proposition, and on the rows. A certificate bounds
+what a number type can change on all of the domain, and a share of the rows, or of
+random points, shows how often that could matter.
 """
 
 from __future__ import annotations

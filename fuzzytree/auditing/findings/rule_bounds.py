@@ -1,14 +1,15 @@
 """Lower and upper rule bases between which the strengths of a view's rules lie.
 
 The *lower* rule base takes each curve from below and the *upper* one from above; in a
-negated clause it is the other way round. Both have the same rules, in which a clause
-may use a term that exists only for it.
+negated proposition it is the other way round. Both have the same rules, in which a
+proposition may use a term that exists only for it.
 
-A weight w is part of both. Under the minimum `w min(a, b) = min(w a, w b)`: each clause
-uses its terms times the weight, exactly where every product is a double, and between
-its neighbours otherwise. Under the product, and in a rule without clauses, a clause is
-added whose degree is the weight everywhere. (`fuzzytree.semantics.inference` multiplies
-the rounded degree of the condition by the weight, in one rounding more.)
+A weight w is part of both. Under the minimum `w min(a, b) = min(w a, w b)`: each
+proposition uses its terms times the weight, exactly where every product is a double,
+and between its neighbours otherwise. Under the product, and in a rule without
+propositions, a proposition is added whose degree is the weight everywhere.
+(`fuzzytree.semantics.inference` multiplies the rounded degree of the condition by the
+weight, in one rounding more.)
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from fuzzytree.auditing.findings.curve_bounds import (
     scale,
 )
 from fuzzytree.model import (
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Shape,
@@ -71,20 +72,22 @@ class BoundedRules(msgspec.Struct, frozen=True, eq=False, dict=True):
         )
         return tuple(sorted(keys, key=repr))
 
-    def weighted_key(self, clause: Clause) -> tuple[tuple[object, ...], float, float]:
-        """Return the key of a clause without weights, and its least and most weight."""
+    def weighted_key(
+        self, proposition: Proposition
+    ) -> tuple[tuple[object, ...], float, float]:
+        """Return a proposition's key without weights, and its least and most weight."""
         weights, keys = set[float](), set[tuple[object, ...]]()
-        for key in self._keys(clause):
+        for key in self._keys(proposition):
             is_weighted = isinstance(key[0], float)
             weights.add(float(str(key[0])) if is_weighted else 1.0)
             keys.add(key[1:] if is_weighted else key)
-        what = clause.variable, clause.negated, frozenset(keys)
+        what = proposition.variable, proposition.negated, frozenset(keys)
         return what, min(weights), max(weights)
 
-    def _keys(self, clause: Clause) -> Iterator[tuple[object, ...]]:
-        """Yield what the terms of a clause are."""
-        for term in clause.terms:
-            name = clause.variable, term
+    def _keys(self, proposition: Proposition) -> Iterator[tuple[object, ...]]:
+        """Yield what the terms of a proposition are."""
+        for term in proposition.terms:
+            name = proposition.variable, term
             known = self.terms.get(name)
             yield (self._shapes[name],) if known is None else known.key
 
@@ -116,18 +119,22 @@ def bounded_rules(
     """Return rules from below and from above; None if they are plain.
 
     Raises:
-        ValueError: If a weight has no place: a rule without clauses, and no input.
+        ValueError: If a weight has no place: a rule without propositions, and no input.
     """
     if not terms and all(weight == 1.0 for weight in weights):
         return None
     builder = _Builder(rules, terms, ranges)
     own = tuple(
-        Rule(tuple(builder.clauses(rule, weight)), rule.then)
+        Rule(tuple(builder.propositions(rule, weight)), rule.then)
         for rule, weight in zip(rules.rules, weights, strict=True)
     )
     inexact = {name for name, one in builder.terms.items() if not one.is_exact}
     used = [
-        {(clause.variable, term) for clause in rule.when for term in clause.terms}
+        {
+            (proposition.variable, term)
+            for proposition in rule.when
+            for term in proposition.terms
+        }
         for rule in own
     ]
     known = {name for of in used for name in of} & inexact
@@ -142,7 +149,7 @@ def bounded_rules(
 
 
 class _Builder:
-    """The terms of both rule bases, as they are made for clauses."""
+    """The terms of both rule bases, as they are made for propositions."""
 
     def __init__(
         self,
@@ -155,44 +162,46 @@ class _Builder:
         self.plain: Mapping[Name, Shape] = shapes_of(rules.variables)
         self.terms = {**terms}
 
-    def clauses(self, rule: Rule, weight: float) -> Iterator[Clause]:
-        """Yield the clauses of a rule, its weight among them."""
-        for clause in rule.when:
+    def propositions(self, rule: Rule, weight: float) -> Iterator[Proposition]:
+        """Yield the propositions of a rule, its weight among them."""
+        for proposition in rule.when:
             if weight == 1.0 or self.is_product:
-                yield self._sided(clause)
+                yield self._sided(proposition)
             else:
-                yield from self._weighted(clause, weight)
+                yield from self._weighted(proposition, weight)
         if weight != 1.0 and (self.is_product or not rule.when):
             yield self._constant(rule, weight)
 
-    def _sided(self, clause: Clause) -> Clause:
-        """Return a clause whose degree is lower in the lower rules."""
-        names = [(clause.variable, term) for term in clause.terms]
-        if not clause.negated or not any(name in self.terms for name in names):
-            return clause
+    def _sided(self, proposition: Proposition) -> Proposition:
+        """Return a proposition whose degree is lower in the lower rules."""
+        names = [(proposition.variable, term) for term in proposition.terms]
+        if not proposition.negated or not any(name in self.terms for name in names):
+            return proposition
         terms = [
             self._named(f"{name[1]}, other side", name[0], self.terms[name].swapped)
             if name in self.terms
             else name[1]
             for name in names
         ]
-        return Clause(clause.variable, tuple(terms), negated=True)
+        return Proposition(proposition.variable, tuple(terms), negated=True)
 
-    def _weighted(self, clause: Clause, weight: float) -> Iterator[Clause]:
-        """Yield a clause's degree times a weight; `w (1 - max(a, b))` as two."""
+    def _weighted(
+        self, proposition: Proposition, weight: float
+    ) -> Iterator[Proposition]:
+        """Yield a proposition's degree times a weight; `w (1 - max(a, b))` as two."""
         names: list[str] = []
-        for term in clause.terms:
-            one = self._points(clause.variable, term)
+        for term in proposition.terms:
+            one = self._points(proposition.variable, term)
             text = f"{term} x {weight!r}"
-            if clause.negated:
+            if proposition.negated:
                 one, text = complement(one) or one, f"not {text}"
             product = scale(one, weight)
             assert product is not None  # of points
-            names.append(self._named(text, clause.variable, product))
-        if clause.negated:
-            yield from (Clause(clause.variable, (name,)) for name in names)
+            names.append(self._named(text, proposition.variable, product))
+        if proposition.negated:
+            yield from (Proposition(proposition.variable, (name,)) for name in names)
         else:
-            yield Clause(clause.variable, tuple(names))
+            yield Proposition(proposition.variable, tuple(names))
 
     def _points(self, variable: str, term: str) -> CurveBounds:
         """Return a term as points, between two lines if need be."""
@@ -204,15 +213,15 @@ class _Builder:
             raise ValueError(f"the curve of {term!r} of {variable!r} has no points")
         return points
 
-    def _constant(self, rule: Rule, weight: float) -> Clause:
-        """Return a clause that has the same degree everywhere."""
-        used = [clause.variable for clause in rule.when]
+    def _constant(self, rule: Rule, weight: float) -> Proposition:
+        """Return a proposition that has the same degree everywhere."""
+        used = [proposition.variable for proposition in rule.when]
         names = used or [one.name for one in self.rules.variables]
         if not names:
             raise ValueError("there is no input that a weight could be laid upon")
         line = Points((0.0,), (weight,))
         bounds = CurveBounds(line, line, (line,))
-        return Clause(names[0], (self._named(f"x {weight!r}", names[0], bounds),))
+        return Proposition(names[0], (self._named(f"x {weight!r}", names[0], bounds),))
 
     def _named(self, text: str, variable: str, one: CurveBounds) -> str:
         """Return the name of a term that is made, kept once."""

@@ -20,27 +20,34 @@ from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
-from fuzzytree.model import BoolArray, Clause, FloatArray, IntArray, RuleBase, shapes_of
+from fuzzytree.model import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Proposition,
+    RuleBase,
+    shapes_of,
+)
 from fuzzytree.numerics import (
     MISSING,
     UNCOVERED,
     Decisions,
     Enclosure,
     axis_value,
-    clause_enclosure,
     decide,
     degree_enclosure,
     exact_answer,
     exact_axis,
     outwards,
+    proposition_enclosure,
 )
 
 CONFIDENCE: Final = 0.95
 """Of every interval."""
 
 _STEP = 4096  # rows between two looks at the clock
-_MOST_DEGREES = 1 << 24  # of all clauses at points that are drawn
-_LEAST_ROWS = 1000  # that are drawn however many clauses there are
+_MOST_DEGREES = 1 << 24  # of all propositions at points that are drawn
+_LEAST_ROWS = 1000  # that are drawn however many propositions there are
 
 
 def wilson(hits: int, rows: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -231,25 +238,25 @@ def _settled(
 
 
 def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Return which rules are above 0 for sure, and which may be: all clauses are."""
+    """Return which rules are above 0 for sure, and which may be."""
     named = dict(zip(rules.inputs, values, strict=True))
     shapes = shapes_of(rules.variables)
-    known: dict[Clause, Enclosure] = {}
+    known: dict[Proposition, Enclosure] = {}
     fires: BoolArray = np.ones((len(rules.rules), values.shape[1]), np.bool_)
     may_fire = fires.copy()
     with np.errstate(all="ignore"):
         axes = {v.name: axis_value(v, named) for v in rules.variables}
         for position, rule in enumerate(rules.rules):
-            for clause in rule.when:
-                if clause not in known:
-                    x = axes[clause.variable]
+            for proposition in rule.when:
+                if proposition not in known:
+                    x = axes[proposition.variable]
                     degrees = [
-                        degree_enclosure(shapes[clause.variable, term], x)
-                        for term in clause.terms
+                        degree_enclosure(shapes[proposition.variable, term], x)
+                        for term in proposition.terms
                     ]
-                    known[clause] = clause_enclosure(clause, degrees)
-                fires[position] &= known[clause].low > 0.0
-                may_fire[position] &= known[clause].high > 0.0
+                    known[proposition] = proposition_enclosure(proposition, degrees)
+                fires[position] &= known[proposition].low > 0.0
+                may_fire[position] &= known[proposition].high > 0.0
     return fires, may_fire
 
 
@@ -295,8 +302,8 @@ def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[AuditAnswer]:
 def _of_domain(subject: Subject) -> Iterator[AuditAnswer]:
     """Yield which shares of the domain's volume are uncovered, weak, tied, close."""
     settings = subject.settings
-    clauses = sum(len(rule.when) for rule in subject.rules.rules)
-    rows = min(settings.rows, max(_MOST_DEGREES // max(clauses, 1), _LEAST_ROWS))
+    propositions = sum(len(rule.when) for rule in subject.rules.rules)
+    rows = min(settings.rows, max(_MOST_DEGREES // max(propositions, 1), _LEAST_ROWS))
     points = sample_points(subject.rules, subject.domain, rows, settings.seed)
     if not points.shape[1]:
         reason = "no drawn point lies within the sides of the combinations"

@@ -1,9 +1,9 @@
-"""Terms and conditions of fuzzy systems as clauses of rules, where that is exact.
+"""Terms and conditions of fuzzy systems as propositions of rules, where that is exact.
 
-A condition becomes *ways*: each way is a number of clauses that are all true, and the
-condition is as true as the best of its ways. Under minimum and maximum, or product and
-maximum, `a and (b or c)` is as strong as the stronger of `a and b` and `a and c`, and 1
-minus the least is the largest of 1 minus each.
+A condition becomes *ways*: each way is a number of propositions that are all true, and
+the condition is as true as the best of its ways. Under minimum and maximum, or product
+and maximum, `a and (b or c)` is as strong as the stronger of `a and b` and `a and c`,
+and 1 minus the least is the largest of 1 minus each.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from fuzzytree.auditing.findings.curve_bounds import (
 from fuzzytree.auditing.findings.records import AuditAnswer, TermName
 from fuzzytree.model import (
     And,
-    Clause,
     Condition,
     Conjunction,
     FuzzySystem,
@@ -39,6 +38,7 @@ from fuzzytree.model import (
     Not,
     Or,
     Points,
+    Proposition,
     RuleBlock,
     Shape,
     SystemInput,
@@ -197,8 +197,8 @@ MOST_WAYS: Final = 64
 MOST_QUESTIONS: Final = 1_000
 """The most propositions in the condition of a rule."""
 
-Way = tuple[Clause, ...]
-"""Clauses that all hold."""
+Way = tuple[Proposition, ...]
+"""Propositions that all hold."""
 
 _ALWAYS: tuple[Way, ...] = ((),)
 _NEVER: tuple[Way, ...] = ()
@@ -247,14 +247,14 @@ class Conditions:
                 self._check_joint("and", negated=negated)
                 return self._joined(parts, is_union=negated, negated=negated)
             case Or(parts=parts):
-                whole = self._one_clause(parts, negated=negated)
+                whole = self._one_proposition(parts, negated=negated)
                 if whole is not None:
                     return [(whole,)]
                 self._check_joint("or", negated=negated)
                 return self._joined(parts, is_union=not negated, negated=negated)
 
     def _proposition(self, one: Is, *, negated: bool) -> list[Way]:
-        """Return the only way of a proposition: a clause, or always, or never."""
+        """Return the only way of a proposition: a proposition, or always, or never."""
         hedges = one.hedges
         while hedges and hedges[0] == "not":
             negated, hedges = not negated, hedges[1:]
@@ -271,24 +271,26 @@ class Conditions:
             term = self.terms.hedged(one.variable, one.label, hedges)
             if term is None:
                 decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
-            return [(Clause(one.variable, (term,), negated),)]
-        return [(Clause(one.variable, (one.label,), negated),)]
+            return [(Proposition(one.variable, (term,), negated),)]
+        return [(Proposition(one.variable, (one.label,), negated),)]
 
-    def _one_clause(
+    def _one_proposition(
         self, parts: Sequence[Condition], *, negated: bool
-    ) -> Clause | None:
-        """Return `x is a or b` as one clause, if it is that and a maximum."""
+    ) -> Proposition | None:
+        """Return `x is a or b` as one proposition, if it is that and a maximum."""
         plain = [*_plain_questions(parts)]
         if self.block.disjunction != "maximum" or None in plain:
             return None
         ways = [
             way for one in plain if one for way in self._proposition(one, negated=False)
         ]
-        clauses = [way[0] for way in ways]
-        if len({clause.variable for clause in clauses}) > 1:
+        propositions = [way[0] for way in ways]
+        if len({proposition.variable for proposition in propositions}) > 1:
             return None
-        terms = dict.fromkeys(term for clause in clauses for term in clause.terms)
-        return Clause(clauses[0].variable, tuple(terms), negated)
+        terms = dict.fromkeys(
+            term for proposition in propositions for term in proposition.terms
+        )
+        return Proposition(propositions[0].variable, tuple(terms), negated)
 
     def _check_joint(self, word: Literal["and", "or"], *, negated: bool) -> None:
         """Raise unless a joint is a minimum, maximum or product where that is exact."""
@@ -323,7 +325,7 @@ class Conditions:
         return whole
 
     def _both(self, one: Way, other: Way) -> Way:
-        """Return clauses of both; a minimum does not change by repetition."""
+        """Return propositions of both; a minimum does not change by repetition."""
         both = (*one, *other)
         return tuple(dict.fromkeys(both)) if self.conjunction == "minimum" else both
 

@@ -220,13 +220,13 @@ def _of_term(
 
 
 def _unused(subject: Subject) -> Iterator[AuditAnswer]:
-    terms, variables, clauses = _inventory(subject)
-    used = set(clauses)
+    terms, variables, propositions = _inventory(subject)
+    used = set(propositions)
     needed = {variable for variable, _ in used}
     for variable in subject.rules.variables:
         if variable.name in needed:
             needed.update(part.input for part in variable.parts)
-    proof = Proved(f"{counted(len(clauses), 'proposition')} of all rules read")
+    proof = Proved(f"{counted(len(propositions), 'proposition')} of all rules read")
     for name in variables:
         if name not in needed:
             own = tuple(TermName(name, term) for of, term in terms if of == name)
@@ -270,9 +270,11 @@ def _inventory(
 
 def used_terms(rules: RuleBase) -> Iterator[tuple[str, str]]:
     """Yield the variables and terms that rules use, as often as they do."""
-    for clause in (clause for rule in rules.rules for clause in rule.when):
-        for term in clause.terms:
-            yield clause.variable, term
+    for proposition in (
+        proposition for rule in rules.rules for proposition in rule.when
+    ):
+        for term in proposition.terms:
+            yield proposition.variable, term
 
 
 # --- FT402: is it well shaped?

@@ -236,12 +236,13 @@ class _Taken:
         Raises:
             DecliningError: If there is one.
         """
-        for clause in dict.fromkeys(clause for way in ways for clause in way):
-            for term in clause.terms:
-                if self.terms.pointed(clause.variable, term) is None:
-                    text = (
-                        f"{term!r} of {clause.variable!r} has no points to be weighted"
-                    )
+        for proposition in dict.fromkeys(
+            proposition for way in ways for proposition in way
+        ):
+            for term in proposition.terms:
+                if self.terms.pointed(proposition.variable, term) is None:
+                    where = f"{term!r} of {proposition.variable!r}"
+                    text = f"{where} has no points to be weighted"
                     decline("FTD07", f"the curve of {text}")
 
     def _never(self, message: str, name: str) -> None:

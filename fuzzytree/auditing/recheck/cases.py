@@ -112,7 +112,7 @@ class Case:
         """The rules in cells.
 
         Raises:
-            UndecidedError: If there are too many, or a rule has no clauses.
+            UndecidedError: If there are too many, or a rule has no propositions.
         """
         if isinstance(self._grid, UndecidedError):
             raise self._grid
@@ -122,7 +122,7 @@ class Case:
     def _grid(self) -> Grid | UndecidedError:
         when = zip(self.rules.rules, self.weights, strict=True)
         if not all(weight == 1 or rule.when for rule, weight in when):
-            return UndecidedError("a rule without clauses is not weighted here")
+            return UndecidedError("a rule without propositions is not weighted here")
         if self.view is not None and not self.view.is_plain:
             return UndecidedError("a condition does not hold by its ways")
         settings = self.audit.settings

@@ -22,7 +22,7 @@ from fuzzytree.auditing.recheck.cases import (
     level_of,
     point_of,
 )
-from fuzzytree.auditing.recheck.forms import clause_text, clauses_of
+from fuzzytree.auditing.recheck.forms import proposition_text, propositions_of
 from fuzzytree.auditing.recheck.grid import FINE, RuleBits
 from fuzzytree.auditing.recheck.meaning import (
     Point,
@@ -31,7 +31,7 @@ from fuzzytree.auditing.recheck.meaning import (
     leaf_of,
     strengths,
 )
-from fuzzytree.auditing.recheck.model_records import Clause, Rules, Tree, Variable
+from fuzzytree.auditing.recheck.model_records import Proposition, Rules, Tree, Variable
 from fuzzytree.auditing.recheck.outcomes import (
     DoesNotHoldError,
     UndecidedError,
@@ -109,7 +109,7 @@ def _met(one: Interval, low: float | None, high: float | None) -> Interval:
     return start, end if high is None else min(end, Fraction(high)), is_open
 
 
-# --- pairs of rules, and clauses: FT104 to FT107, FT201
+# --- pairs of rules, and propositions: FT104 to FT107, FT201
 
 
 def hidden(case: Case, answer: Answer) -> None:
@@ -209,12 +209,12 @@ def highest(case: Case, answer: Answer) -> None:
 
 
 def needless(case: Case, answer: Answer) -> None:
-    """Check that a rule without a clause is nowhere stronger than with it."""
+    """Check that a rule without a proposition is nowhere stronger than with it."""
     if not answer.rules:
-        raise UndecidedError("which other clauses matter is not known")
+        raise UndecidedError("which other propositions matter is not known")
     require(len(answer.rules) == 1, "it is of no rule")
     if not answer.terms:
-        require(not answer.is_finding, "it is of no clause of the rule")
+        require(not answer.is_finding, "it is of no proposition of the rule")
         require(not case.fire(*answer.rules), "the rule fires somewhere")
         return
     rest, number = case.grid.bits_of(_without(case, answer)), answer.rules[0]
@@ -249,24 +249,29 @@ def _union(one: RuleBits, other: RuleBits) -> RuleBits:
     return tuple(a | b for a, b in zip(one, other, strict=True))
 
 
-def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:
-    """Return a rule's clauses without the one that an answer is about."""
-    when, result = case.rules.rules[answer.rules[0] - 1].when, clauses_of(case, answer)
+def _without(case: Case, answer: Answer) -> tuple[Proposition, ...]:
+    """Return a rule's propositions without the one that an answer is about."""
+    when, result = (
+        case.rules.rules[answer.rules[0] - 1].when,
+        propositions_of(case, answer),
+    )
     if len(result) > 1:  # one of them is negated: only the subject says which
-        result = [c for c in result if answer.subject.endswith(repr(clause_text(c)))]
-    require(len(result) == 1, "it is of no clause of the rule")
+        result = [
+            c for c in result if answer.subject.endswith(repr(proposition_text(c)))
+        ]
+    require(len(result) == 1, "it is of no proposition of the rule")
     place = when.index(result.pop())
     return (*when[:place], *when[place + 1 :])
 
 
 def shows_need(case: Case, answer: Answer, state: Witness) -> None:
-    """Check that the prediction at the witness differs without the clause."""
+    """Check that the prediction at the witness differs without the proposition."""
     rest, point = _without(case, answer), point_of(state.point)
     every, place = list(case.rules.rules), answer.rules[0] - 1
     every[place] = every[place]._replace(when=rest)
     other = answer_of(case.rules._replace(rules=tuple(every)), point)
     is_other = other != answer_of(case.rules, point) and not answer.is_finding
-    require(is_other, "the clause does not matter there")
+    require(is_other, "the proposition does not matter there")
 
 
 def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
@@ -349,13 +354,13 @@ def unused(case: Case, answer: Answer) -> None:
 
 
 def complexity(case: Case, answer: Answer) -> None:
-    """Count rules, clauses, terms and variables."""
+    """Count rules, propositions, terms and variables."""
     lengths, used = [len(r.when) for r in case.rules.rules], _used_terms(case.rules)
     counts: dict[str, float] = {
         "rules": len(lengths),
-        "clauses": sum(lengths),
-        "most clauses of a rule": max(lengths),
-        "clauses per rule": sum(lengths) / len(lengths),
+        "propositions": sum(lengths),
+        "most propositions of a rule": max(lengths),
+        "propositions per rule": sum(lengths) / len(lengths),
         "distinct terms in use": len(used),
         "variables in use": len({variable for variable, _ in used}),
     }
@@ -368,8 +373,12 @@ def complexity(case: Case, answer: Answer) -> None:
 
 def _used_terms(rules: Rules) -> set[tuple[str, str]]:
     """Return the variable and term of every proposition of the rules."""
-    clauses = [clause for rule in rules.rules for clause in rule.when]
-    return {(clause.variable, term) for clause in clauses for term in clause.terms}
+    propositions = [proposition for rule in rules.rules for proposition in rule.when]
+    return {
+        (proposition.variable, term)
+        for proposition in propositions
+        for term in proposition.terms
+    }
 
 
 # --- rules that win, tie or fire nowhere: FT101 to FT103, FT202, FT301

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from fuzzytree.auditing.recheck.audit_records import Answer, Declined, Sampled
 from fuzzytree.auditing.recheck.cases import Case
-from fuzzytree.auditing.recheck.model_records import Clause
+from fuzzytree.auditing.recheck.model_records import Proposition
 
 TABLE = """
 FT101 W -info | {1}
@@ -84,16 +84,17 @@ FT106 P +info | {1} and {2} | largest distance; place of it
   {then2}[; degrees differ by at most {largest distance:s}, at {...} = {place of it:s}]
 FT106 PD -info | pairs of rules | pairs
   no [other ]two rules {have}nearly the same antecedent, among {pairs:n pair}{why}
-FT107 W -info | {1}, {clause}
-  {1} needs {clause}: without it {...} becomes {then1} at some input
-FT107 P +info | {1}, {clause}
-  {1} decides the same without {clause}
-FT107 BD -info | {1}, {clause}
-  whether {1} needs {clause} is open
+FT107 W -info | {1}, {proposition}
+  {1} needs {proposition}: without it {...} becomes {then1} at some input
+FT107 P +info | {1}, {proposition}
+  {1} decides the same without {proposition}
+FT107 BD -info | {1}, {proposition}
+  whether {1} needs {proposition} is open
 FT107 P -info | {1}
-  {1} never fires, so its clauses are not tested one by one
-FT107 P -info | clauses | clauses
-  {clauses:d} more <clause matters: it decides|clauses matter: each decides> some input
+  {1} never fires, so its propositions are not tested one by one
+FT107 P -info | propositions | propositions
+  {propositions:d} more <proposition matters: it decides|propositions matter: each
+  decides> some input
 FT201 W +info | {1} and {2} | highest common level; * at least; * at most
   {1} and {2} conflict: both reach [nearly ]{_} at one input, and say {then1} and
   {then2}
@@ -190,7 +191,7 @@ FT404 P +info | {subject}
 FT404 P -info | terms and variables | variables in use; terms in use
   rules use {variables in use:n variable} and {terms in use:n term}
 FT501 P -info | the rule base | *
-  [audited as ]{rules:n rule} with {clauses:n clause}[, index of Nauck
+  [audited as ]{rules:n rule} with {propositions:n proposition}[, index of Nauck
   {index of Nauck:s}]
 FT701 S {hit}info | <rows with a missing value|rows outside the domain>
   on {hits:d} of {rows:d} rows a value is <missing|outside the domain>
@@ -280,10 +281,10 @@ def _matches(text: str, form: str, facts: Facts | None) -> bool:
     return re.fullmatch(result, text, re.DOTALL) is not None
 
 
-def clause_text(clause: Clause) -> str:
-    """Return a clause as sentences show it."""
-    verb = "is not" if clause.negated else "is"
-    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
+def proposition_text(proposition: Proposition) -> str:
+    """Return a proposition as sentences show it."""
+    verb = "is not" if proposition.negated else "is"
+    return f"{proposition.variable} {verb} {' or '.join(proposition.terms)}"
 
 
 def _facts(case: Case, answer: Answer) -> Facts:
@@ -313,9 +314,9 @@ def _facts(case: Case, answer: Answer) -> Facts:
         one, other = answer.terms
         result["terms"] = f"terms {one.term!r} and {other.term!r} of {one.variable!r}"
     for number in answer.rules[:1]:
-        for text in map(clause_text, clauses_of(case, answer)):
+        for text in map(proposition_text, propositions_of(case, answer)):
             if answer.subject == f"{case.name(number)}, {text!r}":
-                result["clause"] = repr(text)
+                result["proposition"] = repr(text)
     result |= {measure.name: measure.value for measure in answer.measures}
     if isinstance(state, Declined):
         result |= {"reason": state.reason, "why": f": {state.reason}"}
@@ -327,11 +328,11 @@ def _facts(case: Case, answer: Answer) -> Facts:
     return result
 
 
-def clauses_of(case: Case, answer: Answer) -> list[Clause]:
-    """Return the clauses of a rule that have the terms of an answer."""
+def propositions_of(case: Case, answer: Answer) -> list[Proposition]:
+    """Return the propositions of a rule that have the terms of an answer."""
     when = case.rules.rules[answer.rules[0] - 1].when
     of = {c: tuple((c.variable, term) for term in c.terms) for c in when}
-    return [clause for clause, labels in of.items() if labels == answer.terms]
+    return [proposition for proposition, labels in of.items() if labels == answer.terms]
 
 
 def matches_facts(case: Case, answer: Answer) -> bool | None:

@@ -1,11 +1,11 @@
 """Axes cut into cells, and rules on a box of them: levels, winners and ties.
 
 A rule is stronger than some rivals at a point exactly if, at some level t, all of its
-clauses are at t or above and each rival has a clause below t. An axis is cut where a
-piece ends, where two degrees cross, and where one turns: in a cell between two cuts
-all are monotone and in one order. Their values at cuts are the critical levels; nothing
-changes between two of these, so one level there decides for all. Which clauses can be
-at t or above together is computed per axis, and combined by `Grid`.
+propositions are at t or above and each rival has a proposition below t. An axis is cut
+where a piece ends, where two degrees cross, and where one turns: in a cell between two
+cuts all are monotone and in one order. Their values at cuts are the critical levels;
+nothing changes between two of these, so one level there decides for all. Which
+propositions can be at t or above together is computed per axis, and combined by `Grid`.
 
 Ties, under the minimum: around a point of an open set each strength is one function of
 one axis. Two of them are equal there only if they are the same function of the same
@@ -22,7 +22,7 @@ from functools import reduce
 from operator import or_
 from typing import NamedTuple
 
-from fuzzytree.auditing.recheck.model_records import Clause, Rules, Shape
+from fuzzytree.auditing.recheck.model_records import Proposition, Rules, Shape
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
 from fuzzytree.auditing.recheck.polynomials import (
     ONE,
@@ -239,7 +239,7 @@ Span = list[tuple[int, int, int, int]]
 class Axis(NamedTuple):
     """A variable: the numbers of the functions of the rules, and its cells."""
 
-    numbers: dict[tuple[Clause, Fraction], int]
+    numbers: dict[tuple[Proposition, Fraction], int]
     cells: list[Cell]
     spans: list[Span]
 
@@ -259,7 +259,7 @@ class Grid:
         self.marks = {one: self.levels.add((one,), ZERO) for one in (ZERO, ONE, *extra)}
         self.axes: list[Axis] = []
         shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
-        every: dict[tuple[Clause, Fraction], Function] = {}
+        every: dict[tuple[Proposition, Fraction], Function] = {}
         for rule, weight in zip(rules.rules, weights, strict=True):
             for c, w in self._weighted(rule.when, weight):
                 group = tuple(shapes[c.variable, term] for term in c.terms)
@@ -281,21 +281,21 @@ class Grid:
         self.patterns: dict[tuple[int, bool], list[set[Pattern]]] = {}
 
     def _weighted(
-        self, when: Iterable[Clause], weight: Fraction
-    ) -> list[tuple[Clause, Fraction]]:
-        """Return clauses with their weights: all of a minimum, one of a product."""
+        self, when: Iterable[Proposition], weight: Fraction
+    ) -> list[tuple[Proposition, Fraction]]:
+        """Return propositions and their weights: all of a minimum, one of a product."""
         return [
-            (clause, ONE if place and self.is_product else weight)
-            for place, clause in enumerate(when)
+            (proposition, ONE if place and self.is_product else weight)
+            for place, proposition in enumerate(when)
         ]
 
-    def bits_of(self, when: Iterable[Clause], weight: Fraction = ONE) -> RuleBits:
-        """Return the functions of clauses on each axis, all of which rules have."""
+    def bits_of(self, when: Iterable[Proposition], weight: Fraction = ONE) -> RuleBits:
+        """Return the functions on each axis that all of some rules have."""
         bits, again = [0] * len(self.axes), 0
-        for clause in self._weighted(when, weight):
+        for proposition in self._weighted(when, weight):
             for place, axis in enumerate(self.axes):
-                if clause in axis.numbers:
-                    bit = 1 << axis.numbers[clause]
+                if proposition in axis.numbers:
+                    bit = 1 << axis.numbers[proposition]
                     again += bool(bits[place] & bit)
                     bits[place] |= bit
         return (*bits, again)
@@ -381,7 +381,7 @@ class Grid:
     def is_below(self, mine: RuleBits, theirs: RuleBits) -> bool:
         """Return whether a rule's degree is nowhere above a rival's, on every axis.
 
-        That suffices for min and product alike. A rule of several clauses on one
+        That suffices for min and product alike. A rule of several propositions on one
         variable is not looked at.
         """
         if mine[-1] or theirs[-1]:
@@ -512,7 +512,7 @@ class Ties:
         return False
 
     def _flat(self, bits_of_rule: RuleBits) -> set[int]:
-        """Return the bands at which a clause stays in some cell."""
+        """Return the bands at which a proposition stays in some cell."""
         return {
             least
             for place, spans in enumerate(self.wide)

@@ -119,13 +119,14 @@ def _digits(value: float) -> str:
 
 def said(rule: Rule, shapes: Mapping[tuple[str, str], Shape]) -> list[Any]:
     """Return what a rule says and with which curves, in an order of its own."""
-    clauses = sorted(rule.when, key=str)
+    propositions = sorted(rule.when, key=str)
     texts = [
-        f"{c.variable} is {'not ' * c.negated}{' or '.join(c.terms)}" for c in clauses
+        f"{c.variable} is {'not ' * c.negated}{' or '.join(c.terms)}"
+        for c in propositions
     ]
     curves = [
         [c.variable, c.negated, sorted(compact(shapes[c.variable, t]) for t in c.terms)]
-        for c in clauses
+        for c in propositions
     ]
     said = f"IF {' AND '.join(texts)} THEN" if texts else "ALWAYS"
     return [f"{said} {rule.then}", sorted(curves, key=str)]
@@ -258,7 +259,7 @@ def _questions(case: Case, report: Report) -> None:
 
 
 def _complete(case: Case, report: Report) -> None:
-    """Check that each rule and clause has an answer, if the code was not cut."""
+    """Check that each rule and proposition has an answer, if the code was not cut."""
     entries = {text.split(" ")[0] for text in case.audit.unasked}
     by = {code: case.coded(code) for code in SEVERITIES}
     every = {*case.numbers}
@@ -284,10 +285,12 @@ def _complete(case: Case, report: Report) -> None:
             continue  # the rules that it is about are not known
         if code not in entries and by[code] and result != numbers:
             report.wrong.append(f"{code} has not one answer for each rule")
-    clauses = sum(len(rule.when) for rule in case.rules.rules)
-    clause_answers = sum(_clauses(case, one) for one in by["FT107"])
-    is_all = "FT107" in entries or not by["FT107"] or clause_answers == clauses
-    report.expect(is_all, "FT107 has not one answer for each clause")
+    propositions = sum(len(rule.when) for rule in case.rules.rules)
+    proposition_answers = sum(_propositions(case, one) for one in by["FT107"])
+    is_all = (
+        "FT107" in entries or not by["FT107"] or proposition_answers == propositions
+    )
+    report.expect(is_all, "FT107 has not one answer for each proposition")
 
 
 def _wins(case: Case, number: int) -> bool:
@@ -299,8 +302,8 @@ def _wins(case: Case, number: int) -> bool:
         return False
 
 
-def _clauses(case: Case, answer: Answer) -> float:
-    """Return of how many clauses an answer is: one, some more, all of a rule."""
+def _propositions(case: Case, answer: Answer) -> float:
+    """Return of how many propositions an answer is: one, some more, all of a rule."""
     if not answer.rules:
         return sum(one.value for one in answer.measures)
     is_one = answer.terms or answer.rules[0] not in case.numbers

@@ -19,7 +19,6 @@ from fuzzytree.auditing.recheck.model_records import (
     And,
     Block,
     Branch,
-    Clause,
     Conclusion,
     Condition,
     Input,
@@ -28,6 +27,7 @@ from fuzzytree.auditing.recheck.model_records import (
     Node,
     Not,
     Or,
+    Proposition,
     Rule,
     Rules,
     Scaled,
@@ -60,13 +60,19 @@ def strengths(rules: Rules, point: Point) -> list[Fraction]:
     """Return the strength of every rule at a point."""
     variables = {v.name: v for v in rules.variables}
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
-    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
-    degrees: dict[Clause, Fraction] = {}
-    for clause in clauses:
-        x = value_of(variables[clause.variable], point)
-        highest = max(degree(shapes[clause.variable, term], x) for term in clause.terms)
-        degrees[clause] = 1 - highest if clause.negated else highest
-    result = [[degrees[clause] for clause in rule.when] for rule in rules.rules]
+    propositions = dict.fromkeys(
+        proposition for rule in rules.rules for proposition in rule.when
+    )
+    degrees: dict[Proposition, Fraction] = {}
+    for proposition in propositions:
+        x = value_of(variables[proposition.variable], point)
+        highest = max(
+            degree(shapes[proposition.variable, term], x) for term in proposition.terms
+        )
+        degrees[proposition] = 1 - highest if proposition.negated else highest
+    result = [
+        [degrees[proposition] for proposition in rule.when] for rule in rules.rules
+    ]
     if rules.semantics.conjunction == "product":
         return [math.prod(one, start=ONE) for one in result]
     return [min(one, default=ONE) for one in result]
@@ -113,7 +119,7 @@ def paths(tree: Tree) -> Iterator[tuple[int, Steps]]:
 
 
 def rules_of(tree: Tree, kind: Literal["relative", "raw"]) -> Rules:
-    """Return the rules of a tree: rule k is the path to leaf k, a clause a node."""
+    """Return the rules of a tree: rule k is the path to leaf k."""
     groups = {v.name: v.terms for v in tree.variables}
     if kind == "raw":
         groups = {group.variable: group.terms for group in tree.sets}
@@ -121,7 +127,9 @@ def rules_of(tree: Tree, kind: Literal["relative", "raw"]) -> Rules:
     rules = [
         Rule(
             tuple(
-                Clause(node.variable, way.terms if kind == "relative" else way.sets)
+                Proposition(
+                    node.variable, way.terms if kind == "relative" else way.sets
+                )
                 for node, way in path
             ),
             tree.leaves[number - 1].label,
@@ -134,7 +142,7 @@ def rules_of(tree: Tree, kind: Literal["relative", "raw"]) -> Rules:
 
 
 MOST_WAYS = 64
-Way = tuple[Clause, ...]
+Way = tuple[Proposition, ...]
 
 
 class Owner(NamedTuple):
@@ -187,7 +195,7 @@ class View:
             for label in one.labels
             if not self._is_left_out(one.name, label.name)
         ]
-        kept = dict.fromkeys(clause for rule in items for clause in rule.when)
+        kept = dict.fromkeys(proposition for rule in items for proposition in rule.when)
         self.rules = Rules(
             system.name,
             tuple(dict.fromkeys(rule.then for rule in items)),
@@ -212,11 +220,12 @@ class View:
             ways = [()]
             self.is_plain &= is_left_out
         else:
-            clause = [
+            proposition = [
                 (c.variable, term) for way in ways for c in way for term in c.terms
             ]
             is_easy = owner.weight == 1 and all(
-                not self._is_left_out(*pair) and "\0" not in pair[1] for pair in clause
+                not self._is_left_out(*pair) and "\0" not in pair[1]
+                for pair in proposition
             )
             text = f"{owner.name} is left out, and can be audited"
             require(not (is_left_out and is_easy), text)
@@ -234,7 +243,7 @@ class View:
             case None:
                 return [()]
             case Is():
-                return self._ways_of_clause(condition, negated=negated)
+                return self._ways_of_proposition(condition, negated=negated)
             case Not(part=part):
                 return self._ways(part, block, negated=not negated)
             case And(parts=(part,)) | Or(parts=(part,)):
@@ -244,7 +253,7 @@ class View:
                 is_fit &= negated or block.conjunction == self.conjunction
                 is_union = negated
             case Or(parts=parts):
-                one = self._one_clause(parts, block, negated=negated)
+                one = self._one_proposition(parts, block, negated=negated)
                 if one is not None:
                     return [(one,)]
                 is_fit = block.disjunction == "maximum"
@@ -268,32 +277,36 @@ class View:
         both = (*one, *other)
         return tuple(dict.fromkeys(both)) if self.conjunction == "minimum" else both
 
-    def _ways_of_clause(self, clause: Is, *, negated: bool) -> list[Way]:
-        hedges = clause.hedges
+    def _ways_of_proposition(self, proposition: Is, *, negated: bool) -> list[Way]:
+        hedges = proposition.hedges
         while hedges[:1] == ("not",):
             negated, hedges = not negated, hedges[1:]
         if hedges[:1] == ("any",):
             return [] if negated else [()]
-        known = self.inputs.get(clause.variable)
-        if known is None or clause.label not in {one.name for one in known.labels}:
+        known = self.inputs.get(proposition.variable)
+        if known is None or proposition.label not in {one.name for one in known.labels}:
             raise UndecidedError("it uses an output")
-        term = "\0".join((clause.label or "", *hedges))
-        return [(Clause(clause.variable, (term,), negated),)]
+        term = "\0".join((proposition.label or "", *hedges))
+        return [(Proposition(proposition.variable, (term,), negated),)]
 
-    def _one_clause(
+    def _one_proposition(
         self, parts: tuple[Condition, ...], block: Block, *, negated: bool
-    ) -> Clause | None:
-        """Return `x is a or b` as one clause, if it is that and a maximum."""
+    ) -> Proposition | None:
+        """Return `x is a or b` as one proposition, if it is that and a maximum."""
         every = [one for one in _walk(Or(parts)) if not isinstance(one, Or)]
         plain = [one for one in every if isinstance(one, Is) and one.label is not None]
         is_plain = plain == every and not any(one.hedges for one in plain)
         if block.disjunction != "maximum" or not is_plain:
             return None
-        clauses = [self._ways_of_clause(one, negated=False)[0][0] for one in plain]
-        if len({clause.variable for clause in clauses}) > 1:
+        propositions = [
+            self._ways_of_proposition(one, negated=False)[0][0] for one in plain
+        ]
+        if len({proposition.variable for proposition in propositions}) > 1:
             return None
-        terms = dict.fromkeys(term for clause in clauses for term in clause.terms)
-        return Clause(clauses[0].variable, tuple(terms), negated)
+        terms = dict.fromkeys(
+            term for proposition in propositions for term in proposition.terms
+        )
+        return Proposition(propositions[0].variable, tuple(terms), negated)
 
     def questions(self) -> set[tuple[str, str]]:
         """Return the variable and term of every proposition of the rules."""
@@ -321,18 +334,20 @@ class View:
             DoesNotHoldError: If a rule's ways are not its own condition.
         """
         values = {v.name: value_of(v, point) for v in self.rules.variables}
-        known: dict[Clause, Between] = {}
+        known: dict[Proposition, Between] = {}
         result: dict[int, Between] = {}
         for owner in dict.fromkeys(self.owners[number - 1] for number in numbers):
             ways = self.ways[owner]
             own = _times(owner.weight, self.condition(owner.when, owner.block, values))
             if not self.rules.rules[ways[0] - 1].when:
-                result[ways[0]] = own  # of no clauses, or not of ways alone
+                result[ways[0]] = own  # of no propositions, or not of ways alone
                 continue
             for number in ways:
                 when = self.rules.rules[number - 1].when
-                for clause in {*when} - known.keys():
-                    known[clause] = self._degree(clause, values[clause.variable])
+                for proposition in {*when} - known.keys():
+                    known[proposition] = self._degree(
+                        proposition, values[proposition.variable]
+                    )
                 one = joined(self.conjunction, [known[c] for c in when])
                 result[number] = _times(owner.weight, one)
             best = [max(result[number][end] for number in ways) for end in (0, 1)]
@@ -340,10 +355,12 @@ class View:
                 raise DoesNotHoldError(f"{owner.name} holds otherwise than its ways")
         return result
 
-    def _degree(self, clause: Clause, x: Fraction) -> Between:
-        every = [bounds(self.shapes[clause.variable, t], x) for t in clause.terms]
+    def _degree(self, proposition: Proposition, x: Fraction) -> Between:
+        every = [
+            bounds(self.shapes[proposition.variable, t], x) for t in proposition.terms
+        ]
         one = max(low for low, _ in every), max(high for _, high in every)
-        return hedged("not", one) if clause.negated else one
+        return hedged("not", one) if proposition.negated else one
 
     def condition(
         self, condition: Condition | None, block: Block, values: Point
@@ -415,10 +432,10 @@ def _text(then: Iterable[Conclusion]) -> str:
     return " and ".join(texts)
 
 
-def _variable(one: Input, clauses: dict[Clause, None]) -> Variable:
+def _variable(one: Input, propositions: dict[Proposition, None]) -> Variable:
     """Return an input with the terms of its propositions, hedged ones by both names."""
     curves = {label.name: label for label in one.labels}
-    used = [t for c in clauses if c.variable == one.name for t in c.terms]
+    used = [t for c in propositions if c.variable == one.name for t in c.terms]
     terms: list[Term] = []
     for name in dict.fromkeys([*curves, *used]):
         label, *hedges = name.split("\0")

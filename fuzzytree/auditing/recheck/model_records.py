@@ -69,14 +69,14 @@ class Variable(NamedTuple):
     parts: tuple[Part, ...] = ()
 
 
-class Clause(NamedTuple):
+class Proposition(NamedTuple):
     variable: str
     terms: tuple[str, ...]
     negated: bool = False
 
 
 class Rule(NamedTuple):
-    when: tuple[Clause, ...]
+    when: tuple[Proposition, ...]
     then: str
     support: int | None = None
 

@@ -78,7 +78,7 @@ class _Sentence:
             words.append(self.rest.pop()[0])
         return " ".join(words) or None
 
-    def clause(self) -> tuple[str, tuple[str, ...], str | None]:
+    def proposition(self) -> tuple[str, tuple[str, ...], str | None]:
         """Read `variable is hedge ... term`; the term may be missing."""
         variable, hedges = self.name(), list[str]()
         self.needs("is")
@@ -101,7 +101,7 @@ class _Sentence:
         return every[0] if len(every) == 1 else Or(tuple(every))
 
     def part(self, level: int) -> Condition:
-        """Read a clause, or a condition in parentheses."""
+        """Read a proposition, or a condition in parentheses."""
         if level > MOST_LEVELS:
             raise ValueError(f"more than {MOST_LEVELS} levels")
         if self.takes("not"):
@@ -109,7 +109,7 @@ class _Sentence:
                 raise ValueError("'(' is missing")
             return Not(self.part(level + 1))
         if not self.takes("("):
-            variable, hedges, label = self.clause()
+            variable, hedges, label = self.proposition()
             if label is None and hedges[-1:] != ("any",):
                 raise ValueError("a term is missing")
             return Is(variable, label, hedges)
@@ -144,7 +144,7 @@ def read_conclusions(text: str) -> tuple[Conclusion, ...]:
     """
     sentence, result = _Sentence(text), list[Conclusion]()
     while not result or sentence.takes("and"):
-        output, hedges, label = sentence.clause()
+        output, hedges, label = sentence.proposition()
         if label is None:
             raise ValueError("a term is missing")
         result.append(Conclusion(output, label, hedges))
@@ -507,7 +507,7 @@ def _read(top: dict[str, Any], kind: str, name: str) -> Whole:
             for v in facts["variables"]
         }
         facts["rules"] = [
-            one | {"if": [_clause(text, known) for text in one["if"]]}
+            one | {"if": [_proposition(text, known) for text in one["if"]]}
             for one in facts["rules"]
         ]
         result = built(records.Rules, facts, name)
@@ -523,12 +523,12 @@ def _numbered(items: list[dict[str, Any]], kind: str) -> Iterator[dict[str, Any]
         yield {key: value for key, value in one.items() if key != kind}
 
 
-def _clause(result: Any, known: Known) -> dict[str, Any]:
+def _proposition(result: Any, known: Known) -> dict[str, Any]:
     if isinstance(result, dict):
         verb = "is not" if "is not" in result else "is"
         if result.keys() != {"variable", verb}:
-            raise CannotRunError(f"not a clause: {result!r:.200}")
-        return records.Clause(
+            raise CannotRunError(f"not a proposition: {result!r:.200}")
+        return records.Proposition(
             result["variable"], result[verb], verb == "is not"
         )._asdict()
     read = [*itertools.islice(readings(result, known), 2)]
@@ -537,21 +537,21 @@ def _clause(result: Any, known: Known) -> dict[str, Any]:
     return read[0]._asdict()
 
 
-def readings(text: str, known: Known) -> Iterator[records.Clause]:
-    """Yield every clause that a sentence can mean.
+def readings(text: str, known: Known) -> Iterator[records.Proposition]:
+    """Yield every proposition that a sentence can mean.
 
     Example:
         >>> list(readings("grip is not firm", {"grip": ["soft", "firm"]}))
-        [Clause(variable='grip', terms=('firm',), negated=True)]
+        [Proposition(variable='grip', terms=('firm',), negated=True)]
     """
     for place in re.finditer("(?= is )", text):
         variable, rest = text[: place.start()], text[place.start() + 4 :]
         if variable in known:
             for terms in _lists(rest, known[variable]):
-                yield records.Clause(variable, terms)
+                yield records.Proposition(variable, terms)
             if rest.startswith("not "):
                 for terms in _lists(rest[4:], known[variable]):
-                    yield records.Clause(variable, terms, negated=True)
+                    yield records.Proposition(variable, terms, negated=True)
 
 
 def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
@@ -579,10 +579,12 @@ def _check_names(model: records.Model, name: str) -> None:
     known = {(v.name, t.name) for v in model.variables for t in v.terms}
     used, labels = set[tuple[str, str]](), set[str]()
     if isinstance(model, records.Rules):
-        clauses = [clause for rule in model.rules for clause in rule.when]
-        used = {(c.variable, term) for c in clauses for term in c.terms}
+        propositions = [
+            proposition for rule in model.rules for proposition in rule.when
+        ]
+        used = {(c.variable, term) for c in propositions for term in c.terms}
         labels = {rule.then for rule in model.rules}
-        is_empty = not model.rules or not all(c.terms for c in clauses)
+        is_empty = not model.rules or not all(c.terms for c in propositions)
     else:
         labels = {leaf.label for leaf in model.leaves}
         is_empty = not model.leaves

@@ -118,18 +118,18 @@ FT106.others note
   no [{listed:?}other ]two rules [{reason:?}are shown to ]have nearly the same
   antecedent, among {pairs:n pair}[: {reason}]
 FT107.needed note
-  {rule} needs {clause:q}: without it {before:q} becomes {then:q} at some input
+  {rule} needs {proposition:q}: without it {before:q} becomes {then:q} at some input
 FT107.irrelevant info
-  {rule} decides the same without {clause:q}
+  {rule} decides the same without {proposition:q}
 FT107.open note
-  whether {rule} needs {clause:q} is open
+  whether {rule} needs {proposition:q} is open
 FT107.silent note
-  {subject} never fires, so its clauses are not tested one by one
+  {subject} never fires, so its propositions are not tested one by one
 FT107.more note
-  {clauses:n more clause matters: it decides|more clauses matter: each decides} some
-  input
+  {propositions:n more proposition matters: it decides|more propositions matter: each
+  decides} some input
 FT107.left-open note
-  whether they are needed is not known for {count:n clause}: {reason}
+  whether they are needed is not known for {count:n proposition}: {reason}
 FT201.conflict info
   {subject} conflict: both reach [{falls short:?}nearly ]{level:s} at one input, and say
   {then:q} and {other:q}
@@ -275,9 +275,11 @@ FT404.unused info
 FT404.used note
   rules use {variables in use:n variable} and {terms in use:n term}
 FT501.size note
-  {rules:n rule} with {clauses:n clause}[, index of Nauck {index of Nauck:s}]
+  {rules:n rule} with {propositions:n proposition}[, index of Nauck {index
+  of Nauck:s}]
 FT501.size-of-view note
-  audited as {rules:n rule} with {clauses:n clause}[, index of Nauck {index of Nauck:s}]
+  audited as {rules:n rule} with {propositions:n proposition}[, index of Nauck {index
+  of Nauck:s}]
 FT601.alike note
   {count:n representation answers|representations answer} alike on up to {rows:d} probes
   and rows

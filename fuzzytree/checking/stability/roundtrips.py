@@ -114,8 +114,8 @@ def _read_again(
     actual, expected = (baseline().load(model)(values) for model in (back, form))
     if is_like and isinstance(form, RuleBase):
         # Its lines became points: each degree moved by at most 2^-52.
-        clauses = max((len(rule.when) for rule in form.rules), default=0)
-        return _compared(title, actual, expected, EXACT * max(clauses, 1) * 2)
+        propositions = max((len(rule.when) for rule in form.rules), default=0)
+        return _compared(title, actual, expected, EXACT * max(propositions, 1) * 2)
     count, gap, fault = _compared(title, actual, expected)
     said = fault or f"{title}: numbers differ, though all rows agree"
     return count, gap, f"{said}; the model that comes back is not equal"

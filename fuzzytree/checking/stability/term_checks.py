@@ -29,11 +29,11 @@ from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model import (
     LR,
     Band,
-    Clause,
     Dtype,
     FloatArray,
     Model,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Runtime,
@@ -104,7 +104,9 @@ def term_probes(
     if not variables:
         return None
     tests = [
-        Rule((Clause(v.name, (t.name,)),), "true") for v in variables for t in v.terms
+        Rule((Proposition(v.name, (t.name,)),), "true")
+        for v in variables
+        for t in v.terms
     ]
     lines: list[list[float]] = [[] for _ in variables]
     places: list[tuple[int, Shape, slice]] = []
@@ -247,8 +249,8 @@ def _try_degrees(
         return
     limits = allowed_errors(one, terms.values)
     for number, (line, shape, rows) in enumerate(terms.places):
-        clause = terms.rules.rules[number].when[0]
-        name = f"{one.title}: {clause.variable} is {clause.terms[0]}"
+        proposition = terms.rules.rules[number].when[0]
+        name = f"{one.title}: {proposition.variable} is {proposition.terms[0]}"
         columns = (terms.values[line], outcome.strengths[number], limits)
         cells = zip(*(column[rows].tolist() for column in columns), strict=True)
         for value, degree, allowed in cells:

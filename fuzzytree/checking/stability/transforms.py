@@ -223,9 +223,9 @@ def exponent_range(model: Model, dtype: Dtype) -> tuple[int, int]:
     number of the type, so that nothing but the exponents changes.
 
     Example:
-        >>> from fuzzytree.model.rulebase import Clause, Rule, RuleBase
+        >>> from fuzzytree.model.rulebase import Proposition, Rule, RuleBase
         >>> step = Term("low", Band(high=1.0))
-        >>> rule = Rule((Clause("x", ("low",)),), "a")
+        >>> rule = Rule((Proposition("x", ("low",)),), "a")
         >>> rules = RuleBase("one", ("a",), (Variable("x", (step,)),), (rule,))
         >>> exponent_range(rules, "float64")
         (-1022, 1021)

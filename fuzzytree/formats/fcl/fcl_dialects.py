@@ -211,9 +211,9 @@ _HEDGES = frozenset({"ANY", "VERY", "SOMEWHAT", "EXTREMELY", "SELDOM"})
 
 def _of_rule(rule: RuleStatement) -> Iterator[DialectEvidence]:
     line = rule.keyword.line or 1
-    propositions = list(clauses(rule.condition))
-    words = [word for one in propositions for word in one.words[:-1]]
-    is_any = any(one.words[-1].upper() == "ANY" for one in propositions)
+    every = list(propositions(rule.condition))
+    words = [word for one in every for word in one.words[:-1]]
+    is_any = any(one.words[-1].upper() == "ANY" for one in every)
     if is_any or any(word.upper() in _HEDGES for word in words):
         yield DialectEvidence("fuzzylite", "hedges", line)
     if is_lower(rule):
@@ -230,19 +230,19 @@ def _of_rule(rule: RuleStatement) -> Iterator[DialectEvidence]:
 
 def is_lower(rule: RuleStatement) -> bool:
     """Return whether the word behind a rule's variable is `is`."""
-    return str(next(iter(clauses(rule.condition))).verb) == "is"
+    return str(next(iter(propositions(rule.condition))).verb) == "is"
 
 
-def clauses(condition: FclCondition) -> Iterator[FclProposition]:
+def propositions(condition: FclCondition) -> Iterator[FclProposition]:
     """Yield the propositions of a condition, from left to right."""
     match condition:
         case FclProposition():
             yield condition
         case FclNegation(part=part):
-            yield from clauses(part)
+            yield from propositions(part)
         case FclJunction(parts=parts):
             for part in parts:
-                yield from clauses(part)
+                yield from propositions(part)
 
 
 def norm_of(

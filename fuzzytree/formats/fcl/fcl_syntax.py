@@ -184,7 +184,7 @@ class _Statements(Transformer[Token, Any]):
     def weight(self, children: list[Token]) -> Token:
         return children[-1]
 
-    def clause(self, children: list[Token]) -> FclProposition:
+    def proposition(self, children: list[Token]) -> FclProposition:
         return FclProposition(children[0], children[1], tuple(children[2:]))
 
     def condition(self, children: list[Any]) -> FclJunction:

@@ -102,7 +102,7 @@ def condition_text(condition: Condition | None) -> str:
         case None:
             return ALWAYS
         case Is(variable=variable, label=label, hedges=hedges):
-            return _clause(variable, label, hedges)
+            return _proposition(variable, label, hedges)
         case Not(part=part):
             return f"not ({condition_text(part)})"
         case And(parts=parts) | Or(parts=parts):
@@ -122,11 +122,11 @@ def condition_text(condition: Condition | None) -> str:
 def conclusions_text(conclusions: tuple[Conclusion, ...]) -> str:
     """Return the sentence of conclusions; `parse_conclusions` reads it."""
     return " and ".join(
-        _clause(one.output, one.label, one.hedges) for one in conclusions
+        _proposition(one.output, one.label, one.hedges) for one in conclusions
     )
 
 
-def _clause(variable: str, label: str | None, hedges: tuple[Hedge, ...]) -> str:
+def _proposition(variable: str, label: str | None, hedges: tuple[Hedge, ...]) -> str:
     words = [hedge.replace(" ", "-") for hedge in hedges]
     name = [] if label is None else [_quoted(label)]
     return " ".join([_quoted(variable), "is", *words, *name])
@@ -199,7 +199,7 @@ class _Sentence:
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 
     def part(self, level: int) -> Condition:
-        """Read a clause, or a condition in parentheses."""
+        """Read a proposition, or a condition in parentheses."""
         if self.takes("not"):
             if not self.next.is_sign("("):
                 raise self.unexpected("'('")
@@ -216,7 +216,7 @@ class _Sentence:
 
     def question(self) -> Is:
         """Read `variable is hedge ... term`."""
-        variable, hedges = self.clause()
+        variable, hedges = self.proposition()
         has_label = self.next.kind == "quoted" or self.next.is_of_a_name
         if hedges and hedges[-1] == "any" and not has_label:
             return Is(variable, None, hedges)
@@ -224,10 +224,10 @@ class _Sentence:
 
     def conclusion(self) -> Conclusion:
         """Read `output is hedge ... term`."""
-        output, hedges = self.clause()
+        output, hedges = self.proposition()
         return Conclusion(output, self.name("a term"), hedges)
 
-    def clause(self) -> tuple[str, tuple[Hedge, ...]]:
+    def proposition(self) -> tuple[str, tuple[Hedge, ...]]:
         """Read a variable, `is` and hedges."""
         variable = self.name("a variable")
         if not self.takes("is"):

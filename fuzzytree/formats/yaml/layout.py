@@ -155,9 +155,9 @@ class VariableOfModel(FileRecord, frozen=True, kw_only=True):
 
 
 class WrittenOut(FileRecord, frozen=True, kw_only=True):
-    """A clause whose names would make a sentence ambiguous."""
+    """A proposition whose names would make a sentence ambiguous."""
 
-    noun: ClassVar[str] = "a clause"
+    noun: ClassVar[str] = "a proposition"
     forms: ClassVar[tuple[KeyForm, ...]] = (KeyForm(("is",)), KeyForm(("is not",)))
     variable: Name
     is_: tuple[Name, ...] | None = field(name="is", default=None)
@@ -165,7 +165,7 @@ class WrittenOut(FileRecord, frozen=True, kw_only=True):
 
 
 class RuleOfModel(FileRecord, frozen=True, kw_only=True):
-    """If all clauses hold, then the class; support counts training rows."""
+    """If all propositions hold, then the class; support counts training rows."""
 
     noun: ClassVar[str] = "a rule"
     if_: tuple[Sentence | WrittenOut, ...] = field(name="if")
@@ -302,8 +302,8 @@ ConditionText = Annotated[
     str,
     Meta(
         max_length=LONGEST_SENTENCE,
-        description="Clauses `VARIABLE is HEDGE ... TERM` with and, or, not (...) and "
-        "parentheses; `always` holds always.",
+        description="Propositions `VARIABLE is HEDGE ... TERM` with and, or, not (...) "
+        "and parentheses; `always` holds always.",
         examples=["dirt is very high and (load is small or load is not big)"],
     ),
 ]
@@ -311,7 +311,7 @@ ConclusionText = Annotated[
     str,
     Meta(
         max_length=LONGEST_SENTENCE,
-        description="Clauses `OUTPUT is HEDGE ... TERM`, joined by `and`.",
+        description="Propositions `OUTPUT is HEDGE ... TERM`, joined by `and`.",
         examples=["power is high and fan is off"],
     ),
 ]

@@ -21,12 +21,12 @@ from fuzzytree.formats.yaml.binding import (
     value_of,
     variables_at,
 )
-from fuzzytree.formats.yaml.clauses import (
+from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
+from fuzzytree.formats.yaml.nodes import MappingNode, Node, Scalar, compose
+from fuzzytree.formats.yaml.propositions import (
     read_rules,
     vocabulary_of,
 )
-from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
-from fuzzytree.formats.yaml.nodes import MappingNode, Node, Scalar, compose
 from fuzzytree.formats.yaml.system_reader import read_system
 from fuzzytree.model import (
     Band,

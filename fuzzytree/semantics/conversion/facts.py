@@ -19,7 +19,6 @@ from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model import (
     Activation,
     And,
-    Clause,
     Condition,
     FuzzySystem,
     Is,
@@ -27,6 +26,7 @@ from fuzzytree.model import (
     Not,
     Or,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     RuleBlock,
@@ -61,8 +61,8 @@ class _Named(Value, frozen=True):
 class _Facts(Value, frozen=True):
     """A rule base without its curves, and how it became a system.
 
-    Clauses are (place of the variable, places of its terms, whether it is negated);
-    rules are (places of the clauses, place of the class, support).
+    Propositions are (place of the variable, places of its terms, whether it is
+    negated); rules are (places of the propositions, place of the class, support).
     """
 
     fuzzytree: int
@@ -74,7 +74,7 @@ class _Facts(Value, frozen=True):
     columns: tuple[str, ...]
     semantics: Semantics
     variables: tuple[_Named, ...]
-    clauses: tuple[tuple[int, tuple[int, ...], bool], ...]
+    propositions: tuple[tuple[int, tuple[int, ...], bool], ...]
     rules: tuple[tuple[tuple[int, ...], int, int | None], ...]
 
 
@@ -97,8 +97,8 @@ def facts_of(
         v.name: (k, {term.name: n for n, term in enumerate(v.terms)})
         for k, v in enumerate(rules.variables)
     }
-    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
-    number = {clause: k for k, clause in enumerate(clauses)}
+    propositions = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
+    number = {proposition: k for k, proposition in enumerate(propositions)}
     labels = {name: k for k, name in enumerate(rules.classes)}
     facts = _Facts(
         fuzzytree=1,
@@ -115,13 +115,15 @@ def facts_of(
             )
             for v in rules.variables
         ),
-        clauses=tuple(
+        propositions=tuple(
             (
-                places[clause.variable][0],
-                tuple(places[clause.variable][1][term] for term in clause.terms),
-                clause.negated,
+                places[proposition.variable][0],
+                tuple(
+                    places[proposition.variable][1][term] for term in proposition.terms
+                ),
+                proposition.negated,
             )
-            for clause in clauses
+            for proposition in propositions
         ),
         rules=tuple(
             (tuple(number[c] for c in rule.when), labels[rule.then], rule.support)
@@ -249,16 +251,16 @@ def _decoded(facts: str) -> _Facts | None:
 def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
     """Return whether facts are as large as the system, before anything is made of them.
 
-    Facts name a clause by its place, so that few bytes could stand for very much.
+    Facts name a proposition by its place, so that few bytes could stand for very much.
     """
-    sizes = [len(terms) for _, terms, _ in facts.clauses]
+    sizes = [len(terms) for _, terms, _ in facts.propositions]
     needed = 0
-    for clauses, place, _ in facts.rules:
+    for propositions, place, _ in facts.rules:
         if not 0 <= place < len(facts.classes):
             return False
-        if not all(0 <= k < len(sizes) for k in clauses):
+        if not all(0 <= k < len(sizes) for k in propositions):
             return False
-        needed += sum(sizes[k] for k in clauses) if clauses else 1
+        needed += sum(sizes[k] for k in propositions) if propositions else 1
     if len(_places(facts)) != len(system.inputs):
         return False
     result = sum(1 for rule in system.rules for _ in questions(rule.when))
@@ -306,16 +308,16 @@ def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
         )
         for place, v in enumerate(facts.variables)
     )
-    clauses = [
-        Clause(
+    propositions = [
+        Proposition(
             variables[_place(place)].name,
             tuple(variables[place].terms[_place(k)].name for k in terms),
             negated,
         )
-        for place, terms, negated in facts.clauses
+        for place, terms, negated in facts.propositions
     ]
     rules = tuple(
-        Rule(tuple(clauses[k] for k in places), facts.classes[label], support)
+        Rule(tuple(propositions[k] for k in places), facts.classes[label], support)
         for places, label, support in facts.rules
     )
     return RuleBase(
@@ -357,7 +359,8 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
     semantics = Semantics("product" if is_product else "minimum", uncovered)
     try:
         rules = tuple(
-            Rule(tuple(_clauses(rule.when)), rule.then[0].label) for rule in block.rules
+            Rule(tuple(_propositions(rule.when)), rule.then[0].label)
+            for rule in block.rules
         )
         result = RuleBase(system.name, classes, variables, rules, semantics)
         expected = as_system(result, "winner")
@@ -367,26 +370,28 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
     return result if value == wanted else None
 
 
-def _clauses(condition: Condition | None) -> Iterator[Clause]:
-    """Yield the clauses of a condition, from left to right.
+def _propositions(condition: Condition | None) -> Iterator[Proposition]:
+    """Yield the propositions of a condition, from left to right.
 
-    What is no AND of clauses gives other clauses, or raises LookupError.
+    What is no AND of propositions gives other propositions, or raises LookupError.
     """
     match condition:
         case None:
             return
         case And(parts=parts):
             for part in parts:
-                yield from _clauses(part)
+                yield from _propositions(part)
         case Is(variable=variable, label=str(label), hedges=() | ("not",) as hedges):
-            yield Clause(variable, (label,), bool(hedges))
+            yield Proposition(variable, (label,), bool(hedges))
         case Not(part=part):
-            (whole,) = _clauses(part)
+            (whole,) = _propositions(part)
             yield replace(whole, negated=not whole.negated)
         case Or(parts=parts):
-            inner = [clause for part in parts for clause in _clauses(part)]
-            terms = tuple(term for clause in inner for term in clause.terms)
-            yield Clause(inner[0].variable, terms)
+            inner = [
+                proposition for part in parts for proposition in _propositions(part)
+            ]
+            terms = tuple(term for proposition in inner for term in proposition.terms)
+            yield Proposition(inner[0].variable, terms)
         case _:
             raise LookupError
 

@@ -41,7 +41,6 @@ from fuzzytree.errors import LossError
 from fuzzytree.model import (
     Activation,
     And,
-    Clause,
     Conclusion,
     Condition,
     Defuzzifier,
@@ -53,6 +52,7 @@ from fuzzytree.model import (
     Not,
     Or,
     Points,
+    Proposition,
     RuleBase,
     RuleBlock,
     Singleton,
@@ -70,7 +70,7 @@ Scores = Literal["rule", "class", "winner"]
 """What the outputs of a system say about a rule base."""
 
 Always = Literal["nothing", "any", "term"]
-"""What a rule without clauses tests: nothing; `input is any`; or whether the input is a
+"""What a rule without propositions tests: nothing; `input is any`; or whether it is a
 term of degree 1 everywhere. The input is the first that is not for sums alone."""
 
 _AVERAGE = Defuzzifier("weighted average")
@@ -82,13 +82,14 @@ def as_system(
 ) -> FuzzySystem:
     """Return a rule base as a system with numeric outputs.
 
-    `fuzzytree.semantics.conversion.scores` says what the outputs mean. A clause with
-    several terms becomes an OR of one variable, joined by maximum. A negated one
+    `fuzzytree.semantics.conversion.scores` says what the outputs mean. A proposition
+    with several terms becomes an OR of one variable, joined by maximum. A negated one
     becomes `is not`, which under min applies to each of its terms; under product it is
     a NOT of the OR.
 
     Raises:
-        LossError: If a rule without clauses must reference an input and there is none.
+        LossError: If a rule without propositions must reference an input and there is
+            none.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -311,7 +312,7 @@ def _with_tautology(
     """Return inputs, and a proposition on one of them that is always true."""
     if not inputs:
         raise LossError(
-            "a rule without clauses must reference an input, but there is none"
+            "a rule without propositions must reference an input, but there is none"
         )
     summed = {part.input for one in inputs for part in one.parts}
     first = next(one for one in inputs if one.labels or one.name not in summed)
@@ -326,26 +327,30 @@ def _with_tautology(
 
 
 def _conditions(rules: RuleBase, tautology: Condition | None) -> list[Condition | None]:
-    """Return the condition of each rule; rules share what their clauses become."""
+    """Return the condition of each rule; rules share what their propositions become."""
     is_product = rules.semantics.conjunction == "product"
     known: dict[int, tuple[Condition, ...]] = {}
     results: list[Condition | None] = []
     for rule in rules.rules:
         parts: list[Condition] = []
-        for clause in rule.when:
-            if id(clause) not in known:
-                known[id(clause)] = _clause(clause, is_product=is_product)
-            parts += known[id(clause)]
+        for proposition in rule.when:
+            if id(proposition) not in known:
+                known[id(proposition)] = _proposition(
+                    proposition, is_product=is_product
+                )
+            parts += known[id(proposition)]
         results.append(
             And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else tautology
         )
     return results
 
 
-def _clause(clause: Clause, *, is_product: bool) -> tuple[Condition, ...]:
-    """Return what a clause becomes: conditions that are joined by AND."""
-    variable, terms = clause.variable, clause.terms
-    if not clause.negated:
+def _proposition(
+    proposition: Proposition, *, is_product: bool
+) -> tuple[Condition, ...]:
+    """Return what a proposition becomes: conditions that are joined by AND."""
+    variable, terms = proposition.variable, proposition.terms
+    if not proposition.negated:
         propositions = tuple(Is(variable, term) for term in terms)
         return propositions if len(propositions) == 1 else (Or(propositions),)
     if len(terms) == 1 or not is_product:  # 1 - max = min of 1 - each, exactly

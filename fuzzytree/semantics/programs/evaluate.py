@@ -41,12 +41,12 @@ def evaluate_program(program: Program, row: Mapping[str, float]) -> ProgramNumbe
     Example:
         >>> from fuzzytree.semantics.programs.rule_program import from_rules
         >>> from fuzzytree.model.rulebase import (
-        ...     Band, Clause, Rule, RuleBase, Term, Variable
+        ...     Band, Proposition, Rule, RuleBase, Term, Variable
         ... )
         >>> low = Term("low", Band(high=1.0, right=3.0))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
-        ...     (Rule((Clause("force", ("low",)),), "soft"),),
+        ...     (Rule((Proposition("force", ("low",)),), "soft"),),
         ... )
         >>> evaluate_program(from_rules(rules), {"force": 2.0}).of("strength")
         (0.5,)

@@ -5,7 +5,7 @@ A tree is no program, for a row passes few of its nodes; the values of its nodes
 
 from __future__ import annotations
 
-from fuzzytree.model import Clause, FuzzyTree, Rule, RuleBase, Variable, shapes_of
+from fuzzytree.model import FuzzyTree, Proposition, Rule, RuleBase, Variable, shapes_of
 from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
 
 DECIDED, TIE, UNCOVERED, MISSING = 0.0, 1.0, 2.0, 3.0
@@ -85,26 +85,26 @@ def known_row(make: Maker, axes: list[Place]) -> Place:
 
 def _strengths(make: Maker, rules: RuleBase, axes: dict[str, Place]) -> list[Place]:
     shapes = shapes_of(rules.variables)
-    degrees: dict[Clause, Place] = {}
+    degrees: dict[Proposition, Place] = {}
 
-    def clause_degree(clause: Clause) -> Place:
-        if clause not in degrees:
-            x = axes[clause.variable]
+    def proposition_degree(proposition: Proposition) -> Place:
+        if proposition not in degrees:
+            x = axes[proposition.variable]
             terms: list[Place] = []
-            for term in clause.terms:
-                degree = shapes[clause.variable, term].degree(make, x)
-                terms.append(make.titled(degree, f"{clause.variable} is {term}"))
+            for term in proposition.terms:
+                degree = shapes[proposition.variable, term].degree(make, x)
+                terms.append(make.titled(degree, f"{proposition.variable} is {term}"))
             highest = make.chain("maximum", terms)
-            if clause.negated:
+            if proposition.negated:
                 highest = 1.0 - highest
-            degrees[clause] = highest
-        return degrees[clause]
+            degrees[proposition] = highest
+        return degrees[proposition]
 
     is_product = rules.semantics.conjunction == "product"
     join = "multiply" if is_product else "minimum"
 
     def strength(rule: Rule) -> Place:
-        parts = [clause_degree(clause) for clause in rule.when]
+        parts = [proposition_degree(proposition) for proposition in rule.when]
         return make.chain(join, parts) if parts else make.constant(1.0)
 
     return [strength(rule) for rule in rules.rules]

@@ -32,8 +32,8 @@ from fuzzytree.errors import ReadError, TableError
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -59,8 +59,10 @@ def grip(cut: float = 2.0) -> RuleBase:
             Variable("slip", (wet,), "", 0.0, 1.0),
         ),
         (
-            Rule((Clause("force", ("soft",)), Clause("slip", ("wet",))), "drop"),
-            Rule((Clause("force", ("hard",)),), "hold"),
+            Rule(
+                (Proposition("force", ("soft",)), Proposition("slip", ("wet",))), "drop"
+            ),
+            Rule((Proposition("force", ("hard",)),), "hold"),
         ),
         Semantics(uncovered="hold"),
     )
@@ -113,7 +115,11 @@ def test_names_units_and_notes_are_cosmetic() -> None:
             slip,
         ),
         rules=(
-            Rule((Clause("force", ("weak",)), old.rules[0].when[1]), "drop", support=9),
+            Rule(
+                (Proposition("force", ("weak",)), old.rules[0].when[1]),
+                "drop",
+                support=9,
+            ),
             old.rules[1],
         ),
     )
@@ -144,7 +150,10 @@ def test_rules_in_another_order_break_where_a_tie_is_answered_otherwise() -> Non
     rising = Term("up", Points((0.0, 1.0), (0.0, 1.0)))
     falling = Term("down", Points((0.0, 1.0), (1.0, 0.0)))
     variable = Variable("x", (rising, falling), "", 0.0, 1.0)
-    rules = (Rule((Clause("x", ("up",)),), "a"), Rule((Clause("x", ("down",)),), "b"))
+    rules = (
+        Rule((Proposition("x", ("up",)),), "a"),
+        Rule((Proposition("x", ("down",)),), "b"),
+    )
     old = RuleBase("tie", ("a", "b"), (variable,), rules)
     found = results(old, replace(old, rules=rules[::-1]))
     assert [change.grade for change in found.changes] == ["breaking"]
@@ -156,7 +165,10 @@ def test_rules_in_another_order_differ_only_where_classes_tie() -> None:
     rises = Term("up", Points((0.0, 2.0), (0.0, 1.0)))  # met at 2/3, which is no double
     falls = Term("down", Points((0.0, 1.0), (1.0, 0.0)))
     variable = Variable("x", (rises, falls), "", 0.0, 1.0)
-    up, down = Rule((Clause("x", ("up",)),), "a"), Rule((Clause("x", ("down",)),), "b")
+    up, down = (
+        Rule((Proposition("x", ("up",)),), "a"),
+        Rule((Proposition("x", ("down",)),), "b"),
+    )
     old = RuleBase("tie", ("a", "b"), (variable,), (up, down))
     found = results(old, replace(old, rules=(down, up, up)))
     assert found.verdict == "open"
@@ -170,7 +182,7 @@ def test_rules_in_another_order_differ_only_where_classes_tie() -> None:
         "no decision was seen to differ, and where both margins are larger than 0 "
         "none does"
     )
-    squared = Rule((*up.when, Clause("x", ("up",))), "a")
+    squared = Rule((*up.when, Proposition("x", ("up",))), "a")
     product = Semantics("product")
     old, new = (
         RuleBase("tie", ("a", "b"), (variable,), (one, down), product)
@@ -209,9 +221,9 @@ def test_a_class_that_is_called_otherwise_is_one_breaking_change() -> None:
 
 def test_rules_are_matched_by_what_they_say() -> None:
     old = grip()
-    extra = Rule((Clause("slip", ("wet",), negated=True),), "hold")
-    clause = Clause("slip", ("wet",), negated=True)
-    changed = replace(old.rules[0], when=(old.rules[0].when[0], clause))
+    extra = Rule((Proposition("slip", ("wet",), negated=True),), "hold")
+    proposition = Proposition("slip", ("wet",), negated=True)
+    changed = replace(old.rules[0], when=(old.rules[0].when[0], proposition))
     new = replace(old, rules=(extra, old.rules[1], changed))
     found = results(old, new)
     assert [(c.sentence, c.old_rules, c.new_rules) for c in found.changes] == [
@@ -238,7 +250,7 @@ def test_an_input_that_is_gone_breaks_and_a_range_does_not() -> None:
         old,
         variables=(replace(force, high=6.0), replace(slip, name="slide")),
         rules=(
-            Rule((old.rules[0].when[0], Clause("slide", ("wet",))), "drop"),
+            Rule((old.rules[0].when[0], Proposition("slide", ("wet",))), "drop"),
             old.rules[1],
         ),
     )
@@ -304,8 +316,8 @@ def test_what_cannot_be_decided_is_left_open_and_said_so() -> None:
     falls = Term("falls", Points((0.0, 1.0), (1.0, 0.0)))
     rises = Term("rises", Points((0.0, 2.0), (0.0, 1.0)))
     rules = (
-        Rule((Clause("x", ("falls",)),), "a"),
-        Rule((Clause("x", ("rises",)),), "b"),
+        Rule((Proposition("x", ("falls",)),), "a"),
+        Rule((Proposition("x", ("rises",)),), "b"),
     )
     old = RuleBase("tie", ("a", "b"), (Variable("x", (falls, rises), "", 0, 1),), rules)
     found = results(old, replace(old, rules=rules[::-1]))

@@ -13,10 +13,10 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Conjunction,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -41,7 +41,7 @@ def random_base(
     odd: float = 0.0,
     combinations: int = 0,
 ) -> RuleBase:
-    """Return rules with one clause for each variable, on [0, 1] each.
+    """Return rules with one proposition for each variable, on [0, 1] each.
 
     Args:
         seed: The same seed makes the same rules.
@@ -51,8 +51,8 @@ def random_base(
         kind: `lr` for the paper's sets with curves of degree six, `points` for
             triangles and trapezoids, `band` for plateaus with flanks, `mixed` for all.
         classes: How many; as many as rules, at most three, if it is 0.
-        shared: How likely a clause uses the term of another rule.
-        odd: How likely a clause is negated, has two terms, or stands twice.
+        shared: How likely a proposition uses the term of another rule.
+        odd: How likely a proposition is negated, has two terms, or stands twice.
         combinations: How many variables are sums of two inputs.
     """
     chance = random.Random(f"{seed} {rules} {features} {kind}")
@@ -64,7 +64,7 @@ def random_base(
     for number in range(rules):
         when = []
         for name in (*names, *mixed):
-            when += _clauses(chance, name, terms[name], kind, shared, odd)
+            when += _propositions(chance, name, terms[name], kind, shared, odd)
         made.append(Rule(tuple(when), labels[number % len(labels)]))
     variables = [
         Variable(name, tuple(terms[name]), low=0.0, high=1.0) for name in names
@@ -90,25 +90,25 @@ def unit_domain(rules: RuleBase, low: float = 0.0, high: float = 1.0) -> Domain:
     return Domain(tuple(DomainSide(name, low, high) for name in rules.inputs))
 
 
-def _clauses(
+def _propositions(
     chance: random.Random,
     name: str,
     terms: list[Term],
     kind: Kind,
     shared: float,
     odd: float,
-) -> list[Clause]:
+) -> list[Proposition]:
     def term() -> str:
         if not terms or chance.random() >= shared:
             terms.append(Term(f"term {len(terms) + 1}", random_shape(chance, kind)))
             return terms[-1].name
         return chance.choice(terms).name
 
-    found = [Clause(name, (term(),))]
+    found = [Proposition(name, (term(),))]
     if chance.random() < odd:
-        found[0] = Clause(name, (term(),), negated=True)
+        found[0] = Proposition(name, (term(),), negated=True)
     if chance.random() < odd:
-        found.append(Clause(name, tuple({term(): None, term(): None})))
+        found.append(Proposition(name, tuple({term(): None, term(): None})))
     return found
 
 
@@ -198,7 +198,9 @@ def with_hidden_rule(rules: RuleBase, level: float = 0.9) -> RuleBase:
     )
     made = tuple(
         Rule(
-            tuple(Clause(name, (terms[place].name,)) for name, terms in added.items()),
+            tuple(
+                Proposition(name, (terms[place].name,)) for name, terms in added.items()
+            ),
             rules.classes[0] if place < 2 else rules.classes[1],
         )
         for place in range(3)

@@ -28,10 +28,10 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Conjunction,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -148,7 +148,7 @@ def _covered_by_two(degree: float, conjunction: Conjunction) -> RuleBase:
 
     def rule(where: str, then: str) -> Rule:
         size = "some" if then == "a" else "more"
-        return Rule((Clause("x", (where,)), Clause("y", (size,))), then)
+        return Rule((Proposition("x", (where,)), Proposition("y", (size,))), then)
 
     made = (rule("middle", "a"), rule("left", "b"), rule("right", "c"))
     return RuleBase("two", ("a", "b", "c"), (x, y), made, Semantics(conjunction))
@@ -182,10 +182,10 @@ def test_a_rule_that_leads_in_a_sliver_is_found() -> None:
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
-def test_rules_of_a_tree_that_share_clauses_are_decided(
+def test_rules_of_a_tree_that_share_propositions_are_decided(
     conjunction: Conjunction,
 ) -> None:
-    # Rules from one subtree tie wherever a shared clause is the smallest.
+    # Rules from one subtree tie wherever a shared proposition is the smallest.
     for seed in range(2):
         rules = rules_from_tree(random_tree(seed, leaves=6), conjunction=conjunction)
         box = Domain(tuple(DomainSide(name, -9.0, 9.0) for name in rules.inputs))
@@ -270,7 +270,10 @@ def test_a_step_at_the_lower_end_of_the_domain_is_not_missed() -> None:
             Term("behind", Points((0.0, 0.0), (0.5, 0.6))),
         ),
     )
-    made = (Rule((Clause("x", ("at",)),), "a"), Rule((Clause("x", ("behind",)),), "b"))
+    made = (
+        Rule((Proposition("x", ("at",)),), "a"),
+        Rule((Proposition("x", ("behind",)),), "b"),
+    )
     rules = RuleBase("step", ("a", "b"), (x,), made, Semantics("product"))
     state = wins_by_boxes(rules, unit_domain(rules), 1, (2,))
     assert isinstance(state, Witness)
@@ -284,7 +287,10 @@ def test_limits_of_a_combination_limit_its_inputs_together() -> None:
     down = Term("down", Points((0.0, 1.0), (0.6, 0.0)))
     parts = (Part("x", 1.0), Part("y", 1.0))
     variables = (Variable("x", (up, down)), Variable("y"), Variable("sum", parts=parts))
-    made = (Rule((Clause("x", ("up",)),), "a"), Rule((Clause("x", ("down",)),), "b"))
+    made = (
+        Rule((Proposition("x", ("up",)),), "a"),
+        Rule((Proposition("x", ("down",)),), "b"),
+    )
     rules = RuleBase("sum", ("a", "b"), variables, made, Semantics("product"))
     sides = (DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0))
     assert isinstance(wins_by_boxes(rules, Domain(sides), 1, (2,)), Witness)
@@ -343,8 +349,8 @@ def test_rules_of_a_hundred_inputs_are_decided_too(
         ("soft", "hard"),
         tuple(Variable(name, (Term("high", line),)) for name in names),
         (
-            Rule(tuple(Clause(name, ("high",)) for name in names), "soft"),
-            Rule((Clause("x0", ("high",)), Clause("x1", ("high",))), "hard"),
+            Rule(tuple(Proposition(name, ("high",)) for name in names), "soft"),
+            Rule((Proposition("x0", ("high",)), Proposition("x1", ("high",))), "hard"),
         ),
         Semantics(conjunction),
     )
@@ -359,7 +365,7 @@ def test_a_step_at_the_lower_end_of_many_inputs_is_a_bracket() -> None:
         "wide",
         ("soft",),
         tuple(Variable(name, (Term("low", step),)) for name in names),
-        (Rule(tuple(Clause(name, ("low",)) for name in names), "soft"),),
+        (Rule(tuple(Proposition(name, ("low",)) for name in names), "soft"),),
     )
     found = wins_by_boxes(rules, unit_domain(rules), 1, set())
     assert isinstance(found, Bracket)

@@ -15,8 +15,8 @@ from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -32,7 +32,9 @@ def _partition(*peaks: float, width: float = 1.0) -> RuleBase:
         Term(f"t{n}", Points((p - width, p, p + width), (0.0, 1.0, 0.0)))
         for n, p in enumerate(peaks)
     )
-    rules = tuple(Rule((Clause("x", (t.name,)),), f"c{n}") for n, t in enumerate(terms))
+    rules = tuple(
+        Rule((Proposition("x", (t.name,)),), f"c{n}") for n, t in enumerate(terms)
+    )
     classes = tuple(rule.then for rule in rules)
     return RuleBase("p", classes, (Variable("x", terms),), rules)
 
@@ -107,7 +109,7 @@ def test_what_is_proved_covered_has_no_uncovered_row(seed: int, kind: str) -> No
 
 def test_a_side_that_falls_as_a_line_covers_the_inputs_before_its_zero() -> None:
     steep = LR(0.75, Half(0.25, (40.0,)), Half(0.125, (1.0,)))  # 0 from 0.74375 down
-    rule = Rule((Clause("x", ("steep",)),), "a")
+    rule = Rule((Proposition("x", ("steep",)),), "a")
     rules = RuleBase("p", ("a",), (Variable("x", (Term("steep", steep),)),), (rule,))
     zero = 0.75 - 0.25 / 40.0
     assert isinstance(uncovered(arrange(rules, _box(zero + 1e-9, 0.75))), Proved)
@@ -118,7 +120,7 @@ def test_a_side_that_falls_as_a_line_covers_the_inputs_before_its_zero() -> None
 
 def test_a_gap_behind_a_step_begins_after_it() -> None:
     step = Term("step", Band(5.0, 9.0))
-    rule = Rule((Clause("x", ("step",)),), "a")
+    rule = Rule((Proposition("x", ("step",)),), "a")
     rules = RuleBase("p", ("a",), (Variable("x", (step,)),), (rule,))
     for start in (5.5, 9.0):  # 9 itself is covered
         found = uncovered(arrange(rules, _box(start, 10.0)))

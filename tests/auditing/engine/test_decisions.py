@@ -30,8 +30,8 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -51,12 +51,12 @@ def _box(rules: RuleBase, **ends: tuple[float, float]) -> Domain:
 
 
 def _shared(after: Points, *, is_swapped: bool = False) -> RuleBase:
-    """Return two rules that share a clause on x and differ on y, as siblings do."""
+    """Return two rules with a common proposition on x that differ on y."""
     shared = Term("shared", Points((0.0, 1.0), (0.0, 1.0)))
     ours, other = Term("ours", Points((0.0, 1.0), (1.0, 0.75))), Term("other", after)
     rules = [
-        Rule((Clause("x", ("shared",)), Clause("y", ("ours",))), "a"),
-        Rule((Clause("x", ("shared",)), Clause("y", ("other",))), "b"),
+        Rule((Proposition("x", ("shared",)), Proposition("y", ("ours",))), "a"),
+        Rule((Proposition("x", ("shared",)), Proposition("y", ("other",))), "b"),
     ]
     return RuleBase(
         "shared",
@@ -94,7 +94,10 @@ def test_a_tie_on_a_plateau_is_found() -> None:
         "plateaus",
         ("a", "b"),
         (Variable("x", (full,)), Variable("y", (full,))),
-        (Rule((Clause("x", ("full",)),), "a"), Rule((Clause("y", ("full",)),), "b")),
+        (
+            Rule((Proposition("x", ("full",)),), "a"),
+            Rule((Proposition("y", ("full",)),), "b"),
+        ),
     )
     inside = arrange(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))
     assert isinstance(wins(inside, 1, [2]), Proved)
@@ -109,7 +112,10 @@ def test_a_tie_at_a_constant_degree_is_found() -> None:
         "constant",
         ("a", "b"),
         (Variable("x", (level,)), Variable("y", (level,))),
-        (Rule((Clause("x", ("level",)),), "a"), Rule((Clause("y", ("level",)),), "b")),
+        (
+            Rule((Proposition("x", ("level",)),), "a"),
+            Rule((Proposition("y", ("level",)),), "b"),
+        ),
     )
     given = arrange(rules, _box(rules))
     assert isinstance(decides_by_order(given, 1, [], [2]), Witness)
@@ -122,7 +128,7 @@ def test_an_input_that_no_rule_covers_is_another_decision_only_if_it_is() -> Non
         "narrow",
         ("a", "b"),
         (Variable("x", (narrow,)),),
-        (Rule((Clause("x", ("narrow",)),), "a"),),
+        (Rule((Proposition("x", ("narrow",)),), "a"),),
     )
     for answer, kind in ((None, Witness), ("b", Witness), ("a", Proved)):
         semantics = Semantics(uncovered=answer)
@@ -139,7 +145,7 @@ def test_where_no_rule_fires_the_first_that_does_is_another_decision() -> None:
         "narrow",
         ("a",),
         (Variable("x", (narrow,)),),
-        (Rule((Clause("x", ("narrow",)),), "a"),),
+        (Rule((Proposition("x", ("narrow",)),), "a"),),
     )
     assert isinstance(other_decision(arrange(rules, _box(rules)), None), Witness)
     outside = arrange(rules, _box(rules, x=(0.8, 1.0)))
@@ -173,7 +179,10 @@ def test_a_tie_on_a_plateau_under_the_product_is_not_taken_for_none() -> None:
         "plateaus",
         ("a", "b"),
         (Variable("x", (full,)), Variable("y", (full,))),
-        (Rule((Clause("x", ("full",)),), "a"), Rule((Clause("y", ("full",)),), "b")),
+        (
+            Rule((Proposition("x", ("full",)),), "a"),
+            Rule((Proposition("y", ("full",)),), "b"),
+        ),
         Semantics("product"),
     )
     inside = arrange(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))

@@ -18,9 +18,9 @@ from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -91,7 +91,9 @@ def test_under_min_a_rule_that_is_above_is_stronger_wherever_the_other_fires(
     half = Term("half", Points((0.0, 0.3, 0.6), (0.0, 0.5, 0.0)))
     tall = Term("tall", Points((-0.1, 0.3, 0.7), (0.0, 1.0, 0.0)))
     variables = tuple(replace(v, terms=(*v.terms, half, tall)) for v in rules.variables)
-    more = tuple(Rule((Clause("x1", (name,)),), "class 1") for name in ("half", "tall"))
+    more = tuple(
+        Rule((Proposition("x1", (name,)),), "class 1") for name in ("half", "tall")
+    )
     rules = replace(rules, variables=variables, rules=(*rules.rules, *more))
     both, rows = compared(rules), strengths(rules)
     assert both.above(8, 7) == "always"
@@ -134,7 +136,7 @@ def test_an_open_lower_end_does_not_count(conjunction: str) -> None:
         "open",
         ("a",),
         (Variable("x", terms),),
-        tuple(Rule((Clause("x", (term.name,)),), "a") for term in terms),
+        tuple(Rule((Proposition("x", (term.name,)),), "a") for term in terms),
         Semantics("product" if conjunction == "product" else "minimum"),
     )
     verdicts = [
@@ -205,7 +207,7 @@ def test_curves_whose_leading_coefficients_cancel_are_compared() -> None:
         "cubics",
         ("a",),
         (Variable("x", terms),),
-        tuple(Rule((Clause("x", (term.name,)),), "a") for term in terms),
+        tuple(Rule((Proposition("x", (term.name,)),), "a") for term in terms),
         Semantics("product"),
     )
     both = compared(rules)
@@ -220,8 +222,8 @@ def test_a_rule_that_is_0_on_both_sides_of_an_irrational_place_never_fires() -> 
     )
     variable = Variable("x", terms, low=0.0, high=1.0)
     whens = (
-        (Clause("x", ("bell",)), Clause("x", ("far",))),
-        (Clause("x", ("bell",)),),
+        (Proposition("x", ("bell",)), Proposition("x", ("far",))),
+        (Proposition("x", ("bell",)),),
     )
     rules = RuleBase("r", ("a",), (variable,), tuple(Rule(when, "a") for when in whens))
     assert compared(rules).fires.tolist() == [False, True]
@@ -254,8 +256,8 @@ def test_rules_that_come_as_near_to_a_level_as_one_likes_do_not_reach_it() -> No
         ("a", "b"),
         (Variable("x"), Variable("y", (falls,)), mixed),
         (
-            Rule((Clause("y", ("falls",)),), "a"),
-            Rule((Clause("mixed", ("falls",)),), "b"),
+            Rule((Proposition("y", ("falls",)),), "a"),
+            Rule((Proposition("mixed", ("falls",)),), "b"),
         ),
     )
     box = Domain((DomainSide("x", 0.0, 2.0), DomainSide("y", 0.0, 4.0, is_open=True)))

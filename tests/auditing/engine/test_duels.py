@@ -23,9 +23,9 @@ from fuzzytree.auditing.engine.ties import tie
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -103,7 +103,7 @@ def _union_base(sliver: float) -> RuleBase:
     middle = Term("middle", Points((0.25, 0.5, 0.75), (0.0, 1.0, 0.0)))
     variable = Variable("x", (left, right, middle))
     rules = tuple(
-        Rule((Clause("x", (name,)),), label)
+        Rule((Proposition("x", (name,)),), label)
         for name, label in (("left", "a"), ("right", "b"), ("middle", "c"))
     )
     return RuleBase("union", ("a", "b", "c"), (variable,), rules)
@@ -128,7 +128,10 @@ def test_a_sliver_that_samples_miss_is_found() -> None:
         "sliver",
         ("a", "b"),
         (variable,),
-        (Rule((Clause("x", ("wide",)),), "a"), Rule((Clause("x", ("thin",)),), "b")),
+        (
+            Rule((Proposition("x", ("wide",)),), "a"),
+            Rule((Proposition("x", ("thin",)),), "b"),
+        ),
     )
     given = arrange(rules, Domain((DomainSide("x", 0.0, 1.0),)))
     found = wins(given, 2, (1,))
@@ -147,8 +150,8 @@ def _mixed(rule_of_sum: str) -> RuleBase:
     far = Term("far", Points((2.0, 3.0), (0.0, 1.0)))
     total = Variable("sum", (high, far), parts=(Part("x", 1.0), Part("y", 1.0)))
     rules = (
-        Rule((Clause("x", ("low",)), Clause("sum", (rule_of_sum,))), "a"),
-        Rule((Clause("y", ("low",)),), "b"),
+        Rule((Proposition("x", ("low",)), Proposition("sum", (rule_of_sum,))), "a"),
+        Rule((Proposition("y", ("low",)),), "b"),
     )
     inputs = (Variable("x", (low,)), Variable("y", (low,)))
     return RuleBase("mixed", ("a", "b"), (*inputs, total), rules)
@@ -204,7 +207,7 @@ def test_an_end_of_the_domain_at_which_a_rule_does_not_fire_is_no_part() -> None
         ("a", "b"),
         (Variable("x", terms),),
         tuple(
-            Rule((Clause("x", (term.name,)),), then)
+            Rule((Proposition("x", (term.name,)),), then)
             for term, then in zip(terms, "ab", strict=True)
         ),
     )

@@ -18,9 +18,9 @@ from fuzzytree.auditing.engine.equivalence import difference_region, equivalence
 from fuzzytree.auditing.engine.states import Bracket, Proved, State, Witness, point_of
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -55,7 +55,7 @@ def pair(seed: int) -> tuple[RuleBase, RuleBase]:
 
     def rule() -> Rule:
         when = [
-            Clause(
+            Proposition(
                 name, tuple(chance.sample(["t0", "t1", "t2"], 2)), chance.random() < 0.2
             )
             for name in ("x", "y")
@@ -138,8 +138,8 @@ def crisp(cut: float, *, name: str = "x") -> RuleBase:
         Term("high", Band(low=cut, left=cut - 1.0)),
     )
     rules = (
-        Rule((Clause(name, ("low",)),), "a"),
-        Rule((Clause(name, ("high",)),), "b"),
+        Rule((Proposition(name, ("low",)),), "a"),
+        Rule((Proposition(name, ("high",)),), "b"),
     )
     return RuleBase("cut", ("a", "b"), (Variable(name, terms),), rules)
 
@@ -161,8 +161,8 @@ def test_rules_in_another_order_differ_at_their_tie_alone() -> None:
     falls = Term("falls", Points((0.0, 1.0), (1.0, 0.0)))
     rises = Term("rises", Points((0.0, 1.0), (0.0, 1.0)))
     rules = (
-        Rule((Clause("x", ("falls",)),), "a"),
-        Rule((Clause("x", ("rises",)),), "b"),
+        Rule((Proposition("x", ("falls",)),), "a"),
+        Rule((Proposition("x", ("rises",)),), "b"),
     )
     old = RuleBase("tie", ("a", "b"), (Variable("x", (falls, rises)),), rules)
     new = replace(old, rules=rules[::-1])
@@ -175,8 +175,8 @@ def test_a_tie_that_no_double_reaches_stays_a_bracket_of_nearly_nothing() -> Non
     falls = Term("falls", Points((0.0, 1.0), (1.0, 0.0)))
     rises = Term("rises", Points((0.0, 2.0), (0.0, 1.0)))
     rules = (
-        Rule((Clause("x", ("falls",)),), "a"),
-        Rule((Clause("x", ("rises",)),), "b"),
+        Rule((Proposition("x", ("falls",)),), "a"),
+        Rule((Proposition("x", ("rises",)),), "b"),
     )
     old = RuleBase("tie", ("a", "b"), (Variable("x", (falls, rises)),), rules)
     found = equivalence(old, replace(old, rules=rules[::-1]), box(old), Clock())
@@ -187,7 +187,7 @@ def test_a_tie_that_no_double_reaches_stays_a_bracket_of_nearly_nothing() -> Non
 
 def test_a_dead_rule_may_go() -> None:
     old = crisp(0.3)
-    both = (Clause("x", ("low",)), Clause("x", ("high",)))
+    both = (Proposition("x", ("low",)), Proposition("x", ("high",)))
     new = replace(old, rules=(*old.rules, Rule(both, "a")))
     assert isinstance(equivalence(old, new, box(old), Clock()), Proved)
 
@@ -220,9 +220,9 @@ def test_a_witness_of_a_combination_is_a_point_of_the_inputs() -> None:
 def test_what_no_input_reaches_is_no_difference() -> None:
     # x - y and x are at most 1 and at least 0, yet not both at once.
     one = sums(0.25)
-    clause = Clause("x", ("low",))
+    proposition = Proposition("x", ("low",))
     low = Variable("x", (Term("low", Points((-1.0, -1.0), (1.0, 0.0))),))
-    both = Rule((clause, Clause("sum", ("high",))), "a")
+    both = Rule((proposition, Proposition("sum", ("high",))), "a")
     old = replace(one, variables=(low, *one.variables[1:]))
     new = replace(old, rules=(both, *old.rules))
     domain = Domain((DomainSide("x", -1.0, 1.0), DomainSide("y", 0.0, 1.0)))
@@ -236,7 +236,7 @@ def test_a_budget_that_is_spent_leaves_a_bracket() -> None:
     assert found.why.startswith("enough boxes were halved: ")
 
 
-def test_a_clause_has_one_form_where_its_curves_are_one() -> None:
+def test_a_proposition_has_one_form_where_its_curves_are_one() -> None:
     near, far = crisp(0.0), crisp(2.0)
     (axis,), (one, other) = common_axes(
         (near, far), [("x", AxisPart(Fraction(-3), Fraction(3), True))]
@@ -259,7 +259,7 @@ def test_bounds_hold_a_polynomial() -> None:
 
 def test_a_region_is_a_box_on_which_both_answer_so() -> None:
     old, new = crisp(0.25), crisp(0.75)
-    idle = Rule((Clause("y", ("t",)),), "b")
+    idle = Rule((Proposition("y", ("t",)),), "b")
     second = Variable("y", (Term("t", Points((0.0, 1.0), (0.0, 0.01))),))
     old, new = (
         replace(m, variables=(*m.variables, second), rules=(*m.rules, idle))

@@ -17,8 +17,8 @@ from fuzzytree.auditing.engine.polynomials import roots, value_at
 from fuzzytree.auditing.engine.states import Proved, Witness
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -47,8 +47,8 @@ def _rules(*, is_mirrored: bool, drop: float = 1.0) -> RuleBase:
         ("a", "b"),
         (Variable("x", own), Variable("y", other)),
         (
-            Rule((Clause("x", ("square",)), Clause("x", ("line",))), "a"),
-            Rule((Clause("y", ("square", "line")),), "b"),
+            Rule((Proposition("x", ("square",)), Proposition("x", ("line",))), "a"),
+            Rule((Proposition("y", ("square", "line")),), "b"),
         ),
     )
 

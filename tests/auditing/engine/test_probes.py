@@ -67,7 +67,7 @@ def test_a_rule_that_is_not_seen_may_win_in_a_sliver() -> None:
     assert isinstance(wins(given, number, rivals), Witness)
 
 
-def test_no_clause_is_evaluated_after_the_stronger_rule_is_known() -> None:
+def test_no_proposition_is_evaluated_after_the_stronger_rule_is_known() -> None:
     base = random_base(4, 8, 3)
     given = arrange(base, unit_domain(base))
     point = {name: Fraction(3, 8) for name in base.inputs}

@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.pieces import clause_ranges, shape_ranges
-from fuzzytree.model.rulebase import LR, Band, Clause, Points, Shape, Side
+from fuzzytree.auditing.engine.pieces import proposition_ranges, shape_ranges
+from fuzzytree.model.rulebase import LR, Band, Points, Proposition, Shape, Side
 from fuzzytree.numerics.exact import exact_degree
 from tests.auditing.engine.bases import random_shape
 
@@ -63,9 +63,9 @@ def test_a_cell_without_width_is_its_point() -> None:
 
 def test_a_negated_choice_is_enclosed() -> None:
     shapes = {("x", "a"): SHAPES[-1], ("x", "b"): SHAPES[-2]}
-    clause = Clause("x", ("a", "b"), negated=True)
+    proposition = Proposition("x", ("a", "b"), negated=True)
     edges = np.linspace(0.0, 1.0, 9)
-    _, cells = clause_ranges(clause, shapes, edges)
+    _, cells = proposition_ranges(proposition, shapes, edges)
     for number, (a, b) in enumerate(itertools.pairwise(edges)):
         for k in range(1, 20):
             x = Fraction(a) + (Fraction(b) - Fraction(a)) * Fraction(k, 19)

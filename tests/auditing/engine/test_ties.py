@@ -1,4 +1,4 @@
-"""Ties on sets with an interior are found where rules share their weakest clause."""
+"""Ties on sets with an interior are found where rules share the weakest proposition."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fuzzytree.auditing.engine.states import Declined, Proved, Witness, point_of
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.model.rulebase import (
     Band,
-    Clause,
     Conjunction,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -36,7 +36,8 @@ HALF = Term("half", Points((0.0,), (0.5,)))
 def _rules(*rules: tuple[str, str, str], conjunction: str = "minimum") -> RuleBase:
     variables = (Variable("x", (UP, DOWN, HALF)), Variable("y", (UP, DOWN, HALF)))
     made = tuple(
-        Rule((Clause("x", (a,)), Clause("y", (b,))), label) for a, b, label in rules
+        Rule((Proposition("x", (a,)), Proposition("y", (b,))), label)
+        for a, b, label in rules
     )
     classes = tuple(dict.fromkeys(label for _, _, label in rules))
     semantics = Semantics(conjunction)  # type: ignore[arg-type]
@@ -46,7 +47,7 @@ def _rules(*rules: tuple[str, str, str], conjunction: str = "minimum") -> RuleBa
 SQUARE = Domain((DomainSide("x", 0.0, 1.0), DomainSide("y", 0.0, 1.0)))
 
 
-def test_rules_that_share_their_weakest_clause_tie() -> None:
+def test_rules_that_share_their_weakest_proposition_tie() -> None:
     given = arrange(_rules(("up", "up", "a"), ("up", "down", "b")), SQUARE)
     found = tie(given, 1, 2)
     assert isinstance(found, Witness)
@@ -109,8 +110,10 @@ def test_products_tie_where_what_they_do_not_share_multiplies_to_the_same() -> N
             ("a", "b"),
             (Variable("x", (UP, rise)), Variable("y", (low, high))),
             (
-                Rule((Clause("x", ("up",)), Clause("y", ("low",))), "a"),
-                Rule((Clause("x", ("rise",)), Clause("y", (other.name,))), "b"),
+                Rule((Proposition("x", ("up",)), Proposition("y", ("low",))), "a"),
+                Rule(
+                    (Proposition("x", ("rise",)), Proposition("y", (other.name,))), "b"
+                ),
             ),
             Semantics("product"),
         )
@@ -140,8 +143,8 @@ def test_products_of_combinations_of_one_direction_are_declined() -> None:
         ("a", "b"),
         (Variable("x", (UP, HALF)), twice),
         (
-            Rule((Clause("x", ("up",)),), "a"),
-            Rule((Clause("twice", ("up",)), Clause("x", ("half",))), "b"),
+            Rule((Proposition("x", ("up",)),), "a"),
+            Rule((Proposition("twice", ("up",)), Proposition("x", ("half",))), "b"),
         ),
         Semantics("product"),
     )
@@ -188,9 +191,9 @@ def test_constants_of_one_level_on_different_axes_tie() -> None:
             ("a", "b", "c"),
             (Variable("x", (HALF, DOWN)), Variable("y", (other,))),
             (
-                Rule((Clause("x", ("half",)),), "a"),
-                Rule((Clause("y", ("other",)),), "b"),
-                Rule((Clause("x", ("down",)),), "c"),
+                Rule((Proposition("x", ("half",)),), "a"),
+                Rule((Proposition("y", ("other",)),), "b"),
+                Rule((Proposition("x", ("down",)),), "c"),
             ),
         )
 
@@ -208,13 +211,15 @@ def test_rules_that_meet_at_an_end_of_the_domain_alone_do_not_tie() -> None:
         ("a", "b"),
         (Variable("x", (first,)), Variable("y", (UP, DOWN))),
         (
-            Rule((Clause("x", ("first",)), Clause("y", ("up",))), "a"),
-            Rule((Clause("x", ("first",)), Clause("y", ("up",))), "b"),
+            Rule((Proposition("x", ("first",)), Proposition("y", ("up",))), "a"),
+            Rule((Proposition("x", ("first",)), Proposition("y", ("up",))), "b"),
         ),
     )
     given = arrange(rules, SQUARE)
     assert isinstance(tie(given, 1, 2), Proved)
-    apart = replace(rules, rules=(rules.rules[0], Rule((Clause("y", ("up",)),), "b")))
+    apart = replace(
+        rules, rules=(rules.rules[0], Rule((Proposition("y", ("up",)),), "b"))
+    )
     assert isinstance(tie(arrange(apart, SQUARE), 1, 2), Proved)
 
 
@@ -239,8 +244,8 @@ def test_ties_on_axes_that_share_inputs_are_decided_where_inputs_have_the_values
         ("a", "b"),
         (Variable("x", (UP,)), Variable("y", (UP,)), mix),
         (
-            Rule((Clause("x", ("up",)), Clause("mix", ("up",))), "a"),
-            Rule((Clause("x", ("up",)), Clause("mix", ("down",))), "b"),
+            Rule((Proposition("x", ("up",)), Proposition("mix", ("up",))), "a"),
+            Rule((Proposition("x", ("up",)), Proposition("mix", ("down",))), "b"),
         ),
     )
     found = tie(arrange(rules, SQUARE), 1, 2)
@@ -256,7 +261,7 @@ def test_rivals_that_stay_at_a_level_are_seen_where_levels_are_near() -> None:
     rise = Term("rise", Points((2.0, 3.5), (0.5, 0.75)))
     dip = Term("dip", Points((1.0, 2.0, 3.0), (1.0, 0.25, 0.5)))
     never = Term("never", Points((0.0, 1.5, 2.0), (0.0, 0.0, 0.75)))
-    on_x, on_y = Clause("x", ("level",)), Clause("y", ("rise",))
+    on_x, on_y = Proposition("x", ("level",)), Proposition("y", ("rise",))
     rules = RuleBase(
         "flat",
         ("a", "b", "c"),
@@ -265,8 +270,8 @@ def test_rivals_that_stay_at_a_level_are_seen_where_levels_are_near() -> None:
             Rule((on_x, on_y), "a"),
             Rule((on_x,), "b"),
             Rule((on_y,), "c"),
-            Rule((Clause("y", ("dip",)),), "c"),
-            Rule((Clause("x", ("level",), negated=True),), "a"),
+            Rule((Proposition("y", ("dip",)),), "c"),
+            Rule((Proposition("x", ("level",), negated=True),), "a"),
         ),
     )
     box = Domain((DomainSide("x", 0.0, 2.0), DomainSide("y", 0.25, 3.75)))
@@ -281,16 +286,16 @@ def test_a_tie_between_any_two_levels_is_seen_where_axes_share_inputs() -> None:
     bump = Term("bump", Points((1.0, 1.5, 2.0), (0.0, 0.25, 0.0)))
     most = Term("most", Points((0.0,), (1.0,)))
     mixed = Variable("mixed", (falls,), parts=(Part("x", -1.0, 1.0),))
-    one = Clause("mixed", ("falls",))
+    one = Proposition("mixed", ("falls",))
     rules = RuleBase(
         "mixed",
         ("a", "b", "c"),
         (Variable("x", (dent, bump, most)), mixed),
         (
             Rule((one,), "a"),
-            Rule((one, Clause("x", ("most",))), "b"),
-            Rule((Clause("x", ("dent",)),), "c"),
-            Rule((Clause("x", ("bump",)),), "c"),
+            Rule((one, Proposition("x", ("most",))), "b"),
+            Rule((Proposition("x", ("dent",)),), "c"),
+            Rule((Proposition("x", ("bump",)),), "c"),
         ),
     )
     found = tie(arrange(rules, Domain((DomainSide("x", 0.0, 2.0),))), 1, 2)
@@ -309,8 +314,8 @@ def test_curves_on_axes_of_one_direction_may_be_one_function_of_the_inputs() -> 
         ("a", "b"),
         (Variable("x", (UP,)), twice),
         (
-            Rule((Clause("x", ("up",)),), "a"),
-            Rule((Clause("twice", ("late",)),), "b"),
+            Rule((Proposition("x", ("up",)),), "a"),
+            Rule((Proposition("twice", ("late",)),), "b"),
         ),
     )
     given = arrange(rules, Domain((DomainSide("x", 0.0, 1.0),)))

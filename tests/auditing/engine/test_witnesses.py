@@ -12,9 +12,9 @@ from fuzzytree.auditing.engine.domain import Domain, DomainSide, linear_form, sp
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -27,7 +27,7 @@ RAMP = Term("much", Points((0.0, 1.0), (0.0, 1.0)))
 
 def _rules(*parts: Part) -> RuleBase:
     mix = Variable("mix", (RAMP,), parts=parts)
-    rule = Rule((Clause("mix", ("much",)),), "a")
+    rule = Rule((Proposition("mix", ("much",)),), "a")
     return RuleBase("p", ("a",), (Variable("x"), mix), (rule,))
 
 

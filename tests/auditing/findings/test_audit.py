@@ -28,7 +28,7 @@ from fuzzytree.auditing.findings.records import (
 )
 from fuzzytree.auditing.findings.subject import AuditRows, Material
 from fuzzytree.errors import TableError
-from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.testing import random_system, random_tree
 from tests.cli.conftest import GRASPS, grip
 
@@ -47,9 +47,9 @@ def steep(*order: int) -> RuleBase:
     """Return three rules, in an order of one's own, of which one has no effect."""
     terms = (Term("low", Band(high=1.0)), Term("high", Band(low=1.0)))
     rules = (
-        Rule((Clause("x", ("low",)),), "a"),
-        Rule((Clause("x", ("high",)),), "b"),
-        Rule((Clause("x", ("low",)), Clause("x", ("high",))), "c"),
+        Rule((Proposition("x", ("low",)),), "a"),
+        Rule((Proposition("x", ("high",)),), "b"),
+        Rule((Proposition("x", ("low",)), Proposition("x", ("high",))), "c"),
     )
     return RuleBase(
         "steep",
@@ -82,7 +82,10 @@ def test_every_function_that_answers_for_a_subject_is_in_the_table() -> None:
         for name in pattern.findall(path.read_text("utf-8"))
         if not name.startswith("_")
     }
-    inner = {"conventions:answers", "clauses:clause_answers"}  # others call these
+    inner = {
+        "conventions:answers",
+        "propositions:proposition_answers",
+    }  # others call these
     assert functions - inner == {family.function for family in FAMILIES}
 
 

@@ -50,8 +50,8 @@ from fuzzytree.model import (
 )
 from fuzzytree.model.rulebase import (
     LR,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -161,7 +161,7 @@ def test_a_weight_whose_products_are_rounded_lies_between_doubles() -> None:
 def rules_of(term: Term) -> RuleBase:
     variables = (Variable("a", (term,)), Variable("b"))
     return RuleBase(
-        "pump", ("x",), variables, (Rule((Clause("a", (term.name,)),), "x"),)
+        "pump", ("x",), variables, (Rule((Proposition("a", (term.name,)),), "x"),)
     )
 
 
@@ -230,7 +230,7 @@ HEDGES: tuple[Hedge, ...] = (
         pytest.param(HIGH, marks=pytest.mark.heavy),
     ],
 )
-def test_hedged_clauses_are_as_strong_as_those_of_the_system(curve: Curve) -> None:
+def test_hedged_propositions_are_as_strong_as_those_of_the_system(curve: Curve) -> None:
     queries = [Is("a", "low", (hedge,)) for hedge in HEDGES]
     queries += [Is("a", "low", ("not", "very")), Is("a", "low", ("very", "not"))]
     rules = tuple((one, "big", 0.5) for one in queries)
@@ -343,7 +343,7 @@ def test_a_term_that_nearly_reaches_the_level_is_reported_between_its_ends(
     assert bool(found) is (is_finding is not None)
 
 
-def test_a_clause_that_two_rules_share_is_one_degree_in_both() -> None:
+def test_a_proposition_that_two_rules_share_is_one_degree_in_both() -> None:
     narrow = (And((A, Or((B, B_HIGH)))), "soft", 1.0)
     found = findings(system_of((*CLEAN, narrow), low=Bell(0.0, 1.0, 2.0)), "FT104")
     assert found == [

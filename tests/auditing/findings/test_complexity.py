@@ -12,7 +12,7 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.complexity import depth
 from fuzzytree.auditing.findings.records import AuditSelection
 from fuzzytree.auditing.findings.subject import Material
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
@@ -25,8 +25,8 @@ RULES = RuleBase(
     ("soft", "hard"),
     (Variable("force", (DOWN, UP), low=0.0, high=2.0),),
     (
-        Rule((Clause("force", ("low",)),), "soft"),
-        Rule((Clause("force", ("high",)),), "hard"),
+        Rule((Proposition("force", ("low",)),), "soft"),
+        Rule((Proposition("force", ("high",)),), "hard"),
     ),
 )
 
@@ -41,9 +41,9 @@ def measures(model: RuleBase, domain: Domain | None = None) -> dict[str, str | f
 def test_a_partition_of_one_variable_has_the_index_one() -> None:
     assert measures(RULES) == {
         "rules": 2,
-        "clauses": 2,
-        "most clauses of a rule": 1,
-        "clauses per rule": 1.0,
+        "propositions": 2,
+        "most propositions of a rule": 1,
+        "propositions per rule": 1.0,
         "distinct terms in use": 2,
         "variables in use": 1,
         "complexity of Nauck": "1",
@@ -60,7 +60,7 @@ def test_a_sum_of_degrees_above_one_covers_less() -> None:
     rules = replace(
         RULES,
         variables=(Variable("force", terms, low=0.0, high=2.0),),
-        rules=(Rule((Clause("force", ("a",)),), "soft"),),
+        rules=(Rule((Proposition("force", ("a",)),), "soft"),),
     )
     found = measures(rules)
     assert found["coverage of Nauck"] == "1/2"
@@ -87,7 +87,7 @@ def test_a_domain_of_one_point_has_no_index() -> None:
 
 def test_rules_that_ask_nothing_have_no_index() -> None:
     rules = replace(RULES, rules=(Rule((), "soft"),))
-    assert measures(rules)["clauses"] == 0
+    assert measures(rules)["propositions"] == 0
 
 
 def test_the_depth_of_a_tree_is_its_longest_path() -> None:

@@ -15,8 +15,8 @@ from fuzzytree.auditing.findings.deciding import answers
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, Policy
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import (
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -39,8 +39,8 @@ def _base(*rules: tuple[str, str], conjunction: str = "minimum") -> RuleBase:
     made: list[Rule] = []
     for terms, label in rules:
         words = terms.split()
-        clauses = (Clause(v, (w,)) for v, w in zip("xy", words, strict=False))
-        made.append(Rule(tuple(c for c in clauses if c.terms != ("any",)), label))
+        propositions = (Proposition(v, (w,)) for v, w in zip("xy", words, strict=False))
+        made.append(Rule(tuple(c for c in propositions if c.terms != ("any",)), label))
     classes = tuple(dict.fromkeys(label for _, label in rules))
     semantics = Semantics(conjunction)  # type: ignore[arg-type]
     return RuleBase("base", classes, variables, tuple(made), semantics)
@@ -142,7 +142,7 @@ def test_a_copy_is_superfluous_and_what_decides_by_place_is_not() -> None:
     assert (1,) not in _found(_asked(("low", "a"), ("low", "b")), "FT103")
 
 
-def test_rules_that_share_their_weakest_clause_are_ambiguous() -> None:
+def test_rules_that_share_their_weakest_proposition_are_ambiguous() -> None:
     rules = (("low low", "a"), ("low high", "b"), ("small any", "c"))
     given = _asked(*rules)
     found = _found(given, "FT202")

@@ -40,9 +40,9 @@ from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Shape,
@@ -68,7 +68,7 @@ def asking(
 ) -> RuleBase:
     """Return a rule base of one input with these curves."""
     terms = tuple(Term(f"t{k}", shape) for k, shape in enumerate(shapes))
-    rule = Rule(tuple(Clause("x", (term.name,)) for term in terms[:1]), "a")
+    rule = Rule(tuple(Proposition("x", (term.name,)) for term in terms[:1]), "a")
     return RuleBase("asking", ("a",), (Variable("x", terms, "", low, high),), (rule,))
 
 
@@ -140,7 +140,7 @@ SUM = RuleBase(
         Variable("x"),
         Variable("y", (Term("t", Band(high=1.0)),), parts=(Part("x", 1.0),)),
     ),
-    (Rule((Clause("y", ("t",)),), "a"),),
+    (Rule((Proposition("y", ("t",)),), "a"),),
 )
 EMPTY = AuditRows("rows", np.array([[np.nan]]))
 
@@ -189,7 +189,7 @@ def test_all_inputs_without_limits_are_named_at_once() -> None:
     names = [f"x{k}" for k in range(12)]
     parts = tuple(Part(name, 1.0) for name in names)
     total = Variable("y", (Term("t", Band(high=1.0)),), parts=parts)
-    rule = Rule((Clause("y", ("t",)),), "a")
+    rule = Rule((Proposition("y", ("t",)),), "a")
     model = RuleBase("sum", ("a",), (*map(Variable, names), total), (rule,))
     with pytest.raises(ValueError, match=r".") as caught:
         domain_of(model)

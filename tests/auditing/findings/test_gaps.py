@@ -11,8 +11,8 @@ from fuzzytree.auditing.findings.gaps import answers
 from fuzzytree.auditing.findings.records import AuditAnswer, AuditSettings, Policy
 from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model.rulebase import (
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -33,7 +33,7 @@ def _asked(
         for n, p in enumerate(peaks)
     )
     rules = tuple(
-        Rule((Clause("x", (t.name,)),), "ab"[n % 2]) for n, t in enumerate(terms)
+        Rule((Proposition("x", (t.name,)),), "ab"[n % 2]) for n, t in enumerate(terms)
     )
     semantics = Semantics(uncovered=uncovered)
     base = RuleBase("b", ("a", "b"), (Variable("x", terms),), rules, semantics)

@@ -27,7 +27,7 @@ from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.checking.converting import format_of, read_content
 from fuzzytree.model import FuzzySystem
 from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Band, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.testing import random_system, random_tree
@@ -152,9 +152,12 @@ def base(**changed: float) -> RuleBase:
     """Return two rules, whose cut can be moved."""
     cut = changed.get("cut", 1.0)
     terms = (Term("low", Band(high=cut)), Term("high", Band(low=cut)))
-    one, other = Clause("x", ("low",)), Clause("y", ("high",))
-    clauses = (other, one) if changed.get("turned") else (one, other)
-    rules = (Rule(clauses, "a", support=int(changed.get("rows", 1))), Rule((one,), "b"))
+    one, other = Proposition("x", ("low",)), Proposition("y", ("high",))
+    propositions = (other, one) if changed.get("turned") else (one, other)
+    rules = (
+        Rule(propositions, "a", support=int(changed.get("rows", 1))),
+        Rule((one,), "b"),
+    )
     return RuleBase(
         "base", ("a", "b"), (Variable("x", terms), Variable("y", terms)), rules
     )
@@ -165,7 +168,7 @@ def ids(rules: RuleBase, *answers: AuditAnswer) -> list[str]:
     return [one.id for one in with_ids(answers, [rules])]
 
 
-def test_an_id_stays_when_clauses_are_turned_and_supports_change() -> None:
+def test_an_id_stays_when_propositions_are_turned_and_supports_change() -> None:
     about = found("FT101", rules=(1,))
     assert ids(base(), about) == ids(base(turned=1), about) == ids(base(rows=9), about)
 

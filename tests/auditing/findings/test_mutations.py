@@ -35,8 +35,8 @@ from fuzzytree.model import (
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     LR,
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -54,8 +54,8 @@ CLEAN = RuleBase(
     ("soft", "hard", "other"),
     (Variable("force", (LOW, HIGH), unit="N", low=0.0, high=4.0),),
     (
-        Rule((Clause("force", ("low",)),), "soft"),
-        Rule((Clause("force", ("high",)),), "hard"),
+        Rule((Proposition("force", ("low",)),), "soft"),
+        Rule((Proposition("force", ("high",)),), "hard"),
     ),
 )
 FAINT = Term("faint", Points((0.5, 1.0, 1.25), (0.0, 0.75, 0.0)))  # below low
@@ -71,14 +71,14 @@ def with_terms(*terms: Term) -> RuleBase:
 
 def with_rule(term: str, then: str, *terms: Term) -> RuleBase:
     """Return the clean rules with one more at the end."""
-    rule = Rule((Clause("force", (term,)),), then)
+    rule = Rule((Proposition("force", (term,)),), then)
     return replace(with_terms(*terms), rules=(*CLEAN.rules, rule))
 
 
-def with_clause(term: Term) -> RuleBase:
-    """Return the clean rules, the first of which has one more clause."""
+def with_proposition(term: Term) -> RuleBase:
+    """Return the clean rules, the first of which has one more proposition."""
     first, *others = CLEAN.rules
-    wide = replace(first, when=(*first.when, Clause("force", (term.name,))))
+    wide = replace(first, when=(*first.when, Proposition("force", (term.name,))))
     return replace(with_terms(term), rules=(wide, *others))
 
 
@@ -120,7 +120,7 @@ SPARE = replace(
 
 
 def multiplied(rules: RuleBase) -> RuleBase:
-    """Return rules that join their clauses by the product."""
+    """Return rules that join their propositions by the product."""
     return replace(rules, semantics=Semantics("product"))
 
 
@@ -162,7 +162,7 @@ PLANTED = (
     Planted("FT105", with_rule("faint", "hard", FAINT), "error", Proved, (3, 1)),
     Planted("FT106", with_rule("low", "soft"), "warning", Proved, (1, 3)),
     Planted("FT106", with_rule("low", "hard"), "error", Proved, (1, 3)),
-    Planted("FT107", with_clause(ALL), "info", Proved, (1, "all")),
+    Planted("FT107", with_proposition(ALL), "info", Proved, (1, "all")),
     Planted("FT201", with_terms(WIDE), "info", Witness, (1, 2)),
     Planted("FT202", with_rule("low", "hard"), "warning", Witness, (1, 3)),
     Planted("FT203", one_cut(0.25), "warning", Witness, (1, 2), clean=one_cut(0.5)),

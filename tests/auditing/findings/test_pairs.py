@@ -1,4 +1,4 @@
-"""Pairs of rules and clauses: what is planted is found, and gone when removed."""
+"""Pairs of rules and propositions: what is planted is found, and gone when removed."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from fuzzytree.auditing.findings.records import (
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model import Conclusion, Is, Or, RuleBlock, SystemRule
 from fuzzytree.model.rulebase import (
-    Clause,
     Conjunction,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -48,9 +48,9 @@ TERMS = (LOW, HIGH, WIDE, NONE)
 CONJUNCTIONS: tuple[Conjunction, ...] = ("minimum", "product")
 
 
-def clause(text: str) -> Clause:
+def proposition(text: str) -> Proposition:
     variable, _, term = text.split()
-    return Clause(variable, (term,))
+    return Proposition(variable, (term,))
 
 
 def base(
@@ -66,7 +66,7 @@ def base(
         ("soft", "hard"),
         tuple(Variable(name, terms, low=0.0, high=high) for name in ("force", "slip")),
         tuple(
-            Rule(tuple(clause(one) for one in when.split(", ") if one), then)
+            Rule(tuple(proposition(one) for one in when.split(", ") if one), then)
             for when, then in rules
         ),
         Semantics(conjunction),
@@ -128,7 +128,7 @@ def test_a_rule_with_another_curve_below_is_subsumed(conjunction: Conjunction) -
     assert isinstance(answer.state, Proved)
 
 
-def test_under_min_another_clause_may_hold_a_rule_below() -> None:
+def test_under_min_another_proposition_may_hold_a_rule_below() -> None:
     # `slip is faint` is at most 1/4, where `force is high` is not below it.
     faint = Term("faint", Points((0.0, 4.0), (0.25, 0.25)))
     quarter = Term("quarter", Points((1.0, 4.0), (0.25, 1.0)))
@@ -142,7 +142,7 @@ def test_under_min_another_clause_may_hold_a_rule_below() -> None:
     assert results(product, "FT104")  # there 1/4 low is below quarter as well
     stronger = replace(
         rules,
-        rules=(rules.rules[0], Rule((Clause("force", ("low",)),), "hard")),
+        rules=(rules.rules[0], Rule((Proposition("force", ("low",)),), "hard")),
     )
     assert not results(stronger, "FT104")
 
@@ -162,7 +162,7 @@ def test_with_inputs_that_depend_on_each_other_nothing_is_ruled_out() -> None:
     rules = replace(
         rules,
         variables=(*rules.variables, mix),
-        rules=(*rules.rules, Rule((Clause("mix", ("high",)),), "soft")),
+        rules=(*rules.rules, Rule((Proposition("mix", ("high",)),), "soft")),
     )
     (answer,) = answers_for(rules, "FT104")
     assert isinstance(answer.state, Declined)
@@ -421,14 +421,14 @@ def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:
     rules = replace(
         rules,
         variables=(*rules.variables, mix),
-        rules=(*rules.rules, Rule((Clause("mix", ("low",)),), "hard")),
+        rules=(*rules.rules, Rule((Proposition("mix", ("low",)),), "hard")),
     )
     (answer,) = [one for one in answers_for(rules, "FT201") if one.rules]
     assert isinstance(answer.state, Witness)
     point = {k: float(v) for k, v in point_of(answer.state.point).items()}
     strengths = exact_answer(rules, point).strengths
     assert min(strengths) > Fraction(9, 10)
-    apart = replace(rules.rules[1], when=(Clause("mix", ("none",)),))
+    apart = replace(rules.rules[1], when=(Proposition("mix", ("none",)),))
     assert not results(replace(rules, rules=(rules.rules[0], apart)), "FT201")
 
 
@@ -471,15 +471,16 @@ def test_only_conclusions_about_one_output_conflict(
 # --- FT107
 
 
-def test_a_clause_that_is_always_true_is_irrelevant() -> None:
+def test_a_proposition_that_is_always_true_is_irrelevant() -> None:
     always = Term("any", Points((0.0, 4.0), (1.0, 1.0)))
     rules = base(CLEAN[0], ("force is high, slip is any", "hard"), more=(always,))
     assert results(rules, "FT107") == ["rule 2 decides the same without 'slip is any'"]
 
 
 @pytest.mark.heavy
-def test_a_clause_that_only_others_make_irrelevant_is_proved_by_boxes() -> None:
-    # Without its clause rule 3 is as strong as one of the others, which stand first.
+def test_a_proposition_that_only_others_make_irrelevant_is_proved_by_boxes() -> None:
+    # Without its proposition rule 3 is as strong as one of the others, which stand
+    # first.
     rules = base(
         ("slip is wide, force is low", "soft"),
         ("slip is wide, force is wide", "soft"),
@@ -495,7 +496,9 @@ def test_a_clause_that_only_others_make_irrelevant_is_proved_by_boxes() -> None:
 
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
-def test_an_input_where_a_clause_matters_is_reported(conjunction: Conjunction) -> None:
+def test_an_input_where_a_proposition_matters_is_reported(
+    conjunction: Conjunction,
+) -> None:
     rules = base(*CLEAN, conjunction=conjunction)
     found = {one.subject: one for one in answers_for(rules, "FT107")}
     one = found["rule 2, 'slip is high'"]
@@ -510,27 +513,27 @@ def test_an_input_where_a_clause_matters_is_reported(conjunction: Conjunction) -
     assert prediction_at(without, point).label == "hard"
 
 
-def test_clauses_of_a_rule_that_never_fires_are_not_tested() -> None:
+def test_propositions_of_a_rule_that_never_fires_are_not_tested() -> None:
     rules = base(*CLEAN, ("force is none, force is high", "hard"))
     assert [
         one.sentence for one in answers_for(rules, "FT107") if one.rules == (3,)
-    ] == ["rule 3 never fires, so its clauses are not tested one by one"]
+    ] == ["rule 3 never fires, so its propositions are not tested one by one"]
 
 
-def test_a_clause_that_a_rule_of_the_class_makes_irrelevant_is_proved() -> None:
+def test_a_proposition_that_a_rule_of_the_class_makes_irrelevant_is_proved() -> None:
     rules = base(("force is wide", "hard"), ("force is high, slip is low", "hard"))
     (answer,) = [one for one in answers_for(rules, "FT107") if "slip" in one.subject]
     assert isinstance(answer.state, Proved)
     assert answer.state.how == "rule 1 of the same class is as strong everywhere"
 
 
-def test_many_clauses_that_matter_are_reported_up_to_a_number_and_counted(
+def test_many_propositions_that_matter_are_reported_up_to_a_number_and_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("fuzzytree.auditing.findings.clauses.MOST_SHOWN", 2)
+    monkeypatch.setattr("fuzzytree.auditing.findings.propositions.MOST_SHOWN", 2)
     answers = answers_for(base(*CLEAN), "FT107")
     assert [isinstance(one.state, Witness) for one in answers] == [True, True, False]
-    assert answers[2].sentence == "1 more clause matters: it decides some input"
+    assert answers[2].sentence == "1 more proposition matters: it decides some input"
 
 
 def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:

@@ -26,9 +26,9 @@ from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import Is, SCurve
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Term,
@@ -45,8 +45,8 @@ RULES = RuleBase(
     ("soft", "hard"),
     (Variable("force", (LOW, HIGH), low=0.0, high=4.0),),
     (
-        Rule((Clause("force", ("low",)),), "soft"),
-        Rule((Clause("force", ("high",)),), "hard"),
+        Rule((Proposition("force", ("low",)),), "soft"),
+        Rule((Proposition("force", ("high",)),), "hard"),
     ),
 )
 FORCES = np.array([[0.0, 0.25, 1.0, 1.1, 3.0, 5.0, np.nan]])
@@ -154,7 +154,7 @@ def test_a_rule_without_rows_is_found_and_gone_when_it_is_removed() -> None:
     planted = replace(
         RULES,
         variables=(replace(RULES.variables[0], terms=(LOW, HIGH, far)),),
-        rules=(*RULES.rules, Rule((Clause("force", ("far",)),), "soft")),
+        rules=(*RULES.rules, Rule((Proposition("force", ("far",)),), "soft")),
     )
     values = np.array([[0.5, 2.0, 3.0]])
     found = queries(subject_of(planted, AuditRows("grips.csv", values)))
@@ -208,8 +208,8 @@ def test_rows_exactly_at_an_end_a_level_and_a_margin_are_counted_exactly() -> No
         RULES,
         variables=(Variable("force", terms, low=-1.0, high=4.0),),
         rules=(
-            Rule((Clause("force", ("up",)),), "soft"),
-            Rule((Clause("force", ("down",)),), "hard"),
+            Rule((Proposition("force", ("up",)),), "soft"),
+            Rule((Proposition("force", ("down",)),), "hard"),
         ),
     )
     tiny = 5e-324
@@ -312,7 +312,7 @@ def test_a_spent_budget_stops_the_count() -> None:
         count_rows(replace(subject_of(RULES), clock=clock), FORCES)
 
 
-def test_of_a_model_of_many_clauses_fewer_points_are_drawn(
+def test_of_a_model_of_many_propositions_fewer_points_are_drawn(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(support, "_MOST_DEGREES", 1)

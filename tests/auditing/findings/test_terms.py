@@ -18,9 +18,9 @@ from fuzzytree.auditing.findings.records import (
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.model.rulebase import (
     LR,
-    Clause,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Shape,
@@ -41,7 +41,7 @@ def base(*terms: Term, high: float = 4.0) -> RuleBase:
         ("soft", "hard"),
         (Variable("force", terms, unit="N", low=0.0, high=high),),
         tuple(
-            Rule((Clause("force", (term.name,)),), ("soft", "hard")[number % 2])
+            Rule((Proposition("force", (term.name,)),), ("soft", "hard")[number % 2])
             for number, term in enumerate(terms)
         ),
     )
@@ -110,7 +110,7 @@ def test_a_term_of_a_combination_is_tested_on_all_its_inputs_allow() -> None:
     )
     inputs = tuple(Variable(name, low=0.0, high=2.0) for name in "ab")
     rules = RuleBase(
-        "m", ("x",), (*inputs, mix), (Rule((Clause("mix", ("far",)),), "x"),)
+        "m", ("x",), (*inputs, mix), (Rule((Proposition("mix", ("far",)),), "x"),)
     )
     (answer,) = found(rules, "FT401")
     assert "is empty: its degree is 0 from -2 to 2" in answer.sentence
@@ -215,7 +215,7 @@ def test_an_input_of_a_used_combination_is_used() -> None:
     mix = Variable("mix", (LOW,), parts=(Part("a", 1.0), Part("b", 1.0)))
     inputs = tuple(Variable(name, low=0.0, high=1.0) for name in "ab")
     rules = RuleBase(
-        "m", ("x",), (*inputs, mix), (Rule((Clause("mix", ("low",)),), "x"),)
+        "m", ("x",), (*inputs, mix), (Rule((Proposition("mix", ("low",)),), "x"),)
     )
     assert not found(rules, "FT404")
 

@@ -142,7 +142,7 @@ def test_a_rule_with_an_or_of_two_inputs_becomes_one_for_each_way() -> None:
     assert found.numbers == (1, 2, 2)
 
 
-def test_an_or_of_one_input_stays_one_clause() -> None:
+def test_an_or_of_one_input_stays_one_proposition() -> None:
     found = view(system_of(block_of(Or((A_LOW, A_HIGH)))), BOX)
     assert rules_of(found) == ["IF a is low or high THEN power is big"]
 

@@ -12,19 +12,19 @@ from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import AuditSelection
 from fuzzytree.auditing.findings.subject import AuditRows, Material
 from fuzzytree.exporters import yaml
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import FuzzyTree
 
 
 def grip() -> RuleBase:
-    """Return rules with a duplicate clause, a subsumed rule and conflicts."""
+    """Return rules with a duplicate proposition, a subsumed rule and conflicts."""
     up = Points((0.0, 4.0), (0.0, 1.0))
     down = Points((0.0, 4.0), (1.0, 0.0))
     middle = Points((1.0, 2.0, 3.0), (0.0, 1.0, 0.0))
     terms = (Term("low", down), Term("mid", middle), Term("high", up))
 
     def rule(then: str, *asked: tuple[str, str]) -> Rule:
-        return Rule(tuple(Clause(name, (term,)) for name, term in asked), then)
+        return Rule(tuple(Proposition(name, (term,)) for name, term in asked), then)
 
     return RuleBase(
         "grip",

@@ -18,10 +18,10 @@ from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.head import LIMITS, digest_of
 from fuzzytree.model.rulebase import (
-    Clause,
     Conjunction,
     Part,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -141,7 +141,7 @@ def wrong_of(model: RuleBase | FuzzyTree, **options: Any) -> list[str]:
     return recheck(*audited(model, **options), ("a.json", "m.yaml")).wrong
 
 
-def rules_of(*when: tuple[Clause, ...], norm: Conjunction = "minimum") -> RuleBase:
+def rules_of(*when: tuple[Proposition, ...], norm: Conjunction = "minimum") -> RuleBase:
     """Return rules of one class on `x` and a sum in which it stands twice."""
     parts = (Part("x", 1.0), Part("x", -0.5, 1.0))
     terms = (Term("up", UP), Term("late", LATE))
@@ -151,8 +151,8 @@ def rules_of(*when: tuple[Clause, ...], norm: Conjunction = "minimum") -> RuleBa
 
 
 def test_the_audit_of_a_rule_that_never_fires_holds() -> None:
-    late = Clause("x", ("late",)), Clause("x", ("up",))
-    rules = rules_of(late, (Clause("x", ("up",)),))
+    late = Proposition("x", ("late",)), Proposition("x", ("up",))
+    rules = rules_of(late, (Proposition("x", ("up",)),))
     assert wrong_of(rules) == []
     facts = json.loads(audited(rules)[0])
     of = next(one for one in facts["answers"] if (one["code"], one["rules"]) == SILENT)
@@ -167,22 +167,22 @@ SILENT = ("FT107", [1])
 
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("terms", [("up",), ("up", "down")])
-def test_the_audit_of_a_rule_with_a_clause_and_its_opposite_holds(
+def test_the_audit_of_a_rule_with_a_proposition_and_its_opposite_holds(
     terms: tuple[str, ...],
 ) -> None:
-    both = Clause("x", terms), Clause("x", terms, negated=True)
-    assert wrong_of(rules_of(both, (Clause("x", ("up",)),))) == []
-    swapped = Clause("x", ("up", "down")), Clause("x", ("down", "up"))
+    both = Proposition("x", terms), Proposition("x", terms, negated=True)
+    assert wrong_of(rules_of(both, (Proposition("x", ("up",)),))) == []
+    swapped = Proposition("x", ("up", "down")), Proposition("x", ("down", "up"))
     assert wrong_of(rules_of(swapped)) == []
 
 
 def test_the_audit_of_a_sum_in_which_an_input_stands_twice_holds() -> None:
-    rules = rules_of((Clause("half", ("up",)),), (Clause("half", ("late",)),))
+    rules = rules_of((Proposition("half", ("up",)),), (Proposition("half", ("late",)),))
     assert wrong_of(rules) == []
 
 
-def test_a_clause_that_stands_twice_weakens_a_product() -> None:
-    up = Clause("x", ("up",))
+def test_a_proposition_that_stands_twice_weakens_a_product() -> None:
+    up = Proposition("x", ("up",))
     assert wrong_of(rules_of((up, up), (up,), norm="product")) == []
 
 
@@ -355,7 +355,7 @@ def test_an_answer_with_three_rules_for_two_is_reported() -> None:
 
 def test_the_audit_with_rows_that_are_no_table_holds() -> None:
     rows = AuditRows("an array", np.array([[0.5, 1.5, 3.5]]))
-    assert wrong_of(rules_of((Clause("x", ("up",)),)), rows=rows) == []
+    assert wrong_of(rules_of((Proposition("x", ("up",)),)), rows=rows) == []
 
 
 @pytest.mark.heavy

@@ -39,15 +39,15 @@ from fuzzytree.model import (
     SystemTerm,
 )
 from fuzzytree.model.rulebase import (
-    Clause,
     Conjunction,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
     Term,
     Variable,
-    clause_text,
+    proposition_text,
     shapes_of,
 )
 from fuzzytree.numerics.exact import exact_degree
@@ -80,8 +80,8 @@ def random_rules(seed: int) -> RuleBase:
     rules: list[Rule] = []
     for _ in range(chance.randint(2, 4)):
         when = [
-            Clause(name, (chance.choice(terms[:3]).name,), chance.random() < 0.15)
-            for name in (*names, *names)  # at most four clauses
+            Proposition(name, (chance.choice(terms[:3]).name,), chance.random() < 0.15)
+            for name in (*names, *names)  # at most four propositions
             if chance.random() < 0.5
         ]
         if rules and chance.random() < 0.4:  # the antecedent of another one
@@ -173,20 +173,22 @@ class Grid:
         made = [self.strength(rule.when) for rule in rules.rules]
         self.strengths = np.array(made)
 
-    def strength(self, when: Sequence[Clause]) -> Numbers:
-        """Return the strength of a rule with at most four clauses."""
+    def strength(self, when: Sequence[Proposition]) -> Numbers:
+        """Return the strength of a rule with at most four propositions."""
         places = [Fraction(k, STEPS) for k in range(TOP * STEPS + 1)]
         names = [variable.name for variable in self.rules.variables]
         shapes = shapes_of(self.rules.variables)
         found = np.full([len(places)] * len(names), self.one, np.int64)
-        for clause in when:
-            (term,) = clause.terms
-            shape = shapes[clause.variable, term]
+        for proposition in when:
+            (term,) = proposition.terms
+            shape = shapes[proposition.variable, term]
             each = [WHOLE * exact_degree(shape, x) for x in places]
             assert all(degree.denominator == 1 for degree in each)
             degrees = np.array([*map(int, each)])
-            degrees = WHOLE - degrees if clause.negated else degrees
-            along = degrees.reshape([-1 if n == clause.variable else 1 for n in names])
+            degrees = WHOLE - degrees if proposition.negated else degrees
+            along = degrees.reshape(
+                [-1 if n == proposition.variable else 1 for n in names]
+            )
             product = found // WHOLE * along
             found = np.minimum(found, along) if self.is_min else product
         return found.ravel()
@@ -268,7 +270,7 @@ def _is_so(grid: Grid, found: Audit, answer: AuditAnswer) -> bool:
         return all(pair in reported for pair in same)
     if answer.code == "FT107" and answer.terms:
         when = [*rules[numbers[0]].when]
-        ends = [answer.subject.endswith(repr(clause_text(one))) for one in when]
+        ends = [answer.subject.endswith(repr(proposition_text(one))) for one in when]
         del when[ends.index(True)]
         other = strengths.copy()
         other[numbers[0]] = grid.strength(when)

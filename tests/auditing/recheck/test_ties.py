@@ -8,7 +8,7 @@ import pytest
 
 from fuzzytree.auditing.recheck import model_records
 from fuzzytree.auditing.recheck.grid import Grid, Line, Ties
-from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from tests.auditing.engine.bases import random_base
 from tests.auditing.recheck.reading import read
 
@@ -40,7 +40,7 @@ def rules(*asked: tuple[str, ...]) -> RuleBase:
     """Return rules of a class each, on two inputs."""
     terms = (Term("up", UP), Term("down", DOWN), Term("top", TOP))
     made = tuple(
-        Rule(tuple(Clause(one[0], (one[2:],)) for one in when), f"class {n}")
+        Rule(tuple(Proposition(one[0], (one[2:],)) for one in when), f"class {n}")
         for n, when in enumerate(asked)
     )
     variables = (Variable("x", terms), Variable("y", terms))

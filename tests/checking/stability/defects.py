@@ -23,8 +23,8 @@ from fuzzytree.model.contracts import (
 from fuzzytree.model.rulebase import (
     LR,
     Band,
-    Clause,
     Part,
+    Proposition,
     Rule,
     RuleBase,
     Side,
@@ -58,17 +58,17 @@ def small_rules() -> RuleBase:
             mix,
         ),
         (
-            Rule((Clause("a", ("low",)), Clause("b", ("soft",))), "yes"),
-            Rule((Clause("a", ("high",)), Clause("b", ("open",))), "no"),
-            Rule((Clause("mix", ("high",)),), "no"),
-            Rule((Clause("mix", ("low",)), Clause("a", ("high",))), "yes"),
+            Rule((Proposition("a", ("low",)), Proposition("b", ("soft",))), "yes"),
+            Rule((Proposition("a", ("high",)), Proposition("b", ("open",))), "no"),
+            Rule((Proposition("mix", ("high",)),), "no"),
+            Rule((Proposition("mix", ("low",)), Proposition("a", ("high",))), "yes"),
         ),
     )
 
 
 def one_rule(*terms: Term) -> RuleBase:
     """Return rules with one variable, a rule for each term."""
-    rules = tuple(Rule((Clause("a", (term.name,)),), "yes") for term in terms)
+    rules = tuple(Rule((Proposition("a", (term.name,)),), "yes") for term in terms)
     return RuleBase("one", ("yes",), (Variable("a", terms),), rules)
 
 
@@ -138,10 +138,10 @@ def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
         assert isinstance(model, RuleBase)
         shapes = {(v.name, t.name): t.shape for v in model.variables for t in v.terms}
 
-        def one(clause: Clause, axes: dict[str, float]) -> float:
-            result = [shapes[clause.variable, term] for term in clause.terms]
+        def one(proposition: Proposition, axes: dict[str, float]) -> float:
+            result = [shapes[proposition.variable, term] for term in proposition.terms]
             return max(
-                degree(shape, axes[clause.variable])
+                degree(shape, axes[proposition.variable])
                 for shape in result
                 if isinstance(shape, Band | LR)
             )

@@ -7,8 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.model.rulebase import (
-    Clause,
     Points,
+    Proposition,
     Rule,
     RuleBase,
     Semantics,
@@ -51,7 +51,7 @@ def test_strengths_rule_status_and_class_are_those_of_the_reference(seed: int) -
         assert_equal(rules, probes(rules, limit=220, seed=seed))
 
 
-def test_a_rule_without_a_clause_always_holds() -> None:
+def test_a_rule_without_a_proposition_always_holds() -> None:
     rules = RuleBase("one", ("a",), (), (Rule((), "a"), Rule((), "a")))
     found = evaluate_program(from_rules(rules), {})
     assert found.of("strength") == (1.0, 1.0)
@@ -82,7 +82,7 @@ def test_points_have_the_bits_of_the_reference(
         "points",
         ("a",),
         (Variable("x", (Term("in", Points(values, degrees)),)),),
-        (Rule((Clause("x", ("in",)),), "a"),),
+        (Rule((Proposition("x", ("in",)),), "a"),),
     )
     assert_equal(rules, probes(rules, limit=400))
     inner = [a + (b - a) * k / 97 for a, b in pairwise(values) for k in range(98)]

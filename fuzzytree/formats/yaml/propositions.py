@@ -1,4 +1,4 @@
-"""Rules of a file: clauses as sentences, and names that nothing declares."""
+"""Rules of a file: propositions as sentences, and names that nothing declares."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.binding import shortened
 from fuzzytree.model import (
     And,
-    Clause,
     Condition,
     Mistake,
     Or,
     Path,
+    Proposition,
     Rule,
     RuleBlock,
     SNorm,
@@ -55,29 +55,31 @@ def vocabulary_of(variables: Iterable[Variable]) -> Vocabulary:
     return {v.name: words(term.name for term in v.terms) for v in variables}
 
 
-def readings(text: str, vocabulary: Vocabulary) -> tuple[Clause, ...]:
-    """Return the clauses that a sentence can mean: none, one, or two of several.
+def readings(text: str, vocabulary: Vocabulary) -> tuple[Proposition, ...]:
+    """Return the propositions that a sentence can mean: none, one, or two of several.
 
     Example:
         >>> readings("grip is not firm", {"grip": words(["soft", "firm"])})
-        (Clause(variable='grip', terms=('firm',), negated=True),)
+        (Proposition(variable='grip', terms=('firm',), negated=True),)
     """
-    results: list[Clause] = []
+    results: list[Proposition] = []
     end = text.find(_IS)
     while 0 <= end <= LONGEST_NAME and len(results) < 2:
         variable = text[:end]
         known = vocabulary.get(variable)
         if known is not None and known.most_ors <= _MOST_ORS:
             rest = text[end + len(_IS) :]
-            results += [Clause(variable, terms) for terms in _lists(rest, known)]
+            results += [Proposition(variable, terms) for terms in _lists(rest, known)]
             if rest.startswith(_NOT):
                 lists = _lists(rest[len(_NOT) :], known)
-                results += [Clause(variable, terms, negated=True) for terms in lists]
+                results += [
+                    Proposition(variable, terms, negated=True) for terms in lists
+                ]
         end = text.find(_IS, end + 1)
     return tuple(results[:2])
 
 
-def guess(text: str, vocabulary: Vocabulary) -> Clause | None:
+def guess(text: str, vocabulary: Vocabulary) -> Proposition | None:
     """Return what a sentence without a reading comes closest to, None if it is none."""
     end = text.find(_IS)
     best = end
@@ -90,7 +92,7 @@ def guess(text: str, vocabulary: Vocabulary) -> Clause | None:
     rest = text[best + len(_IS) :]
     negated = rest.startswith(_NOT)
     terms = rest[len(_NOT) :] if negated else rest
-    return Clause(text[:best], tuple(terms.split(_OR)), negated)
+    return Proposition(text[:best], tuple(terms.split(_OR)), negated)
 
 
 def _lists(text: str, known: TermWords) -> list[tuple[str, ...]]:
@@ -126,32 +128,36 @@ def read_rules(
     mistakes: list[Mistake],
 ) -> tuple[Rule, ...]:
     """Return the rules, with one that is always right in the place of a broken one."""
-    cache: dict[str | layout.WrittenOut, Clause | None] = {}
+    cache: dict[str | layout.WrittenOut, Proposition | None] = {}
     rules: list[Rule] = []
     for position, one in enumerate(bound):
         if one is None:
             rules.append(Rule((), any_class))
             continue
-        clauses: list[Clause] = []
-        for index, clause in enumerate(one.if_):
+        propositions: list[Proposition] = []
+        for index, proposition in enumerate(one.if_):
             path: Path = ("rules", position, "when", index)
-            if clause not in cache:
-                meaning = _clause(clause, vocabulary)
-                cache[clause] = meaning if isinstance(meaning, Clause) else None
+            if proposition not in cache:
+                meaning = _proposition(proposition, vocabulary)
+                cache[proposition] = (
+                    meaning if isinstance(meaning, Proposition) else None
+                )
                 if isinstance(meaning, str):
                     mistakes.append((path, f"rule {position + 1}: {meaning}"))
-            read_clause = cache[clause]
-            if read_clause is not None:
-                clauses.append(read_clause)
-        rules.append(Rule(tuple(clauses), one.then, one.support))
+            read_proposition = cache[proposition]
+            if read_proposition is not None:
+                propositions.append(read_proposition)
+        rules.append(Rule(tuple(propositions), one.then, one.support))
     return tuple(rules)
 
 
-def _clause(value: str | layout.WrittenOut, vocabulary: Vocabulary) -> Clause | str:
-    """Return a clause, or why the sentence cannot be one."""
+def _proposition(
+    value: str | layout.WrittenOut, vocabulary: Vocabulary
+) -> Proposition | str:
+    """Return a proposition, or why the sentence cannot be one."""
     if isinstance(value, layout.WrittenOut):
         terms = value.is_ if value.is_ is not None else value.is_not or ()
-        return Clause(value.variable, terms, negated=value.is_ is None)
+        return Proposition(value.variable, terms, negated=value.is_ is None)
     result = readings(value, vocabulary)
     if len(result) == 1:
         return result[0]
@@ -162,16 +168,16 @@ def _clause(value: str | layout.WrittenOut, vocabulary: Vocabulary) -> Clause | 
     known = None if meaning is None else vocabulary.get(meaning.variable)
     if meaning is None or (known and known.terms.issuperset(meaning.terms)):
         return (
-            f"{shortened(value)} is no clause; a clause is 'VARIABLE is TERM or TERM', "
-            "or the same with 'is not'"
+            f"{shortened(value)} is no proposition; a proposition is 'VARIABLE is TERM "
+            "or TERM', or the same with 'is not'"
         )
     return meaning
 
 
-def _written_out(clause: Clause) -> str:
-    verb = "is not" if clause.negated else "is"
-    terms = ", ".join(map(repr, clause.terms))
-    return f"{{variable: {clause.variable!r}, {verb}: [{terms}]}}"
+def _written_out(proposition: Proposition) -> str:
+    verb = "is not" if proposition.negated else "is"
+    terms = ", ".join(map(repr, proposition.terms))
+    return f"{{variable: {proposition.variable!r}, {verb}: [{terms}]}}"
 
 
 def joined(join: type[And] | type[Or], left: Condition, right: Condition) -> Condition:

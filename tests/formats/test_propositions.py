@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzytree.formats.yaml.clauses import guess, readings, words
-from fuzzytree.model.rulebase import Clause, clause_text
+from fuzzytree.formats.yaml.propositions import guess, readings, words
+from fuzzytree.model.rulebase import Proposition, proposition_text
 
 PLAIN = {"size": words(["low", "high"]), "wet or dry": words(["wet", "dry"])}
 TRAPS = {
@@ -20,16 +20,18 @@ TRAPS = {
 
 
 @pytest.mark.parametrize(
-    ("text", "clause"),
+    ("text", "proposition"),
     [
-        ("size is low", Clause("size", ("low",))),
-        ("size is high or low", Clause("size", ("high", "low"))),
-        ("size is not low or high", Clause("size", ("low", "high"), negated=True)),
-        ("wet or dry is wet or dry", Clause("wet or dry", ("wet", "dry"))),
+        ("size is low", Proposition("size", ("low",))),
+        ("size is high or low", Proposition("size", ("high", "low"))),
+        ("size is not low or high", Proposition("size", ("low", "high"), negated=True)),
+        ("wet or dry is wet or dry", Proposition("wet or dry", ("wet", "dry"))),
     ],
 )
-def test_a_sentence_of_plain_names_has_one_reading(text: str, clause: Clause) -> None:
-    assert readings(text, PLAIN) == (clause,)
+def test_a_sentence_of_plain_names_has_one_reading(
+    text: str, proposition: Proposition
+) -> None:
+    assert readings(text, PLAIN) == (proposition,)
 
 
 @pytest.mark.parametrize(
@@ -43,13 +45,17 @@ def test_what_names_nothing_has_no_reading(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "first", "second"),
     [
-        ("a is not b", Clause("a", ("not b",)), Clause("a", ("b",), negated=True)),
-        ("a is b or c", Clause("a", ("b", "c")), Clause("a", ("b or c",))),
-        ("a is b is c", Clause("a", ("b is c",)), Clause("a is b", ("c",))),
+        (
+            "a is not b",
+            Proposition("a", ("not b",)),
+            Proposition("a", ("b",), negated=True),
+        ),
+        ("a is b or c", Proposition("a", ("b", "c")), Proposition("a", ("b or c",))),
+        ("a is b is c", Proposition("a", ("b is c",)), Proposition("a is b", ("c",))),
     ],
 )
 def test_every_reading_of_an_ambiguous_sentence_is_found(
-    text: str, first: Clause, second: Clause
+    text: str, first: Proposition, second: Proposition
 ) -> None:
     assert set(readings(text, TRAPS)) == {first, second}
 
@@ -67,21 +73,21 @@ NAMES = st.lists(
     ),
     st.data(),
 )
-def test_readings_are_those_that_a_search_of_all_clauses_finds(
+def test_readings_are_those_that_a_search_of_all_propositions_finds(
     terms: dict[str, list[str]], data: st.DataObject
 ) -> None:
     variable = data.draw(st.sampled_from(sorted(terms)))
     size = data.draw(st.integers(1, min(3, len(terms[variable]))))
     chosen = tuple(data.draw(st.permutations(terms[variable]))[:size])
-    text = clause_text(Clause(variable, chosen, data.draw(st.booleans())))
+    text = proposition_text(Proposition(variable, chosen, data.draw(st.booleans())))
     longest = text.count(" or ") + 1
     expected = {
-        Clause(name, several, negated)
+        Proposition(name, several, negated)
         for name in terms
         for count in range(1, longest + 1)
         for several in itertools.product(terms[name], repeat=count)
         for negated in (False, True)
-        if clause_text(Clause(name, several, negated)) == text
+        if proposition_text(Proposition(name, several, negated)) == text
     }
     vocabulary = {name: words(labels) for name, labels in terms.items()}
     found = readings(text, vocabulary)
@@ -90,7 +96,9 @@ def test_readings_are_those_that_a_search_of_all_clauses_finds(
 
 
 def test_a_guess_prefers_a_variable_that_exists() -> None:
-    assert guess("a is b is d", TRAPS) == Clause("a is b", ("d",))
-    assert guess("size is not lo or hi", PLAIN) == Clause("size", ("lo", "hi"), True)
-    assert guess("sise is low", PLAIN) == Clause("sise", ("low",))
+    assert guess("a is b is d", TRAPS) == Proposition("a is b", ("d",))
+    assert guess("size is not lo or hi", PLAIN) == Proposition(
+        "size", ("lo", "hi"), True
+    )
+    assert guess("sise is low", PLAIN) == Proposition("sise", ("low",))
     assert guess("size low", PLAIN) is None

@@ -1,4 +1,4 @@
-"""Is a clause needed? It is if some input is classified differently without it."""
+"""Is a proposition needed? It is if some input is classified differently without it."""
 
 from __future__ import annotations
 
@@ -36,35 +36,42 @@ from fuzzytree.auditing.findings.records import (
 )
 from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 from fuzzytree.auditing.findings.support import sample_points
-from fuzzytree.model import Clause, FloatArray, IntArray, Rule, RuleBase, clause_text
+from fuzzytree.model import (
+    FloatArray,
+    IntArray,
+    Proposition,
+    Rule,
+    RuleBase,
+    proposition_text,
+)
 from fuzzytree.numerics import decide
 
 MOST_ROWS: Final = 4096
-"""The most rows that are drawn to find an input where a clause matters."""
+"""The most rows that are drawn to find an input where a proposition matters."""
 
 MOST_SHOWN: Final = 100
-"""The most clauses that matter that are listed one by one."""
+"""The most propositions that matter that are listed one by one."""
 
-_MOST_STRENGTHS = 1 << 24  # of all rules with and without each clause, at all rows
-_MOST_TRIED = 4  # rows that are evaluated in fractions for one clause
+_MOST_STRENGTHS = 1 << 24  # of all rules with and without each proposition, at all rows
+_MOST_TRIED = 4  # rows that are evaluated in fractions for one proposition
 
 
 class _Dropped(NamedTuple):
-    """A clause, the number of its rule, and the rule without it."""
+    """A proposition, the number of its rule, and the rule without it."""
 
     rule: int
-    clause: Clause
+    proposition: Proposition
     shorter: Rule
 
     def of(self, rules: RuleBase) -> RuleBase:
-        """Return the rule base without the clause."""
+        """Return the rule base without the proposition."""
         every = list(rules.rules)
         every[self.rule - 1] = self.shorter
         return replace(rules, rules=tuple(every))
 
 
-def clause_answers(subject: Subject) -> Iterator[AuditAnswer]:
-    """Answer for each clause whether some decision changes without it."""
+def proposition_answers(subject: Subject) -> Iterator[AuditAnswer]:
+    """Answer for each proposition whether some decision changes without it."""
     every = [*_dropped(subject.rules)]
     if not every:
         return
@@ -84,7 +91,7 @@ def clause_answers(subject: Subject) -> Iterator[AuditAnswer]:
         if one.rule in silent:
             continue
         subject.clock.check()
-        subject.clock.report("irrelevant clause", (number - count) / len(every))
+        subject.clock.report("irrelevant proposition", (number - count) / len(every))
         state = _state(subject, compared, sample, one, number, slices)
         if state is None:
             slices.left_out += 1
@@ -94,22 +101,22 @@ def clause_answers(subject: Subject) -> Iterator[AuditAnswer]:
             if needed > MOST_SHOWN:
                 continue
         yield _answer(subject, one, state)
-    yield from slices.rest("FT107", "clause")
+    yield from slices.rest("FT107", "proposition")
     for number in silent:
         name = subject.rule_name(number)
-        proof = Proved("one of its clauses is 0 on all of the domain")
+        proof = Proved("one of its propositions is 0 on all of the domain")
         yield audit_answer("FT107.silent", name, proof, rules=(number,))
     if needed > MOST_SHOWN:
         proof = Proved("an input was found for each, and evaluated in fractions")
-        measures = (Measure("clauses", needed - MOST_SHOWN),)
-        yield audit_answer("FT107.more", "clauses", proof, measures=measures)
+        measures = (Measure("propositions", needed - MOST_SHOWN),)
+        yield audit_answer("FT107.more", "propositions", proof, measures=measures)
 
 
 def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
     for number, rule in enumerate(rules.rules, 1):
-        for place, clause in enumerate(rule.when):
+        for place, proposition in enumerate(rule.when):
             rest = (*rule.when[:place], *rule.when[place + 1 :])
-            yield _Dropped(number, clause, replace(rule, when=rest))
+            yield _Dropped(number, proposition, replace(rule, when=rest))
 
 
 def _state(
@@ -166,7 +173,7 @@ def _witness(rules: RuleBase, point: dict[str, Fraction]) -> Witness:
 
 
 class _Sample:
-    """Rows of the domain, with the strengths of all rules with and without clauses."""
+    """Rows of the domain, and the strengths of rules with and without propositions."""
 
     def __init__(
         self, subject: Subject, arrangement: Arrangement, both: RuleBase
@@ -204,9 +211,10 @@ class _Sample:
         return self.rules.rules[strengths.index(best)].then
 
     def witness(self, one: _Dropped, number: int) -> Witness | None:
-        """Return a row whose class changes without a clause, if there is one."""
+        """Return a row whose class changes without a proposition, if there is one."""
         own, strengths = one.rule - 1, self.strengths[number]
-        # A rule only gains without a clause: it wins, or everything stays the same.
+        # A rule only gains without a proposition: it wins, or everything stays the
+        # same.
         wins = (strengths > self.best) | ((strengths == self.best) & (own < self.first))
         is_other = self.labels != self.classes[own]
         rows = np.flatnonzero(wins & is_other & (strengths > 0.0))
@@ -227,8 +235,8 @@ class _Sample:
 
 
 def _answer(subject: Subject, one: _Dropped, state: State) -> AuditAnswer:
-    name, text = subject.rule_name(one.rule), clause_text(one.clause)
-    facts: dict[str, FactValue] = {"rule": name, "clause": text}
+    name, text = subject.rule_name(one.rule), proposition_text(one.proposition)
+    facts: dict[str, FactValue] = {"rule": name, "proposition": text}
     message = "FT107.irrelevant" if isinstance(state, Proved) else "FT107.open"
     if isinstance(state, Witness):
         message = "FT107.needed"
@@ -238,6 +246,8 @@ def _answer(subject: Subject, one: _Dropped, state: State) -> AuditAnswer:
         f"{name}, {text!r}",
         state,
         rules=(one.rule,),
-        terms=tuple(TermName(one.clause.variable, term) for term in one.clause.terms),
+        terms=tuple(
+            TermName(one.proposition.variable, term) for term in one.proposition.terms
+        ),
         facts=facts,
     )
