@@ -25,8 +25,8 @@ from fuzzytree.benchmarking.records import (
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes.sampling import lines_bound
 from peers import engines, evaluator, trees
+from peers.sampling import lines_bound
 
 _PYTHON = "one row after another"
 _SINGLE = "compares values rounded to float32 with cuts in double"

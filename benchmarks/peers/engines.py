@@ -19,13 +19,8 @@ from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Outcome
 from fuzzytree.model.rulebase import Proposition, Rule, RuleBase, Shape
 from fuzzytree.runtimes.rows import checked, plan_axes, winners
-from fuzzytree.runtimes.sampling import (
-    line_error,
-    proposition_shapes,
-    samples,
-    universe,
-)
 from peers.crisp import lines_of
+from peers.sampling import line_error, proposition_shapes, samples, universe
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray

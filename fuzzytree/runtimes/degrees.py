@@ -22,7 +22,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.model import LR, Dtype, IntArray, Points, Shape, Side, checkpoint
+from fuzzytree.model import (
+    LR,
+    Dtype,
+    FloatArray,
+    IntArray,
+    Points,
+    Shape,
+    Side,
+    checkpoint,
+)
 from fuzzytree.numerics import segments_of
 
 if TYPE_CHECKING:
@@ -300,7 +309,7 @@ def _polylines(
     return run
 
 
-def shape_degrees(shape: Shape, values: Reals) -> Reals:
+def shape_degrees(shape: Shape, values: FloatArray) -> FloatArray:
     """Return the degree of each of some finite doubles, bit-equal to the reference.
 
     Example:

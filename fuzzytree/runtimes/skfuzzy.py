@@ -1,9 +1,10 @@
 """scikit-fuzzy: a rule base as a system of that library, evaluated by its own code.
 
-Each variable becomes an `Antecedent` whose universe holds the points of
-`fuzzytree.runtimes.sampling`, each rule a `Rule` over its terms, joined by the
-library's `&`, `|` and `~`. Its simulation fuzzifies the values and computes the rules.
-Its last step, defuzzification, has no meaning for classes: we take the strongest rule.
+Each variable becomes an `Antecedent` whose universe holds the points of its terms, in
+which curves are lines within `TOLERANCE`, each rule a `Rule` over its terms, joined by
+the library's `&`, `|` and `~`. Its simulation fuzzifies the values and computes the
+rules. Its last step, defuzzification, has no meaning for classes: we take the strongest
+rule.
 
 The system is put together from its variables' graphs, and the rules are kept beside it:
 `ControlSystem(rules)` takes a minute for 60 rules, and adds only their order.
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,10 @@ from fuzzytree.model import (
     Run,
     Runtime,
     Shape,
+    shapes_of,
 )
+from fuzzytree.numerics import by_points
+from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.runtimes.rows import (
     axis_lines,
     checked,
@@ -36,17 +40,15 @@ from fuzzytree.runtimes.rows import (
     plan_axes,
     winners,
 )
-from fuzzytree.runtimes.sampling import (
-    line_error,
-    lines_bound,
-    proposition_shapes,
-    samples,
-    universe,
-)
 from fuzzytree.runtimes.table import rules_only
 
-_MOST_POINTS = 128  # on each curved piece of a shape
-_MOST_NUMBERS = 1 << 20  # samples of one variable, over all of its terms
+TOLERANCE = 1e-4
+"""The largest error of a degree where a curve becomes points."""
+
+HIGHEST = 1.0 - 2.0**-50
+"""The highest degree off a plateau: joined by lines, such degrees stay below 1."""
+
+_ROUNDING = 2.0**-40  # of a line between two points; covers far more than it must
 _MOST_RULES = 200
 
 _CANNOT = (
@@ -77,7 +79,7 @@ def load(model: Model) -> Run:
             f"running scikit-fuzzy needs {install_hint('skfuzzy')}"
         ) from error
 
-    antecedents, fired = _build(rules)
+    antecedents, fired = _build(by_points(rules, TOLERANCE).model)
     system = control.ControlSystem()
     system.graph = networkx.compose_all([a.graph for a in antecedents.values()])
     axes = plan_axes(rules.variables)
@@ -124,18 +126,26 @@ def _carried(model: Model) -> RuleBase:
     return rules
 
 
-def _proposition_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
+def _named_shapes(rules: RuleBase) -> dict[str, dict[str, Shape]]:
     """Return the shapes that propositions name: those of each variable, by term."""
+    shapes = shapes_of(rules.variables)
     result: dict[str, dict[str, Shape]] = {}
-    for (variable, term), shape in proposition_shapes(rules).items():
-        result.setdefault(variable, {})[term] = shape
+    for rule in rules.rules:
+        for one in rule.when:
+            named = result.setdefault(one.variable, {})
+            named.update((term, shapes[one.variable, term]) for term in one.terms)
     return result
 
 
-def _universe(shapes: Sequence[Shape]) -> FloatArray:
-    """Return the points of a variable: fewer on each piece the more terms there are."""
-    share = _MOST_NUMBERS // (4 * len(shapes) ** 2)
-    return universe(shapes, min(max(share, 4), _MOST_POINTS))
+def _universe(shapes: Iterable[Shape]) -> FloatArray:
+    """Return all points of some terms, with 0 and the doubles beside each.
+
+    So plateaus begin and end at the very double, and a step is as wide as one.
+    """
+    knots = np.array([0.0, *(knot for shape in shapes for knot in shape.knots())])
+    beside = np.nextafter(knots, -np.inf), np.nextafter(knots, np.inf)
+    values: FloatArray = np.unique(np.concatenate([knots, *beside]))
+    return values[np.isfinite(values)]
 
 
 def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
@@ -145,11 +155,12 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
     is_product = rules.semantics.conjunction == "product"
     conjunction = np.multiply if is_product else np.fmin
     antecedents: dict[str, Any] = {}
-    for name, shapes in _proposition_shapes(rules).items():
-        points = _universe(list(shapes.values()))
+    for name, shapes in _named_shapes(rules).items():
+        points = _universe(shapes.values())
         antecedents[name] = control.Antecedent(points, name)
         for term, shape in shapes.items():
-            degrees = samples(shape, points)
+            degrees = shape_degrees(shape, points)
+            degrees[degrees < 1.0] = np.minimum(degrees[degrees < 1.0], HIGHEST)
             if _is_too_steep(points, degrees):
                 raise LossError(
                     f"cannot run {rules.name} as scikit-fuzzy: term {term!r} of "
@@ -192,12 +203,9 @@ def _either(terms: list[Any]) -> Any:
 def bound(model: Model) -> tuple[float, str]:
     """Return how far strengths may be from the reference's, and why."""
     rules = _carried(model)
-    errors: dict[tuple[str, str], float] = {}
-    for name, shapes in _proposition_shapes(rules).items():
-        points = _universe(list(shapes.values()))
-        for term, shape in shapes.items():
-            errors[name, term] = line_error(shape, points)
-    return lines_bound(rules, errors)
+    lines = by_points(rules, TOLERANCE)
+    most = max(len(rule.when) for rule in rules.rules)
+    return min(lines.bound + most * _ROUNDING, 1.0), f"{lines.origin}, and rounding"
 
 
 RUNTIMES = (

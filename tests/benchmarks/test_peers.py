@@ -18,6 +18,7 @@ import pytest
 from msgspec.structs import replace
 from peers import TREE_PEERS, engines, peers
 from peers.crisp import nodes_of
+from peers.sampling import lines_bound
 
 from fuzzytree.benchmarking.candidates import found_of, questions
 from fuzzytree.benchmarking.records import Candidate, CandidateOutput, LoadedCandidate
@@ -42,7 +43,6 @@ from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.runtimes.native import load as load_native
 from fuzzytree.runtimes.reference import RUNTIMES as REFERENCE
 from fuzzytree.runtimes.rows import axis_lines, plan_axes
-from fuzzytree.runtimes.sampling import lines_bound
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree, with_points
 

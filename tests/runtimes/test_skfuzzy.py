@@ -19,7 +19,6 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.runtimes.degrees import shape_degrees
-from fuzzytree.runtimes.sampling import HIGHEST, line_error, samples, universe
 from fuzzytree.runtimes.skfuzzy import bound, load
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
@@ -35,33 +34,22 @@ SHAPES: list[Shape] = [
 ]
 
 
-@pytest.mark.one_in(3)
-@pytest.mark.parametrize("points", [4, 16, 128])
 @pytest.mark.parametrize("shape", SHAPES, ids=repr)
-def test_lines_between_points_keep_their_certified_error(
-    shape: Shape, points: int
+def test_degrees_keep_their_certified_error_and_are_one_on_the_plateau_alone(
+    shape: Shape,
 ) -> None:
-    places = universe([shape], points)
-    heights = samples(shape, places)
+    x = Variable("x", (Term("t", shape),))
+    rules = RuleBase("r", ("a",), (x,), (Rule((Proposition("x", ("t",)),), "a"),))
     center = 1e6 if isinstance(shape, LR) and shape.mean else 0.0
     width = 1e-2 if center else 20.0
     chance = np.random.default_rng(0)
     values = center + width * chance.uniform(-1.0, 1.0, 100_000)
-    joined = np.interp(values, places, heights)
-    error = np.abs(joined - shape_degrees(shape, values)).max()
-    assert error <= line_error(shape, places)
-
-
-def test_lines_between_points_of_a_band_are_off_by_rounding_alone() -> None:
-    few, many = (line_error(SHAPES[0], universe(SHAPES[:1], n)) for n in (16, 128))
-    assert many <= few < 1e-9
-
-
-def test_samples_are_one_on_the_plateau_only() -> None:
-    places = universe(SHAPES[:1], 32)
-    heights = samples(SHAPES[0], places)
-    assert np.array_equal(heights == 1.0, (places > 0.0) & (places <= 1.0))
-    assert heights[heights < 1.0].max() == HIGHEST
+    exact = shape_degrees(shape, values)
+    found = load(rules)(values[np.newaxis]).strengths
+    assert found is not None
+    assert np.abs(found[0] - exact).max() <= bound(rules)[0]
+    if isinstance(shape, Band):
+        assert np.array_equal(found[0] == 1.0, exact == 1.0)
 
 
 def test_a_tree_is_refused() -> None:
@@ -96,7 +84,8 @@ def test_the_bound_says_where_it_comes_from() -> None:
     rules = RuleBase("r", ("a",), (x,), (Rule((Proposition("x", ("low",)),), "a"),))
     assert bound(rules) == (
         2.0**-40,
-        "largest error of lines between the points of the terms",
+        "largest certified error of a degree: lines within 0.0001 of the curves, "
+        "and rounding",
     )
 
 
