@@ -107,7 +107,7 @@ def told(name: str, found: Sequence[Asked]) -> None:
     states = Counter(type(one).__name__ for of in found for one in of.states)
     floor = statistics.median(of.floor_s for of in found)
     middle = statistics.median(every)
-    closed = states["Witness"] + states["Proved"]
+    closed = states["Witness"] + states["Proved"] + states["Computed"]
     cut = statistics.median(of.cut_s for of in found)
     whole = statistics.median(of.cut_s + sum(of.each_s) for of in found)
     levels = f"{found[-1].levels:6}" if found[-1].levels else "     -"
@@ -265,7 +265,9 @@ def whole(name: str, budget_s: float) -> str:
     left = sum(": not run: the budget" in text for text in found.unasked)
     cut = sum(": cut short" in text for text in found.unasked)
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    known = states["Witness"] + states["Proved"] + states["Sampled"]
+    known = (
+        states["Witness"] + states["Proved"] + states["Computed"] + states["Sampled"]
+    )
     return (
         f"  {name:32} {budget_s:6g} {taken:6.1f} {wall:6.1f} {most:6.0f} {known:6} "
         f"{states['Bracket']:6} {states['Declined']:6} {cut:6} {left:6}"

@@ -10,6 +10,7 @@ from .engine.domain import Domain as Domain
 from .engine.domain import limited as limited
 from .engine.states import Bracket as Bracket
 from .engine.states import Claim as Claim
+from .engine.states import Computed as Computed
 from .engine.states import Coordinate as Coordinate
 from .engine.states import Declined as Declined
 from .engine.states import Proved as Proved

@@ -167,9 +167,9 @@ class AuditOptions:
 def command(options: AuditOptions) -> int:
     """Find rules that never win, gaps and conflicts in MODEL, any readable file.
 
-    Each answer is PROVED on the whole domain, shown by a WITNESS, enclosed by a
-    BRACKET, SAMPLED or DECLINED; `fuzzytree explain CODE` explains a finding and its
-    remedy. Ctrl-C keeps what is proved so far.
+    Each answer is PROVED on the whole domain, COMPUTED, shown by a WITNESS, enclosed
+    by a BRACKET, SAMPLED or DECLINED; `fuzzytree explain CODE` explains a finding and
+    its remedy. Ctrl-C keeps what is proved so far.
 
     Exit 0 without findings, 1 with findings that are not accepted, 2 if the audit
     cannot run, 130 if interrupted.

@@ -48,6 +48,7 @@ _COLOURS: Mapping[str, str] = {
     "warning": "33;1",
     "info": "36",
     "PROVED": "32;1",
+    "COMPUTED": "32",
     "WITNESS": "35;1",
     "BRACKET": "34;1",
     "SAMPLED": "36;1",

@@ -12,6 +12,7 @@ from fuzzytree.auditing import (
     AuditAnswer,
     Bracket,
     Claim,
+    Computed,
     Declined,
     Proved,
     Sampled,
@@ -26,6 +27,7 @@ _SOME = 4  # inputs of a witness that a table has room for
 
 STATES: dict[str, str] = {
     "PROVED": "holds on all of the domain",
+    "COMPUTED": "was worked out or compared, and not decided again",
     "WITNESS": "happens: a point is shown",
     "BRACKET": "lies between two bounds",
     "SAMPLED": "was counted in rows",
@@ -201,7 +203,7 @@ def state_text(state: State, *, has_title: bool = False) -> str:
         'the largest lead lies between 0.1 and 0.2; the budget is spent'
     """
     match state:
-        case Proved(how=how):
+        case Proved(how=how) | Computed(how=how):
             return how
         case Witness(claims=claims):
             return claims_text(claims) or "it happens here"

@@ -52,13 +52,13 @@ has no exact
 
 1 more answer is no finding; --all lists each
 
-code   question      count  found  proved  witness  bracket  sampled  declined
-FT101  dead rule     1      1      1       -        -        -        -
-FT202  ambiguity     1      1      -       1        -        -        -
-FT301  coverage gap  1      1      -       -        1        -        -
-FT401  empty term    1      -      -       -        -        -        1
-FT701  data support  1      -      -       -        -        1        -
-all                  5      3      1       1        1        1        1
+code   question      count  found  proved  computed  witness  bracket  sampled  declined
+FT101  dead rule     1      1      1       -         -        -        -        -
+FT202  ambiguity     1      1      -       -         1        -        -        -
+FT301  coverage gap  1      1      -       -         -        1        -        -
+FT401  empty term    1      -      -       -         -        -        -        1
+FT701  data support  1      -      -       -         -        -        1        -
+all                  5      3      1       -         1        1        1        1
 
 not examined, or not to the end
 - FT102 marginal rule: cut short: the budget of 60 s is spent

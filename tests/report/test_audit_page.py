@@ -22,6 +22,7 @@ from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report import audit_findings, audit_page
 from fuzzytree.report.audit_page import page
+from fuzzytree.report.audit_states import STATES
 from fuzzytree.testing import random_system, random_tree
 from tests.report.page_audits import EVIL, answers, audit_of, rows_of, rule_base
 
@@ -157,7 +158,7 @@ def test_every_part_of_a_finding_is_on_the_page() -> None:
         assert said in text, said
 
 
-@pytest.mark.parametrize("state", ["PROVED", "WITNESS", "BRACKET", "SAMPLED"])
+@pytest.mark.parametrize("state", [*STATES])
 def test_a_state_has_its_word_its_sign_and_its_frame(state: str) -> None:
     content = page(audit_of(rule_base()), rule_base())
     badge = f'<span class="state {state.lower()}"><svg class="icon"'

@@ -2,10 +2,10 @@
 
 Every number is a fraction; doubles only exclude, rounded outwards. A function takes the
 rules on a box (`arrangement`) and the numbers of rules, from 1, and returns one of the
-five `states`; without a `clock` it has no time limit. In reading order:
+six `states`; without a `clock` it has no time limit. In reading order:
 
 Terms
-    - `states`: the five states of a result, claims, coordinates, regions; wording
+    - `states`: the six states of a result, claims, coordinates, regions; wording
     - `domain`: the box, and the values of variables on it
     - `clock`: a budget of time, and how it is shared
 

@@ -1,4 +1,4 @@
-"""The five states of an answer, and how sentences show counts, numbers and names."""
+"""The six states of an answer, and how sentences show counts, numbers and names."""
 
 from __future__ import annotations
 
@@ -74,10 +74,20 @@ class Span(Value, frozen=True):
 
 
 class Proved(Value, frozen=True, tag="PROVED", tag_field="state"):
-    """The claim is true on all of the domain.
+    """The claim is true on all of the domain; `recheck` decides it again.
 
     Attributes:
         how: The work of the proof with its counts, in a sentence.
+    """
+
+    how: str
+
+
+class Computed(Value, frozen=True, tag="COMPUTED", tag_field="state"):
+    """The answer was worked out or compared; no other program decides it again.
+
+    Attributes:
+        how: What was done, in a sentence.
     """
 
     how: str
@@ -153,7 +163,7 @@ class Declined(Value, frozen=True, tag="DECLINED", tag_field="state"):
     reason: str
 
 
-State = Proved | Witness | Bracket | Sampled | Declined
+State = Proved | Computed | Witness | Bracket | Sampled | Declined
 
 
 def coordinates(point: Mapping[str, Fraction]) -> tuple[Coordinate, ...]:

@@ -19,7 +19,7 @@ from fuzzytree.auditing.engine.polynomials import (
     roots,
     value_at,
 )
-from fuzzytree.auditing.engine.states import Proved
+from fuzzytree.auditing.engine.states import Computed
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
 from fuzzytree.auditing.findings.subject import Subject
@@ -60,8 +60,8 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     # Of a view ways count, and rules left out do not.
     is_view = subject.system is not None and subject.policy.decision == "all"
     message = "FT501.size-of-view" if is_view else "FT501.size"
-    proof = Proved("counted, and integrated in fractions")
-    yield audit_answer(message, "the rule base", proof, measures=tuple(measures))
+    how = Computed("counted, and integrated in fractions")
+    yield audit_answer(message, "the rule base", how, measures=tuple(measures))
 
 
 def depth(tree: FuzzyTree) -> int:

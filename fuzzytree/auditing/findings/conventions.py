@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.states import (
     Claim,
-    Proved,
+    Computed,
     Representation,
     Witness,
     coordinates,
@@ -212,7 +212,7 @@ def _alike(question: Convention, titles: Sequence[str]) -> AuditAnswer:
         how += f"; {question.left_out} more probes were left out"
     message = "FT602.alike" if count else "FT602.none"
     facts = {"count": len(titles), "probes": count}
-    return audit_answer(message, name, Proved(how), facts=facts)
+    return audit_answer(message, name, Computed(how), facts=facts)
 
 
 def _differing(question: Convention, title: str, fact: str, count: int) -> AuditAnswer:
@@ -220,7 +220,7 @@ def _differing(question: Convention, title: str, fact: str, count: int) -> Audit
     return audit_answer(
         "FT602.differs",
         f"{question.name}, {title}",
-        Proved(f"both were run; {fact}"),
+        Computed(f"both were run; {fact}"),
         facts={
             "convention": question.name,
             "representation": title,

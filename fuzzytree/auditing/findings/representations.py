@@ -15,7 +15,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State
+from fuzzytree.auditing.engine.states import Bracket, Computed, Declined, State
 from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
@@ -115,7 +115,7 @@ def agreement_answers(
 def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> AuditAnswer:
     noun = "probes and rows" if one.basis == "rows" else "ways"
     facts = "; ".join(one.detail[:2])
-    state: State = Proved(f"both were run or read; {facts}")
+    state: State = Computed(f"both were run or read; {facts}")
     if subject.system is None and one.row_numbers:
         model = _model(subject)
         models = {str(name): form for name, form in forms(model).items()}
@@ -154,7 +154,7 @@ def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> AuditAnswer:
     return audit_answer(
         messages.get(basis, "FT601.equal"),
         f"representations, by {basis}",
-        Proved(how),
+        Computed(how),
         facts={"count": len(ones), "rows": max(one.rows for one in ones)},
     )
 
@@ -169,8 +169,8 @@ def _certified(
     name = one.representation
     if one.verdict == "DISAGREES":
         facts = {"detail": "; ".join(one.detail[:2])}
-        proof = Proved("each row was compared with its exact answer")
-        yield audit_answer("FT601.exceeds", name, proof, facts=facts)
+        compared = Computed("each row was compared with its exact answer")
+        yield audit_answer("FT601.exceeds", name, compared, facts=facts)
     bound = certify(_within(form, subject.domain), _DTYPES[one.dtype])
     measures = []
     if bound.delta is not None:
@@ -201,7 +201,7 @@ def _certified(
 def _bounded(bound: Certificate, one: Certified) -> State:
     origin = bound.origin.replace("the declared ranges", "the domain")
     if bound.delta is not None or not bound.reasons:
-        return Proved(origin)
+        return Computed(origin)
     largest = one.largest or 0.0
     of = f"the largest error of a strength of {one.representation}"
     return Bracket(of, largest, 1.0, "; ".join(bound.reasons))

@@ -9,6 +9,7 @@ from statistics import NormalDist
 from fuzzytree.auditing.recheck.audit_records import (
     Answer,
     Bracket,
+    Computed,
     Measure,
     Proved,
     Sampled,
@@ -126,6 +127,9 @@ def _state(case: Case, report: Report, answer: Answer) -> None:
     elif isinstance(state, Sampled):
         _sample(state)
         raise UndecidedError("a sample is not drawn again here")
+    elif isinstance(state, Computed):
+        require(bool(state.how), "it is computed, without how")
+        report.counts["answers COMPUTED, not decided again"] += 1
     else:
         is_reason = state.code.startswith("FTD") and state.code in SEVERITIES
         require(is_reason and bool(state.reason), "declined, and not for a reason")

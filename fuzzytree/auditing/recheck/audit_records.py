@@ -41,6 +41,10 @@ class Proved(NamedTuple):
     how: str
 
 
+class Computed(NamedTuple):
+    how: str
+
+
 class Witness(NamedTuple):
     point: tuple[Coordinate, ...]
     claims: tuple[Claim, ...]
@@ -71,7 +75,7 @@ class Declined(NamedTuple):
     reason: str
 
 
-State = Proved | Witness | Bracket | Sampled | Declined
+State = Proved | Computed | Witness | Bracket | Sampled | Declined
 
 
 class Label(NamedTuple):

@@ -190,7 +190,7 @@ FT404 P +info | {subject}
   no rule uses {subject}
 FT404 P -info | terms and variables | variables in use; terms in use
   rules use {variables in use:n variable} and {terms in use:n term}
-FT501 P -info | the rule base | *
+FT501 C -info | the rule base | *
   [audited as ]{rules:n rule} with {propositions:n proposition}[, index of Nauck
   {index of Nauck:s}]
 FT701 S {hit}info | <rows with a missing value|rows outside the domain>

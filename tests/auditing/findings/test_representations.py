@@ -10,8 +10,8 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.states import (
     Bracket,
+    Computed,
     Declined,
-    Proved,
     Sampled,
     Witness,
     point_of,
@@ -62,7 +62,7 @@ def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
     assert by_name["representations, by proof"].sentence == (
         "2 representations are equal on every input"
     )
-    assert isinstance(by_name["representations, by rows"].state, Proved)
+    assert isinstance(by_name["representations, by rows"].state, Computed)
     assert (
         "onnxruntime float32: raw rules"
         in by_name["representations, by rows"].state.how
@@ -102,7 +102,7 @@ def test_what_a_number_type_can_change_is_bounded_and_how_often_is_sampled() -> 
     assert facts.sentence.startswith(
         "rules in float32: no decision can differ where the margin exceeds 2 x "
     )
-    assert isinstance(facts.state, Proved)
+    assert isinstance(facts.state, Computed)
     assert facts.state.how.endswith("for values in the domain")
     names = {one.name: one.value for one in facts.measures}
     assert 0.0 < names["largest error seen"] <= names["certified error of a strength"]
@@ -266,7 +266,7 @@ def test_a_runtime_in_which_nan_is_a_number_is_found() -> None:
         "missing values: blind: rules differs in 6 of 6 probes: probe 1: force nan: "
         "native: rules answers no class (missing), blind: rules soft (rule 1)"
     )
-    assert isinstance(finding.state, Proved)
+    assert isinstance(finding.state, Computed)
 
 
 def test_the_witness_of_a_broken_convention_lies_in_the_domain() -> None:
@@ -284,7 +284,7 @@ def test_a_question_without_a_probe_says_so_and_one_with_too_many_too() -> None:
     (none,) = answered(subject, Convention("ties", np.empty((1, 0))), None)
     assert none.sentence == "ties: no probe of it was met"
     (some,) = answered(subject, Convention("ties", np.array([[1.0]]), 3), None)
-    assert isinstance(some.state, Proved)
+    assert isinstance(some.state, Computed)
     assert some.state.how.endswith("; 3 more probes were left out")
 
 
