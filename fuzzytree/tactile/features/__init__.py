@@ -7,6 +7,7 @@ a frame has the same features, bit for bit, wherever they are computed.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -17,13 +18,12 @@ from fuzzytree.semantics import Maker, Place, Program, Result, result_of
 from fuzzytree.tactile.features.moments import (
     ORDER,
     Centred,
-    Noisy,
+    Complex,
     angle,
-    complex_moment,
     signed_log,
     sum_name,
 )
-from fuzzytree.tactile.features.names import Feature, feature_of
+from fuzzytree.tactile.features.names import INVARIANTS, Feature, feature_of
 from fuzzytree.tactile.sensor import Sensor
 
 PRESSED = "pressed"
@@ -121,13 +121,13 @@ def _program(
     make: _Maker, features: Sequence[Feature], inputs: Sequence[str]
 ) -> Program:
     """Return the program of some features, with those of the inputs that it needs."""
-    pressed = make.steps("where", make.moments.is_pressed, make.one, make.zero)
+    pressed = make.make.where(make.moments.is_pressed, 1.0, 0.0)
     results: list[Result] = []
     for feature in features:
-        with make.steps.topic(feature.name):
+        with make.make.topic(feature.name):
             results.append(result_of("output", feature.name, make.feature(feature)))
     results.append(result_of("output", PRESSED, pressed))
-    whole = make.steps.program("features", tuple(inputs), tuple(results))
+    whole = make.make.program("features", tuple(inputs), tuple(results))
     used = {step.name for step in whole.steps if step.operation == "input"}
     needed = tuple(name for name in inputs if name in used)
     return Program(whole.name, needed, whole.steps, whole.results, whole.titles)
@@ -137,24 +137,21 @@ class _Maker:
     """Makes the steps of features, each part once."""
 
     def __init__(self, sensor: Sensor, moments: Centred) -> None:
-        self.sensor, self.moments = sensor, moments
-        self.steps, self.noise = moments.make, moments.noise
-        self.zero, self.one = self.steps.constant(0.0), self.steps.constant(1.0)
-        self._parts: dict[tuple[int, int], tuple[Noisy, Noisy]] = {}
+        self.sensor, self.moments, self.make = sensor, moments, moments.make
+        self._parts: dict[str, Complex] = {}
 
     def feature(self, feature: Feature) -> Place:
         """Return the value of a feature, 0 where nothing presses."""
         value = self._value(feature)
         if feature.is_log:
-            value = signed_log(self.steps, value)
-        return self.steps("where", self.moments.is_pressed, value, self.zero)
+            value = signed_log(value)
+        return self.make.where(self.moments.is_pressed, value, 0.0)
 
     def _value(self, feature: Feature) -> Place:
-        make, base = self.steps, feature.base
+        make, base = self.make, feature.base
         if feature.kind != "moment":
             count = math.prod(map(len, _cells_of(self.sensor, feature)))
-            found = make("divide", make.input(base), make.constant(float(count)))
-            return self._scaled(found, 1, feature)
+            return self._scaled(make.input(base) / float(count), 1, feature)
         match base:
             case "force" | "peak":
                 name = sum_name(0, 0) if base == "force" else base
@@ -165,93 +162,54 @@ class _Maker:
                 return self._centre(base)
             case "angle" | "cos2" | "sin2":
                 return self._direction(base)
-            case _ if base[0] == "S":
-                value, degree = self._invariant(int(base[1:]))
-                return self._scaled(value, degree, feature)
+            case _ if base in INVARIANTS:
+                return self._invariant(feature)
             case _:
                 part, name = base.split()
-                parts = self.parts(int(name[1]), int(name[2]))
-                value = self.noise.settled(parts[part == "Im"])
+                value = self._part(name)[part == "Im"].settled()
                 return self._scaled(value, 1, feature)
 
-    def parts(self, p: int, q: int) -> tuple[Noisy, Noisy]:
-        """Return the parts of C_pq, noise settled to 0."""
-        if (p, q) not in self._parts:
-            with self.steps.topic(f"C{p}{q}"):
-                self._parts[p, q] = complex_moment(self.moments, p, q)
-        return self._parts[p, q]
+    def _part(self, name: str) -> Complex:
+        """Return a complex moment by its name, such as C20."""
+        if name not in self._parts:
+            with self.make.topic(name):
+                found = self.moments.complex_moment(int(name[1]), int(name[2]))
+                self._parts[name] = found
+        return self._parts[name]
 
     def _scaled(self, value: Place, degree: int, feature: Feature) -> Place:
         """Return a value of some degree in g, for g in [0, 1] or divided by its sum."""
-        make = self.steps
+        unit: Place | float = float(self.sensor.full**degree)
         if feature.per_force:
-            unit = make.chain("multiply", [self.moments.total] * degree)
-        else:
-            unit = make.constant(float(self.sensor.full**degree))
-        return make("divide", value, unit)
+            unit = self.make.chain("multiply", [self.moments.total] * degree)
+        return value / unit
 
     def _centre(self, base: str) -> Place:
         x, y = self.moments.centre()
         side = self.sensor.columns if base == "x" else self.sensor.rows
         offset = 0.0 if side % 2 else 0.5
-        if base == "y":
-            offset = -offset
-        middle = self.steps.constant(offset)
-        return self.steps("add", x if base == "x" else y, middle)
+        return x + offset if base == "x" else y + -offset
 
     def _direction(self, base: str) -> Place:
-        make = self.steps
-        real, imaginary = (self.noise.settled(part) for part in self.parts(2, 0))
+        make = self.make
+        real, imaginary = (part.settled() for part in self._part("C20"))
         if base == "angle":
-            whole = angle(make, imaginary, real)
-            return make("multiply", whole, make.constant(0.5))
-        squares = [make("multiply", part, part) for part in (real, imaginary)]
-        length = make("square_root", make("add", *squares))
-        is_none = make("equal", length, self.zero)
-        length = make("where", is_none, self.one, length)
-        return make("divide", real if base == "cos2" else imaginary, length)
+            return angle(imaginary, real) * 0.5
+        length = make.root(real * real + imaginary * imaginary)
+        length = make.where(make.equal(length, 0.0), 1.0, length)
+        return (real if base == "cos2" else imaginary) / length
 
-    def _invariant(self, number: int) -> tuple[Place, int]:
-        """Return S_number (paper, 2.1) without the unit, and its degree in g."""
-        noise, parts = self.noise, self.parts
-        match number:
-            case 1 | 9:
-                order = 1 if number == 1 else 2
-                return noise.settled(parts(order, order)[0]), 1
-            case 2 | 3 | 4 | 7 | 8:
-                p, q = {2: (2, 0), 3: (3, 0), 4: (2, 1), 7: (4, 0), 8: (3, 1)}[number]
-                real, imaginary = parts(p, q)
-                squares = (
-                    noise.product(real, real),
-                    noise.product(imaginary, imaginary),
-                )
-                return noise.settled(noise.sum(*squares)), 2
-            case 5:
-                square = self._times(parts(2, 1), parts(2, 1))
-                cube = self._times(square, parts(2, 1))
-                return self._twice_real(cube, parts(3, 0)), 4
-            case 6:
-                square = self._times(parts(2, 1), parts(2, 1))
-                return self._twice_real(square, parts(2, 0)), 3
-            case 10:
-                square = self._times(parts(3, 1), parts(3, 1))
-                return self._twice_real(square, parts(4, 0)), 3
-            case _:
-                return self._twice_real(parts(3, 1), parts(2, 0)), 2
-
-    def _times(
-        self, one: tuple[Noisy, Noisy], two: tuple[Noisy, Noisy]
-    ) -> tuple[Noisy, Noisy]:
-        product = self.noise.product
-        real = self.noise.difference(product(one[0], two[0]), product(one[1], two[1]))
-        imaginary = self.noise.sum(product(one[0], two[1]), product(one[1], two[0]))
-        return real, imaginary
-
-    def _twice_real(self, one: tuple[Noisy, Noisy], two: tuple[Noisy, Noisy]) -> Place:
-        """Return 2 Re(one conj(two))."""
-        product = self.noise.product
-        real = self.noise.sum(product(one[0], two[0]), product(one[1], two[1]))
-        return self.noise.settled(self.noise.times(2.0, real))
+    def _invariant(self, feature: Feature) -> Place:
+        """Return an invariant (paper, 2.1)."""
+        scale, factors, conjugated = INVARIANTS[feature.base]
+        product = functools.reduce(Complex.times, map(self._part, factors))
+        value = product.real
+        if conjugated:
+            value = product.along(self._part(conjugated))
+        if scale != 1.0:
+            value = value * scale
+        degree = len(factors) + bool(conjugated)
+        return self._scaled(value.settled(), degree, feature)
 
 
 def _every_sum(sensor: Sensor, features: Sequence[Feature]) -> list[Sum]:

@@ -50,7 +50,25 @@ FEATURES: Mapping[str, str] = MappingProxyType(
 """What each named feature is. C_pq is the sum of (x + iy)^p (x - iy)^q g over the cells
 with x to the right and y up from the centre of pressure, in cells, and g in [0, 1]."""
 
-PAPER: tuple[str, ...] = tuple(f"S{number}" for number in range(1, 12))
+INVARIANTS: Mapping[str, tuple[float, tuple[str, ...], str]] = MappingProxyType(
+    {
+        "S1": (1.0, ("C11",), ""),
+        "S2": (1.0, ("C20",), "C20"),
+        "S3": (1.0, ("C30",), "C30"),
+        "S4": (1.0, ("C21",), "C21"),
+        "S5": (2.0, ("C21", "C21", "C21"), "C30"),
+        "S6": (2.0, ("C21", "C21"), "C20"),
+        "S7": (1.0, ("C40",), "C40"),
+        "S8": (1.0, ("C31",), "C31"),
+        "S9": (1.0, ("C22",), ""),
+        "S10": (2.0, ("C31", "C31"), "C40"),
+        "S11": (2.0, ("C31",), "C20"),
+    }
+)
+"""Each invariant is a factor times the real part of a product of moments and of the
+conjugate of another one, if it has one."""
+
+PAPER: tuple[str, ...] = tuple(INVARIANTS)
 """The paper's features (2.1)."""
 
 ORIENTATION: tuple[str, ...] = ("angle", "Re C30", "Re C21")

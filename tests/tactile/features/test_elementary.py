@@ -16,13 +16,13 @@ from fuzzytree.tactile.features.moments import angle, signed_log
 
 def log_program() -> Program:
     make = Maker()
-    found = signed_log(make, make.input("x"))
+    found = signed_log(make.input("x"))
     return make.program("log", ("x",), (result_of("output", "y", found),))
 
 
 def angle_program() -> Program:
     make = Maker()
-    found = angle(make, make.input("y"), make.input("x"))
+    found = angle(make.input("y"), make.input("x"))
     return make.program("angle", ("x", "y"), (result_of("output", "a", found),))
 
 
@@ -71,6 +71,6 @@ def test_an_angle_is_exact_on_the_axes(x: float, y: float, degrees: float) -> No
 
 def test_the_logarithm_of_less_than_nothing_is_no_negative_zero() -> None:
     make = Maker()
-    results = (result_of("output", "v", signed_log(make, make.input("x"))),)
+    results = (result_of("output", "v", signed_log(make.input("x"))),)
     program = make.program("log", ("x",), results)
     assert [str(v) for v in evaluate_program(program, {"x": -1e-18}).values] == ["0.0"]

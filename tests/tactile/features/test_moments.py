@@ -12,9 +12,9 @@ from exact_features import exact_features
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.runtimes.programs import plan_program, run_program
-from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
+from fuzzytree.semantics.programs.steps import Maker, Program, result_of
 from fuzzytree.tactile.features import frame_program, moments
-from fuzzytree.tactile.features.moments import Centred, Noisy, complex_moment, sum_name
+from fuzzytree.tactile.features.moments import Centred, Noisy, sum_name
 from fuzzytree.tactile.features.names import FEATURES, PAPER
 from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Cells, Sensor
@@ -42,7 +42,7 @@ def bounded(sensor: Sensor) -> tuple[Program, FramePlan]:
     centred = Centred(make)
     results = []
     for p, q in ORDERS:
-        for part, found in zip("ri", complex_moment(centred, p, q), strict=True):
+        for part, found in zip("ri", centred.complex_moment(p, q), strict=True):
             error = make.constant(0.0) if found.error is None else found.error
             results.append(result_of("output", f"{part}{p}{q}", found.value))
             results.append(result_of("output", f"error {part}{p}{q}", error))
@@ -83,12 +83,12 @@ def test_the_bound_of_a_moment_holds_what_rounding_did(sensor: Sensor) -> None:
 def test_a_bound_without_the_error_of_what_is_moved_would_not_hold(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    honest = Centred._settle
+    honest = Centred._moved
 
-    def careless(self: Centred, one: Noisy, other: Noisy, rest: Place) -> Noisy:
-        return Noisy(honest(self, one, other, rest).value, self.make.constant(0.0))
+    def careless(self: Centred, one: Noisy, other: Noisy, axis: int) -> Noisy:
+        return Noisy(honest(self, one, other, axis).value, self.make.constant(0.0))
 
-    monkeypatch.setattr(moments.Centred, "_settle", careless)
+    monkeypatch.setattr(moments.Centred, "_moved", careless)
     with pytest.raises(AssertionError):
         test_the_bound_of_a_moment_holds_what_rounding_did(Sensor(16, 16))
 
