@@ -184,13 +184,8 @@ def known_task(name: str, folder: PathLike | None = None) -> Task:
     presses = read_presses(path, label=known.label)
     if known.others:
         first = presses.label_names[0]
-        presses = Presses(
-            presses.frames,
-            known.full,
-            np.minimum(presses.label, 1),
-            (first, known.others),
-            presses.subject,
-        )
+        label = np.minimum(presses.label, 1)
+        presses = replace(presses, label=label, label_names=(first, known.others))
     sensor = _sensor(presses, known.full, known.threshold)
     task = by_subject(
         name, presses, sensor, known.about, known.features, known.settings
@@ -260,8 +255,9 @@ def file_task(
     """
     name = os.fspath(path)
     presses = read_presses(path, label=label)
-    least = presses.threshold if threshold is None else threshold
-    sensor = _sensor(presses, presses.full if full is None else full, least)
+    own = presses.sensor
+    least = own.threshold if threshold is None else threshold
+    sensor = _sensor(presses, own.full if full is None else full, least)
     if test is None:
         return by_subject(name, presses, sensor, f"{len(presses.frames)} frames")
     other, title = read_presses(test, label=label), os.fspath(test)
@@ -273,10 +269,9 @@ def file_task(
     count = len(presses.frames)
     both = Presses(
         np.concatenate([presses.frames, other.frames]),
-        presses.full,
+        sensor,
         np.concatenate([presses.label, other.label]),
         presses.label_names,
-        np.zeros(0, np.int64),
     )
     if not (len(presses.label) and len(other.label)):
         raise TableError(f"{name if len(other.label) else title}: has no {label!r}")

@@ -153,7 +153,7 @@ def _draw_profiles(axes: Axes, fuzzy: Floats, plain: Floats, times: int) -> None
 def picture_of_a_hand() -> Figure:
     """Draw a press of a hand at each number of times (paper, Fig. 6)."""
     given = read_frames(HAND, threshold=6)
-    cells = pressed(given.sensor, given.presses.frames)[0]
+    cells = pressed(given.sensor, given.frames)[0]
     return draw_frames(
         [cells, *(interpolated(cells, times) for times in TIMES)],
         titles=["16 x 16 cells", *(f"{times} times" for times in TIMES)],

@@ -17,7 +17,7 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,26 +49,47 @@ _BROKEN_HEADER = (
 _USED = ("frames", "full", "threshold", "label", "label_names", "subject")
 
 
+def _unknown() -> npt.NDArray[np.int64]:
+    return np.zeros(0, np.int64)
+
+
 @dataclass(frozen=True, slots=True)
 class Presses:
     """Frames, and what is known of them.
 
     Attributes:
         frames: Shape (frames, rows, columns), whole numbers.
-        full: What a cell reads that takes no more.
+        sensor: Whose frames they are.
         label: Shape (frames,): the place of the class in `label_names`; empty if it
             is not known.
         label_names: The names of the classes.
         subject: Shape (frames,): who was pressing; empty if it is not known.
-        threshold: Above it a cell is pressed.
     """
 
     frames: Cells
-    full: int
-    label: npt.NDArray[np.int64]
-    label_names: tuple[str, ...]
-    subject: npt.NDArray[np.int64]
-    threshold: int = 0
+    sensor: Sensor
+    label: npt.NDArray[np.int64] = field(default_factory=_unknown)
+    label_names: tuple[str, ...] = ()
+    subject: npt.NDArray[np.int64] = field(default_factory=_unknown)
+
+    def of_class(self, name: str) -> Presses:
+        """Return the same frames, all of one class."""
+        code = np.zeros(len(self.frames), np.int64)
+        return replace(self, label=code, label_names=(name,))
+
+    def on(self, sensor: Sensor, name: str) -> Presses:
+        """Return the same frames as those of a board's sensor.
+
+        Raises:
+            ReadError: If they are of another size; it begins with the name.
+        """
+        rows, columns = self.frames.shape[1:]
+        if (sensor.rows, sensor.columns) != (rows, columns):
+            raise ReadError(
+                f"{name}: holds frames of {rows} x {columns} cells, and the board has "
+                f"{sensor.rows} x {sensor.columns}"
+            )
+        return replace(self, sensor=sensor)
 
 
 def read_presses(path: PathLike, *, label: str = "label") -> Presses:
@@ -107,17 +128,18 @@ def read_presses(path: PathLike, *, label: str = "label") -> Presses:
     usual = 255 if frames.dtype.itemsize == 1 else 65535
     full = _number(arrays.get("full"), usual, 1, 65535, f"{name}: 'full'")
     least = _number(arrays.get("threshold"), 0, 0, full - 1, f"{name}: 'threshold'")
-    return Presses(frames, full, labels, names, subject, least)
+    rows, columns = frames.shape[1:]
+    return Presses(frames, Sensor(rows, columns, full, least), labels, names, subject)
 
 
 def presses_content(presses: Presses) -> bytes:
     """Return an archive; the same frames give the same bytes."""
     arrays: dict[str, npt.NDArray[Any]] = {
         "frames": presses.frames,
-        "full": np.array(presses.full, np.int64),
+        "full": np.array(presses.sensor.full, np.int64),
     }
-    if presses.threshold:
-        arrays["threshold"] = np.array(presses.threshold, np.int64)
+    if presses.sensor.threshold:
+        arrays["threshold"] = np.array(presses.sensor.threshold, np.int64)
     if len(presses.label):
         arrays["label"] = presses.label
         arrays["label_names"] = np.array(presses.label_names, np.str_)
@@ -227,45 +249,23 @@ def _number(
     return int(found.item())
 
 
-@dataclass(frozen=True, slots=True)
-class SensorFrames:
-    """Frames, and the sensor that they come from.
-
-    Attributes:
-        presses: The frames and what is known of them.
-        sensor: From the caller, the recording, or the size of the frames.
-    """
-
-    presses: Presses
-    sensor: Sensor
-
-    def of_class(self, name: str) -> SensorFrames:
-        """Return the same frames, all of one class."""
-        code = np.zeros(len(self.presses.frames), np.int64)
-        presses = replace(self.presses, label=code, label_names=(name,))
-        return replace(self, presses=presses)
-
-
 def read_frames(
     path: PathLike,
     *,
-    sensor: Sensor | None = None,
     full: int | None = None,
     threshold: int | None = None,
     label: str = "label",
-) -> SensorFrames:
+) -> Presses:
     """Return the frames of a file.
 
     Args:
         path: A numpy archive (see `fuzzytree.tactile.presses`) or a recording.
-        sensor: That of a board, if it is known; else that of the recording, or one of
-            the size of the archive's frames.
         full: What a cell takes, instead of what the file says; for archives.
         threshold: Above it a cell is pressed, the same way.
         label: The array of the classes in an archive.
 
     Raises:
-        ReadError: If the file is neither, or holds frames of another size.
+        ReadError: If the file is neither.
     """
     name = os.fspath(path)
     if Path(path).is_fifo():  # it is read twice, and can keep us waiting
@@ -277,22 +277,12 @@ def read_frames(
         raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
     if is_recording:
         recording = read_recording(path)
-        found = recording.board.sensor
-        none = np.zeros(0, np.int64)
-        presses = Presses(recording.frames, found.full, none, (), none, found.threshold)
-    else:
-        presses = read_presses(path, label=label)
-        rows, columns = presses.frames.shape[1:]
-        try:
-            limit = presses.full if full is None else full
-            least = presses.threshold if threshold is None else threshold
-            found = Sensor(rows, columns, limit, least)
-        except InvalidModelError as error:
-            raise ReadError(f"{name}: {error}") from error
-    rows, columns = presses.frames.shape[1:]
-    if sensor and (sensor.rows, sensor.columns) != (rows, columns):
-        raise ReadError(
-            f"{name}: holds frames of {rows} x {columns} cells, and the board has "
-            f"{sensor.rows} x {sensor.columns}"
-        )
-    return SensorFrames(presses, sensor or found)
+        return Presses(recording.frames, recording.board.sensor)
+    presses = read_presses(path, label=label)
+    own = presses.sensor
+    try:
+        limit = own.full if full is None else full
+        least = own.threshold if threshold is None else threshold
+        return replace(presses, sensor=Sensor(own.rows, own.columns, limit, least))
+    except InvalidModelError as error:
+        raise ReadError(f"{name}: {error}") from error

@@ -19,6 +19,7 @@ from fuzzytree.schemas.generation import of_result
 from fuzzytree.tactile.board_file import load_board
 from fuzzytree.tactile.presses import Presses, read_presses
 from fuzzytree.tactile.recognition.recogniser import Recogniser
+from fuzzytree.tactile.sensor import Sensor
 from tests.cli.conftest import folder, originals
 from tests.tactile.archives import write_presses
 
@@ -52,7 +53,9 @@ def bars(folder: Path) -> Path:
     frames[3, 5, 5] = 30  # a cell that is not at rest
     label, subject = np.arange(24) % 2, np.arange(24) // 8
     path = folder / "bars.npz"
-    write_presses(path, Presses(frames, 200, label, ("upright", "flat"), subject))
+    write_presses(
+        path, Presses(frames, Sensor(6, 6, 200), label, ("upright", "flat"), subject)
+    )
     return path
 
 

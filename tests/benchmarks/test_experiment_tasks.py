@@ -16,6 +16,7 @@ from experiment_tasks import (
 
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.tactile.presses import Presses
+from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.archives import write_presses
 
 
@@ -27,7 +28,7 @@ def saved(path: Path, *, subject: list[int] | None, names: str = "ab") -> Path:
         path,
         Presses(
             frames,
-            255,
+            Sensor(2, 2),
             np.array([0, 0, 1, 1]),
             tuple(names),
             np.array(subject or [], np.int64),

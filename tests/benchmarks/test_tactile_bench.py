@@ -22,7 +22,6 @@ pytestmark = pytest.mark.usefixtures("few_objects")
 
 ROOT = Path(__file__).resolve().parents[2]
 SCHEMA = ROOT / "benchmarks" / "tactile_bench.schema.json"
-NONE = np.zeros(0, np.int64)
 SIZE = ["--sensor", "6x4", "--full", "100"]
 Said = pytest.CaptureFixture[str]
 
@@ -33,7 +32,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save(learnt_tree(SMALL, ("area", "S1")), "tree.yaml")
     cells = np.random.default_rng(0).integers(0, 101, (9, 6, 4)).astype(np.uint8)
     cells[0] = 0
-    write_presses("f.npz", Presses(cells, 100, NONE, (), NONE))
+    write_presses("f.npz", Presses(cells, SMALL))
 
 
 def test_the_schema_is_the_one_that_the_code_generates() -> None:

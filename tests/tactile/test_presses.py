@@ -15,15 +15,15 @@ from fuzzytree.tactile.presses import (
     presses_content,
     read_presses,
 )
+from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.archives import write_presses
 
 FRAMES = np.arange(24, dtype=np.uint16).reshape(2, 3, 4)
 
 
 def presses() -> Presses:
-    return Presses(
-        FRAMES, 1000, np.array([1, 0]), ("hand", "bär"), np.array([7, 9]), 5
-    )  # fmt: skip
+    label, subject = np.array([1, 0]), np.array([7, 9])
+    return Presses(FRAMES, Sensor(3, 4, 1000, 5), label, ("hand", "bär"), subject)
 
 
 def saved(path: Path, **arrays: object) -> Path:
@@ -37,7 +37,7 @@ def test_what_was_written_reads_back_equal(tmp_path: Path) -> None:
     found = read_presses(path)
     assert found.frames.dtype == np.uint16
     assert found.frames.tolist() == FRAMES.tolist()
-    assert (found.full, found.threshold) == (1000, 5)
+    assert (found.sensor.full, found.sensor.threshold) == (1000, 5)
     assert found.label_names == ("hand", "bär")
     assert found.label.tolist() == [1, 0]
     assert found.subject.tolist() == [7, 9]
@@ -51,7 +51,7 @@ def test_an_archive_of_numpy_itself_is_read(tmp_path: Path) -> None:
     frames = np.asfortranarray(FRAMES.astype(np.uint8))
     found = read_presses(saved(tmp_path / "n.npz", frames=frames, other=[0.5]))
     assert found.frames.tolist() == FRAMES.tolist()
-    assert (found.full, found.label_names, len(found.label)) == (255, (), 0)
+    assert (found.sensor.full, found.label_names, len(found.label)) == (255, (), 0)
 
 
 def test_classes_may_stand_under_another_name(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def command(options: TactileCheckOptions) -> int:
     found = check_onnx_files(
         frames_model(options.model),
         {name: read_bounded(name) for name in options.files},
-        None if options.data is None else read_frames(options.data).presses.frames,
+        None if options.data is None else read_frames(options.data).frames,
         sensor=sensor_of_options(options) if is_named else None,
         reject=options.reject,
         rows_only=options.rows_only,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,10 +24,10 @@ from fuzzytree.cli import (
 )
 from fuzzytree.errors import ReadError
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import FramesOptions, frames_and_sensor
+from fuzzytree.tactile.cli.sensors import FramesOptions, frames_of_options
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.presses import SensorFrames
+    from fuzzytree.tactile.presses import Presses
     from fuzzytree.tactile.runtimes.frames import Features
 
 CLASS = "class"
@@ -74,10 +74,7 @@ def command(options: TactileFeaturesOptions) -> int:
         check_place(options.output)
     with wrong_options():
         names = names_of(options.text)
-    parts = [
-        frames_and_sensor(path, options, label=options.label, word=word)
-        for word, path in _named(options.frames)
-    ]
+    parts = [*_parts(options)]
     _check_alike(options.frames, parts)
     found = costs(parts[0].sensor, names)
     if options.output is not None:
@@ -90,28 +87,27 @@ def command(options: TactileFeaturesOptions) -> int:
     return 0
 
 
-def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the class, empty if not stated, and the path of each file."""
-    found: list[tuple[str, str]] = []
-    for text in frames:
+def _parts(options: TactileFeaturesOptions) -> Iterator[Presses]:
+    """Yield the frames of each file, of the class that stands before its name."""
+    for text in options.frames:
         word, sign, path = text.partition("=")
         if not sign or Path(text).exists():
             word, path = "", text
-        if not word and len(frames) > 1:
+        if not word and len(options.frames) > 1:
             raise click.UsageError(
                 f"of several files, each has a class: CLASS={path}, not {path}"
             )
-        found.append((word, path))
-    return found
+        found = frames_of_options(path, options, label=options.label)
+        yield found.of_class(word) if word else found
 
 
-def _check_alike(frames: Sequence[str], parts: Sequence[SensorFrames]) -> None:
+def _check_alike(frames: Sequence[str], parts: Sequence[Presses]) -> None:
     """Refuse files that make no table together.
 
     Sensors may only differ in what rests on them, and all state subjects or none does.
     """
 
-    def kind(part: SensorFrames) -> str:
+    def kind(part: Presses) -> str:
         found = part.sensor
         size = f"{found.rows} x {found.columns} cells"
         return f"{size}, full {found.full}, threshold {found.threshold}"
@@ -122,14 +118,14 @@ def _check_alike(frames: Sequence[str], parts: Sequence[SensorFrames]) -> None:
                 f"{name}: is of another sensor ({kind(part)}) than {frames[0]} "
                 f"({kind(parts[0])})"
             )
-        if bool(len(part.presses.subject)) != bool(len(parts[0].presses.subject)):
+        if bool(len(part.subject)) != bool(len(parts[0].subject)):
             raise ReadError(f"of {name} and {frames[0]}, only one states subjects")
 
 
 def _table(
     options: TactileFeaturesOptions,
     output: str,
-    parts: Sequence[SensorFrames],
+    parts: Sequence[Presses],
     costs: Mapping[str, float],
 ) -> int:
     from fuzzytree.report import counted
@@ -137,17 +133,15 @@ def _table(
     from fuzzytree.tactile.sensor import saturated
 
     names = [*costs]
-    found = [features_of(part.sensor, part.presses.frames, names) for part in parts]
+    found = [features_of(part.sensor, part.frames, names) for part in parts]
     content = _csv(parts, found).encode()
     if output == "-":
         answer_bytes(content)
         return 0
     write_atomically(output, content)
-    presses, sensor = parts[0].presses, parts[0].sensor
-    counts = [len(part.presses.frames) for part in parts]
-    full = sum(
-        int((saturated(part.sensor, part.presses.frames) > 0).sum()) for part in parts
-    )
+    presses, sensor = parts[0], parts[0].sensor
+    counts = [len(part.frames) for part in parts]
+    full = sum(int((saturated(part.sensor, part.frames) > 0).sum()) for part in parts)
     none = sum(int((~part.is_pressed).sum()) for part in found)
     size = f"{sensor.rows} x {sensor.columns} cells"
     rows = [
@@ -178,10 +172,10 @@ def _table(
     return 0
 
 
-def _csv(parts: Sequence[SensorFrames], found: Sequence[Features]) -> str:
+def _csv(parts: Sequence[Presses], found: Sequence[Features]) -> str:
     """Return the table: features, and class and subject where known."""
-    has_class = bool(len(parts[0].presses.label))
-    has_subject = bool(len(parts[0].presses.subject))
+    has_class = bool(len(parts[0].label))
+    has_subject = bool(len(parts[0].subject))
     heads = [*found[0].names]
     heads += [CLASS] if has_class else []
     heads += ["subject"] if has_subject else []
@@ -189,12 +183,11 @@ def _csv(parts: Sequence[SensorFrames], found: Sequence[Features]) -> str:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(heads)
     for part, features in zip(parts, found, strict=True):
-        presses = part.presses
         for number in features.is_pressed.nonzero()[0].tolist():
             cells: list[object] = [*features.values[:, number].tolist()]
             if has_class:
-                cells.append(presses.label_names[int(presses.label[number])])
+                cells.append(part.label_names[int(part.label[number])])
             if has_subject:
-                cells.append(int(presses.subject[number]))
+                cells.append(int(part.subject[number]))
             table.writerow(cells)
     return text.getvalue()

@@ -21,14 +21,14 @@ from fuzzytree.cli import (
     wrong_options,
 )
 from fuzzytree.files import check_place, write_atomically
-from fuzzytree.tactile.cli.sensors import FramesOptions, frames_and_sensor
+from fuzzytree.tactile.cli.sensors import FramesOptions, frames_of_options
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
     from fuzzytree.tactile.plots import FrameAxis
-    from fuzzytree.tactile.presses import SensorFrames
+    from fuzzytree.tactile.presses import Presses
 
     Pressed = npt.NDArray[np.int64]
 
@@ -89,8 +89,8 @@ def command(options: TactileInterpolateOptions) -> int:
         )
     times = _times(options.text)
     check_place(options.output)
-    given = frames_and_sensor(options.frames, options)
-    values = pressed(given.sensor, given.presses.frames)
+    given = frames_of_options(options.frames, options)
+    values = pressed(given.sensor, given.frames)
     number = _chosen(options, values, is_picture=suffix != ARCHIVE)
     if number is not None:
         values = values[number : number + 1]
@@ -109,11 +109,11 @@ def command(options: TactileInterpolateOptions) -> int:
 
 
 def _facts(
-    given: SensorFrames, number: int | None, values: Pressed, times: Sequence[int]
+    given: Presses, number: int | None, values: Pressed, times: Sequence[int]
 ) -> dict[str, Any]:
     from fuzzytree.tactile.sensor import saturated
 
-    raw = given.presses.frames
+    raw = given.frames
     taken = raw if number is None else raw[number : number + 1]
     rows, columns = values.shape[1:]
     return {
@@ -192,7 +192,7 @@ def _archive(values: Pressed, times: Sequence[int]) -> bytes:
 
 def _picture(
     options: TactileInterpolateOptions,
-    given: SensorFrames,
+    given: Presses,
     number: int,
     cells: Pressed,
     times: Sequence[int],
@@ -201,11 +201,11 @@ def _picture(
     from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames
 
-    presses, sensor = given.presses, given.sensor
+    sensor = given.sensor
     images = [cells, *(interpolated(cells, n) for n in times)]
     title = f"{Path(options.frames).name}, frame {number}"
-    if len(presses.label):
-        title = f"{title}, {presses.label_names[presses.label[number]]}"
+    if len(given.label):
+        title = f"{title}, {given.label_names[given.label[number]]}"
     axis = _axis(given, number) if options.is_marked else None
     names = [f"{n} times" if n > 1 else "once" for n in times]
     figure = draw_frames(
@@ -219,12 +219,12 @@ def _picture(
     return drawn(figure, Path(options.output).suffix.lower())
 
 
-def _axis(given: SensorFrames, number: int) -> FrameAxis | None:
+def _axis(given: Presses, number: int) -> FrameAxis | None:
     """Return the centre and axis of a frame; None where nothing presses."""
     from fuzzytree.tactile.plots import FrameAxis
     from fuzzytree.tactile.runtimes.frames import features_of
 
-    frame = given.presses.frames[number]
+    frame = given.frames[number]
     found = features_of(given.sensor, frame, ["x", "y", "angle"])
     if not found.is_pressed[0]:
         return None

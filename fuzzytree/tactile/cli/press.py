@@ -164,8 +164,4 @@ def _content(found: dict[str, Simulated]) -> bytes:
     sizes = [len(made.frames) for made in found.values()]
     label = np.repeat(np.arange(len(found)), sizes)
     sensor = next(iter(found.values())).sensor
-    nobody = np.zeros(0, np.int64)
-    presses = Presses(
-        frames, sensor.full, label, tuple(found), nobody, sensor.threshold
-    )
-    return presses_content(presses)
+    return presses_content(Presses(frames, sensor, label, tuple(found)))

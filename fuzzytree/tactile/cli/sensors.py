@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -11,7 +12,7 @@ from fuzzytree.cli import option, say_rows, wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.model import Model
-    from fuzzytree.tactile.presses import SensorFrames
+    from fuzzytree.tactile.presses import Presses
     from fuzzytree.tactile.sensor import Cells, Sensor
 
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
@@ -22,36 +23,30 @@ data_option = option(
 )
 
 
-class SensorOptions:
-    """The options that say which sensor it is."""
+class FramesOptions:
+    """The options that say whose frames a file holds."""
 
     board: str | None = option("--board", metavar="FILE", help="File of the board.")
-    size: str | None = option(
-        "--sensor", metavar="16x16", help="Rows and columns of the sensor."
-    )
     full: int | None = option(
         "--full",
         metavar="N",
         type=int,
-        help="Reading of a saturated cell; default 255.",
+        help="Reading of a saturated cell; default that of a file of frames, or 255.",
     )
     threshold: int | None = option(
         "--threshold",
         metavar="N",
         type=int,
-        help="Reading above which a cell is pressed; default 0.",
+        help="Reading above which a cell is pressed; default that of a file of "
+        "frames, or 0.",
     )
 
 
-class FramesOptions:
-    """The options that say more of a file of frames than it does itself."""
+class SensorOptions(FramesOptions):
+    """The options that say which sensor it is."""
 
-    board: str | None = option(
-        "--board", metavar="FILE", help="File of the board of the frames."
-    )
-    full: int | None = option("--full", type=int, help="Reading of a saturated cell.")
-    threshold: int | None = option(
-        "--threshold", type=int, help="Reading above which a cell is pressed."
+    size: str | None = option(
+        "--sensor", metavar="16x16", help="Rows and columns of the sensor."
     )
 
 
@@ -65,7 +60,8 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
     from fuzzytree.tactile.sensor import Sensor
 
     if options.board is not None:
-        return _sensor_of_board(options, "--sensor, --full and --threshold")
+        others = (options.size, options.full, options.threshold)
+        return _sensor_of_board(options.board, "--sensor, --full and", others)
     if options.size is None:
         raise click.UsageError(
             "name the board with --board, or its size: --sensor 16x16"
@@ -80,22 +76,19 @@ def sensor_of_options(options: SensorOptions) -> Sensor:
         return Sensor(rows, columns, full, options.threshold or 0)
 
 
-def _sensor_of_board(options: SensorOptions | FramesOptions, others: str) -> Sensor:
+def _sensor_of_board(board: str, names: str, others: Sequence[object]) -> Sensor:
     """Return the sensor of `--board`; refuse options that contradict it."""
     from fuzzytree.tactile.board_file import load_board
 
-    size = options.size if isinstance(options, SensorOptions) else None
-    if any(one is not None for one in (size, options.full, options.threshold)):
-        raise click.UsageError(f"--board sets {others}; choose one of them")
-    return load_board(options.board or "").sensor
+    if any(one is not None for one in others):
+        raise click.UsageError(f"--board sets {names} --threshold; choose one of them")
+    return load_board(board).sensor
 
 
-def frames_and_sensor(
-    path: str, options: FramesOptions, *, label: str = "label", word: str = ""
-) -> SensorFrames:
+def frames_of_options(
+    path: str, options: FramesOptions, *, label: str = "label"
+) -> Presses:
     """Return the frames of an archive or recording, with the sensor they fit.
-
-    All of them are of the class `word`, if it is not empty.
 
     Raises:
         click.UsageError: If a board is named with --full or --threshold.
@@ -103,14 +96,11 @@ def frames_and_sensor(
     """
     from fuzzytree.tactile.presses import read_frames
 
-    sensor = None
-    if options.board is not None:
-        sensor = _sensor_of_board(options, "--full and --threshold")
     full, threshold = options.full, options.threshold
-    found = read_frames(
-        path, sensor=sensor, full=full, threshold=threshold, label=label
-    )
-    return found.of_class(word) if word else found
+    if options.board is None:
+        return read_frames(path, full=full, threshold=threshold, label=label)
+    sensor = _sensor_of_board(options.board, "--full and", (full, threshold))
+    return read_frames(path, label=label).on(sensor, path)
 
 
 def frames_of_file(
@@ -127,11 +117,12 @@ def frames_of_file(
         return None
     from fuzzytree.tactile.presses import read_frames
 
-    presses = read_frames(path, sensor=sensor).presses
-    if presses.threshold not in (0, sensor.threshold):  # 0 where it states none
-        text = f"states the threshold {presses.threshold}, not {sensor.threshold}"
+    found = read_frames(path)
+    stated = found.sensor.threshold
+    if stated not in (0, sensor.threshold):  # 0 where it states none
+        text = f"states the threshold {stated}, not {sensor.threshold}"
         say_rows(("differs", path, text), quiet=quiet)
-    return presses.frames
+    return found.on(sensor, path).frames
 
 
 def frames_model(path: str) -> Model:

@@ -21,7 +21,6 @@ from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
 
 pytestmark = pytest.mark.usefixtures("few_objects")
 
-NONE = np.zeros(0, np.int64)
 SIZE = ["--sensor", "6x4", "--full", "100"]
 Said = pytest.CaptureFixture[str]
 
@@ -34,7 +33,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save(raw_rules(tree), "rules.yaml")
     cells = np.random.default_rng(0).integers(0, 101, (9, 6, 4)).astype(np.uint8)
     cells[0] = 0
-    write_presses("f.npz", Presses(cells, 100, NONE, (), NONE))
+    write_presses("f.npz", Presses(cells, SMALL))
 
 
 def test_a_graph_is_checked_and_written(capsys: Said) -> None:
@@ -56,7 +55,7 @@ def test_frames_that_were_pressed_above_another_threshold_are_reported(
     capsys: Said,
 ) -> None:
     cells = np.ones((1, 6, 4), np.uint8)
-    write_presses("six.npz", Presses(cells, 100, NONE, (), NONE, threshold=6))
+    write_presses("six.npz", Presses(cells, Sensor(6, 4, 100, 6)))
     for threshold in (4, 6):
         frames_of_file("six.npz", Sensor(6, 4, 100, threshold))
     stated = capsys.readouterr().err

@@ -17,8 +17,6 @@ from fuzzytree.tactile.presses import Presses
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from tests.tactile.archives import write_presses
 
-NONE = np.zeros(0, np.int64)
-
 
 @pytest.fixture
 def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
@@ -28,7 +26,8 @@ def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     cells[1, 1:5, 1:5] = 255
     cells[3, 2, 2:5] = 40
     label, subject = np.array([0, 1, 0, 0]), np.array([1, 1, 2, 2])
-    write_presses("f.npz", Presses(cells, 255, label, ("small", "large"), subject))
+    names = ("small", "large")
+    write_presses("f.npz", Presses(cells, Sensor(6, 6), label, names, subject))
     return "f.npz"
 
 
@@ -115,7 +114,7 @@ def test_files_of_one_class_each_become_one_table(
         ("cup=cup.ftr", "f=g.npz"): "f=g.npz: is of another sensor (6 x 6 cells, full "
         "255, threshold 3) than cup=cup.ftr (6 x 6 cells, full 255, threshold 0)\n",
     }
-    write_presses("g.npz", Presses(cells, 255, NONE, (), NONE, threshold=3))
+    write_presses("g.npz", Presses(cells, Sensor(6, 6, 255, 3)))
     for given, text in refused.items():
         assert main(["tactile", "features", *given]) == 2
         assert capsys.readouterr().err == text

@@ -12,6 +12,7 @@ import pytest
 from fuzzytree.cli.program import main
 from fuzzytree.tactile.interpolation import interpolated
 from fuzzytree.tactile.presses import Presses
+from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.archives import write_presses
 
 CELLS = np.zeros((3, 4, 5), np.uint8)
@@ -22,8 +23,7 @@ CELLS[2, 0, 0] = 7
 @pytest.fixture
 def frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.chdir(tmp_path)
-    none = np.zeros(0, np.int64)
-    write_presses("f.npz", Presses(CELLS, 255, none, (), none))
+    write_presses("f.npz", Presses(CELLS, Sensor(4, 5)))
     return "f.npz"
 
 
@@ -79,7 +79,7 @@ def test_the_class_of_a_frame_stands_above_its_picture(
 
     monkeypatch.setattr(module, "draw_frames", remembered)
     label = np.array([1, 0, 1])
-    presses = Presses(CELLS, 255, label, ("bar", "disc"), np.zeros(0, np.int64))
+    presses = Presses(CELLS, Sensor(4, 5), label, ("bar", "disc"))
     write_presses("named.npz", presses)
     assert run("named.npz", "-o", "p.png", "--quiet") == 0
     assert run(frames, "-o", "q.png", "--quiet") == 0
@@ -149,7 +149,6 @@ def test_what_cannot_be_done_is_one_sentence(
 def test_no_frames_make_no_picture(
     frames: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    none = np.zeros(0, np.int64)
-    write_presses("none.npz", Presses(CELLS[:0], 255, none, (), none))
+    write_presses("none.npz", Presses(CELLS[:0], Sensor(4, 5)))
     assert run("none.npz", "-o", "p.svg") == 2
     assert capsys.readouterr().err == "none.npz: holds no frame\n"

@@ -26,7 +26,7 @@ def test_presses_of_all_objects_are_written_with_their_labels(
     found = read_presses(folder / "p.npz")
     assert found.label_names == tuple(OBJECTS)
     assert found.label.tolist() == np.repeat(range(7), 3).tolist()
-    assert (found.full, found.threshold) == (255, PAPER.threshold)
+    assert (found.sensor.full, found.sensor.threshold) == (255, PAPER.threshold)
     assert np.array_equal(found.frames[9:12], press("circle", 3).frames)
     content = (folder / "p.npz").read_bytes()
     digest = hashlib.sha256(content).hexdigest()

@@ -286,7 +286,7 @@ def test_frames_become_arrays_that_other_actions_read(call: Call, place: Path) -
     assert call("tactile", "replay", "a.ftr", "-o", "a.npz", "--quiet")[2] == ""
     assert Path("a.npz").read_bytes() == before
     found = read_presses("a.npz")
-    assert (found.full, found.threshold) == (255, BOARD.sensor.threshold)
+    assert (found.sensor.full, found.sensor.threshold) == (255, BOARD.sensor.threshold)
     assert (found.frames == read_recording("a.ftr").frames).all()
     arrays = np.load("a.npz", allow_pickle=False)
     assert arrays["times"].tolist() == [1.0, 1.25, 1.5, 2.25, 2.5, 3.75]
