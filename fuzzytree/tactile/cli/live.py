@@ -17,6 +17,7 @@ from fuzzytree.cli import (
     flag,
     option,
     quiet_option,
+    say,
     say_rows,
     takes,
     wrong_options,
@@ -111,14 +112,16 @@ class TactileLiveOptions:
 
 @click.command("live", short_help="Recognise what lies on a sensor, on-line.")
 @takes(TactileLiveOptions)
-def command(options: TactileLiveOptions) -> None:
+def command(options: TactileLiveOptions) -> int:
     """Recognise the object on the sensor, frame by frame.
 
     SOURCE is a serial port, a recording, or `simulator`: the paper's objects one after
     another. A terminal shows a picture, the class and the strengths; elsewhere there
-    is a line for each object that is newly recognised. Ctrl-C ends.
+    is a line for each object that is newly recognised. Ctrl-C ends. Exit 1 if
+    --record ended before.
     """
     from fuzzytree.tactile.link.recording import Recorder
+    from fuzzytree.tactile.recognition.frame_sources import Newest, Recorded
     from fuzzytree.tactile.recognition.live import Live
     from fuzzytree.tactile.recognition.recogniser import Recogniser, usual_floor
     from fuzzytree.tactile.report.page import LivePage
@@ -126,6 +129,7 @@ def command(options: TactileLiveOptions) -> None:
     known = frames_model(options.model)
     floor = usual_floor(known) if options.reject is None else options.reject
     labels: Counter[str] = Counter()
+    recorded: Recorded | None = None
     with contextlib.ExitStack() as stack:
         stack.callback(sys.setswitchinterval, sys.getswitchinterval())
         sys.setswitchinterval(SWITCH_S)
@@ -133,10 +137,13 @@ def command(options: TactileLiveOptions) -> None:
             found, used = _opened(options)
             stack.callback(found.close)
             recogniser = Recogniser(known, used.sensor, floor)
-        live = Live(recogniser, found, options.source)
-        recorder = None
         if options.record is not None:
-            recorder = stack.enter_context(Recorder(options.record, used))
+            found = recorded = Recorded(found, Recorder(options.record, used))
+            stack.callback(recorded.end)
+            if options.board is not None:
+                found = Newest(recorded, MOST_WAITING)
+                stack.callback(found.close)
+        live = Live(recogniser, found, options.source)
         if options.page is not None:
             page = LivePage(live, options.page, times=options.times)
             url = stack.enter_context(page).url
@@ -146,11 +153,16 @@ def command(options: TactileLiveOptions) -> None:
                 for answer in live.answers(options.frames):
                     write(answer)
                     labels[_word(answer)] += 1
-                    if recorder is not None:
-                        recorder.write(answer.frame, found.counters)
         except KeyboardInterrupt:
             pass
     _report(live, labels, floor, options)
+    if recorded is None or options.record is None:
+        return 0
+    kept = f"{recorded.written} frames"
+    say_rows(("wrote", options.record, kept), quiet=options.quiet)
+    if recorded.failure:
+        say(recorded.failure)
+    return 1 if recorded.failure else 0
 
 
 def _opened(options: TactileLiveOptions) -> tuple[FrameSource, Board]:
@@ -159,10 +171,6 @@ def _opened(options: TactileLiveOptions) -> tuple[FrameSource, Board]:
 
     source, board, speed = options.source, options.board, options.speed
     is_file = Path(source).is_file()
-    if board is None and source != SIMULATOR and not is_file:
-        raise click.UsageError(
-            f"{source} is no recording; for a port, name its board with --board"
-        )
     if board is not None and (source == SIMULATOR or is_file):
         raise click.UsageError(f"--board is for a port; {source} has its own")
     if source == SIMULATOR:
@@ -171,7 +179,10 @@ def _opened(options: TactileLiveOptions) -> tuple[FrameSource, Board]:
     if is_file:
         replayed = sources.Replayed(source, speed)
         return replayed, replayed.board
-    assert board is not None  # refused above
+    if board is None:
+        raise click.UsageError(
+            f"{source} is no recording; for a port, name its board with --board"
+        )
     return _line(board, options)
 
 
@@ -179,10 +190,9 @@ def _line(board: str, options: TactileLiveOptions) -> tuple[FrameSource, Board]:
     """Open a port, and measure what its board reads when nothing presses."""
     from fuzzytree.tactile import link as lines
     from fuzzytree.tactile.board_file import load_board
-    from fuzzytree.tactile.recognition.frame_sources import FromPort
 
     known, quiet = load_board(board), options.quiet
-    most = MOST_WAITING if options.record is None else lines.MOST_WAITING
+    most = MOST_WAITING if options.record is None else lines.room(known)
     line = lines.open_connection(known, options.source, most_waiting=most)
     try:
         count = known.start.frames
@@ -192,7 +202,7 @@ def _line(board: str, options: TactileLiveOptions) -> tuple[FrameSource, Board]:
         found = lines.start(known, _coming(line, quiet=quiet))
         for remark in found.remarks:
             say_rows(("remark", remark, ""), quiet=quiet)
-        return FromPort(line), found.board
+        return line, found.board
     except BaseException:
         line.close()
         raise
@@ -217,11 +227,15 @@ def _display(
     """Show a picture on a terminal; elsewhere yield what writes new, stable results."""
     from fuzzytree.tactile.cli.screen import Screen, ended_by_signals, look_of
     from fuzzytree.tactile.recognition.live import Hold
-    from fuzzytree.tactile.report.live import line, line_facts
+    from fuzzytree.tactile.report.live import line, line_facts, visible
 
-    hold = Hold(options.hold)
+    hold, said = Hold(options.hold), [""]
 
     def write(answer: LiveResult) -> None:
+        trouble = live.source.trouble
+        if trouble not in ("", said[-1]):
+            said.append(trouble)
+            say(visible(trouble))
         if answer.state is None or not hold((answer.state, answer.code)):
             return
         facts = line_facts(answer)
@@ -263,6 +277,5 @@ def _report(
         *([(word, f"{unknown} frames", floor)] if unknown else []),
         ("counted", counts(view), ""),
         *([("took", timing(view), "")] if view.latency else []),
-        *([("wrote", options.record, "")] if options.record else []),
         quiet=options.quiet,
     )

@@ -30,21 +30,14 @@ from fuzzytree.files import check_place
 from fuzzytree.tactile.cli.signals import stop_signal
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.link import Connection, Started, State
+    from fuzzytree.tactile.link import Connection, Started
     from fuzzytree.tactile.link.recording import Recorder
     from fuzzytree.tactile.sensor import Frame
 
 End = Literal["frames", "seconds", "told", "port"]
 """Enough frames, or seconds; Ctrl-C and its like; or the port went away."""
 
-_SENTENCES: dict[State, str] = {
-    "open": "frames come again",
-    "silent": "no frame comes; waiting",
-    "away": "went away; waiting until it is back",
-}
 _LOOK_S = 0.1
-_WAITING_BYTES = 2**24  # of frames, while the disk is busy
 
 
 class TactileRecordOptions:
@@ -82,7 +75,7 @@ def command(options: TactileRecordOptions) -> int:
     for a port that goes away. Exit 1 if the port does not come back.
     """
     from fuzzytree.tactile.board_file import load_board
-    from fuzzytree.tactile.link import open_connection, start
+    from fuzzytree.tactile.link import open_connection, room, start
     from fuzzytree.tactile.link.recording import Recorder
 
     if options.output == "-":
@@ -94,7 +87,7 @@ def command(options: TactileRecordOptions) -> int:
     with (
         stop_signal() as stop,
         open_connection(
-            known, options.port, wait=not options.no_wait, most_waiting=_waiting(known)
+            known, options.port, wait=not options.no_wait, most_waiting=room(known)
         ) as line,
     ):
         coming = _Coming(line, stop, options)
@@ -102,7 +95,6 @@ def command(options: TactileRecordOptions) -> int:
             ("opened", options.port, f"{known.name}, {known.port.baud} baud"),
             quiet=options.quiet,
         )
-        coming.begin()  # a line that stays silent ends, too
         try:
             started = start(known, coming.frames())
         except PortError:
@@ -143,19 +135,13 @@ class _Coming:
     ) -> None:
         self.count, self.seconds = 0, 0.0
         self._line, self._stop, self._options = line, stop, options
-        self._state: State = "open"
-        self._reconnects = 0
-        self._any = False
+        self._trouble, self._reconnects = "", 0
         self._first_s = 0.0
-        self._begun = self._said = time.monotonic()
-
-    def begin(self) -> None:
-        """Begin to count the seconds, now."""
         self._begun = self._said = time.monotonic()
 
     def record(self, recorder: Recorder) -> End:
         """Write frames until it is enough; return why it ended."""
-        self.begin()
+        self._begun = self._said = time.monotonic()
         limit_s, most = self._options.seconds, self._options.frames
         for frame in self.frames():
             if self.count and limit_s and frame.time - self._first_s >= limit_s:
@@ -183,19 +169,22 @@ class _Coming:
         return self.count
 
     def frames(self) -> Iterator[Frame]:
-        """Yield frames until a signal, the time limit or the end of the connection."""
+        """Yield frames until a signal, the time limit or the end of the connection.
+
+        Raises:
+            PortError: If bytes come that are no frames, before the first frame.
+        """
         limit_s = self._options.seconds
         while not self._stop.is_set():
             frame = None
             try:
                 frame = self._line.take(_LOOK_S)
             except PortError as error:
-                if not self._any:
+                if self._line.state != "ended" and not self._line.counters.frames:
                     raise
                 say(str(error))
             self._tell()
             if frame is not None:
-                self._any = True
                 yield frame
                 continue
             is_late = limit_s and time.monotonic() - self._begun >= limit_s
@@ -204,15 +193,14 @@ class _Coming:
 
     def _tell(self) -> None:
         """Say when the line changes, and each second, on a terminal, how far it is."""
-        state, before = self._line.state, self._state
-        self._state = state
-        counters, quiet = self._line.counters, self._options.quiet
-        text = _SENTENCES.get(state, "") if state != before else ""
+        trouble, quiet = self._line.trouble, self._options.quiet
+        counters, port = self._line.counters, self._line.port
         if counters.reconnects != self._reconnects:
-            self._reconnects = counters.reconnects
-            text = "went away, and is back"
-        if text:
-            say(f"{self._line.port}: {text}", quiet=quiet)
+            self._reconnects, self._trouble = counters.reconnects, trouble
+            say(f"{port}: went away, and is back", quiet=quiet)
+        elif trouble != self._trouble and self._line.state != "ended":
+            self._trouble = trouble
+            say(trouble or f"{port}: frames come again", quiet=quiet)
         now = time.monotonic()
         if now - self._said >= 1 and self.count:
             self._said = now
@@ -220,12 +208,6 @@ class _Coming:
                 text = f"{now - self._begun:.0f} s, {self.count} frames"
                 wrong = f"{counters.damaged} damaged, {counters.dropped} dropped"
                 say(f"{text}, {wrong}", quiet=quiet)
-
-
-def _waiting(board: Board) -> int:
-    """Return how many frames may wait."""
-    size = board.sensor.rows * board.sensor.columns * board.sensor.bits // 8
-    return min(max(_WAITING_BYTES // size, 64), 4096)
 
 
 def _tell_start(started: Started, *, quiet: bool) -> None:

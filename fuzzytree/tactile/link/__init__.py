@@ -72,6 +72,7 @@ State = Literal["open", "silent", "away", "ended"]
 
 MOST_WAITING: Final = 64
 """How many frames wait for a slow reader before the oldest are dropped."""
+_WAITING_BYTES = 2**24  # of frames, while a disk is busy
 _LOOK_S = 0.02  # how often the thread looks up while nothing comes
 _MOST_AT_ONCE = 65536  # bytes
 _PAUSES = (0.002, 0.02)  # seconds, before a port that fails is taken for gone
@@ -138,6 +139,12 @@ def open_connection(
     )
 
 
+def room(board: Board) -> int:
+    """Return how many frames may wait for a disk that is busy."""
+    size = board.sensor.rows * board.sensor.columns * board.sensor.bits // 8
+    return min(max(_WAITING_BYTES // size, MOST_WAITING), 4096)
+
+
 class Started(NamedTuple):
     """A board as it is at rest, and what is odd about it, in sentences."""
 
@@ -190,6 +197,7 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
         self._waiting: deque[Frame] = deque()
         self._most_waiting = most_waiting
         self._error: BaseException | None = None
+        self._contradiction = ""
         self._decoder = decoder_of(board, is_joined=True)
         self._before = Counters()  # what earlier decoders counted, and the line itself
         self._counted = Counters()
@@ -205,6 +213,23 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
         with self._news:
             return Counters(*astuple(self._counted))
 
+    @property
+    def trouble(self) -> str:
+        """A sentence about a line that gives no frames; empty if frames come."""
+        match self.state:
+            case "open":
+                return self._contradiction
+            case "silent":
+                return self._contradiction or "the board is silent"
+            case "away":
+                return f"{self.port} went away; waiting until it is back"
+            case "ended":
+                return f"{self.port} gives no more frames"
+
+    def now(self) -> float:
+        """Return the time since the line was opened, in seconds."""
+        return time.monotonic() - self.opened_at
+
     def take(self, timeout_s: float | None = None) -> Frame | None:
         """Return the next frame, or None if none came in time, or none will come.
 
@@ -212,8 +237,9 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
             timeout_s: How long to wait; without end if None.
 
         Raises:
-            PortError: Once, if bytes come that are no frames of the board, and if the
-                port went away and is not waited for. The line goes on to be read.
+            PortError: If the port went away and is not waited for, and if bytes come
+                that are no frames of the board, and no frame has come before; later
+                that is a trouble.
         """
         with self._news:
             self._news.wait_for(
@@ -308,7 +334,7 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
                 self._waiting.append(Frame(cells, now - self.opened_at, self._number))
                 self._number += 1
             if found:
-                self.state = "open"
+                self.state, self._contradiction = "open", ""
             self._counted = _sum(self._before, self._decoder.counters)
             self._news.notify_all()
 
@@ -320,7 +346,10 @@ class Connection(contextlib.AbstractContextManager["Connection"]):
             is_quiet = self._watch.is_quiet(now)
             self._pass_on(self._decoder.flush() if is_quiet else [], now)
         if text := self._watch.contradiction(now):
-            self._fail(text)
+            if self._number:
+                self._contradiction = f"{self.port}: {text}"
+            else:
+                self._fail(text)
 
     def _fail(self, text: str) -> None:
         with self._news:

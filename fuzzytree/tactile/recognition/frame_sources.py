@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from fuzzytree.errors import PortError
+from fuzzytree.errors import WriteError
 from fuzzytree.files import PathLike
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link import Connection
-from fuzzytree.tactile.link.recording import FrameRecord, RecordingFile
+from fuzzytree.tactile.link.recording import FrameRecord, Recorder, RecordingFile
+from fuzzytree.tactile.recognition.live import FrameSource
 from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import FULL, PAPER, SIDE, press
@@ -116,58 +118,113 @@ class Replayed(Paced):
         self._file.close()
 
 
-class FromPort:
-    """Gives the frames of a line out as they come."""
+class Recorded:
+    """Gives the frames of a source, each after it was written to a recording.
 
-    def __init__(self, line: Connection) -> None:
-        self._line = line
-        self._contradiction = ""
+    A recording that cannot be written ends, and the frames go on.
+
+    Attributes:
+        written: How many frames were written.
+        failure: A sentence about why the recording ended; empty if it goes on.
+    """
+
+    def __init__(self, source: FrameSource, recorder: Recorder) -> None:
+        self._source, self._recorder = source, recorder
+        self.written, self.failure = 0, ""
+        self.now, self.close = source.now, source.close
 
     @property
     def counters(self) -> Counters:
-        """What the line has counted."""
-        return self._line.counters
+        """What the source has counted."""
+        return self._source.counters
 
     @property
     def trouble(self) -> str:
-        """A sentence about a line that gives no frames."""
-        match self._line.state:
-            case "open":
-                return self._contradiction
-            case "silent":
-                return self._contradiction or "the board is silent"
-            case "away":
-                return f"{self._line.port} went away; waiting until it is back"
-            case "ended":
-                return f"{self._line.port} gives no more frames"
+        """Why the recording ended, and why no frame comes."""
+        return "; ".join(filter(None, (self.failure, self._source.trouble)))
 
     def __iter__(self) -> Iterator[Frame]:
-        """Give frames until the line ends.
-
-        Raises:
-            PortError: If bytes come that are no frames of the board, and no frame has
-                come before; later that is a trouble, and it goes on.
-        """
-        while True:
-            try:
-                frame = self._line.take()
-            except PortError as error:
-                if not self._line.counters.frames:
-                    raise
-                self._contradiction = str(error)
-                continue
-            if frame is None:
-                return
-            self._contradiction = ""
+        """Give the frames."""
+        for frame in self._source:
+            if not self.failure:
+                try:
+                    self._recorder.write(frame, self._source.counters)
+                    self.written += 1
+                except WriteError as error:
+                    self.failure = f"the recording ended: {error}"
             yield frame
 
-    def now(self) -> float:
-        """Return the time since the line was opened."""
-        return time.monotonic() - self._line.opened_at
+    def end(self) -> None:
+        """End the recording, once no more frames come."""
+        try:
+            self._recorder.close()
+        except WriteError as error:
+            self.failure = self.failure or f"the recording ended: {error}"
+
+
+class Newest:
+    """Reads a source in a thread of its own, and gives its newest frames.
+
+    Args:
+        source: What is read, however slow the reader of this is.
+        most: How many frames wait before the oldest are dropped.
+    """
+
+    def __init__(self, source: FrameSource, most: int) -> None:
+        self._source = source
+        self._waiting: deque[Frame] = deque(maxlen=most)
+        self._news = threading.Condition()
+        self._dropped, self._is_over = 0, False
+        self._error: BaseException | None = None
+        self.now = source.now
+        self._thread = threading.Thread(target=self._read, name="newest", daemon=True)
+        self._thread.start()
+
+    @property
+    def counters(self) -> Counters:
+        """What the source has counted, with the frames that were dropped here."""
+        found = self._source.counters
+        return replace(found, dropped=found.dropped + self._dropped)
+
+    @property
+    def trouble(self) -> str:
+        """What the source says."""
+        return self._source.trouble
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Give frames until the source ends.
+
+        Raises:
+            PortError: As the source.
+        """
+        while True:
+            with self._news:
+                self._news.wait_for(lambda: self._waiting or self._is_over)
+                if not self._waiting:
+                    break
+                frame = self._waiting.popleft()
+            yield frame
+        if self._error is not None:
+            raise self._error
 
     def close(self) -> None:
-        """Close the port."""
-        self._line.close()
+        """Close the source, and wait until all that came from it was read."""
+        self._source.close()
+        self._thread.join()
+
+    def _read(self) -> None:
+        try:
+            for frame in self._source:
+                with self._news:
+                    self._dropped += len(self._waiting) == self._waiting.maxlen
+                    self._waiting.append(frame)
+                    self._news.notify_all()
+        except BaseException as error:  # raised to the reader
+            self._error = error
+        finally:
+            with self._news:
+                self._is_over = True
+                self._news.notify_all()
 
 
 def simulated(

@@ -113,7 +113,8 @@ class LiveView:
         full: What a cell reads that takes no more.
         cells: What presses, of shape (rows, columns); None before the first frame.
         answer: To the last frame; None before the first.
-        rate: Frames a second, lately; 0 before the second.
+        rate: Answers a second, lately, and of all frames once it is over; 0 before
+            the second.
         latency: None before the first answer.
         counters: Of the source, by name.
         refused: Frames that do not fit.
@@ -155,7 +156,7 @@ class Live:
         self._began = source.now()
         self._latencies = np.zeros(_KEPT)
         self._times = np.zeros(_RATED)
-        self._largest = 0.0
+        self._largest = self._first = self._last = 0.0
         self._counted = _failures(source.counters)
         self._past: tuple[str, float] = "", -_SHOWN_S
 
@@ -228,7 +229,8 @@ class Live:
         """Keep a result for the displays, and notify them."""
         latency, time = answer.latency_s, answer.frame.time
         self._latencies[self._number % _KEPT] = latency
-        self._times[self._number % _RATED] = time
+        self._times[self._number % _RATED] = self._last = time
+        self._first = self._first if self._number else time
         self._largest = max(self._largest, latency)
         counted = _failures(self.source.counters)
         if counted != self._counted:
@@ -240,9 +242,13 @@ class Live:
             self._news.notify_all()
 
     def _rate(self) -> float:
-        known = self._times[: min(self._number, _RATED)]
-        span = float(np.ptp(known)) if len(known) else 0.0
-        return (len(known) - 1) / span if span > 0.0 else 0.0
+        if self._is_over:
+            count, times = self._number, np.array([self._first, self._last])
+        else:
+            times = self._times[: min(self._number, _RATED)]
+            count = len(times)
+        span = float(np.ptp(times)) if count else 0.0
+        return (count - 1) / span if span > 0.0 else 0.0
 
     def _latency(self) -> Latency | None:
         if not self._number:

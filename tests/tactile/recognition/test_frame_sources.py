@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fuzzytree.errors import WriteError
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.link import open_connection
-from fuzzytree.tactile.recognition.frame_sources import FromPort
-from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.link import Connection, open_connection
+from fuzzytree.tactile.link.recording import FrameRecord, Recorder, read_recording
+from fuzzytree.tactile.recognition.frame_sources import Newest, Paced, Recorded
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.device import Wire
 from fuzzytree.tactile.simulation.encoding import encoded
 
@@ -31,8 +33,8 @@ def wire(tmp_path: Path) -> Iterator[Wire]:
 
 
 @pytest.fixture
-def source(wire: Wire, tmp_path: Path) -> Iterator[FromPort]:
-    found = FromPort(open_connection(BOARD, str(tmp_path / "board")))
+def source(wire: Wire, tmp_path: Path) -> Iterator[Connection]:
+    found = open_connection(BOARD, str(tmp_path / "board"))
     yield found
     found.close()
 
@@ -45,7 +47,7 @@ def until(is_so: Callable[[], bool]) -> None:
 
 
 def test_a_line_says_that_it_is_silent_away_and_back(
-    wire: Wire, source: FromPort, tmp_path: Path
+    wire: Wire, source: Connection, tmp_path: Path
 ) -> None:
     frames = iter(source)
     wire.send(FRAME * 2)
@@ -65,14 +67,16 @@ def test_a_line_says_that_it_is_silent_away_and_back(
 
 
 def test_a_line_that_is_closed_gives_no_more_frames(
-    wire: Wire, source: FromPort, tmp_path: Path
+    wire: Wire, source: Connection, tmp_path: Path
 ) -> None:
     source.close()
     assert list(source) == []
     assert source.trouble == f"{tmp_path / 'board'} gives no more frames"
 
 
-def test_the_time_of_a_line_is_that_of_its_frames(wire: Wire, source: FromPort) -> None:
+def test_the_time_of_a_line_is_that_of_its_frames(
+    wire: Wire, source: Connection
+) -> None:
     wire.send(FRAME)
     frame = next(iter(source))
     assert 0.0 <= frame.time <= source.now() < frame.time + 20.0
@@ -80,7 +84,7 @@ def test_the_time_of_a_line_is_that_of_its_frames(wire: Wire, source: FromPort) 
 
 @pytest.mark.heavy
 def test_bytes_that_are_no_frames_end_nothing_once_there_were_frames(
-    wire: Wire, source: FromPort
+    wire: Wire, source: Connection
 ) -> None:
     seen: list[int] = []
 
@@ -103,3 +107,48 @@ def test_bytes_that_are_no_frames_end_nothing_once_there_were_frames(
     source.close()
     reader.join(20.0)
     assert not reader.is_alive()
+
+
+def records(count: int) -> Iterator[FrameRecord]:
+    """Yield frames that come at 1,000 a second."""
+    for number in range(count):
+        cells = np.full((4, 4), number % 256, np.uint8)
+        yield FrameRecord(Frame(cells, number / 1000, number), Counters(frames=number))
+
+
+def test_a_recording_keeps_every_frame_however_slow_its_reader_is(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.ftr"
+    recorded = Recorded(Paced(records(2000), speed=0.0), Recorder(path, BOARD))
+    newest = Newest(recorded, 4)
+    until(lambda: recorded.written == 2000)
+    newest.close()
+    assert [frame.number for frame in newest] == [1996, 1997, 1998, 1999]
+    assert newest.counters.dropped == 1996
+    recorded.end()
+    found = read_recording(path)
+    assert found.numbers.tolist() == [*range(2000)]
+    assert found.counters.dropped == 0
+
+
+def test_a_full_disk_ends_the_recording_and_the_frames_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = Recorder.write
+
+    def full(self: Recorder, frame: Frame, counters: Counters) -> None:
+        if frame.number == 3:
+            raise WriteError("a.ftr: cannot be written: no space left on device")
+        honest(self, frame, counters)
+
+    monkeypatch.setattr(Recorder, "write", full)
+    source = Paced(records(9), speed=0.0)
+    recorded = Recorded(source, Recorder(tmp_path / "a.ftr", BOARD))
+    assert [frame.number for frame in recorded] == [*range(9)]
+    assert recorded.trouble == (
+        "the recording ended: a.ftr: cannot be written: no space left on device"
+    )
+    recorded.end()
+    assert recorded.written == 3
+    assert len(read_recording(tmp_path / "a.ftr").frames) == 3

@@ -58,6 +58,14 @@ def test_every_frame_is_answered_and_the_last_one_is_seen() -> None:
     assert view.is_over
 
 
+def test_the_rate_of_all_is_that_of_the_answers() -> None:
+    frames = [Frame(SMALL, number / 100, number) for number in (0, 1, 2, 3, 50, 51)]
+    source = Paced([FrameRecord(one, Counters(frames=1)) for one in frames], 0.0)
+    found = Live(recogniser(), source, "frames")
+    assert len(list(found.answers())) == 6
+    assert found.view().rate == pytest.approx(5 / 0.51)
+
+
 def test_before_the_first_frame_there_is_nothing_to_see() -> None:
     view = live([]).view()
     assert (view.cells, view.answer, view.latency) == (None, None, None)
