@@ -27,7 +27,7 @@ from fuzzytree.model import (
     kind_of,
     narrowing_refusal,
 )
-from fuzzytree.semantics import from_system
+from fuzzytree.semantics import from_rules, from_system
 
 if TYPE_CHECKING:
     import onnx
@@ -45,9 +45,6 @@ OPSETS = range(12, 27)
 
 IRS = range(4, 14)
 """The file versions that can be written; constants need no input from 4 on."""
-
-READABLE_OPSET = 13
-READABLE_IR = 8
 
 OLDEST: Mapping[str, str] = {
     "rules": "1.15.0",
@@ -100,8 +97,9 @@ def write_onnx(
             of the training table, of which the others are ignored.
         outputs: Which outputs, in this order: unless given, `label` and `rule`, of a
             system `outputs` and `status`.
-        readable: Whether degrees and the winner are functions of the domain
-            `fuzzytree`, for people who look into the file (rules only).
+        readable: Whether each operation is a node, named after what it computes, such
+            as `grip_is_firm` or `rule_1_strength`, for people who look into the file
+            (rules only).
         plain: Whether a tree does without the operators of ai.onnx.ml.
         verify: Whether to load the file in onnxruntime and to compare its predictions.
 
@@ -126,7 +124,7 @@ def write_onnx(
     usual: Sequence[Output] = ("outputs", "status") if is_system else ("label", "rule")
     outputs = usual if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
-    _check_variants(model, opset, ir, readable=readable, plain=plain)
+    _check_variants(model, readable=readable, plain=plain)
     require("onnx", "writing onnx needs")
     if verify:
         require("onnxruntime", "verifying a written onnx file needs")
@@ -185,20 +183,13 @@ def _check_options(
         )
 
 
-def _check_variants(
-    model: Model | FuzzySystem, opset: int, ir: int, *, readable: bool, plain: bool
-) -> None:
+def _check_variants(model: Model | FuzzySystem, *, readable: bool, plain: bool) -> None:
     if readable and isinstance(model, FuzzySystem):
-        raise ValueError("readable is for rules: a system's graph has no functions")
+        raise ValueError("readable is for rules: a system's graph always is")
     if plain and not _is_tree(model):
         raise ValueError("plain is for trees: rules never need ai.onnx.ml")
     if readable and _is_tree(model):
-        raise ValueError("readable is for rules: a tree's graph has no functions")
-    if readable and (opset < READABLE_OPSET or ir < READABLE_IR):
-        raise ValueError(
-            f"readable needs opset {READABLE_OPSET} and ir {READABLE_IR} or later, "
-            f"not opset {opset} and ir {ir}"
-        )
+        raise ValueError("readable is for rules: a tree's graph has no rules")
 
 
 def check_outputs(
@@ -257,7 +248,7 @@ def _model_proto(
     )
 
     numbers = NUMBERS[dtype]
-    graph = OnnxGraph(opset, numbers, is_readable=readable)
+    graph = OnnxGraph(opset, numbers)
     columns = _columns(model, signature)
     degree, rules = np_to_onnx(numbers.degree), _rule_count(model)
     kinds: dict[Output, tuple[int, list[str | int]]] = {
@@ -269,14 +260,16 @@ def _model_proto(
     }
     facts = _facts(model, dtype, columns, outputs)
     if isinstance(model, FuzzySystem):
-        from fuzzytree.exporters.onnx_steps import rows_at_once, system_graph
+        from fuzzytree.exporters.onnx_steps import program_graph, rows_at_once
 
         kinds["outputs"] = (degree, ["rows", len(model.outputs)])
         program = from_system(model, activations="activations" in outputs)
-        system_graph(graph, program, columns, outputs)
+        program_graph(graph, program, columns, outputs)
         facts["chunk"] = str(rows_at_once(model, program))
     else:
-        _fill(graph, model, columns, outputs, plain=plain)
+        if readable:
+            facts["form"] = "readable"
+        _fill(graph, model, columns, outputs, readable=readable, plain=plain)
     return model_proto(
         graph,
         facts["carrier"],
@@ -294,6 +287,7 @@ def _fill(
     columns: Sequence[str],
     outputs: Sequence[Output],
     *,
+    readable: bool,
     plain: bool,
 ) -> None:
     """Add all nodes of a tree or rule base to a graph."""
@@ -305,6 +299,10 @@ def _fill(
         is_plain = plain or needs_plain(model)
         frame = tree_graph(graph, model, columns, is_plain=is_plain)
         onnx_ends.add_tree_outputs(graph, model, frame, outputs)
+    elif readable:
+        from fuzzytree.exporters.onnx_steps import program_graph
+
+        program_graph(graph, from_rules(model), columns, outputs, model.classes)
     else:
         from fuzzytree.exporters.onnx_rules import rules_graph
 

@@ -16,7 +16,7 @@ import msgspec
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write_onnx
-from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
+from fuzzytree.exporters.onnx_graph import TREES
 from fuzzytree.model import FuzzySystem, Model, fingerprint
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
             ir=result.ir_version,
             signature="needed" if columns == list(needed) else "all",
             outputs=json.loads(facts["outputs"]),
-            readable=DOMAIN in versions,
+            readable=facts.get("form") == "readable",
             plain=facts["carrier"] == "tree" and TREES not in versions,
             verify=False,
         )
@@ -115,12 +115,11 @@ def _operators(fresh: onnx.ModelProto, result: onnx.ModelProto) -> Iterator[str]
 
 
 def _nodes(proto: onnx.ModelProto) -> dict[str, list[onnx.NodeProto]]:
-    """Return the nodes of each operator, those of functions too."""
+    """Return the nodes of each operator."""
     nodes: dict[str, list[onnx.NodeProto]] = {}
-    for body in (proto.graph.node, *(function.node for function in proto.functions)):
-        for node in body:
-            name = f"{node.domain}.{node.op_type}" if node.domain else node.op_type
-            nodes.setdefault(name, []).append(node)
+    for node in proto.graph.node:
+        name = f"{node.domain}.{node.op_type}" if node.domain else node.op_type
+        nodes.setdefault(name, []).append(node)
     return nodes
 
 
@@ -220,7 +219,7 @@ class Contents(msgspec.Struct, frozen=True):
 
 
 def contents(content: bytes) -> Contents:
-    """Count what an ONNX file consists of; nodes within functions count once.
+    """Count what an ONNX file consists of.
 
     Example:
         >>> from fuzzytree.exporters.onnx import write_onnx
@@ -232,8 +231,7 @@ def contents(content: bytes) -> Contents:
     import onnx
 
     graph = onnx.load_model_from_string(content)
-    bodies = [graph.graph.node, *(function.node for function in graph.functions)]
-    counted = Counter(node.op_type for body in bodies for node in body)
+    counted = Counter(node.op_type for node in graph.graph.node)
     return Contents(
         len(content), dict(sorted(counted.items())), len(graph.graph.initializer)
     )

@@ -209,12 +209,8 @@ def add_rule_outputs(
 
 def add_winner(graph: OnnxGraph, strengths: str, named: str = "rule") -> str:
     """Add the number of the first of the strongest rules, 0 where none fires."""
-    return graph.block("Winner", _winner, {"strengths": strengths}, named=named)
-
-
-def _winner(graph: OnnxGraph, inputs: Sequence[str], named: str) -> str:
     return graph.node(
-        "ArgMax", inputs[0], axis=0, keepdims=0, select_last_index=0, named=named
+        "ArgMax", strengths, axis=0, keepdims=0, select_last_index=0, named=named
     )
 
 

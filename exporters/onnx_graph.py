@@ -7,7 +7,7 @@ same calls give the same bytes.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -18,14 +18,10 @@ from onnx import helper, numpy_helper
 from fuzzytree.model import Dtype, NameMap
 from fuzzytree.numerics import RealArray, RealKind
 
-DOMAIN = "fuzzytree"
-"""The domain of our own functions, in readable files."""
-
 TREES = "ai.onnx.ml"
 """The domain of `TreeEnsemble`."""
 
 Constant = npt.NDArray[np.generic]
-Body = Callable[["OnnxGraph", Sequence[str], str], str]
 
 _LONGEST_NAME = 60
 
@@ -104,35 +100,27 @@ NUMBERS: dict[Dtype, Precision] = {
 
 
 class OnnxGraph:
-    """Nodes, constants and functions, collected; every result is known by its name.
+    """Nodes and constants, collected; every result is known by its name.
 
     Attributes:
         opset: The version of the operators.
         types: The types in which it computes.
         source: The name of the input values, of shape (rows, columns).
         topic: What the next nodes are part of: their names begin with it.
-        is_readable: Whether `block` makes functions or writes their nodes in place.
         nodes: The nodes so far.
         tensors: The constants so far, equal ones once.
-        functions: The functions so far, by name.
     """
 
     def __init__(
         self,
         opset: int,
         types: Precision = NUMBERS["float64"],
-        *,
-        is_readable: bool = False,
-        in_function: bool = False,
     ) -> None:
         self.opset, self.types = opset, types
         self.source = "inputs"
         self.topic = ""
-        self.is_readable = is_readable
         self.nodes: list[onnx.NodeProto] = []
         self.tensors: list[onnx.TensorProto] = []
-        self.functions: dict[str, onnx.FunctionProto] = {}
-        self._in_function = in_function
         self._known: dict[tuple[str, tuple[int, ...], bytes], str] = {}
         self._taken: dict[str, int] = dict.fromkeys(_ENDS, 1)
         self._results: dict[tuple[str, ...], str] = {}
@@ -190,10 +178,7 @@ class OnnxGraph:
             name = self._fresh(_number_name(value, hint))
             tensor = numpy_helper.from_array(np.ascontiguousarray(value), name)
             tensor = tensor if value.shape else numpy_helper.from_array(value, name)
-            if self._in_function:
-                self.node("Constant", named=name, value=tensor)
-            else:
-                self.tensors.append(tensor)
+            self.tensors.append(tensor)
             self._known[key] = name
             if _is_mistaken(value):
                 self._mistaken[name] = value
@@ -251,40 +236,6 @@ class OnnxGraph:
     def column(self, values: RealArray, hint: str) -> str:
         """Return the name of a constant with one number for each row of a block."""
         return self.constant(values.reshape(-1, 1), hint)
-
-    def block(
-        self,
-        name: str,
-        body: Body,
-        inputs: Mapping[str, str],
-        *,
-        named: str = "",
-    ) -> str:
-        """Add what a body makes of its inputs: in place, or as a call of a function.
-
-        Args:
-            name: The function's name; one name must always mean the same body.
-            body: Adds nodes to the graph that it is given, from the names of its
-                inputs to a result of the given name, and returns that name.
-            inputs: For each parameter of the function, the name of its argument.
-            named: The name of the result; made unless given.
-        """
-        # A constant that needs care is known here, and not behind a parameter.
-        is_plain = self._mistaken.keys().isdisjoint(inputs.values())
-        if not (self.is_readable and is_plain):
-            return body(self, list(inputs.values()), named)
-        if name not in self.functions:
-            inner = OnnxGraph(self.opset, self.types, in_function=True)
-            result = body(inner, list(inputs), "result")
-            self.functions[name] = helper.make_function(
-                DOMAIN,
-                name,
-                list(inputs),
-                [result],
-                inner.nodes,
-                [helper.make_opsetid("", self.opset)],
-            )
-        return self.node(name, *inputs.values(), named=named, domain=DOMAIN)
 
     @contextlib.contextmanager
     def about(self, topic: str) -> Generator[None, None, None]:
@@ -369,13 +320,10 @@ def model_proto(
     imports = [helper.make_opsetid("", graph.opset)]
     if any(node.domain == TREES for node in graph.nodes):
         imports.append(helper.make_opsetid(TREES, 5))
-    if graph.functions:
-        imports.append(helper.make_opsetid(DOMAIN, 1))
     proto = helper.make_model(
         body,
         opset_imports=imports,
         ir_version=ir,
-        functions=list(graph.functions.values()),
         producer_name="fuzzytree",
         producer_version=facts["version"],
         doc_string=text,

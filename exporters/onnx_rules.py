@@ -235,18 +235,10 @@ def _edges(graph: OnnxGraph, values: str, edges: Sequence[EdgePart]) -> str:
     widths = rounded(spans, numbers.axis, is_divisor=True)
     distance = graph.node("Sub", values, graph.column(ends, "ends"))
     position = graph.node("Div", distance, graph.column(widths, "widths"))
-
-    def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
-        beyond, position = inputs
-        zero, one, below_one = (
-            inner.number(value, numbers.degree)
-            for value in (0.0, 1.0, numbers.below_one)
-        )
-        degree = inner.node("Clip", position, zero, below_one)
-        return inner.node("Where", beyond, degree, one, named=named)
-
-    arguments = {"beyond": beyond, "position": _cast(graph, position)}
-    return graph.block("Edges", body, arguments)
+    degree = numbers.degree
+    zero, below_one = graph.number(0.0, degree), graph.number(numbers.below_one, degree)
+    flank = graph.node("Clip", _cast(graph, position), zero, below_one)
+    return graph.node("Where", beyond, flank, one)
 
 
 def _bounds(edges: Sequence[EdgePart], kind: type[RealKind]) -> RealArray:
@@ -285,18 +277,10 @@ def _slopes(
     reaches = rounded([side.reach for side in sides], numbers.degree)
     rooms = [side.reach - 1.0 for side in sides]
     room = rounded(rooms, numbers.degree, is_divisor=True)
-    arguments = {
-        "u": _cast(graph, u),
-        "reach": graph.column(reaches, "reaches"),
-        "room": graph.column(room, "rooms"),
-    }
-    arguments |= _coefficients(graph, [side.curve for side in sides])
-    return graph.block(f"Slopes{len(arguments) - 3}", _slope_body, arguments)
-
-
-def _slope_body(graph: OnnxGraph, inputs: Sequence[str], named: str) -> str:
-    numbers = graph.types
-    u, reach, room, *curve = inputs
+    reach = graph.column(reaches, "reaches")
+    tail = graph.column(room, "rooms")
+    curve = _coefficients(graph, [side.curve for side in sides])
+    u = _cast(graph, u)
     zero, one = (graph.number(value, numbers.degree) for value in (0.0, 1.0))
     u = graph.node("Min", graph.node("Max", u, zero), reach)
     t = graph.node("Min", u, one)
@@ -307,10 +291,10 @@ def _slope_body(graph: OnnxGraph, inputs: Sequence[str], named: str) -> str:
         fall = _horner(graph, curve, v)
     body = graph.node("Sub", one, graph.node("Mul", t, fall))
     body = graph.node("Clip", body, zero, one)
-    w = graph.node("Div", graph.node("Sub", reach, u), room)
+    w = graph.node("Div", graph.node("Sub", reach, u), tail)
     w = graph.node("Clip", w, zero, one)
     square = graph.node("Mul", w, w)
-    return graph.node("Mul", body, graph.node("Mul", square, square), named=named)
+    return graph.node("Mul", body, graph.node("Mul", square, square))
 
 
 def _cast(graph: OnnxGraph, value: str) -> str:
@@ -319,13 +303,13 @@ def _cast(graph: OnnxGraph, value: str) -> str:
     return graph.node("Cast", value, to=np_to_onnx(graph.types.degree))
 
 
-def _coefficients(graph: OnnxGraph, curves: Sequence[Curve]) -> dict[str, str]:
+def _coefficients(graph: OnnxGraph, curves: Sequence[Curve]) -> list[str]:
     """Return the columns of c0, c1, ... of all curves, of the longest's length."""
-    columns: dict[str, str] = {}
+    columns: list[str] = []
     for power in range(max(map(len, curves))):
         values = [curve[power] if power < len(curve) else 0.0 for curve in curves]
-        name = f"c{power}"
-        columns[name] = graph.column(rounded(values, graph.types.degree), name)
+        numbers = rounded(values, graph.types.degree)
+        columns.append(graph.column(numbers, f"c{power}"))
     return columns
 
 
@@ -364,13 +348,10 @@ def _chained(
         is_above = graph.node("Greater", values, graph.column(point, "points"))
         line = far = graph.column(lines.far[behind], "degrees")
         if (lines.near[behind] != lines.far[behind]).any():
-            parts = {
-                "anchor": graph.column(lines.anchor[behind], "anchors"),
-                "width": graph.column(lines.width[behind], "widths"),
-                "near": graph.column(lines.near[behind], "degrees"),
-                "far": far,
-            }
-            line = _line(graph, values, parts)
+            anchor = graph.column(lines.anchor[behind], "anchors")
+            width = graph.column(lines.width[behind], "widths")
+            near = graph.column(lines.near[behind], "degrees")
+            line = _line(graph, values, (anchor, width, near, far))
         degree = graph.node("Where", is_above, line, degree)
     return degree
 
@@ -388,30 +369,26 @@ def _searched(graph: OnnxGraph, values: str, lines: Segments) -> str:
         step = graph.node("Where", is_above, graph.constant(room, "rooms"), zero)
         place = graph.node("Add", place, step)
         room = room >> 1
-    parts = {
-        name: graph.node("Gather", graph.constant(table, name), place, axis=0)
+    parts = [
+        graph.node("Gather", graph.constant(table, name), place, axis=0)
         for name, table in (
             ("anchor", lines.anchor),
             ("width", lines.width),
             ("near", lines.near),
             ("far", lines.far),
         )
-    }
+    ]
     return _line(graph, values, parts)
 
 
-def _line(graph: OnnxGraph, values: str, parts: dict[str, str]) -> str:
+def _line(graph: OnnxGraph, x: str, parts: Sequence[str]) -> str:
     """Add the degree on a line, as in `fuzzytree.numerics.segments`."""
-    return graph.block("Line", _line_body, {"x": values, **parts})
-
-
-def _line_body(graph: OnnxGraph, inputs: Sequence[str], named: str) -> str:
-    x, anchor, width, near, far = inputs
+    anchor, width, near, far = parts
     position = graph.node("Div", graph.node("Sub", x, anchor), width)
     change = graph.node("Mul", _cast(graph, position), graph.node("Sub", far, near))
     degree = graph.node("Add", change, near)
     degree = graph.node("Max", degree, graph.node("Min", near, far))
-    return graph.node("Min", degree, graph.node("Max", near, far), named=named)
+    return graph.node("Min", degree, graph.node("Max", near, far))
 
 
 def _propositions(

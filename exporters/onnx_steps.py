@@ -13,16 +13,29 @@ the same operands, so its bits are the same.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.onnx_graph import OnnxGraph, identifier, np_to_onnx
+from fuzzytree.exporters.onnx_graph import (
+    Constant,
+    OnnxGraph,
+    Precision,
+    identifier,
+    np_to_onnx,
+)
 from fuzzytree.model import FuzzySystem
-from fuzzytree.semantics import Program, Step, StepValue, still_results
+from fuzzytree.numerics import RealArray, RealKind, rounded
+from fuzzytree.semantics import (
+    BELOW_ONE,
+    Program,
+    ResultKind,
+    Step,
+    StepValue,
+    still_results,
+)
 
 NODES: Mapping[str, str] = {
     "add": "Add",
@@ -98,14 +111,15 @@ def add_steps(graph: OnnxGraph, program: Program, columns: Sequence[str]) -> lis
     """
     source = graph.node("Transpose", graph.source, hint="columns", perm=[1, 0])
     still = still_results(program)
+    kinds = _number_types(program, still, graph.types)
     names: dict[int, str] = {}
     links = {one: list[str]() for one in chain_links(program, still, CHAINS)}
 
-    def named(place: int) -> str:
+    def named(place: int, kind: type[RealKind], *, is_divisor: bool = False) -> str:
         known = still[place]
-        if known is not None and place not in names:  # only what a node takes
-            names[place] = number_constant(graph, known)
-        return names[place]
+        if known is None:
+            return names[place]
+        return number_constant(graph, known, kind, is_divisor=is_divisor)
 
     for place, step in enumerate(program.steps):
         if still[place] is not None:
@@ -117,8 +131,12 @@ def add_steps(graph: OnnxGraph, program: Program, columns: Sequence[str]) -> lis
             names[place] = graph.node("Gather", source, row, hint=graph.topic)
             continue
         first = step.arguments[0]
+        moving = [a for a in step.arguments if still[a] is None]
+        kind = next((kinds[a] for a in moving if _is_number(program, a)), kinds[place])
         operands = [
-            named(argument) for argument in step.arguments if argument not in links
+            named(argument, kind, is_divisor=number > 0 and step.operation == "divide")
+            for number, argument in enumerate(step.arguments)
+            if argument not in links
         ]
         operands = links.get(first, []) + operands
         if place in links:
@@ -127,12 +145,55 @@ def add_steps(graph: OnnxGraph, program: Program, columns: Sequence[str]) -> lis
             chain = CHAINS[step.operation]
             names[place] = graph.node(chain, *operands, hint=graph.topic)
         else:
-            names[place] = add_step(graph, step, operands, program)
+            name = add_step(graph, step, operands, program, kind, kinds[place])
+            if step.operation == "divide" and kind is not kinds[place]:
+                name = graph.node("Cast", name, to=np_to_onnx(kinds[place]))
+            names[place] = name
     graph.topic = ""
     places = [result.step for result in program.results]
     return [
-        named(place) if still[place] is None else spread(graph, source, named(place))
+        names[place]
+        if still[place] is None
+        else spread(graph, source, named(place, kinds[place]))
         for place in places
+    ]
+
+
+def _is_number(program: Program, place: int) -> bool:
+    return program.steps[place].kind == "number"
+
+
+def _number_types(
+    program: Program, still: Sequence[StepValue | None], types: Precision
+) -> list[type[RealKind]]:
+    """Return the type of each step's number.
+
+    What is computed with inputs has the type of the axes up to a quotient, which is
+    cast to that of degrees. Numbers that an operation joins are of one type.
+    """
+    if not types.is_mixed:
+        return [types.degree] * len(program.steps)
+    group = list(range(len(program.steps)))
+
+    def first(place: int) -> int:
+        while group[place] != place:
+            place = group[place]
+        return place
+
+    for place, step in enumerate(program.steps):
+        joined = [
+            a for a in step.arguments if still[a] is None and _is_number(program, a)
+        ]
+        if step.kind == "number" and step.operation not in ("divide", "below", "pick"):
+            joined.append(place)
+        for other in joined[1:]:
+            group[first(other)] = first(joined[0])
+    inputs = {
+        first(k) for k, one in enumerate(program.steps) if one.operation == "input"
+    }
+    return [
+        types.axis if first(place) in inputs else types.degree
+        for place in range(len(program.steps))
     ]
 
 
@@ -161,16 +222,38 @@ def chain_links(
     }
 
 
-def number_constant(graph: OnnxGraph, known_value: StepValue) -> str:
+def number_constant(
+    graph: OnnxGraph,
+    known_value: StepValue,
+    kind: type[RealKind] = np.float64,
+    *,
+    is_divisor: bool = False,
+) -> str:
     """Return the name of what no input enters: a number, a truth, or samples."""
-    kind: npt.DTypeLike = np.float64
     first = known_value[0] if isinstance(known_value, list) else known_value
     if isinstance(first, bool):
-        kind = np.bool_
-    value = np.array(known_value, kind)
+        value: Constant = np.array(known_value, np.bool_)
+    elif kind is np.float32 and known_value == BELOW_ONE:
+        value = np.array(graph.types.below_one, kind)
+    else:
+        value = as_kind(known_value, kind, is_divisor=is_divisor)
     if isinstance(known_value, list):
         value = value.reshape(-1, 1)
     return graph.constant(value, "number")
+
+
+def as_kind(
+    values: StepValue | Sequence[float],
+    kind: type[RealKind],
+    *,
+    is_divisor: bool = False,
+) -> RealArray:
+    """Return numbers of a type, finite ones finite and divisors never 0."""
+    exact = np.array(values, np.float64)
+    near = rounded(exact.reshape(-1).tolist(), kind, is_divisor=is_divisor).reshape(
+        exact.shape
+    )
+    return np.where(np.isfinite(exact), near, exact.astype(kind))
 
 
 def spread(graph: OnnxGraph, source: str, name: str) -> str:
@@ -180,23 +263,31 @@ def spread(graph: OnnxGraph, source: str, name: str) -> str:
 
 
 def add_step(
-    graph: OnnxGraph, step: Step, operands: Sequence[str], program: Program
+    graph: OnnxGraph,
+    step: Step,
+    operands: Sequence[str],
+    program: Program,
+    takes: type[RealKind] = np.float64,
+    gives: type[RealKind] = np.float64,
 ) -> str:
-    """Add the nodes of a step, given its arguments, and return the result's name."""
+    """Add the nodes of a step, given its arguments, and return the result's name.
+
+    `takes` and `gives` are the types of its numbers.
+    """
     if step.operation in NODES:
         return graph.node(NODES[step.operation], *operands, hint=graph.topic)
     match step.operation:
         case "is_finite":
             size = graph.node("Abs", *operands)
-            return graph.node("Less", size, graph.number(np.inf))
+            return graph.node("Less", size, graph.number(np.inf, takes))
         case "cosine":
             return _cosine(graph, operands[0])
         case "remainder":
             return graph.node("Mod", *operands, fmod=1)
         case "below":
-            return _below(graph, step, operands[0])
+            return _below(graph, step, operands[0], takes, gives)
         case "pick":
-            return _pick(graph, step, operands[0])
+            return _pick(graph, step, operands[0], takes, gives)
         case "running":
             return graph.node("CumSum", *operands, graph.whole(0))
         case "total":
@@ -221,25 +312,37 @@ def _cosine(graph: OnnxGraph, angle: str) -> str:
     return graph.node("Sub", graph.number(1.0), twice)
 
 
-def _below(graph: OnnxGraph, step: Step, value: str) -> str:
+def _below(
+    graph: OnnxGraph,
+    step: Step,
+    value: str,
+    takes: type[RealKind],
+    gives: type[RealKind],
+) -> str:
     """Count the numbers of a table below a value, one row of truths for each."""
     ranks = [-1] + [1] * (2 if step.samples else 1)
-    table = graph.constant(np.array(step.table).reshape(ranks), "table")
+    table = graph.constant(as_kind(step.table, takes).reshape(ranks), "table")
     is_below = graph.node("Less", table, value)
-    kind = np_to_onnx(np.float64)
-    return graph.total(graph.node("Cast", is_below, to=kind), axis=0, keepdims=0)
+    ones = graph.node("Cast", is_below, to=np_to_onnx(gives))
+    return graph.total(ones, axis=0, keepdims=0)
 
 
-def _pick(graph: OnnxGraph, step: Step, value: str) -> str:
+def _pick(
+    graph: OnnxGraph,
+    step: Step,
+    value: str,
+    takes: type[RealKind],
+    gives: type[RealKind],
+) -> str:
     """Take the entry at a place; places outside, and NaN, take the first."""
-    inside = graph.node("LessOrEqual", graph.number(0.0), value)
-    last = float(len(step.table) - 1)
-    inside = graph.node(
-        "And", inside, graph.node("LessOrEqual", value, graph.number(last))
-    )
-    place = graph.node("Where", inside, value, graph.number(0.0))
+    zero = graph.number(0.0, takes)
+    last = graph.number(float(len(step.table) - 1), takes)
+    inside = graph.node("LessOrEqual", zero, value)
+    inside = graph.node("And", inside, graph.node("LessOrEqual", value, last))
+    place = graph.node("Where", inside, value, zero)
     place = graph.node("Cast", place, to=np_to_onnx(np.int64))
-    return graph.node("Gather", graph.constant(np.array(step.table), "table"), place)
+    table = graph.constant(as_kind(step.table, gives), "table")
+    return graph.node("Gather", table, place)
 
 
 def _total(graph: OnnxGraph, samples: str, count: int) -> str:
@@ -336,6 +439,13 @@ class Blocks:
                 self._names[place] = self.graph.node("Gather", block, at, axis=0)
         return self._names[place]
 
+    def flat(self, place: int) -> str:
+        """Return the name of a result, of shape (rows,)."""
+        name = self.single(place)
+        if self._still[place] is not None:
+            name = spread(self.graph, self._source, name)
+        return name
+
     def stacked(self, places: Sequence[int]) -> str:
         """Return results as one block, of shape (places, rows) or (places, 1)."""
         if all(self._still[place] is not None for place in places):
@@ -368,9 +478,7 @@ class Blocks:
     def _home(self, place: int) -> tuple[str, int]:
         """Return the block in which a result is a row, and which row."""
         if place not in self._rows:
-            name = self.single(place)
-            if self._still[place] is not None:
-                name = spread(self.graph, self._source, name)
+            name = self.flat(place)
             axis = self.graph.numbers([0], "axes")
             if self.graph.opset >= 13:
                 block = self.graph.node("Unsqueeze", name, axis)
@@ -471,13 +579,22 @@ class Blocks:
         return identifier(" ".join(words)) if words else ""
 
 
-def system_graph(
+_BLOCKS: Mapping[str, ResultKind] = {
+    "outputs": "output",
+    "activations": "activation",
+    "strengths": "strength",
+}
+_WHOLE: Mapping[str, ResultKind] = {"status": "status", "rule": "rule"}
+
+
+def program_graph(
     graph: OnnxGraph,
     program: Program,
     columns: Sequence[str],
     outputs: Container[str],
+    classes: Sequence[str] = (),
 ) -> None:
-    """Add the program of a system and the outputs that are wanted.
+    """Add the program of a system, or of rules, and the outputs that are wanted.
 
     Raises:
         LossError: If it needs a function that onnxruntime lacks in double.
@@ -488,26 +605,27 @@ def system_graph(
             f"cannot write {program.name} as onnx: a formula needs "
             f"{', '.join(missing)}, which onnxruntime computes in float32 only"
         )
-    blocks_of = {
-        "outputs": program.of("output"),
-        "activations": program.of("activation"),
-    }
-    wanted = {name: places for name, places in blocks_of.items() if name in outputs}
-    (status,) = program.of("status")
-    if is_wide(program):
+    if is_wide(program) and graph.types.degree is np.float64:
         blocks = Blocks(graph, program, columns)
-        for name, places in wanted.items():
-            block = blocks.rows(places)
-            graph.node("Transpose", block, perm=[1, 0], named=name)
-        last = blocks.single(status) if "status" in outputs else ""
+        single: Callable[[int], str] = blocks.flat
     else:
         names = add_steps(graph, program, columns)
-        known = {one.step: n for one, n in zip(program.results, names, strict=True)}
-        for name, places in wanted.items():
-            _columns(graph, [known[place] for place in places], name)
-        last = known[status]
-    if "status" in outputs:
-        graph.node("Cast", last, named="status", to=np_to_onnx("int64"))
+        places = (one.step for one in program.results)
+        single, blocks = dict(zip(places, names, strict=True)).__getitem__, None
+    for name, kind in _BLOCKS.items():
+        if name in outputs and blocks is not None:
+            block = blocks.rows(program.of(kind))
+            graph.node("Transpose", block, perm=[1, 0], named=name)
+        elif name in outputs:
+            _columns(graph, [single(place) for place in program.of(kind)], name)
+    whole = np_to_onnx(np.int64)
+    for name, kind in _WHOLE.items():
+        if name in outputs:
+            graph.node("Cast", single(program.of(kind)[0]), named=name, to=whole)
+    if "label" in outputs:
+        place = graph.node("Cast", single(program.of("class")[0]), to=whole)
+        table = graph.texts([*classes, ""], "labels")  # -1 is the last of them
+        graph.node("Gather", table, place, axis=0, named="label")
 
 
 def _columns(graph: OnnxGraph, names: Sequence[str], named: str) -> None:

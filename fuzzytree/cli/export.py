@@ -63,7 +63,7 @@ class ExportOptions:
         help="onnx: outputs of the graph, of label,rule,status,strengths.",
     )
     readable: bool = flag(
-        "--readable", help="onnx: write functions with readable names."
+        "--readable", help="onnx: write a node with a name for each step of rules."
     )
     plain: bool = flag(
         "--plain", help="onnx: write a tree without operators of ai.onnx.ml."

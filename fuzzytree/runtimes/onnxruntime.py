@@ -150,8 +150,8 @@ def prepare(
 ) -> Prepared:
     """Write a model as ONNX, in memory, and open it.
 
-    A `readable` graph of rules has functions, for people; a `plain` one of a tree has
-    no tree operators. One call uses at most `threads` threads.
+    A `readable` graph of rules has a node for each operation, for people; a `plain` one
+    of a tree has no tree operators. One call uses at most `threads` threads.
 
     Raises:
         LossError: If the number type or the kind of graph cannot hold the model.

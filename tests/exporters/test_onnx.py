@@ -114,6 +114,15 @@ def golden_text(content: bytes) -> str:
     return onnx.printer.to_text(proto) + "\n"
 
 
+def test_a_readable_graph_bears_the_names_of_propositions_and_rules() -> None:
+    for dtype in ("float64", "mixed", "float32"):
+        content = write_onnx(
+            lr_rules(), readable=True, dtype=dtype, opset=12, ir=7, allow_loss=True
+        ).content
+        names = {one.name for one in onnx.load_model_from_string(content).graph.node}
+        assert {"slip", "slip_is_low", "rule_1_strength", "winner_where"} <= names
+
+
 @pytest.mark.parametrize("case", ["tree", "rules", "readable"])
 def test_the_text_form_of_a_small_model_is_the_golden_one(case: str) -> None:
     text = golden_text(golden_models()[case])
@@ -326,10 +335,7 @@ def test_wrong_options_are_refused_by_name() -> None:
         "plain is for trees: rules never need ai.onnx.ml"
     )
     assert refused(tree, readable=True) == (
-        "readable is for rules: a tree's graph has no functions"
-    )
-    assert refused(rules, readable=True, opset=12) == (
-        "readable needs opset 13 and ir 8 or later, not opset 12 and ir 8"
+        "readable is for rules: a tree's graph has no rules"
     )
     assert refused(rules, signature="all") == (
         "'slips' does not know the columns of its training table, "
@@ -419,10 +425,10 @@ def test_thresholds_are_rounded_to_the_nearest_float32() -> None:
 def test_a_file_with_another_answer_is_not_written(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def wrong(sheet: OnnxGraph, inputs: list[str], named: str) -> str:
-        return sheet.node("ArgMin", inputs[0], axis=0, keepdims=0, named=named)
+    def wrong(sheet: OnnxGraph, strengths: str, named: str = "rule") -> str:
+        return sheet.node("ArgMin", strengths, axis=0, keepdims=0, named=named)
 
-    monkeypatch.setattr(onnx_ends, "_winner", wrong)
+    monkeypatch.setattr(onnx_ends, "add_winner", wrong)
     with pytest.raises(DisagreementError) as caught:
         write_onnx(lr_rules())
     assert str(caught.value) == (

@@ -154,7 +154,7 @@ def test_a_file_without_outputs_cannot_be_run() -> None:
         ({"signature": "all"}, "signature: there is needed, not 'all'"),
         (
             {"readable": True},
-            "readable is for rules: a system's graph has no functions",
+            "readable is for rules: a system's graph always is",
         ),
         ({"plain": True}, "plain is for trees"),
     ],

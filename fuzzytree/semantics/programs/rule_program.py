@@ -5,7 +5,15 @@ A tree is no program, for a row passes few of its nodes; the values of its nodes
 
 from __future__ import annotations
 
-from fuzzytree.model import FuzzyTree, Proposition, Rule, RuleBase, Variable, shapes_of
+from fuzzytree.model import (
+    FuzzyTree,
+    Proposition,
+    Rule,
+    RuleBase,
+    Variable,
+    proposition_text,
+    shapes_of,
+)
 from fuzzytree.semantics.programs.steps import Maker, Place, Program, result_of
 
 DECIDED, TIE, UNCOVERED, MISSING = 0.0, 1.0, 2.0, 3.0
@@ -31,13 +39,23 @@ def from_rules(rules: RuleBase) -> Program:
         True
     """
     make = Maker()
-    axes = {variable.name: axis(make, variable) for variable in rules.variables}
-    known = known_row(make, list(axes.values()))
+    axes: dict[str, Place] = {}
+    for one in rules.variables:
+        with make.topic(one.name):
+            axes[one.name] = make.titled(axis(make, one), one.name)
+    with make.topic("inputs"):
+        known = known_row(make, list(axes.values()))
     strengths = _strengths(make, rules, axes)
-    best = make.chain("maximum", strengths)
-    hits = [make.equal(strength, best) for strength in strengths]
-    rule = _first(make, hits, list(range(1, len(hits) + 1)))
-    last = _first(make, hits[::-1], list(range(len(hits), 0, -1)))
+    with make.topic("highest strength"):
+        best = make.chain("maximum", strengths)
+    hits: list[Place] = []
+    for number, strength in enumerate(strengths, 1):
+        with make.topic(f"rule {number}"):
+            hits.append(make.equal(strength, best))
+    with make.topic("winner"):
+        rule = _first(make, hits, list(range(1, len(hits) + 1)))
+    with make.topic("last winner"):
+        last = _first(make, hits[::-1], list(range(len(hits), 0, -1)))
     zero = make.constant(0.0)
     is_none = make.equal(best, zero)
     rule = make.where(is_none, zero, rule)
@@ -92,22 +110,27 @@ def _strengths(make: Maker, rules: RuleBase, axes: dict[str, Place]) -> list[Pla
             x = axes[proposition.variable]
             terms: list[Place] = []
             for term in proposition.terms:
-                degree = shapes[proposition.variable, term].degree(make, x)
-                terms.append(make.titled(degree, f"{proposition.variable} is {term}"))
-            highest = make.chain("maximum", terms)
-            if proposition.negated:
-                highest = 1.0 - highest
+                title = f"{proposition.variable} is {term}"
+                with make.topic(title):
+                    degree = shapes[proposition.variable, term].degree(make, x)
+                    terms.append(make.titled(degree, title))
+            with make.topic(proposition_text(proposition)):
+                highest = make.chain("maximum", terms)
+                if proposition.negated:
+                    highest = 1.0 - highest
             degrees[proposition] = highest
         return degrees[proposition]
 
     is_product = rules.semantics.conjunction == "product"
     join = "multiply" if is_product else "minimum"
 
-    def strength(rule: Rule) -> Place:
+    def strength(number: int, rule: Rule) -> Place:
         parts = [proposition_degree(proposition) for proposition in rule.when]
-        return make.chain(join, parts) if parts else make.constant(1.0)
+        with make.topic(f"rule {number}"):
+            whole = make.chain(join, parts) if parts else make.constant(1.0)
+            return make.titled(whole, f"rule {number} strength")
 
-    return [strength(rule) for rule in rules.rules]
+    return [strength(number, rule) for number, rule in enumerate(rules.rules, 1)]
 
 
 def _first(make: Maker, hits: list[Place], numbers: list[int]) -> Place:
