@@ -18,14 +18,8 @@ from fuzzytree.benchmarking.records import (
     Question,
 )
 from fuzzytree.model import FloatArray, Model, RuleBase
-from fuzzytree.numerics import (
-    Decisions,
-    ErrorMeasure,
-    decide,
-    error_against_exact,
-    strength_errors,
-)
-from fuzzytree.semantics import landmarks, probe_values
+from fuzzytree.numerics import Decisions, decide, strength_errors
+from fuzzytree.semantics import Status, landmarks, probe_values
 
 MOST_ROWS = 2_000
 """Rows on which errors are observed, of those that are timed."""
@@ -52,7 +46,7 @@ class CandidateJudgement(NamedTuple):
     row_ns: float
 
 
-class _Sample(msgspec.Struct, frozen=True):
+class ExactSample(msgspec.Struct, frozen=True):
     """Rows to judge on, and the exact answers to them."""
 
     model: Model
@@ -69,7 +63,7 @@ class CandidateJudge:
         self.forms, self.clock = forms, clock
         most = min(map(_most_rows, forms.values()))
         self.values = np.ascontiguousarray(values[:, :most])
-        self.samples: dict[Question, tuple[_Sample, _Sample]] = {}
+        self.samples: dict[Question, tuple[ExactSample, ExactSample]] = {}
 
     def judged(
         self, candidate: Candidate, loaded: LoadedCandidate
@@ -95,9 +89,10 @@ class CandidateJudge:
         certified = certify() if certify else None
         bound, origin = certified or (None, "nothing is certified")
         beyond = "the bound covers the rows, and these may lie beyond them"
+        on_rows, on_edges = _part(rows, most), _part(edges, most)
         return CandidateJudgement(
-            _error(loaded, _part(rows, most), bound, origin),
-            _error(loaded, _part(edges, most), None, beyond),
+            measured_error(loaded.answer(on_rows.values), on_rows, bound, origin),
+            measured_error(loaded.answer(on_edges.values), on_edges, None, beyond),
             self._row_ns(loaded, row_ns),
         )
 
@@ -109,14 +104,14 @@ class CandidateJudge:
         call()
         return min(row_ns, max(self.clock.wall() - start, 1) / count)
 
-    def _samples(self, question: Question) -> tuple[_Sample, _Sample]:
+    def _samples(self, question: Question) -> tuple[ExactSample, ExactSample]:
         """Return the rows of the study, and rows aimed at the model's edges."""
         if question not in self.samples:
             model = self.forms[question]
             edges = _edges(model)
             self.samples[question] = (
-                _Sample(model, self.values, decide(model, self.values)),
-                _Sample(model, edges, decide(model, edges)),
+                ExactSample(model, self.values, decide(model, self.values)),
+                ExactSample(model, edges, decide(model, edges)),
             )
         return self.samples[question]
 
@@ -125,41 +120,52 @@ def _edges(model: Model) -> FloatArray:
     return probe_values(model, min(MOST_PROBES, _most_rows(model)))
 
 
-def _error(
-    loaded: LoadedCandidate, sample: _Sample, bound: float | None, origin: str
+def measured_error(
+    output: CandidateOutput, sample: ExactSample, bound: float | None, origin: str
 ) -> Error:
-    output = loaded.answer(sample.values)
-    facts = error_against_exact(
-        sample.model,
-        sample.values,
-        output.labels,
-        output.strengths,
-        bound=bound,
-        origin=origin,
-        exact=sample.exact,
+    """Return how far the answers to a sample are from the exact ones."""
+    model, truth = sample.model, sample.exact
+    flips = output.labels != truth.label
+    largest = band = margin = None
+    if isinstance(model, RuleBase):
+        if output.strengths is not None:
+            errors, _ = strength_errors(model, sample.values, output.strengths)
+            largest = float(errors.max(initial=0.0))
+        if bound is not None:
+            band = float((truth.margin <= 2.0 * bound).mean()) if flips.size else 0.0
+        if flips.any():
+            margin = float(truth.margin_high[flips].max())
+    lost, gained = _cover(output, sample)
+    return Error(
+        int(flips.size),
+        largest,
+        bound,
+        origin,
+        int(flips.sum()),
+        margin,
+        band,
+        lost,
+        gained,
     )
-    error = Error(**facts._asdict())
-    return msgspec.structs.replace(error, largest=_largest(facts, output, sample))
 
 
-def _largest(
-    facts: ErrorMeasure, output: CandidateOutput, sample: _Sample
-) -> float | None:
-    """Return the largest error, not above the bound where only the oracle is in doubt.
+def _cover(output: CandidateOutput, sample: ExactSample) -> tuple[int, int]:
+    """Return how many rows lost and gained cover, as far as the answers show it."""
+    model, truth, strengths = sample.model, sample.exact, output.strengths
+    weighed = truth.status != Status.MISSING
+    if strengths is not None:
+        weighed = weighed & ~np.isnan(strengths).any(axis=0)
+        is_covered = (strengths > 0.0).any(axis=0)
+    elif isinstance(model, RuleBase) and model.semantics.uncovered is None:
+        is_covered = output.labels >= 0
+    else:
+        return 0, 0
+    should = truth.rule > 0
+    lost, gained = should & ~is_covered, is_covered & ~should
+    return int((lost & weighed).sum()), int((gained & weighed).sum())
 
-    What was observed is an upper end. Where it is above the bound and the lower end is
-    not, the bound is the better upper end.
-    """
-    largest, bound = facts.largest, facts.bound
-    if largest is None or bound is None or largest <= bound:
-        return largest
-    if not isinstance(sample.model, RuleBase) or output.strengths is None:
-        return largest
-    least, _ = strength_errors(sample.model, sample.values, output.strengths)
-    return largest if least.max() > bound else bound
 
-
-def _part(sample: _Sample, most: int) -> _Sample:
+def _part(sample: ExactSample, most: int) -> ExactSample:
     """Return at most so many rows, in even steps."""
     step = -(-sample.values.shape[1] // most)
     if step <= 1:
@@ -171,7 +177,7 @@ def _part(sample: _Sample, most: int) -> _Sample:
         if isinstance(array, np.ndarray)
     }
     exact = msgspec.structs.replace(sample.exact, **arrays)
-    return _Sample(sample.model, values, exact)
+    return ExactSample(sample.model, values, exact)
 
 
 def _most_rows(model: Model) -> int:

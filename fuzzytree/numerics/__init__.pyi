@@ -33,9 +33,7 @@ from .narrowing import RealKind as RealKind
 from .narrowing import losses as losses
 from .narrowing import rounded as rounded
 from .oracle import Decisions as Decisions
-from .oracle import ErrorMeasure as ErrorMeasure
 from .oracle import decide as decide
-from .oracle import error_against_exact as error_against_exact
 from .oracle import strength_errors as strength_errors
 from .placing import points_of as points_of
 from .pointwise import Lines as Lines

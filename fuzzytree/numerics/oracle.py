@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -62,10 +61,8 @@ __all__ = [
     "TIE",
     "UNCOVERED",
     "Decisions",
-    "ErrorMeasure",
     "Exact",
     "decide",
-    "error_against_exact",
     "exact_answer",
     "exact_axis",
     "exact_degree",
@@ -496,104 +493,3 @@ def _errors(
     least[missing | enclosed.missing] = most[missing | enclosed.missing] = 0.0
     least[is_one_sided] = most[is_one_sided] = 1.0
     return least, most
-
-
-class ErrorMeasure(NamedTuple):
-    """How far answers are from the exact ones.
-
-    Attributes:
-        rows: Rows on which it was observed.
-        largest: The largest difference of a strength from the exact one that is
-            certain: the largest lower end of `strength_errors`. None where no strengths
-            are known.
-        bound: The certified bound of it; None where there is none.
-        origin: Where the bound comes from, or why there is none.
-        flips: Rows whose class differs from the exact one.
-        largest_flip_margin: The largest exact margin of such a row, rounded up; None
-            without a flip, and for a tree, which weighs nothing.
-        in_band: Share of rows whose exact margin is at most twice the bound, so that
-            the bound leaves their class open; None without a bound.
-        cover_lost: Rows that a rule covers exactly and none in the answers.
-        cover_gained: Rows that none covers exactly and one in the answers.
-    """
-
-    rows: int
-    largest: float | None
-    bound: float | None
-    origin: str
-    flips: int
-    largest_flip_margin: float | None
-    in_band: float | None
-    cover_lost: int
-    cover_gained: int
-
-
-def error_against_exact(
-    model: Model,
-    values: FloatArray,
-    labels: IntArray,
-    strengths: FloatArray | None = None,
-    *,
-    bound: float | None = None,
-    origin: str = "",
-    exact: Decisions | None = None,
-) -> ErrorMeasure:
-    """Return how far answers to some rows are from the exact ones.
-
-    Args:
-        model: What was to be computed.
-        values: Shape (inputs, rows).
-        labels: The class number of each answer; -1 for no class.
-        strengths: Shape (rules, rows), if they are known.
-        bound: The certified largest error of a strength, if there is one.
-        origin: Where the bound comes from.
-        exact: The exact answers to the same rows, if they are known already.
-
-    Example:
-        >>> from fuzzytree.semantics.lowering import rules_from_tree
-        >>> from fuzzytree.testing import random_tree
-        >>> rules, values = rules_from_tree(random_tree(0)), np.zeros((4, 2))
-        >>> labels = decide(rules, values).label
-        >>> found = error_against_exact(rules, values, labels, bound=1e-6)
-        >>> found.flips, found.in_band
-        (0, 0.0)
-    """
-    truth = decide(model, values, with_strengths=False) if exact is None else exact
-    flips = labels != truth.label
-    is_rules = isinstance(model, RuleBase)
-    largest = None
-    if isinstance(model, RuleBase) and strengths is not None:
-        errors = strength_errors(model, values, strengths)[0]
-        largest = float(errors.max(initial=0.0))
-    band = None
-    if bound is not None and is_rules:
-        band = float((truth.margin <= 2.0 * bound).mean()) if flips.size else 0.0
-    lost, gained = _cover(model, labels, strengths, truth)
-    return ErrorMeasure(
-        int(flips.size),
-        largest,
-        bound,
-        origin,
-        int(flips.sum()),
-        float(truth.margin_high[flips].max()) if flips.any() and is_rules else None,
-        band,
-        lost,
-        gained,
-    )
-
-
-def _cover(
-    model: Model, labels: IntArray, strengths: FloatArray | None, truth: Decisions
-) -> tuple[int, int]:
-    """Return how many rows lost and gained cover, as far as the predictions show it."""
-    weighed = truth.status != MISSING
-    if strengths is not None:
-        weighed = weighed & ~np.isnan(strengths).any(axis=0)
-        is_covered = (strengths > 0.0).any(axis=0)
-    elif isinstance(model, RuleBase) and model.semantics.uncovered is None:
-        is_covered = labels >= 0
-    else:
-        return 0, 0
-    should = truth.rule > 0
-    lost, gained = should & ~is_covered, is_covered & ~should
-    return int((lost & weighed).sum()), int((gained & weighed).sum())

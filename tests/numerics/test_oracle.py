@@ -37,7 +37,6 @@ from fuzzytree.numerics.oracle import (
     UNCOVERED,
     Decisions,
     decide,
-    error_against_exact,
     exact_answer,
     strength_errors,
 )
@@ -361,43 +360,6 @@ def test_strengths_of_another_shape_are_refused() -> None:
     text = rf"^strengths must have shape \({len(rules.rules)}, 2\), not \(1, 2\)$"
     with pytest.raises(ValueError, match=text):
         strength_errors(rules, values, np.zeros((1, 2)))
-
-
-def test_the_facts_of_answers_count_flips_band_and_cover() -> None:
-    # x is low: 1, 2/3, 1/3, 0; the answers forget the third and invent the fourth.
-    rules = RuleBase(
-        "one",
-        ("a",),
-        (Variable("x", (LOW,)),),
-        (Rule((Proposition("x", ("low",)),), "a"),),
-    )
-    values = np.array([[0.0, 2.0, 3.0, 4.0]])
-    given = np.array([[1.0, 0.75, 0.0, 0.125]])
-    labels = np.array([0, 0, -1, 0])
-    found = error_against_exact(
-        rules, values, labels, given, bound=0.2, origin="a guess"
-    )
-    assert found._asdict() == {
-        "rows": 4,
-        "largest": pytest.approx(1 / 3),
-        "bound": 0.2,
-        "origin": "a guess",
-        "flips": 2,
-        "largest_flip_margin": pytest.approx(1 / 3),
-        "in_band": 0.5,
-        "cover_lost": 1,
-        "cover_gained": 1,
-    }
-
-
-def test_a_tree_has_flips_and_no_margins() -> None:
-    tree = random_tree(0)
-    values = values_of(tree, 60)
-    labels = decide(tree, values).label
-    labels[0] = 1 if labels[0] == 0 else 0
-    found = error_against_exact(tree, values, labels)
-    assert (found.flips, found.largest_flip_margin, found.in_band) == (1, None, None)
-    assert found.largest is None
 
 
 @pytest.mark.parametrize("seed", range(6))
