@@ -8,8 +8,7 @@ The operations on one number, and their order, are those of
   slope of |x - m| if its sides are equal. Points are one *polyline*.
 - `max(min(p, CAP), core)` with a core of 0 or 1 is both `min(max(p, 0), CAP)` off the
   plateau and 1 on it.
-- The line between points on which a value lies is found by comparing the value with
-  every point (`counted`, best for few points) or by halving (`halved`).
+- The line between points on which a value lies is found by halving (`place_of`).
 - (-d) / s is d / (-s); x - x and similar signs of zero are compared equal.
 """
 
@@ -45,8 +44,6 @@ BLOCK = 1 << 15
 
 _LARGE_BLOCK = 1 << 17  # numbers: of points, which go through in small blocks
 _SMALL_BLOCK = 1 << 14  # numbers: scratch that the allocator keeps at hand
-_MANY = 16  # points from which a line is found faster by halving
-_TINY = 1 << 9  # numbers up to which it is faster anyway
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +176,7 @@ def _kind(atom: Atom) -> tuple[int, int]:
         case SetSide():
             return 3, len(atom.side.curve)
         case Polyline():
-            return (4 if len(atom.points.values) < _MANY else 5), 0
+            return 4, 0
 
 
 def _column(values: Sequence[float], kind: Real) -> Reals:
@@ -297,14 +294,13 @@ def _polylines(
     shapes = [atom.points for atom in atoms]
     lines = segments_of(shapes, numbers.axis, numbers.degree)
     shape = np.arange(len(atoms)).reshape(-1, 1)
-    is_few = len(shapes[0].values) < _MANY
 
     def run(x: Reals, out: Reals, _: Reals) -> None:
         size = max(_SMALL_BLOCK // max(x.shape[1], 1), 1)
         for start in range(0, len(x), size):
             part, which = x[start : start + size], shape[start : start + size]
-            find = counted if is_few and part.size > _TINY else halved
-            out[start : start + size] = join(lines, find(lines, which, part), part)
+            place = place_of(lines, which, part)
+            out[start : start + size] = join(lines, place, part)
 
     return run
 
@@ -347,25 +343,7 @@ def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
     return result
 
 
-def counted(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
-    """Return the place of the line on which each value lies, by comparisons.
-
-    `shape` has numbers of shapes of less than 128 points and broadcasts to the values.
-    """
-    first = lines.first.take(shape)
-    last = 2 * lines.room.take(shape) - 1  # a line without a further point
-    below = np.zeros(x.shape, np.int8)
-    is_above = np.empty(x.shape, np.bool_)
-    for number in range(int(last.max(initial=0))):
-        limit = lines.values.take(first + np.minimum(number, last))
-        if np.isinf(limit).all():
-            break
-        np.greater(x, limit, out=is_above)
-        below += is_above.view(np.int8)
-    return first + below
-
-
-def halved(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
+def place_of(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
     """Return the place of the line on which each value lies, by halving.
 
     `shape` has numbers of shapes and broadcasts to the values.
