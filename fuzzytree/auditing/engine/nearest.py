@@ -150,27 +150,6 @@ def nearest(
     return search.run(within, near)
 
 
-def nearest_box(
-    domain: Domain, centre: Mapping[str, Fraction], targets: Iterable[Domain]
-) -> Nearest:
-    """Return how far the nearest of some boxes of the inputs is, exactly.
-
-    The lower bound is the distance itself, and the point is a little farther.
-
-    `domain`: in whose widths distance is measured.
-
-    Example:
-        >>> whole = Domain((DomainSide("x", 0.0, 4.0),))
-        >>> right = Domain((DomainSide("x", 2.0, 4.0, is_open=True),))
-        >>> result = nearest_box(whole, {"x": Fraction(1)}, [right])
-        >>> str(result.low), 2 < result.point["x"] < Fraction("2.01")
-        ('1/4', True)
-    """
-    inputs = [side.variable for side in domain.sides]
-    parts = [polytope_of(target, inputs, {}) for target in targets]
-    return Polytopes(domain, inputs, parts).nearest(centre, range(len(parts)))
-
-
 class _Search:
     """One search, with the bounds so far."""
 

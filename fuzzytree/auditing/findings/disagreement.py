@@ -55,7 +55,6 @@ MOST_ROWS = 2000
 _LEAF_PART = 0.25  # of the time that is left, for one leaf
 _PART = 0.9  # of the time, to seek; the rest is for the answers
 _HINTS = 16  # rows from which a point where both differ is sought by doubles
-_CROSSED = 8  # rows whose nearest cut is looked at
 
 
 class TreeAndRules:
@@ -158,12 +157,12 @@ def nearest_difference(
             differ.append(point)
     search = _Search(both, alike[:MOST_ROWS], clock)
     if is_alike:
-        search.settled = set(range(len(search.rows)))
+        search.count = len(search.rows)
     else:
         search.run([*differ, *known])
     yield _nearest_answer(points, search, len(differ), len(alike))
-    if 0 < len(search.settled) < len(search.rows):
-        yield rows_left_out("FT203", len(search.rows) - len(search.settled))
+    if 0 < search.count < len(search.rows):
+        yield rows_left_out("FT203", len(search.rows) - search.count)
 
 
 def answer_of(rules: RuleBase, number: int) -> str | None:
@@ -174,146 +173,102 @@ def answer_of(rules: RuleBase, number: int) -> str | None:
 class _Search:
     """The nearest disagreement to any of some rows, as far as it is known.
 
-    As long as a ball around a row touches no leaf of another class, both can only
-    differ where the raw rules change their mind; and just beyond the nearest cut they
-    do differ, unless the raw rules change theirs there too. So distances to cuts show
-    how far to look, and bounds on all balls at once which rows are left.
+    Attributes:
+        count: How many rows were settled: around them none is nearer than `low`.
+        low: Nearer than this there is none; None if there is none at all.
+        best: The nearest one that is known, and `row` the number of its row.
+        claims: What both decide there.
+        why: Why more is not known.
     """
 
     def __init__(self, both: TreeAndRules, rows: Sequence[_Row], clock: Clock) -> None:
         self.both, self.rows, self.clock = both, rows, clock
         self.end = clock.share(_PART)
-        self.settled: set[int] = set()
-        self.place = 0
+        self.count = self.row = 0
         self.low: Fraction | None = None
         self.best: Nearest | None = None
         self.claims: tuple[Claim, ...] = ()
         self.why = ""
-        self.exact: dict[int, Fraction] = {}
 
-    @property
-    def row(self) -> int:
-        """The number of the row that the best one is near to."""
-        return self.rows[self.place].number
+    def run(self, points: Sequence[Mapping[str, Fraction]]) -> None:
+        """Look around one row after the other, no farther than the best one is.
 
-    def run(self, seeds: Sequence[Mapping[str, Fraction]]) -> None:
-        """Seek it, first near points at which both differ."""
+        `points`: where both may differ; the rows that are nearest to one come first.
+        """
         try:
             if self.rows:
-                self._run(seeds)
+                self._run(points)
         except OutOfTimeError:
-            self.why = self.why or "the budget was spent"
-        if self.best is not None and self.place not in self.settled:
-            self.low = Fraction(0)
+            self.why = "the budget was spent"
 
-    def _run(self, seeds: Sequence[Mapping[str, Fraction]]) -> None:
-        self._cross()
-        hints = self._hints(seeds)
-        far = (np.inf,)
-        order = sorted(
-            range(len(self.rows)),
-            key=lambda place: (place != self.place, hints.get(place, far)[0]),
-        )
-        left = self._left(order)
-        while left and not self.end.is_over:
-            place, row = left[0], self.rows[left[0]]
-            share = len(self.settled) / len(self.rows)
+    def _run(self, points: Sequence[Mapping[str, Fraction]]) -> None:
+        inputs, around = self.both.tree.inputs, self.both.around
+        values = columns([row.point for row in self.rows], inputs)
+        some = self.rows[:_HINTS]
+        near, away = around.approached(values[:, :_HINTS], [row.label for row in some])
+        moved = near[:, away < np.inf].T.tolist()
+        points = [
+            *points,
+            *(dict(zip(inputs, map(Fraction, one), strict=True)) for one in moved),
+        ]
+        hints = around.pairs(values, columns(points, inputs))
+        for place in np.argsort([far for _, far in hints], kind="stable").tolist():
+            row, (hint, far) = self.rows[place], hints[place]
+            share = self.count / len(self.rows)
             self.clock.report(f"nearest disagreement to row {row.number}", share)
-            result = nearest(
-                self.both.domain,
-                row.point,
-                lambda box: self.both.disagree(box, self.end),
-                self.both.differ,
-                self.end,
-                within=None if self.best is None else self.best.high,
-                near=[hints[place][1]] if place in hints else (),
-            )
-            if result.is_none:  # and so for all of them: the search covered the domain
-                self.settled, self.low = set(range(len(self.rows))), None
+            if not self._is_clear(row):
+                result = nearest(
+                    self.both.domain,
+                    row.point,
+                    lambda box: self.both.disagree(box, self.end),
+                    self.both.differ,
+                    self.end,
+                    within=None if self.best is None else self.best.high,
+                    near=[points[hint]] if far < np.inf else (),
+                )
+                if result.is_none:  # and so for all of them: it covered the domain
+                    self.count, self.low = len(self.rows), None
+                    return
+                self._keep(row, result)
+            self.count += 1
+            if self.end.is_over and self.count < len(self.rows):
+                self.why = self.why or "the budget was spent"
                 return
-            before = self.best
-            self._lower(result.low)
-            self.settled.add(place)
-            self._keep(place, result)
-            if result.why and not result.is_narrow:
-                self.why = self.why or f"around row {row.number}: {result.why}"
-            left = left[1:] if self.best is before else self._left(left[1:])
-        if left:
-            self.why = self.why or "the budget was spent"
 
-    def _keep(self, place: int, result: Nearest) -> None:
-        """Keep a result that is nearer than the best one."""
+    def _keep(self, row: _Row, result: Nearest) -> None:
+        """Keep what is known around a row, and its point if it is the nearest."""
+        self._lower(result.low)
         high, best = result.high, None if self.best is None else self.best.high
-        if result.point is None or high is None or (best is not None and high >= best):
-            return
-        self.claims = self.both.claims(result.point)
-        self.best, self.place = result, place
+        if result.why and not result.is_narrow:
+            self.why = self.why or f"around row {row.number}: {result.why}"
+        if result.point is not None and high is not None and (not best or high < best):
+            self.claims = self.both.claims(result.point)
+            self.best, self.row = result, row.number
 
     def _lower(self, low: Fraction) -> None:
         self.low = low if self.low is None else min(self.low, low)
 
-    def _cross(self) -> None:
-        """Look just beyond the nearest cuts."""
-        order = sorted(range(len(self.rows)), key=lambda place: self.rows[place].cut)
-        for place in order[:_CROSSED]:
-            row = self.rows[place]
-            best = None if self.best is None else self.best.high
-            if self.end.is_over or (best is not None and row.cut > best):
-                return
-            result = self.both.crisp.nearest_other(row.point, self.end)
-            if not result.why:
-                self.exact[place] = result.low
-            if result.point is not None and self.both.differ(result.point):
-                self._keep(place, result)
-
-    def _hints(
-        self, seeds: Sequence[Mapping[str, Fraction]]
-    ) -> dict[int, tuple[float, dict[str, Fraction]]]:
-        """Return points where both may differ, with their distances, by row."""
-        inputs, around = self.both.tree.inputs, self.both.around
-        hints: dict[int, tuple[float, dict[str, Fraction]]] = {}
-        rows = self.rows[:_HINTS]
-        values = columns([row.point for row in rows], inputs)
-        near, away = around.approached(values, [row.label for row in rows])
-        for place, distance_of in enumerate(away.tolist()):
-            if distance_of < np.inf:
-                moved = map(Fraction, near[:, place].tolist())
-                hints[place] = distance_of, dict(zip(inputs, moved, strict=True))
-        every = columns([row.point for row in self.rows], inputs)
-        nearest_seed = around.pairs(every, columns(seeds, inputs))
-        order = np.argsort([far for _, far in nearest_seed], kind="stable")
-        for place in order[:_HINTS].tolist():
-            seed, far = nearest_seed[place]
-            if far < hints.get(place, (np.inf,))[0]:
-                hints[place] = far, dict(seeds[seed])
-        return hints
-
-    def _left(self, places: Sequence[int]) -> list[int]:
-        """Return the rows around which both may differ nearer than is known."""
-        if self.best is None or self.best.high is None or not places:
-            return list(places)
+    def _is_clear(self, row: _Row) -> bool:
+        """Return whether bounds show that both agree around a row, up to the best."""
+        if self.best is None or self.best.high is None:
+            return False
         radius = max(self.best.low, self.best.high * (1 - NARROW))
-        rows = [self.rows[place] for place in places]
-        around, reach = self.both.around, outwards(radius)[1]
-        balls = around.ball(columns([r.point for r in rows], around.inputs), reach)
-        clear = around.is_clear(*balls, [row.label for row in rows])
-        left: list[int] = []
-        for place, row, is_clear in zip(places, rows, clear.tolist(), strict=True):
-            if is_clear and max(self.exact.get(place, row.cut), row.cut) >= radius:
-                self.settled.add(place)
-                self._lower(radius)
-            else:
-                left.append(place)
-        return left
+        around = self.both.around
+        centre = columns([row.point], around.inputs)
+        ball = around.ball(centre, outwards(radius)[1])
+        if row.cut < radius or not around.is_clear(*ball, [row.label]).all():
+            return False
+        self._lower(radius)
+        return True
 
 
 def _nearest_answer(
     points: DomainRows, search: _Search, differ: int, alike: int
 ) -> AuditAnswer:
     measures = [Measure("rows that differ already", differ)]
-    measures.append(Measure("rows evaluated", len(search.settled)))
+    measures.append(Measure("rows evaluated", search.count))
     facts = points.facts
-    count = len(search.settled)
+    count = search.count
     if not count:
         why = "no row of the domain is decided alike by both"
         if alike:

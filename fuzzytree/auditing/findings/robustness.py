@@ -24,7 +24,6 @@ from fuzzytree.auditing.engine.nearest import (
     Polytope,
     Polytopes,
     nearest,
-    nearest_box,
     polytope_of,
 )
 from fuzzytree.auditing.engine.regions import boxes, leaf_at, regions
@@ -37,9 +36,8 @@ from fuzzytree.auditing.engine.states import (
     State,
     Witness,
     coordinates,
-    number_text,
 )
-from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.engine.witnesses import is_within, simplified
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import AuditAnswer, FactValue, Measure
@@ -74,15 +72,12 @@ class CrispDecider:
     def __init__(self, tree: FuzzyTree, domain: Domain) -> None:
         self.tree, self.domain = tree, domain
         self.labels: list[str] = []
-        self.boxes: list[Domain] = []
         parts: list[Polytope] = []
         variables = {variable.name: variable for variable in tree.variables}
         for region in regions(tree):
             for box in boxes(region, tree, domain):
                 self.labels.append(region.label)
-                self.boxes.append(box)
                 parts.append(polytope_of(box, tree.inputs, variables))
-        self.is_plain = not any(variable.parts for variable in tree.variables)
         self.polytopes = Polytopes(domain, tree.inputs, parts)
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
@@ -95,17 +90,10 @@ class CrispDecider:
         del label
         return False
 
-    def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
-        """Do nothing: regions are known."""
-
     def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
         """Return how far the nearest region of another class is."""
         label, _ = self.decided(point)
-        chosen = self._others(label)
-        if self.is_plain:
-            others = [self.boxes[number] for number in chosen]
-            return nearest_box(self.domain, point, others)
-        return self.polytopes.nearest(point, chosen, clock)
+        return self.polytopes.nearest(point, self._others(label), clock)
 
     def bound(self, point: Mapping[str, Fraction], label: str | None) -> float:
         """Return a radius within which no region of another class is, by doubles."""
@@ -122,10 +110,9 @@ class RuleDecider:
     of: Representation = "rules"
 
     def __init__(self, subject: Subject) -> None:
-        self.subject = subject
+        self.subject, self.domain = subject, subject.domain
         self.arrangement = arrange(subject.rules, subject.domain)
         self.around = BoxBounds(subject.rules, subject.domain)
-        self.ahead: dict[tuple[Fraction, ...], tuple[Point, float]] = {}
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
         """Return the class of the first of the strongest rules, and the rule."""
@@ -146,23 +133,13 @@ class RuleDecider:
         order = [rule.then == label for rule in self.subject.rules.rules]
         return any(order) and not all(order[: len(order) - order[::-1].index(True)])
 
-    def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
-        """Seek points near some others that are decided otherwise, by doubles."""
-        inputs = self.subject.rules.inputs
-        labels = [decision_at(self.arrangement, point) for point in points]
-        near, away = self.around.approached(columns(points, inputs), labels)
-        for place, point in enumerate(points):
-            values = map(Fraction, near[:, place].tolist())
-            other = dict(zip(inputs, values, strict=True))
-            self.ahead[tuple(point[n] for n in inputs)] = other, float(away[place])
-
     def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
         """Return how far the nearest point is where a rule of another class wins."""
         label = decision_at(self.arrangement, point)
-        key = tuple(point[name] for name in self.subject.rules.inputs)
-        if key not in self.ahead:
-            self.look([point])
-        other, away = self.ahead[key]
+        inputs = self.subject.rules.inputs
+        ahead, far = self.around.approached(columns([point], inputs), [label])
+        hint = dict(zip(inputs, map(Fraction, ahead[:, 0].tolist()), strict=True))
+        away = float(far[0])
 
         def is_one(other: Mapping[str, Fraction]) -> bool:
             return is_within(self.arrangement, other) and (
@@ -176,7 +153,7 @@ class RuleDecider:
             is_one,
             clock,
             clear=self._clear(point, label, away),
-            near=[other] if away < np.inf else (),
+            near=[hint] if away < np.inf else (),
         )
 
     def _clear(
@@ -287,8 +264,13 @@ def _answer(
     other, _ = decider.decided(result.point)
     claim = Claim("decides", of=decider.of, label=other)
     moved = [axis for axis, value in result.point.items() if value != point[axis]]
-    values = _short_values(decider, point, result.point, moved)
-    facts |= {"other": other, "moved": tuple((axis, values[axis]) for axis in moved)}
+    near = simplified(
+        {axis: result.point[axis] for axis in moved},
+        decider.domain,
+        lambda some: decider.decided({**point, **some})[0] == other,
+    )
+    values = tuple((axis, repr(float(value))) for axis, value in near.items())
+    facts |= {"other": other, "moved": values}
     message = "FT204.nearest"
     if len(moved) > _MOST_NAMED:
         message, facts["moved"] = "FT204.nearest-of-many", len(moved)
@@ -296,32 +278,6 @@ def _answer(
     low = distance_measure("certified radius", result.low)
     measures = low, distance_measure("distance of the witness", result.high)
     return audit_answer(message, title, state, measures=measures, facts=facts)
-
-
-def _short_values(
-    decider: Decider,
-    row: Mapping[str, Fraction],
-    point: Mapping[str, Fraction],
-    moved: Sequence[str],
-) -> Mapping[str, str]:
-    """Return the values of a point in the fewest digits that are decided like it."""
-    other, _ = decider.decided(point)
-    for digits in range(6, 18) if len(moved) <= _MOST_NAMED else ():
-        values = {axis: f"{float(point[axis]):.{digits}g}" for axis in moved}
-        near = {axis: Fraction(text) for axis, text in values.items()}
-        if decider.decided({**point, **near})[0] == other:
-            return values
-    return {axis: _moved(point[axis], row[axis]) for axis in moved}
-
-
-def _moved(value: Fraction, own: Fraction) -> str:
-    """Return a value in so many digits that it looks unlike the row's own."""
-    near = float(value)
-    if number_text(near) != number_text(float(own)):
-        return number_text(near)
-    if near != float(own):
-        return repr(near)
-    return f"a hair {'above' if value > own else 'below'} {near!r}"
 
 
 # --- all rows
@@ -345,7 +301,6 @@ def answers(subject: Subject) -> Iterator[AuditAnswer]:
     radii: list[_RowRadius] = []
     most = MOST_ROWS if subject.tree is None else MOST_ROWS_OF_TREE
     chosen = points.at[:most]
-    decider.look([point for _, point in chosen])
     for number, point in chosen:
         if clock.is_over:
             break

@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, contains
 from fuzzytree.auditing.engine.domain import span as ends_on
-from fuzzytree.auditing.engine.nearest import Nearest, Polytope, Polytopes, polytope_of
+from fuzzytree.auditing.engine.nearest import Nearest, Polytopes, polytope_of
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -106,44 +106,53 @@ def rank_by_distance(
         rows: The rows.
         domain: In whose widths distance is measured.
         inputs: The names of the rows' values.
-        variables: The combinations that regions may name; where one of another name
-            is met, the point of the witness counts.
+        variables: The combinations that regions name.
     """
-    known: list[tuple[Fraction, int, AuditAnswer]] = []
+    combined = {one.name: one for one in variables if one.parts}
+    boxes = [_box(gap, domain, combined) for gap in gaps]
+    parts = Polytopes(
+        domain, inputs, [polytope_of(box or domain, inputs, combined) for box in boxes]
+    )
+    fixed = {one.variable: one.low for one in domain.sides if one.low == one.high}
+    fixed_point = {name: Fraction(fixed[name]) for name in inputs if name in fixed}
+    points = {
+        number: dict(zip(inputs, map(Fraction, values), strict=True)) | fixed_point
+        for number, values in enumerate(rows.values.T.tolist(), 1)
+        if all(map(math.isfinite, values))
+    }
+    bounds = {number: parts.bounds(point) for number, point in points.items()}
+    known: list[tuple[Fraction, AuditAnswer]] = []
     unknown: list[AuditAnswer] = []
-    for place, gap in enumerate(gaps):
-        part = _part(gap, domain, inputs, variables)
-        if part is None:
-            near = _nearest_row(_spans(gap, inputs), rows, domain, inputs)
-        else:
-            near = _nearest_to_part(part, rows, domain, inputs)
-        if near is None:
+    for place, (gap, box) in enumerate(zip(gaps, boxes, strict=True)):
+        best: tuple[Fraction, int] | None = None
+        for number in sorted(points, key=lambda one, at=place: (bounds[one][at], one)):
+            if box is None or (best is not None and bounds[number][place] > best[0]):
+                break
+            low = parts.nearest(points[number], [place]).low
+            best = (low, number) if best is None or low < best[0] else best
+        if best is None:
             unknown.append(gap)
             continue
-        away, number = near
+        away, number = best
         added = (
             distance_measure("distance to the nearest row", away),
             Measure("nearest row", number),
         )
         measures = (*gap.measures, *added)
-        known.append((away, place, msgspec.structs.replace(gap, measures=measures)))
-    ordered = sorted(known, key=lambda one: one[:2])
-    return (*(gap for _, _, gap in ordered), *unknown)
+        known.append((away, msgspec.structs.replace(gap, measures=measures)))
+    return (*(gap for _, gap in sorted(known, key=lambda one: one[0])), *unknown)
 
 
-def _part(
-    gap: AuditAnswer,
-    domain: Domain,
-    inputs: Sequence[str],
-    variables: Sequence[Variable],
-) -> Polytope | None:
-    """Return the region of a gap whose combinations are known; None of any other."""
-    combined = {one.name: one for one in variables if one.parts}
-    names = {span.variable for span in gap.region}
-    if not names & set(combined) or not names <= {*combined, *inputs}:
-        return None
+def _box(
+    gap: AuditAnswer, domain: Domain, combined: Mapping[str, Variable]
+) -> Domain | None:
+    """Return where a gap is: its region, else its point; None if it names neither."""
+    spans = gap.region
+    if not spans and isinstance(gap.state, Witness):
+        point = point_of(gap.state.point)
+        spans = tuple(Span(name, *outwards(value)) for name, value in point.items())
     sides = {side.variable: side for side in domain.sides}
-    for one in gap.region:
+    for one in spans:
         name = one.variable
         if name not in sides:
             low, high = ends_on(combined[name], domain)
@@ -152,79 +161,7 @@ def _part(
         low_end = whole.low if one.low is None else max(whole.low, one.low)
         high_end = whole.high if one.high is None else min(whole.high, one.high)
         sides[name] = DomainSide(name, low_end, high_end)
-    return polytope_of(Domain(tuple(sides.values())), inputs, combined)
-
-
-def _nearest_to_part(
-    part: Polytope, rows: AuditRows, domain: Domain, inputs: Sequence[str]
-) -> tuple[Fraction, int] | None:
-    """Return how near a row is to a part of the inputs, at least, and which is it."""
-    regions = Polytopes(domain, inputs, [part])
-    near: list[tuple[float, int, dict[str, Fraction]]] = []
-    for row, values in enumerate(rows.values.T.tolist()):
-        if all(map(math.isfinite, values)):
-            point = dict(zip(inputs, map(Fraction, values), strict=True))
-            near.append((regions.bounds(point)[0], row, point))
-    best: tuple[Fraction, int] | None = None
-    for bound, row, point in sorted(near, key=lambda one: one[:2]):
-        if best is not None and bound > best[0]:
-            break
-        result = regions.nearest(point, [0])
-        if not result.is_none and (best is None or result.low < best[0]):
-            best = result.low, row + 1
-    return best
-
-
-def _spans(gap: AuditAnswer, inputs: Sequence[str]) -> tuple[Span, ...]:
-    """Return where a gap is: its region, or the point where that needs more."""
-    if gap.region and all(span.variable in inputs for span in gap.region):
-        return gap.region
-    if not isinstance(gap.state, Witness):
-        return ()
-    point = point_of(gap.state.point)
-    return tuple(Span(name, *outwards(value)) for name, value in point.items())
-
-
-def _nearest_row(
-    spans: Sequence[Span], rows: AuditRows, domain: Domain, inputs: Sequence[str]
-) -> tuple[Fraction, int] | None:
-    """Return the least distance of a row from a box, and the row's number."""
-    column = {name: place for place, name in enumerate(inputs)}
-    away = np.zeros(rows.values.shape[1])
-    for span in spans:
-        side = domain.side(span.variable)
-        if side is None or side.low == side.high:
-            continue
-        x = rows.values[column[span.variable]]
-        below = -np.inf if span.low is None else span.low
-        above = np.inf if span.high is None else span.high
-        width = side.high - side.low
-        away = np.maximum(away, np.maximum(below - x, x - above) / width)
-    away[~np.isfinite(rows.values).all(axis=0)] = np.inf
-    if not spans or not np.isfinite(away).any():
-        return None
-    row = int(np.argmin(away))
-    values = {
-        name: Fraction(float(rows.values[at, row])) for name, at in column.items()
-    }
-    return box_distance(spans, values, domain), row + 1
-
-
-def box_distance(
-    spans: Sequence[Span], point: Mapping[str, Fraction], domain: Domain
-) -> Fraction:
-    """Return how far a point is from a box, in shares of the domain's widths."""
-    away = Fraction(0)
-    for span in spans:
-        side = domain.side(span.variable)
-        if side is None or side.low == side.high:
-            continue
-        width, x = Fraction(side.high) - Fraction(side.low), point[span.variable]
-        if span.low is not None:
-            away = max(away, (Fraction(span.low) - x) / width)
-        if span.high is not None:
-            away = max(away, (x - Fraction(span.high)) / width)
-    return away
+    return Domain(tuple(sides.values())) if spans else None
 
 
 def rows_left_out(code: str, count: int) -> AuditAnswer:

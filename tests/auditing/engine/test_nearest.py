@@ -9,10 +9,12 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.nearest import (
     NARROW,
+    Nearest,
+    Polytopes,
     ball,
     distance,
     nearest,
-    nearest_box,
+    polytope_of,
 )
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -26,6 +28,11 @@ from fuzzytree.auditing.engine.states import (
 SQUARE = Domain((DomainSide("x", 0.0, 4.0), DomainSide("y", -1.0, 1.0)))
 CENTRE = {"x": Fraction(1), "y": Fraction(0)}
 LIMIT = Fraction(29, 10)
+
+
+def nearest_box(*boxes: Domain) -> Nearest:
+    parts = [polytope_of(box, [*CENTRE], {}) for box in boxes]
+    return Polytopes(SQUARE, [*CENTRE], parts).nearest(CENTRE, range(len(parts)))
 
 
 def _is_right(point: Mapping[str, Fraction]) -> bool:
@@ -115,7 +122,7 @@ def test_the_distance_to_the_nearest_box_is_exact(is_open: bool) -> None:
     near = Domain(
         (DomainSide("x", 2.0, 4.0, is_open=is_open), DomainSide("y", -1.0, -0.25))
     )
-    found = nearest_box(SQUARE, CENTRE, [far, near])
+    found = nearest_box(far, near)
     assert found.low == Fraction(1, 4)
     assert found.point is not None
     assert found.high is not None
@@ -128,7 +135,7 @@ def test_a_centre_at_an_open_end_has_distance_zero_and_a_point_beside_it() -> No
     beside = Domain(
         (DomainSide("x", 1.0, 4.0, is_open=True), DomainSide("y", -1.0, 1.0))
     )
-    found = nearest_box(SQUARE, CENTRE, [beside])
+    found = nearest_box(beside)
     assert found.low == 0
     assert found.point is not None
     assert 1 < found.point["x"] < Fraction(1 + 1e-9)
@@ -136,4 +143,4 @@ def test_a_centre_at_an_open_end_has_distance_zero_and_a_point_beside_it() -> No
 
 
 def test_without_a_box_there_is_no_nearest_one() -> None:
-    assert nearest_box(SQUARE, CENTRE, []).is_none
+    assert nearest_box().is_none

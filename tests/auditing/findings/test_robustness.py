@@ -148,7 +148,7 @@ def test_without_rows_it_is_declined() -> None:
 
 
 def test_a_budget_that_ends_keeps_the_rows_that_were_tested() -> None:
-    times = iter([0.0] + [0.5] * 6 + [9.0] * 1000)
+    times = iter([0.0] + [0.5] * 7 + [9.0] * 1000)
     clock = Clock(1.0, now=lambda: next(times))
     rows = [[number / 10] for number in range(1, 9)]
     results = [*answers(subject_of(one_cut(), rows=rows, clock=clock))]

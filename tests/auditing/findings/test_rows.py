@@ -5,12 +5,12 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
+import pytest
 
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
 from fuzzytree.auditing.engine.states import Claim, Proved, Span, Witness, coordinates
 from fuzzytree.auditing.findings.records import AuditAnswer
 from fuzzytree.auditing.findings.rows import (
-    box_distance,
     distance_measure,
     points_of,
     rank_by_distance,
@@ -60,12 +60,12 @@ def test_a_gap_of_a_combination_is_as_far_as_its_inputs_must_move() -> None:
     assert first.measures[0].value == 0.0
 
 
-def test_a_gap_of_an_unknown_combination_is_measured_at_its_point() -> None:
+def test_a_gap_without_a_region_is_measured_at_its_point() -> None:
     point = coordinates({"x": Fraction(3), "y": Fraction(1, 2)})
     state = Witness(point, (Claim("below", rules=(1,), level="0"),))
-    gap = AuditAnswer("FT301", "sum", "", state, True, region=(Span("sum", 3.0, 4.0),))
+    gap = AuditAnswer("FT301", "here", "", state, True)
     [results] = rank_by_distance([gap], ROWS, BOX, ["x", "y"])
-    assert results.measures[0].exact == "1/2"
+    assert results.measures[0].value == pytest.approx(0.5, abs=1e-15)
 
 
 def test_a_place_that_is_not_named_stands_last_as_it_is() -> None:
@@ -83,9 +83,10 @@ def test_without_a_complete_row_nothing_is_ranked() -> None:
 
 def test_a_fixed_input_does_not_count() -> None:
     fixed = Domain((DomainSide("x", 2.0, 2.0), DomainSide("y", 0.0, 1.0)))
-    spans = (Span("x", 3.0, 4.0), Span("y", 0.5, 1.0))
-    point = {"x": Fraction(0), "y": Fraction(0)}
-    assert box_distance(spans, point, fixed) == Fraction(1, 2)
+    rows = AuditRows("rows", np.array([[0.0], [0.0]]))
+    gap = _gap("here", Span("x", 2.0, 2.0), Span("y", 0.5, 1.0))
+    [results] = rank_by_distance([gap], rows, fixed, ["x", "y"])
+    assert results.measures[0].value == 0.5
 
 
 def test_equal_rows_stand_once_and_those_outside_are_counted() -> None:
