@@ -125,8 +125,8 @@ def rank_by_distance(
     unknown: list[AuditAnswer] = []
     for place, (gap, box) in enumerate(zip(gaps, boxes, strict=True)):
         best: tuple[Fraction, int] | None = None
-        for number in sorted(points, key=lambda one, at=place: (bounds[one][at], one)):
-            if box is None or (best is not None and bounds[number][place] > best[0]):
+        for bound, number in sorted((bounds[one][place], one) for one in points):
+            if box is None or (best is not None and bound > best[0]):
                 break
             low = parts.nearest(points[number], [place]).low
             best = (low, number) if best is None or low < best[0] else best
