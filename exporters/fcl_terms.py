@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
-from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
-from fuzzytree.exporters.fuzzy_files import refuse, with_labels
+from fuzzytree.exporters.fuzzy_files import with_labels, without_heights
 from fuzzytree.formats import shape_in_fcl
 from fuzzytree.model import (
     Call,
@@ -27,7 +26,7 @@ from fuzzytree.model import (
     SystemOutput,
     SystemTerm,
 )
-from fuzzytree.semantics import EXACT, points_for
+from fuzzytree.semantics import has_numbers, pointed
 
 Names = Mapping[str, str]
 
@@ -44,9 +43,7 @@ def term_text(
     names: Names,
 ) -> str | None:
     """Return the curve of a label; None if the dialect has none for it."""
-    is_weighted = (
-        isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted
-    )
+    is_weighted = has_numbers(variable)
     curve = label.curve
     if isinstance(curve, Singleton) and (is_weighted or words.name == "jfuzzylogic"):
         return number(curve.value)
@@ -112,49 +109,15 @@ def as_points(
     Raises:
         LossError: With every curve that points cannot stand for.
     """
-    losses: list[Loss] = []
-    reasons: list[str] = []
 
-    def changed(variable: SystemInput | SystemOutput) -> tuple[SystemTerm, ...]:
-        if isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted:
-            return variable.labels
-        labels: list[SystemTerm] = []
-        for label in variable.labels:
-            where = f"term {label.name!r} of {variable.name!r}"
-            try:
-                labels.append(_pointed(label, variable, words, tolerance, losses))
-            except LossError as error:
-                reasons.append(f"{where}: {error}")
-                labels.append(label)  # rules name it; the system is refused below
-        return tuple(labels)
+    def is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+        return has_numbers(variable) or term_text(variable, term, words, {}) is not None
 
-    system = with_labels(system, changed)
-    refuse(system.name, "fcl", reasons)
+    system, lost = pointed(system, tolerance, keeps=is_known)
+    losses = [*lost]
+    if words.name != "fuzzylite":
+        system = without_heights(system, "FCL", losses)
     return system, losses
-
-
-def _pointed(
-    label: SystemTerm,
-    variable: SystemInput | SystemOutput,
-    words: FclWords,
-    tolerance: float,
-    losses: list[Loss],
-) -> SystemTerm:
-    if term_text(variable, label, words, {}) is not None:
-        return label
-    where = f"term {label.name!r} of {variable.name!r}"
-    result = points_for(label.curve, tolerance)
-    points = result.points
-    if result.bound > EXACT:
-        tail = f"; {result.tail}" if result.tail else ""
-        what = f"it becomes {len(points.values)} points joined by lines{tail}"
-        losses.append(Loss(where, what, result.bound))
-    if label.height != 1.0:
-        what = f"its height {label.height!r} is multiplied into its points"
-        losses.append(Loss(where, what, EXACT))
-        degrees = tuple(label.height * degree for degree in points.degrees)
-        points = replace(points, degrees=degrees)
-    return SystemTerm(label.name, points)
 
 
 def unspeakable(system: FuzzySystem, words: FclWords) -> Iterator[str]:

@@ -57,6 +57,7 @@ from fuzzytree.semantics import (
     cast_remarks,
     facts_of,
     flattened,
+    has_numbers,
     joined_outputs,
     number_losses,
     pointed,
@@ -301,8 +302,7 @@ def _terms(
 
     `_lines` and `with_known_curves` refuse or replace them before a file is written.
     """
-    is_weighted = isinstance(one, SystemOutput) and one.defuzzifier.is_weighted
-    find = number_of if is_weighted else term_of
+    find = number_of if has_numbers(one) else term_of
     results = (find(label.curve, dialect) for label in labels)
     return [result for result in results if result is not None]
 

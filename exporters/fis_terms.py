@@ -30,9 +30,12 @@ from fuzzytree.model import (
     SigmoidDifference,
     Singleton,
     SystemCurve,
+    SystemInput,
+    SystemOutput,
+    SystemTerm,
     Trapezoid,
 )
-from fuzzytree.semantics import pointed, shape_of
+from fuzzytree.semantics import has_numbers, pointed, shape_of
 
 Term = tuple[str, str]
 """A kind such as `trimf`, and its numbers as text."""
@@ -46,10 +49,11 @@ def with_known_curves(
     Raises:
         LossError: If a curve cannot become points within the tolerance.
     """
-    curves = [label.curve for one in system.variables for label in one.labels]
-    unknown = {type(one) for one in curves if term_of(one, dialect) is None}
-    known = {type(one) for one in curves} - unknown
-    return pointed(system, tolerance, allowed=tuple(known))
+
+    def is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+        return has_numbers(variable) or term_of(term.curve, dialect) is not None
+
+    return pointed(system, tolerance, keeps=is_known)
 
 
 def term_of(curve: Curve, dialect: Dialect) -> Term | None:

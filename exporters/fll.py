@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final, get_args
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -39,8 +39,6 @@ from fuzzytree.model import (
     LR,
     Activation,
     Band,
-    Conclusion,
-    Defuzzifier,
     Format,
     FuzzySystem,
     Loss,
@@ -48,11 +46,8 @@ from fuzzytree.model import (
     Points,
     RuleBase,
     RuleBlock,
-    Singleton,
-    SystemCurve,
     SystemInput,
     SystemOutput,
-    SystemRule,
     SystemTerm,
     Trapezoid,
     Written,
@@ -66,15 +61,12 @@ from fuzzytree.semantics import (
     cast_remarks,
     facts_of,
     flattened,
+    has_numbers,
     pointed,
     refuse_singletons,
 )
 
 _RESERVED: Final = (*RULE_WORDS, *FUNCTIONS, "fabs", "pow", "pi", "inf", "nan", "x")
-_ONE: Final = SystemOutput(
-    "y", (SystemTerm("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
-)
-_ALWAYS: Final = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
 _FINEST: Final = 1e-3
 
 
@@ -124,9 +116,7 @@ def write(
         if scores != "winner":
             raise ValueError("scores: are of rules; a system has outputs of its own")
         refuse_singletons(model, "fll")
-        system, lost = pointed(model, tolerance, allowed=get_args(SystemCurve))
-        losses += lost
-        system, lost = _with_pointed_numbers(system, tolerance)
+        system, lost = pointed(model, tolerance, keeps=_is_known)
         losses += lost
     system, lost = flattened(system)
     losses += [*lost, *_losses(system)]
@@ -159,28 +149,9 @@ def _accepted(names: Sequence[str]) -> NameMap:
     return NameMap.of(names, reserved=reserved, longest=LONGEST_NAME)
 
 
-def _with_pointed_numbers(
-    system: FuzzySystem, tolerance: float
-) -> tuple[FuzzySystem, tuple[Loss, ...]]:
-    """Return a system whose weighted outputs have points for bands and LR sets."""
-    outputs: list[SystemOutput] = []
-    losses: list[Loss] = []
-    for output in system.outputs:
-        shapes = tuple(one for one in output.labels if isinstance(one.curve, Band | LR))
-        if shapes:
-            representation = (SystemInput("of it", shapes),)
-            result, lost = pointed(
-                FuzzySystem(system.name, representation, (_ONE,), (_ALWAYS,)), tolerance
-            )
-            known = {one.name: one for one in result.inputs[0].labels}
-            labels = tuple(known.get(one.name, one) for one in output.labels)
-            output = replace(output, labels=labels)
-            losses += [
-                replace(one, where=one.where.replace("'of it'", repr(output.name)))
-                for one in lost
-            ]
-        outputs.append(output)
-    return replace(system, outputs=tuple(outputs)), tuple(losses)
+def _is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+    del variable
+    return not isinstance(term.curve, Band | LR)
 
 
 def _losses(system: FuzzySystem) -> Iterator[Loss]:
@@ -222,7 +193,7 @@ def _speakable(system: FuzzySystem) -> tuple[RuleBlock, ...]:
 def _term_text(
     variable: SystemInput | SystemOutput, label: SystemTerm, names: Mapping[str, str]
 ) -> str | None:
-    if isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted:
+    if isinstance(variable, SystemOutput) and has_numbers(variable):
         return number_text(label, weighted_type(variable), names)
     return degree_text(label, names)
 

@@ -31,19 +31,15 @@ from fuzzytree.model import (
     Activation,
     Format,
     FuzzySystem,
-    Gaussian,
     Linear,
     Loss,
     NameMap,
     Points,
     RuleBase,
-    SCurve,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemTerm,
-    Trapezoid,
-    TwoGaussians,
     Written,
     refusal,
 )
@@ -54,13 +50,13 @@ from fuzzytree.semantics import (
     cast_remarks,
     facts_of,
     flattened,
+    has_numbers,
     joined_outputs,
     pointed,
     refuse_singletons,
     shape_of,
 )
 
-_ALLOWED: Final = (Trapezoid, Gaussian, SCurve, Singleton)
 _FLOAT32: Final = (
     "the standard's numbers have 32 bits: a reader that keeps to it changes each "
     "number by a share of up to 6e-8 (2^-24); corners of curves move by that, values "
@@ -159,16 +155,13 @@ def _with_known_curves(
     )
     if has_heights:
         refuse_singletons(system, "fml with the heights of terms")
-    is_one_sided = all(
-        shape_in_words(label.curve) is not None
-        for one in system.variables
-        for label in one.labels
-        if isinstance(label.curve, TwoGaussians)
-    )
-    allowed: tuple[type, ...] = () if has_heights else _ALLOWED
-    if is_one_sided and not has_heights:
-        allowed = (*allowed, TwoGaussians)
-    system, lost = pointed(system, tolerance, allowed=allowed)
+
+    def is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+        if has_numbers(variable) or isinstance(term.curve, Points):
+            return True
+        return not has_heights and shape_in_words(term.curve) is not None
+
+    system, lost = pointed(system, tolerance, keeps=is_known)
     losses = [*lost]
     if has_heights:
         system = without_heights(system, "FML", losses)

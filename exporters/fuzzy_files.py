@@ -24,6 +24,7 @@ from fuzzytree.model import (
     SystemTerm,
     changes_text,
 )
+from fuzzytree.semantics import has_numbers
 
 TITLE = "Written by fuzzytree."
 
@@ -92,9 +93,8 @@ def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySy
     """
 
     def scaled(variable: SystemInput | SystemOutput, label: SystemTerm) -> SystemTerm:
-        is_number = isinstance(variable, SystemOutput) and (
-            variable.defuzzifier.is_weighted
-            and isinstance(label.curve, Singleton | Linear)
+        is_number = has_numbers(variable) and isinstance(
+            label.curve, Singleton | Linear
         )
         if label.height == 1.0 or is_number:
             return replace(label, height=1.0)

@@ -6,6 +6,7 @@ from .conversion.facts import numbers_of as numbers_of
 from .conversion.facts import places_of as places_of
 from .conversion.points import EXACT as EXACT
 from .conversion.points import check_tolerance as check_tolerance
+from .conversion.points import has_numbers as has_numbers
 from .conversion.points import pointed as pointed
 from .conversion.points import points_for as points_for
 from .conversion.points import shape_of as shape_of

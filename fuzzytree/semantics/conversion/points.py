@@ -8,8 +8,8 @@ apart as the tolerance allows (`conversion.point_plans`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import NamedTuple, TypeVar, get_args
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, TypeVar
 
 from msgspec.structs import replace
 
@@ -26,6 +26,8 @@ from fuzzytree.model import (
     RuleBase,
     Shape,
     Singleton,
+    SystemInput,
+    SystemOutput,
     SystemTerm,
     Term,
     Trapezoid,
@@ -39,19 +41,32 @@ EXACT = 2.0**-52
 D = TypeVar("D", RuleBase, FuzzySystem)
 
 
+Keeps = Callable[[SystemInput | SystemOutput, SystemTerm], bool]
+"""Whether a term of a variable stays as it is; one of rules is one of an input."""
+
+
+def has_numbers(variable: SystemInput | SystemOutput) -> bool:
+    """Return whether a variable is an output of weighted numbers."""
+    return isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted
+
+
+def _is_kept(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+    return has_numbers(variable) or isinstance(term.curve, Points)
+
+
 def pointed(
-    document: D, tolerance: float, *, allowed: tuple[type, ...] = ()
+    document: D, tolerance: float, *, keeps: Keeps = _is_kept
 ) -> tuple[D, tuple[Loss, ...]]:
     """Return a document whose curves are points, and how far each can be off.
 
-    Of a system all terms of inputs and of outputs that are no weighted numbers change.
     The bound is of the degree, at any real value of the axis.
 
     Args:
         document: A rule base or a system.
         tolerance: The largest difference of a degree that is allowed; above 0 and
             below 1.
-        allowed: Classes of curves that stay as they are, beside `Points`.
+        keeps: Whether a term stays as it is: `Points` and the weighted numbers of
+            outputs unless given.
 
     Returns:
         The document, and a loss for each curve whose points are further off than
@@ -70,7 +85,7 @@ def pointed(
         True
     """
     check_tolerance(tolerance)
-    change: _Change = _Change(tolerance, (Points, *allowed))
+    change: _Change = _Change(tolerance, keeps)
     result: D = (
         _pointed_rules(document, change)
         if isinstance(document, RuleBase)
@@ -104,13 +119,11 @@ def _pointed_rules(rules: RuleBase, change: _Change) -> RuleBase:
 
 def _pointed_system(system: FuzzySystem, change: _Change) -> FuzzySystem:
     inputs = tuple(
-        replace(one, labels=tuple(change.label(one.name, x) for x in one.labels))
+        replace(one, labels=tuple(change.label(one, x) for x in one.labels))
         for one in system.inputs
     )
     outputs = tuple(
-        one
-        if one.defuzzifier.is_weighted
-        else replace(one, labels=tuple(change.label(one.name, x) for x in one.labels))
+        replace(one, labels=tuple(change.label(one, x) for x in one.labels))
         for one in system.outputs
     )
     return replace(system, inputs=inputs, outputs=outputs)
@@ -119,34 +132,33 @@ def _pointed_system(system: FuzzySystem, change: _Change) -> FuzzySystem:
 class _Change:
     """Changes curves, and remembers what was lost and what cannot be done."""
 
-    def __init__(self, tolerance: float, allowed: tuple[type, ...]) -> None:
-        self.tolerance, self.allowed = tolerance, allowed
+    def __init__(self, tolerance: float, keeps: Keeps) -> None:
+        self.tolerance, self.keeps = tolerance, keeps
         self.losses: list[Loss] = []
         self.reasons: list[str] = []
 
     def term(self, variable: str, term: Term) -> Term:
-        result = self._curve(variable, term.name, term.shape)
-        return Term(term.name, result) if isinstance(result, Points) else term
+        result = self.label(SystemInput(variable), SystemTerm(term.name, term.shape))
+        curve = result.curve
+        return Term(term.name, curve) if isinstance(curve, Points) else term
 
-    def label(self, variable: str, label: SystemTerm) -> SystemTerm:
-        result = self._curve(variable, label.name, label.curve)
-        return replace(label, curve=result)
-
-    def _curve(self, variable: str, name: str, curve: Curve) -> Curve:
-        if isinstance(curve, self.allowed):
-            return curve
-        where = f"term {name!r} of {variable!r}"
+    def label(
+        self, variable: SystemInput | SystemOutput, label: SystemTerm
+    ) -> SystemTerm:
+        if self.keeps(variable, label):
+            return label
+        where = f"term {label.name!r} of {variable.name!r}"
         try:
-            result = points_for(curve, self.tolerance)
+            result = points_for(label.curve, self.tolerance)
         except LossError as error:
             self.reasons.append(f"{where}: {error}")
-            return curve
+            return label
         if result.bound > EXACT:
             count = len(result.points.values)
             tail = f"; {result.tail}" if result.tail else ""
             what = f"it becomes {count} points joined by lines{tail}"
             self.losses.append(Loss(where, what, result.bound))
-        return result.points
+        return replace(label, curve=result.points)
 
 
 class PlacedPoints(NamedTuple):
@@ -302,6 +314,10 @@ def _points_of(left: _Pairs, right: _Pairs) -> Points:
 _COARSE = 0.01  # lines become the same points for every tolerance
 
 
+def _is_no_band(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+    return has_numbers(variable) or not isinstance(term.curve, Band | LR)
+
+
 def straightened(model: D) -> D | None:
     """Return a model whose bands are points, if that loses nothing.
 
@@ -315,9 +331,8 @@ def straightened(model: D) -> D | None:
         >>> straightened(rules).variables[0].terms[0].shape.values
         (1.0, 1.0, 3.0)
     """
-    others = tuple(kind for kind in get_args(Curve) if kind not in (Band, LR))
     try:
-        result, losses = pointed(model, _COARSE, allowed=others)
+        result, losses = pointed(model, _COARSE, keeps=_is_no_band)
     except LossError:
         return None
     return None if losses or result == model else result
