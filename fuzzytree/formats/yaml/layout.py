@@ -6,7 +6,8 @@ exclude others, the sets of keys that may stand together.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Final, Literal
+import inspect
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, get_args
 
 import msgspec
 from msgspec import Meta, field
@@ -20,8 +21,11 @@ from fuzzytree.model import (
     DefuzzifierMethod,
     Grid,
     LabelType,
+    PiCurve,
     Relation,
+    Singleton,
     SNorm,
+    SystemCurve,
     TNorm,
 )
 
@@ -326,63 +330,12 @@ class RangeOfSystem(RangeOfVariable, frozen=True, kw_only=True):
     outside: Literal["clipped"] | None = None
 
 
-class GaussianCurve(FileRecord, frozen=True, kw_only=True):
-    """`exp(-(x - mean)^2 / (2 deviation^2))`."""
-
-    noun: ClassVar[str] = "a gaussian"
-    mean: float
-    deviation: float
-
-
-class TwoGaussiansCurve(FileRecord, frozen=True, kw_only=True):
-    """A gaussian below `left` times another one above `right`, each 1 elsewhere."""
-
-    noun: ClassVar[str] = "a curve of two gaussians"
-    left: float
-    left_deviation: float = field(name="left deviation")
-    right: float
-    right_deviation: float = field(name="right deviation")
-
-
-class BellCurve(FileRecord, frozen=True, kw_only=True):
-    """`1 / (1 + |(x - center) / width|^(2 slope))`."""
-
-    noun: ClassVar[str] = "a bell"
-    center: float
-    width: float
-    slope: float
-
-
 class SigmoidCurve(FileRecord, frozen=True, kw_only=True):
     """`1 / (1 + exp(-slope (x - inflection)))`."""
 
     noun: ClassVar[str] = "a sigmoid"
     inflection: float
     slope: float
-
-
-class WideCurve(FileRecord, frozen=True, kw_only=True):
-    """A cosine or a spike about a centre."""
-
-    noun: ClassVar[str] = "a curve about a center"
-    center: float
-    width: float
-
-
-class CurveFromTo(FileRecord, frozen=True, kw_only=True):
-    """Where a curve has the degree 0, and where it has 1 (or ends)."""
-
-    noun: ClassVar[str] = "a curve between two values"
-    start: float
-    end: float
-
-
-class ConcaveCurve(FileRecord, frozen=True, kw_only=True):
-    """Rises or falls to 1 at the end, ever more steeply."""
-
-    noun: ClassVar[str] = "a concave curve"
-    inflection: float
-    end: float
 
 
 class LinearCurve(FileRecord, frozen=True, kw_only=True):
@@ -393,15 +346,39 @@ class LinearCurve(FileRecord, frozen=True, kw_only=True):
     offset: float = 0.0
 
 
+def _record_of(kind: type[SystemCurve]) -> type[msgspec.Struct]:
+    """Return the record of a membership function: its numbers by their names."""
+    numbers = [
+        (name, float, field(name=name.replace("_", " ")))
+        for name in kind.__struct_fields__
+    ]
+    about = {"__doc__": inspect.getdoc(kind), "noun": f"a {_tag(kind)}"}
+    name = f"{kind.__name__}Numbers"
+    return msgspec.defstruct(
+        name, numbers, bases=(FileRecord,), namespace=about, frozen=True, kw_only=True
+    )
+
+
+def _tag(kind: type[SystemCurve]) -> str:
+    return str(kind.__struct_config__.tag)
+
+
+_OF_NUMBERS: Final = {
+    _tag(kind): _record_of(kind)
+    for kind in get_args(SystemCurve)
+    if kind not in (PiCurve, Singleton)
+    and all(one.type is float for one in msgspec.structs.fields(kind))
+}
+"""The record of each membership function that is written as its numbers by name."""
+
 _CURVES = (
-    *("trapezoid", "triangle", "gaussian", "two gaussians", "bell", "sigmoid"),
-    *("sigmoid difference", "sigmoid product", "s", "pi", "cosine", "concave", "spike"),
-    *("arc", "semi ellipse", "at least", "at most", "singleton", "linear", "formula"),
+    *("trapezoid", "triangle", *_OF_NUMBERS, "sigmoid difference", "sigmoid product"),
+    *("pi", "at least", "at most", "singleton", "linear", "formula"),
 )
 Two = Annotated[tuple[SigmoidCurve, ...], Meta(min_length=2, max_length=2)]
 
 
-class LabelOfVariable(TermOfVariable, frozen=True, kw_only=True):
+class TermOfSystem(TermOfVariable, frozen=True, kw_only=True):
     """A label of a variable of a system, with one curve.
 
     A trapezoid `[a, b, c, d]` rises from a to b, is 1 up to c and falls to d; `-.inf`
@@ -419,24 +396,30 @@ class LabelOfVariable(TermOfVariable, frozen=True, kw_only=True):
     height: float = 1.0
     trapezoid: Four | None = None
     triangle: Three | None = None
-    gaussian: GaussianCurve | None = None
-    two_gaussians: TwoGaussiansCurve | None = field(name="two gaussians", default=None)
-    bell: BellCurve | None = None
-    sigmoid: SigmoidCurve | None = None
     sigmoid_difference: Two | None = field(name="sigmoid difference", default=None)
     sigmoid_product: Two | None = field(name="sigmoid product", default=None)
-    s: CurveFromTo | None = None
     pi: Four | None = None
-    cosine: WideCurve | None = None
-    concave: ConcaveCurve | None = None
-    spike: WideCurve | None = None
-    arc: CurveFromTo | None = None
-    semi_ellipse: CurveFromTo | None = field(name="semi ellipse", default=None)
     at_least: float | None = field(name="at least", default=None)
     at_most: float | None = field(name="at most", default=None)
     singleton: float | None = None
     linear: LinearCurve | None = None
     formula: FormulaText | None = None
+
+
+if TYPE_CHECKING:
+    LabelOfVariable = TermOfSystem
+else:  # with a field for each function that is written as its numbers
+    LabelOfVariable = msgspec.defstruct(
+        "LabelOfVariable",
+        [
+            (tag.replace(" ", "_"), record | None, field(name=tag, default=None))
+            for tag, record in _OF_NUMBERS.items()
+        ],
+        bases=(TermOfSystem,),
+        namespace={"__doc__": TermOfSystem.__doc__},
+        frozen=True,
+        kw_only=True,
+    )
 
 
 class InputOfSystem(FileRecord, frozen=True, kw_only=True):
