@@ -22,15 +22,13 @@ MOST_FRAMES = 100
 """The most frames in one picture."""
 
 _PANEL = 1.9  # inches, the longer side of a frame
-_GAP = 0.14
-_MARGIN = 0.14
-_WORDS = 0.22  # above each row of frames, if they have titles
-_TITLE = 0.3
-_BAR = (0.2, 0.12, 0.62)  # left of, of, and right of the scale
+_ROOM = (1.1, 0.5)  # beside and above the frames
+_THIN = 19.0  # a frame that is longer is drawn wider than it is
 _DOTS = 420  # a picture of fewer dots than this is enlarged, each cell to a square
 _LONGEST = 26  # letters above a frame; what is longer is cut and ends in dots
 _LETTER = 0.115  # inches, the most that one of a title takes on average
 _COLOURS = 240  # of 256: without the ones that are black
+_EDGE = "#8c959f"
 _AXIS = "#00a3c4"  # seen on white and on the darkest colour
 
 
@@ -99,28 +97,39 @@ def draw_frames(
     """
     drawn = [np.asarray(frame, np.float64) for frame in frames]
     _check(drawn, titles=titles, axes=axes, cells=cells)
-    largest = max(float(frame.max()) for frame in drawn)
-    end = largest if largest > 0.0 else 1.0
-    across = columns or len(drawn)
+    end = max(float(frame.max()) for frame in drawn)
+    across = min(columns or len(drawn), len(drawn))
     if not columns and across > 4:
         across = math.ceil(math.sqrt(across))  # about a square
+    down = math.ceil(len(drawn) / across)
     with style():
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        figure = Figure()
+        width = across * _PANEL + _ROOM[0]
+        figure = Figure((width, down * _PANEL + _ROOM[1]), layout="constrained")
         FigureCanvasAgg(figure)
-        panels = _panels(figure, drawn, across, words=titles, title=title)
+        panels = figure.subplots(down, across, squeeze=False).ravel().tolist()
         shapes = cells or [frame.shape for frame in drawn]
-        for number, (panel, frame) in enumerate(zip(panels, drawn, strict=True)):
-            image = _draw(panel, frame, end)
+        for number, frame in enumerate(drawn):
+            image = _draw(panels[number], frame, end if end > 0.0 else 1.0)
             if titles:
                 words = short(titles[number], _LONGEST)
-                panel.set_title(words, fontsize=SIZE, pad=4, parse_math=False)
+                panels[number].set_title(words, fontsize=SIZE, pad=4, parse_math=False)
             if axes and (axis := axes[number]) is not None:
-                _mark(panel, axis, frame.shape, shapes[number])
-            if panel is panels[-1]:
-                _draw_scale(figure, image, unit)
+                _mark(panels[number], axis, frame.shape, shapes[number])
+        for panel in panels[len(drawn) :]:
+            panel.remove()
+        bar = figure.colorbar(image, ax=panels[: len(drawn)], shrink=0.9)
+        bar.set_label(unit, fontsize=SIZE)
+        bar.outline.set(color=_EDGE, linewidth=0.6)
+        bar.ax.tick_params(labelsize=SIZE - 1, length=2.5, color=_EDGE)
+        bar.ax.locator_params(nbins=5)
+        if title:
+            words = short(title, max(int(width / _LETTER), 1))
+            bold: Any = {"fontweight": "bold", "fontsize": SIZE + 3}
+            figure.suptitle(words, x=0.02, ha="left", parse_math=False, **bold)
+        figure.draw_without_rendering()  # which makes the layout
     return figure
 
 
@@ -135,47 +144,6 @@ def _check(frames: Sequence[Cells], **others: Sequence[object]) -> None:
     for name, found in others.items():
         if found and len(found) != len(frames):
             raise ValueError(f"{len(found)} {name} for {len(frames)} frames")
-
-
-def _panels(
-    figure: Figure,
-    frames: Sequence[Cells],
-    across: int,
-    *,
-    words: Sequence[str],
-    title: str,
-) -> list[Axes]:
-    """Make room for all frames, each as large as its longer side allows."""
-    across = min(across, len(frames))
-    down = math.ceil(len(frames) / across)
-    sides = [_sides(frame.shape) for frame in frames]
-    width, height = max(w for w, _ in sides), max(h for _, h in sides)
-    above = _WORDS if words else 0.0
-    top = _MARGIN + (_TITLE if title else 0.0)
-    total_width = 2 * _MARGIN + across * width + (across - 1) * _GAP + sum(_BAR)
-    total_height = top + _MARGIN + down * (height + above) + (down - 1) * _GAP
-    figure.set_size_inches(total_width, total_height)
-    if title:
-        x, y = _MARGIN / total_width, 1.0 - _MARGIN / total_height
-        words = short(title, max(int(total_width / _LETTER), 1))
-        bold: dict[str, Any] = {"fontweight": "bold", "fontsize": SIZE + 3}
-        figure.text(x, y, words, va="top", parse_math=False, **bold)
-    found: list[Axes] = []
-    for number, (wide, high) in enumerate(sides):
-        row, column = divmod(number, across)
-        left = _MARGIN + column * (width + _GAP) + (width - wide) / 2.0
-        bottom = total_height - top - (row + 1) * (height + above) - row * _GAP
-        bottom += (height - high) / 2.0
-        box = left / total_width, bottom / total_height
-        found.append(figure.add_axes((*box, wide / total_width, high / total_height)))
-    return found
-
-
-def _sides(shape: tuple[int, ...]) -> tuple[float, float]:
-    """Return the width and height of a frame in inches; a line has some height."""
-    rows, columns = shape[0], shape[1]
-    scale = _PANEL / max(rows, columns)
-    return max(columns * scale, 0.1), max(rows * scale, 0.1)
 
 
 def _draw(panel: Axes, frame: Cells, end: float) -> Any:
@@ -194,7 +162,8 @@ def _draw(panel: Axes, frame: Cells, end: float) -> Any:
     panel.set_xticks([])
     panel.set_yticks([])
     for spine in panel.spines.values():
-        spine.set(color="#8c959f", linewidth=0.6)
+        spine.set(color=_EDGE, linewidth=0.6)
+    panel.set_box_aspect(min(max(frame.shape[0] / frame.shape[1], 1 / _THIN), _THIN))
     return image
 
 
@@ -219,19 +188,3 @@ def _mark(
     dot.set_gid("centre")
     panel.set_xlim(0.0, shape[1])
     panel.set_ylim(0.0, shape[0])
-
-
-def _draw_scale(figure: Figure, image: Any, unit: str) -> None:
-    """Draw the scale of colours at the right, as high as the frames."""
-    width, height = figure.get_size_inches()
-    left = (width - _MARGIN - sum(_BAR[1:])) / width
-    bottom = _MARGIN / height
-    boxes = [axes.get_position() for axes in figure.axes]
-    top = max(box.y1 for box in boxes)
-    high = min(top - bottom, 2.0 * _PANEL / height)
-    axes = figure.add_axes((left, top - high, _BAR[1] / width, high))
-    bar = figure.colorbar(image, cax=axes)
-    bar.set_label(unit, fontsize=SIZE)
-    bar.outline.set(color="#8c959f", linewidth=0.6)
-    axes.tick_params(labelsize=SIZE - 1, length=2.5, color="#8c959f")
-    axes.locator_params(nbins=5)
