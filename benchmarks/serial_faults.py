@@ -30,7 +30,7 @@ from fuzzytree.tactile.simulation.device import (
     bauds,
     empty,
 )
-from fuzzytree.tactile.simulation.encoding import encoded, in_board_order, packed
+from fuzzytree.tactile.simulation.encoding import encoded, in_board_order
 
 _NOISE = 16  # the most bytes of noise between two frames
 _CHANCES = ("flip", "lose", "double", "noise", "marker")
@@ -147,12 +147,12 @@ def with_marker(board: Board, cells: Cells, random: np.random.Generator) -> Cell
     marker = np.frombuffer(bytes.fromhex(protocol.marker), np.uint8)
     size = protocol.bits // 8
     values = in_board_order(board, cells)
-    sent = np.frombuffer(packed(values, protocol.bits, protocol.byte_order), np.uint8)
+    kind = np.dtype(f"u{size}").newbyteorder(protocol.byte_order)
+    sent = np.frombuffer(values.astype(kind).tobytes(), np.uint8)
     places = random.permutation(max(len(sent) - len(marker) + 1, 0))
     for place in places[: 8 * size].tolist():
         changed = sent.copy()
         changed[place : place + len(marker)] = marker
-        kind = np.dtype(f"u{size}").newbyteorder(protocol.byte_order)
         found = changed.view(kind).astype(np.int64)
         if int(found.max()) <= board.sensor.full:
             sensor = board.sensor

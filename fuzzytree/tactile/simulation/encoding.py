@@ -1,13 +1,13 @@
 """What a board puts on the line for a frame: the other side of the decoders.
 
-Written from the description in `tactile/boards.py` alone, so that a frame that goes
-out here and comes in there is a test of both.
+What proves a frame (checksums, runs of zeros, lines) is written from the description in
+`tactile/boards.py` alone, so that a frame that goes out here and comes in there is a
+test of both.
 """
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Literal, assert_never
+from typing import assert_never
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +15,13 @@ import numpy.typing as npt
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import (
     Board,
-    ByteOrder,
     Checksum,
     Marker,
     Request,
     Sentinel,
     Text,
 )
+from fuzzytree.tactile.link.fixed import layout_of
 from fuzzytree.tactile.sensor import Cells, check_frames
 
 _SEPARATORS = {"space": " ", "comma": ",", "semicolon": ";"}
@@ -47,22 +47,14 @@ def encoded(board: Board, cells: Cells, number: int = 0) -> bytes:
     values = in_board_order(board, cells)
     protocol = board.protocol
     match protocol:
-        case Marker():
-            sizes = b""
-            if protocol.sizes != "none":
-                pair = np.array([board.sensor.rows, board.sensor.columns])
-                sizes = packed(pair, 16, protocol.byte_order)
+        case Marker() | Request():
+            layout = layout_of(board, protocol)
             stamp = _stamp(number, protocol.skip)
-            body = sizes + stamp + packed(values, protocol.bits, protocol.byte_order)
-            check = checksum(protocol.checksum, body)
-            head, tail = bytes.fromhex(protocol.marker), bytes.fromhex(protocol.tail)
-            return head + body + check + tail
+            front = layout.head + stamp + values.astype(layout.dtype).tobytes()
+            check = checksum(protocol.checksum, front[layout.checked_from :])
+            return front + check + layout.tail
         case Sentinel():
             return _with_runs(protocol, values)
-        case Request():
-            stamp = _stamp(number, protocol.skip)
-            body = stamp + packed(values, protocol.bits, protocol.byte_order)
-            return body + checksum(protocol.checksum, body)
         case Text():
             return _lines(board, protocol, values, number)
         case _:
@@ -111,16 +103,6 @@ def in_board_order(board: Board, cells: Cells) -> npt.NDArray[np.int64]:
     return values
 
 
-def packed(
-    values: npt.NDArray[np.int64], bits: Literal[8, 16], byte_order: ByteOrder
-) -> bytes:
-    """Return whole numbers as bytes, 8 or 16 bits each."""
-    if bits == 8:
-        return bytes(values.astype(np.uint8))
-    words = values.astype(np.uint16)
-    return bytes(words.astype(words.dtype.newbyteorder(byte_order)).data)
-
-
 def checksum(kind: Checksum, body: bytes) -> bytes:
     """Return the checksum of some bytes: none, one or two bytes.
 
@@ -145,20 +127,12 @@ def checksum(kind: Checksum, body: bytes) -> bytes:
 
 
 def _crc16(body: bytes) -> int:
-    table, crc = _crc_table(), 0xFFFF
+    crc = 0xFFFF
     for byte in body:
-        crc = (crc >> 8) ^ table[(crc ^ byte) & 0xFF]
-    return crc
-
-
-@cache
-def _crc_table() -> tuple[int, ...]:
-    table: list[int] = []
-    for value in range(256):
+        crc ^= byte
         for _ in range(8):
-            value = (value >> 1) ^ (0xA001 if value & 1 else 0)
-        table.append(value)
-    return tuple(table)
+            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+    return crc
 
 
 def _stamp(number: int, size: int) -> bytes:
