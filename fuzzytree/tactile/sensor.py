@@ -63,6 +63,16 @@ class Sensor(Value, frozen=True):
         """How many bits hold what a cell reads."""
         return 8 if self.full <= 255 else 16
 
+    @property
+    def dtype(self) -> np.dtype[np.unsignedinteger]:
+        """The type of what a cell reads, in a frame and in a recording."""
+        return np.dtype(f"<u{self.bits // 8}")
+
+    @property
+    def largest(self) -> int:
+        """The largest number of that type."""
+        return (1 << self.bits) - 1
+
 
 def limit_mistakes(value: Value) -> Iterator[Mistake]:
     """Yield each field of a record that is outside the limits of its type.

@@ -24,7 +24,7 @@ from fuzzytree.exporters import (
 )
 from fuzzytree.model import Model, Written
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
-from fuzzytree.tactile.features.aimed import frame_type, proving_frames
+from fuzzytree.tactile.features.aimed import proving_frames
 from fuzzytree.tactile.features.plain import check_reject, plain_shown
 from fuzzytree.tactile.sensor import Cells, Sensor, offsets
 
@@ -168,7 +168,7 @@ def _text(
 ) -> Iterator[str]:
     sensor, file = made.sensor, CFile(model, DOUBLE, prefix)
     yield from file.declarations()
-    kind = frame_type(sensor).__name__ + "_t"
+    kind = f"uint{sensor.bits}_t"
     types = _TYPES.replace("ROWSu", f"{sensor.rows}u").replace("CELL ", f"{kind} ")
     yield fill(types.replace("COLUMNSu", f"{sensor.columns}u"), prefix)
     yield from file.definitions(is_arithmetic=True)
@@ -205,7 +205,7 @@ def _cells(sensor: Sensor) -> Iterator[str]:
     yield "\n/* How much presses on a cell: 0 where nothing does. */\n"
     yield "static int32_t name_pressed(const name_cell *frame, unsigned place)\n{\n"
     yield "    int32_t value = frame[place];\n"
-    if sensor.full != (1 << sensor.bits) - 1:
+    if sensor.full != sensor.largest:
         yield f"    if (value > {sensor.full})\n        value = {sensor.full};\n"
     if taken:
         yield "    value -= name_offset[place];\n"

@@ -26,7 +26,6 @@ from fuzzytree.exporters import (
 )
 from fuzzytree.model import FuzzyTree, Model, RuleBase, Written, fingerprint, kind_of
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
-from fuzzytree.tactile.features.aimed import frame_type
 from fuzzytree.tactile.features.plain import State, check_reject
 from fuzzytree.tactile.sensor import Sensor, offsets
 
@@ -235,7 +234,7 @@ def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
     shape = sheet.numbers([-1, size], "shape")
     values = sheet.node("Reshape", "frames", shape, hint="cells")
     values = sheet.node("Cast", values, hint="cells", to=double)
-    if sensor.full != np.iinfo(frame_type(sensor)).max:
+    if sensor.full != sensor.largest:
         full = sheet.number(float(sensor.full))
         values = sheet.node("Min", values, full, hint="cells")
     if offsets(sensor):

@@ -22,11 +22,6 @@ _MOST_CUTS = 40
 _HALVINGS = 20  # 16 bits are done after them
 
 
-def frame_type(sensor: Sensor) -> type[np.uint8] | type[np.uint16]:
-    """Return the type of numbers that holds what a cell reads."""
-    return np.uint8 if sensor.bits == 8 else np.uint16
-
-
 def aimed_frames(sensor: Sensor, random: int = 24, seed: int = 0) -> Cells:
     """Return frames at which computations could part.
 
@@ -35,27 +30,26 @@ def aimed_frames(sensor: Sensor, random: int = 24, seed: int = 0) -> Cells:
     presses of all sizes.
 
     Returns:
-        Shape (frames, rows, columns), of the type of `frame_type`.
+        Shape (frames, rows, columns), of the sensor's type.
 
     Example:
         >>> aimed_frames(Sensor(2, 2, threshold=9), 0)[:, 0, 0].tolist()[:4]
         [0, 9, 10, 255]
     """
-    kind = frame_type(sensor)
     base = np.zeros((sensor.rows, sensor.columns), np.int64)
     if sensor.baseline:
         base += np.array(sensor.baseline, np.int64).reshape(base.shape)
     above = [*_plain(sensor, base), *_symmetric(sensor, base)]
     above += _presses(sensor, base, random, seed)
     frames = np.array([base, *above], np.int64)
-    return np.clip(frames, 0, np.iinfo(kind).max).astype(kind)
+    return np.clip(frames, 0, sensor.largest).astype(sensor.dtype)
 
 
 def _plain(sensor: Sensor, base: Whole) -> Iterator[Whole]:
     yield base + sensor.threshold
     yield base + sensor.threshold + 1
     yield np.full_like(base, sensor.full)
-    yield np.full_like(base, np.iinfo(frame_type(sensor)).max)
+    yield np.full_like(base, sensor.largest)
     yield np.zeros_like(base)
     last, right = sensor.rows - 1, sensor.columns - 1
     for row, column in ((0, 0), (last, 0), (last, right), (last // 2, right // 2)):

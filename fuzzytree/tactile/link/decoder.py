@@ -35,7 +35,6 @@ class Decoder(ABC):
         self.framed = 0
         self._buffer = bytearray()
         self._need = 1  # the fewest bytes in the buffer that can decide anything
-        self._dtype = np.uint8 if board.sensor.bits == 8 else np.uint16
         self._board = board
 
     @property
@@ -109,15 +108,13 @@ class Decoder(ABC):
             # Nothing is below 0: what reads above full was refused.
             whole = self._board.sensor.full - whole.astype(np.int64)
         self.counters.frames += len(whole)
-        return list(np.ascontiguousarray(whole, self._dtype))
+        return list(np.ascontiguousarray(whole, self._board.sensor.dtype))
 
 
 def largest_cell(board: Board) -> int:
     """Return the most that a cell of a whole frame can hold, as it was sent."""
     sensor = board.sensor
-    if board.pressure == "falls":
-        return sensor.full
-    return 255 if sensor.bits == 8 else 65535
+    return sensor.full if board.pressure == "falls" else sensor.largest
 
 
 def banner_bytes(data: bytes, lines: int) -> tuple[int, int]:

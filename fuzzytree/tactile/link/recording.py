@@ -79,42 +79,32 @@ def header(board: Board, started_ns: int) -> bytes:
     return content + crc(content)
 
 
-def fixed_part(
-    board: Board, board_bytes: int, started_ns: int, *, counters: int = _COUNTERS
-) -> bytes:
+def fixed_part(board: Board, board_bytes: int, started_ns: int) -> bytes:
     """Return the part of the header that is of the same length in every file."""
     fields = (
         MAGIC,
         VERSION,
         board.sensor.rows,
         board.sensor.columns,
-        cell_type(board).itemsize,
-        counters,
-        layout_of(board, counters=counters).itemsize,
+        board.sensor.dtype.itemsize,
+        _COUNTERS,
+        layout_of(board).itemsize,
         board_bytes,
         started_ns,
     )
     return np.array(fields, FIXED).tobytes()
 
 
-def cell_type(board: Board) -> np.dtype[np.unsignedinteger]:
-    """Return the type of a cell, as a decoder gives it."""
-    return np.dtype("u1" if board.sensor.bits == 8 else "<u2")
-
-
-def layout_of(board: Board, *, counters: int = _COUNTERS) -> np.dtype[np.void]:
-    """Return how the fields of a record lie in its bytes.
-
-    A later version may have more counters.
-    """
+def layout_of(board: Board) -> np.dtype[np.void]:
+    """Return how the fields of a record lie in its bytes."""
     shape = (board.sensor.rows, board.sensor.columns)
     return np.dtype(
         [
             ("mark", "S4"),
             ("number", "<i8"),
             ("time_ns", "<i8"),
-            ("counters", "<i8", (counters,)),
-            ("cells", cell_type(board), shape),
+            ("counters", "<i8", (_COUNTERS,)),
+            ("cells", board.sensor.dtype, shape),
             ("crc", "<u4"),
         ]
     )
@@ -123,7 +113,7 @@ def layout_of(board: Board, *, counters: int = _COUNTERS) -> np.dtype[np.void]:
 def _packed(frame: Frame, counters: Counters, board: Board) -> bytes:
     """Return a record as bytes."""
     cells = check_frames(board.sensor, frame.cells)[0]
-    largest = np.iinfo(cell_type(board)).max
+    largest = board.sensor.largest
     if cells.min() < 0 or cells.max() > largest:
         wrong = cells.min() if cells.min() < 0 else cells.max()
         raise TableError(f"a cell lies in 0 to {largest}, not {wrong}")
@@ -143,7 +133,7 @@ def _unpacked(content: bytes, layout: np.dtype[np.void]) -> FrameRecord | None:
     if min(number, time_ns, *counters) < 0:
         return None
     return FrameRecord(
-        Frame(fields["cells"], time_ns / _NS, number), Counters(*counters[:_COUNTERS])
+        Frame(fields["cells"], time_ns / _NS, number), Counters(*counters)
     )
 
 
@@ -384,7 +374,7 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
                 f"{name}: is a recording of version {head['version']}; "
                 f"this program reads version {VERSION}"
             )
-        length, counters = int(head["board_bytes"]), int(head["counters"])
+        length = int(head["board_bytes"])
         self.started_ns = int(head["started_ns"])
         rest = self._read(size, min(length, LARGEST_BOARD) + 4)
         text = rest[:-4]
@@ -394,10 +384,10 @@ class RecordingFile(contextlib.AbstractContextManager["RecordingFile"]):
             self.board = msgspec.json.decode(text, type=Board)
         except (msgspec.MsgspecError, UnicodeDecodeError) as error:
             raise ReadError(f"{name}: its board cannot be read: {error}") from error
-        if fixed != fixed_part(self.board, length, self.started_ns, counters=counters):
+        if fixed != fixed_part(self.board, length, self.started_ns):
             raise ReadError(f"{name}: its header contradicts its board")
         self._begin = size + len(rest)
-        self._layout = layout_of(self.board, counters=counters)
+        self._layout = layout_of(self.board)
 
 
 def read_recording(path: PathLike) -> Recording:
@@ -410,7 +400,7 @@ def read_recording(path: PathLike) -> Recording:
     with RecordingFile(path) as file:
         sensor, most = file.board.sensor, file.most_frames
         shape = (most, sensor.rows, sensor.columns)
-        kind = cell_type(file.board)
+        kind = sensor.dtype
         if math.prod(shape) * kind.itemsize > LARGEST_ARRAY:
             raise ReadError(
                 f"{os.fspath(path)}: its {most} frames are more than "

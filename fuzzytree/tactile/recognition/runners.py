@@ -19,7 +19,6 @@ from fuzzytree.tactile.exporters.onnx_frames import (
     write_frames,
 )
 from fuzzytree.tactile.features import frame_program
-from fuzzytree.tactile.features.aimed import frame_type
 from fuzzytree.tactile.features.plain import plain_shown
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.sensor import Cells, Sensor, check_frames
@@ -49,9 +48,8 @@ def as_sent(sensor: Sensor, frames: Cells) -> Cells:
         [[[255, 0]]]
     """
     found = check_frames(sensor, frames)
-    kind = frame_type(sensor)
-    if found.dtype != kind:
-        found = np.clip(found, 0, sensor.full).astype(kind)
+    if found.dtype != sensor.dtype:
+        found = np.clip(found, 0, sensor.full).astype(sensor.dtype)
     return np.ascontiguousarray(found)
 
 

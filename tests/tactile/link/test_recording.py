@@ -229,6 +229,7 @@ def _header(text: bytes, **changes: int) -> bytes:
         ),
         (_header(msgspec.json.encode(BOARD), rows=4), "its header contradicts its bo"),
         (_header(msgspec.json.encode(BOARD), record_bytes=1), "its header contradic"),
+        (_header(msgspec.json.encode(BOARD), counters=11), "its header contradicts i"),
     ],
 )
 def test_what_is_no_recording_is_one_sentence(
@@ -251,18 +252,6 @@ def test_a_folder_a_pipe_and_nothing_are_no_recordings(tmp_path: Path) -> None:
         with pytest.raises(ReadError) as caught:
             read_recording(tmp_path / name)
         assert str(caught.value) == f"{tmp_path / name}: {why}"
-
-
-@pytest.mark.parametrize("counters", [3, 11])
-def test_a_recording_with_fewer_or_more_counters_is_read(
-    tmp_path: Path, counters: int
-) -> None:
-    text = msgspec.json.encode(BOARD)
-    header = _sealed(records.fixed_part(BOARD, len(text), 0, counters=counters) + text)
-    record = np.zeros((), records.layout_of(BOARD, counters=counters))
-    record["mark"], record["counters"] = records.MARK, range(counters)
-    found = _read(tmp_path / "a.ftr", header + _sealed(record.tobytes()[:-4]))
-    assert found.counters == Counters(*range(min(counters, 9)))
 
 
 def test_a_file_that_is_there_is_kept_unless_reported(tmp_path: Path) -> None:
