@@ -64,6 +64,7 @@ class Presses:
             is not known.
         label_names: The names of the classes.
         subject: Shape (frames,): who was pressing; empty if it is not known.
+        is_stream: Whether the frames follow each other, as in a recording.
     """
 
     frames: Cells
@@ -71,6 +72,28 @@ class Presses:
     label: npt.NDArray[np.int64] = field(default_factory=_unknown)
     label_names: tuple[str, ...] = ()
     subject: npt.NDArray[np.int64] = field(default_factory=_unknown)
+    is_stream: bool = False
+
+    def placements(self, is_pressed: npt.NDArray[np.bool_]) -> dict[str, int]:
+        """Return how often something was put down, for each class that is known.
+
+        In a stream that is once from one empty frame to the next, else once a frame.
+
+        Args:
+            is_pressed: Shape (frames,): whether anything presses.
+
+        Example:
+            >>> cells = np.ones((4, 1, 1), np.uint8)
+            >>> cup = Presses(cells, Sensor(1, 1), is_stream=True).of_class("cup")
+            >>> cup.placements(np.array([True, True, False, True]))
+            {'cup': 2}
+        """
+        is_begun = is_pressed.copy()
+        if self.is_stream:
+            is_begun[1:] &= ~is_pressed[:-1]
+        codes = self.label[is_begun] if len(self.label) else self.label
+        counts = np.bincount(codes, minlength=len(self.label_names)).tolist()
+        return dict(zip(self.label_names, counts, strict=True))
 
     def of_class(self, name: str) -> Presses:
         """Return the same frames, all of one class."""
@@ -277,7 +300,7 @@ def read_frames(
         raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
     if is_recording:
         recording = read_recording(path)
-        return Presses(recording.frames, recording.board.sensor)
+        return Presses(recording.frames, recording.board.sensor, is_stream=True)
     presses = read_presses(path, label=label)
     own = presses.sensor
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import shlex
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,11 +26,13 @@ from fuzzytree.cli import (
 from fuzzytree.errors import ReadError
 from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import FramesOptions, frames_of_options
+from fuzzytree.tactile.features.names import USUAL
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.presses import Presses
     from fuzzytree.tactile.runtimes.frames import Features
 
+FEW_PLACEMENTS = 10
 CLASS = "class"
 """The column of the classes."""
 
@@ -41,7 +44,7 @@ class TactileFeaturesOptions(FramesOptions):
     text: str = option(
         "--features",
         metavar="NAMES",
-        default="paper",
+        default=USUAL,
         show_default=True,
         help="Names and sets of features, separated by commas.",
     )
@@ -153,6 +156,13 @@ def _table(
     if full:
         text = f"a cell reads {sensor.full} or more"
         rows.append(("full", counted(full, "frame"), text))
+    placed: Counter[str] = Counter()
+    for part, one in zip(parts, found, strict=True):
+        placed.update(part.placements(one.is_pressed))
+    for name, count in placed.items():
+        if count < FEW_PLACEMENTS:
+            text = f"below {FEW_PLACEMENTS}, `live` finds more of its presses unknown"
+            rows.append(("few", name, f"{counted(count, 'placement')}: {text}"))
     after = ["fuzzytree", "learn", output, "--target", CLASS, "-o", "tree.yaml"]
     after += ["--ignore", "subject"] if len(presses.subject) else []
     text = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
@@ -164,6 +174,7 @@ def _table(
                 "file": output,
                 "frames": sum(counts),
                 "nothing": none,
+                "placements": placed,
                 "saturated": full,
                 "features": names,
                 "costs": costs,

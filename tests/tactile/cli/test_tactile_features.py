@@ -45,6 +45,10 @@ def test_frames_become_a_table_that_a_tree_is_learnt_from(
         "read     f.npz   4 frames of 6 x 6 cells\n"
         "left out 1 frame nothing presses\n"
         "full     1 frame a cell reads 255 or more\n"
+        "few      small   2 placements: below 10, `live` finds more of its presses "
+        "unknown\n"
+        "few      large   1 placement: below 10, `live` finds more of its presses "
+        "unknown\n"
         "wrote    t.csv   2 features; next: fuzzytree learn t.csv --target class "
         "-o tree.yaml --ignore subject\n"
     )
@@ -101,9 +105,13 @@ def test_files_of_one_class_each_become_one_table(
         "0.6352941176470588,1.2705882352941176,a pen",
         "0.7058823529411765,1.411764705882353,cup",
     ]
-    assert capsys.readouterr().err.splitlines()[:2] == [
+    few = "below 10, `live` finds more of its presses unknown"
+    lines = capsys.readouterr().err.splitlines()
+    assert [*lines[:2], *lines[4:6]] == [
         "read     cup=cup.ftr   2 frames of 6 x 6 cells",
         "read     a pen=pen.ftr 2 frames of 6 x 6 cells",
+        f"few      cup           2 placements: {few}",
+        f"few      a pen         1 placement: {few}",
     ]
     refused = {
         ("cup.ftr", "pen=pen.ftr"): "of several files, each has a class: "
