@@ -141,17 +141,14 @@ def write_onnx(
         from fuzzytree.exporters import onnx_session
         from fuzzytree.exporters.onnx_graph import NUMBERS
 
-        if isinstance(model, FuzzySystem):
-            onnx_session.prove_system(content, model, outputs)
-        else:
-            onnx_session.prove(
-                content,
-                model,
-                _columns(model, signature),
-                outputs,
-                kind=NUMBERS[dtype].axis,
-                is_exact=dtype == "float64" or (dtype == "mixed" and _is_tree(model)),
-            )
+        onnx_session.prove(
+            content,
+            model,
+            _columns(model, signature),
+            outputs,
+            kind=NUMBERS[dtype].axis,
+            is_exact=dtype == "float64" or (dtype == "mixed" and _is_tree(model)),
+        )
     return Written(content, lost)
 
 

@@ -11,17 +11,10 @@ import numpy.typing as npt
 import onnxruntime
 
 from fuzzytree.errors import DisagreementError, LossError
-from fuzzytree.exporters.program_text import answer_of
-from fuzzytree.model import FuzzySystem, Model, RuleBase
+from fuzzytree.exporters.program_text import answer_of, system_examples
+from fuzzytree.model import Document, FuzzySystem, RuleBase
 from fuzzytree.numerics import RealKind
-from fuzzytree.semantics import (
-    Program,
-    error_bounds,
-    from_system,
-    infer,
-    landmarks,
-    system_probes,
-)
+from fuzzytree.semantics import Row, few_probes, from_system, system_probes
 
 _STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
 
@@ -78,20 +71,18 @@ def first_line(error: Exception) -> str:
     return text.split(" : ", 3)[-1] if text.startswith("[ONNXRuntimeError]") else text
 
 
-MOST_ROWS = 24
-"""Rows on which a written file is run, at the most."""
-
-_MOST_PROPOSITIONS = 50_000  # what the reference does in well under a second
+_MOST_ROWS = 24  # on which a written file is run
+_MOST_OPERATIONS = 300_000  # of all rows: what the reference does in under a second
 
 
 def prove(
     content: bytes,
-    model: Model,
+    model: Document,
     columns: Sequence[str],
     names: Sequence[str],
     *,
-    kind: type[RealKind],
-    is_exact: bool,
+    kind: type[RealKind] = np.float64,
+    is_exact: bool = True,
 ) -> None:
     """Load a file, run it and compare its predictions with the reference.
 
@@ -99,22 +90,29 @@ def prove(
 
     Raises:
         LossError: If onnxruntime does not load or run the file.
-        DisagreementError: If an answer differs.
+        DisagreementError: If a prediction differs, by more than its bound.
     """
-    rows = list(_sample_rows(model))
+    rows = _rows(model)
     table = [[row.get(name, 0.0) for name in columns] for row in rows]
     with np.errstate(over="ignore"):  # beyond float32 is missing in float32
         values = np.array(table, np.float64).astype(kind)
     values = values.reshape(len(rows), len(columns))
-    result = proved_run(content, model.name, names, values)
-    for number, row in enumerate(rows):
-        is_missing = not all(map(math.isfinite, row.values()))
-        if is_exact or is_missing:
-            outputs = {name: array[number] for name, array in result.items()}
-            _compare(model, row, outputs)
+    result = _run(content, model.name, names, values)
+    every = zip(rows, _expected(model, rows), strict=True)
+    for number, (row, (expected, allowed)) in enumerate(every):
+        if not is_exact and all(map(math.isfinite, row.values())):
+            continue
+        for name, array in result.items():
+            one, right = array[number : number + 1].reshape(-1).tolist(), expected[name]
+            if not _is_near(one, right, allowed.get(name, ())):
+                shown, wanted = (v[0] if len(v) == 1 else v for v in (one, right))
+                raise DisagreementError(
+                    f"the onnx file of {model.name} returns another {name} than the "
+                    f"model where {dict(row)}: {shown}, not {wanted}"
+                )
 
 
-def proved_run(
+def _run(
     content: bytes, model: str, names: Sequence[str], values: Array
 ) -> dict[str, Array]:
     """Return the named outputs of a file for some rows.
@@ -132,97 +130,55 @@ def proved_run(
     return {name: np.asarray(one) for name, one in zip(names, result, strict=True)}
 
 
-def _sample_rows(model: Model) -> Iterator[dict[str, float]]:
-    """Yield rows near a model's landmarks, the last with a missing value."""
+def _rows(model: Document) -> Sequence[Row]:
+    """Return rows on which a file is run, more of a small model."""
+    if isinstance(model, FuzzySystem):
+        size = from_system(model, activations=True).size
+        limit = min(_MOST_ROWS, _MOST_OPERATIONS // size)
+        return system_probes(model, limit=max(1, limit))
     size = 1
     if isinstance(model, RuleBase):
-        size = sum(len(c.terms) for rule in model.rules for c in rule.when) or 1
-    points = {
-        v.name: sorted({point for term in v.terms for point in landmarks(term.shape)})
-        or [v.low or 0.0, v.high or 1.0]
-        for v in model.variables
-        if not v.parts
-    }
-    for number in range(max(1, min(MOST_ROWS, _MOST_PROPOSITIONS // size))):
-        yield {
-            name: values[(number * (3 + 2 * position) + position) % len(values)]
-            for position, (name, values) in enumerate(points.items())
-        }
-    if points:
-        yield dict.fromkeys(points, math.nan)
+        size = 6 * sum(len(c.terms) for rule in model.rules for c in rule.when) or 1
+    limit = min(_MOST_ROWS, _MOST_OPERATIONS // size)
+    rows = few_probes(model, max(1, limit))
+    return [*rows, dict.fromkeys(model.inputs, math.nan)]
 
 
-def _compare(model: Model, row: dict[str, float], outputs: dict[str, object]) -> None:
-    answer = answer_of(model, row)
-    expected: dict[str, object] = {
-        "rule": answer.rule,
-        "label": answer.label or "",
-        "status": int(answer.status),
-    }
-    for name, value in outputs.items():
-        if name == "strengths":
-            same = np.array_equal(
-                np.asarray(value, np.float64), answer.strengths, equal_nan=True
-            )
-        else:
-            same = value == expected[name]
-        if not same:
-            right = answer.strengths if name == "strengths" else expected[name]
-            raise DisagreementError(
-                f"the onnx file of {model.name} returns another {name} than the model "
-                f"where {row}: {value}, not {right}"
-            )
+Values = Mapping[str, Sequence[float | str]]
+Bounds = Mapping[str, Sequence[float]]
 
 
-_MOST_STEPS = 300_000  # of all rows
+def _expected(model: Document, rows: Sequence[Row]) -> Iterator[tuple[Values, Bounds]]:
+    """Yield the reference's values of each output, and how far they may be off."""
+    if isinstance(model, FuzzySystem):
+        first = len(model.outputs)
+        examples = system_examples(model, rows, activations=True)
+        for _, numbers, bounds, status in examples:
+            values = {"outputs": numbers[:first], "activations": numbers[first:]}
+            most = {"outputs": bounds[:first], "activations": bounds[first:]}
+            yield {**values, "status": [status]}, most
+        return
+    for row in rows:
+        answer = answer_of(model, row)
+        yield (
+            {
+                "rule": [answer.rule],
+                "label": [answer.label or ""],
+                "status": [int(answer.status)],
+                "strengths": answer.strengths,
+            },
+            {},
+        )
 
 
-def prove_system(content: bytes, system: FuzzySystem, outputs: Sequence[str]) -> None:
-    """Load a file, run it and compare its outputs with the inference.
-
-    Raises:
-        LossError: If onnxruntime does not load or run the file.
-        DisagreementError: If a number differs by more than its bound.
-    """
-    program = from_system(system, activations=True)
-    limit = max(1, min(MOST_ROWS, _MOST_STEPS // program.size))
-    rows = system_probes(system, limit=limit)
-    table = np.array([[row[name] for name in system.columns] for row in rows])
-    table = table.reshape(len(rows), len(system.columns))
-    results = proved_run(content, system.name, outputs, table)
-    for text in _differences(system, program, rows, table, results):
-        raise DisagreementError(text)
-
-
-def _differences(
-    system: FuzzySystem,
-    program: Program,
-    rows: Sequence[Mapping[str, float]],
-    table: npt.NDArray[np.float64],
-    results: Mapping[str, Array],
-) -> Iterator[str]:
-    """Yield numbers of a file that differ from the inference by more than allowed."""
-    right = [infer(system, row) for row in rows]
-    expected = {
-        "outputs": np.array([one.outputs for one in right], np.float64),
-        "activations": np.array([one.activations for one in right], np.float64),
-        "status": np.array([[one.status] for one in right], np.float64),
-    }
-    bounds = error_bounds(program, table.T).T
-    first, last = len(system.outputs), len(system.outputs) + len(system.rules)
-    allowed = {
-        "outputs": bounds[:, :first],
-        "activations": bounds[:, first:last],
-        "status": bounds[:, last:],
-    }
-    for name, array in results.items():
-        answers = array.astype(np.float64).reshape(expected[name].shape)
-        one = expected[name]
-        is_same = (answers == one) | (np.isnan(answers) & np.isnan(one))
-        with np.errstate(invalid="ignore"):  # of two infinities
-            is_near = is_same | (np.abs(answers - one) <= allowed[name])
-        for row, place in np.argwhere(~(is_near | np.isinf(allowed[name]))).tolist():
-            yield (
-                f"the onnx file of {system.name} gives other {name} than the model "
-                f"where {dict(rows[row])}: {answers[row, place]}, not {one[row, place]}"
-            )
+def _is_near(
+    values: Sequence[object], right: Sequence[float | str], allowed: Sequence[float]
+) -> bool:
+    """Return whether values are equal, or as near as allowed; NaN is NaN."""
+    if any(isinstance(value, str) for value in right):
+        return [*values] == [*right]
+    one, two = np.array(values, np.float64), np.array(right, np.float64)
+    most = np.array(allowed, np.float64) if allowed else np.zeros(len(two))
+    with np.errstate(invalid="ignore"):  # of two infinities
+        is_near = (one == two) | (np.abs(one - two) <= most) | np.isinf(most)
+    return bool(np.all(is_near | (np.isnan(one) & np.isnan(two))))

@@ -433,7 +433,7 @@ def test_a_file_with_another_answer_is_not_written(
         write_onnx(lr_rules())
     assert str(caught.value) == (
         "the onnx file of slips returns another rule than the model "
-        "where {'slip': 8.8}: 0, not 1"
+        "where {'slip': 10.0}: 0, not 1"
     )
 
 

@@ -191,7 +191,7 @@ def test_a_wrong_graph_is_not_returned(
     operation: str, operator: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(onnx_steps, "NODES", {**onnx_steps.NODES, operation: operator})
-    with pytest.raises(DisagreementError, match=r"gives other .* than the model where"):
+    with pytest.raises(DisagreementError, match=r"returns another .* where"):
         write_onnx(SYSTEM, outputs=("outputs", "activations"))
 
 
