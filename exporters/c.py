@@ -18,7 +18,7 @@ from fuzzytree.exporters.c_steps import (
     system_code,
     system_selftest,
 )
-from fuzzytree.exporters.c_tables import CModel, CTreeTest
+from fuzzytree.exporters.c_tables import CModel
 from fuzzytree.exporters.c_text import (
     DOUBLE,
     SINGLE,
@@ -261,7 +261,7 @@ class CFile(CModel):
         yield from axes_code(model.variables, self.line, self.numbers)
         axes = _TAKE_COMBINED if any(v.parts for v in model.variables) else _TAKE
         if isinstance(model, FuzzyTree):
-            yield from tree_code(model, self.tests, self.numbers, axes)
+            yield from tree_code(self, model, axes)
         elif self.tables is not None:
             is_product = semantics.conjunction == "product"
             yield from rules_code(
@@ -463,10 +463,9 @@ TAKE_AXES
 """
 
 
-def tree_code(
-    tree: FuzzyTree, tests: Sequence[CTreeTest], numbers: CNumbers, axes: str
-) -> Iterator[str]:
+def tree_code(file: CModel, tree: FuzzyTree, axes: str) -> Iterator[str]:
     """Yield the tables of a tree and the function that walks through them."""
+    tests, numbers = file.tests, file.numbers
     numbered = {label: place for place, label in enumerate(tree.classes)}
     labels = [numbered[leaf.label] for leaf in tree.leaves]
     if not tests:
@@ -475,7 +474,7 @@ def tree_code(
         yield text.replace("TAKE_AXES\n", plain)
         return
     ends = [place for test in tests for place in (test.no, test.yes)]
-    lines = [test.line for test in tests]
+    lines = [file.line[test.variable] for test in tests]
     cuts = numbers.rounded([test.cut for test in tests])
     yield f"#define NAME_QUESTIONS {len(tests)}u\n\n"
     yield _TABLES

@@ -199,7 +199,11 @@ def _leaf(file: CModel, values: Sequence[Real]) -> int:
     while place < len(tests):
         one = tests[place]
         (cut,) = file.numbers.rounded([one.cut])
-        place = one.yes if values[one.line] > file.numbers.kind(cut) else one.no
+        place = (
+            one.yes
+            if values[file.line[one.variable]] > file.numbers.kind(cut)
+            else one.no
+        )
     return place - len(tests) + 1
 
 

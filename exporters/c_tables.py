@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fuzzytree.exporters.c_text import CNumbers
-from fuzzytree.exporters.program_text import places_of
+from fuzzytree.exporters.program_text import TreeTest, places_of, tree_tests
 from fuzzytree.model import (
     LR,
     Band,
-    FuzzyTree,
     Model,
-    Node,
     Points,
     Proposition,
     RuleBase,
@@ -213,54 +211,6 @@ def _points(points: Points, numbers: CNumbers) -> list[float]:
     return [*numbers.rounded(points.values), *degrees]
 
 
-@dataclass(frozen=True, slots=True)
-class CTreeTest:
-    """Whether a value lies above a cut, and where no and yes lead.
-
-    A place below the number of tests is a test, and k places behind is leaf k + 1.
-    """
-
-    line: int
-    cut: float
-    no: int
-    yes: int
-
-
-def cut_tests(tree: FuzzyTree, line: Mapping[str, int]) -> list[CTreeTest]:
-    """Return the tests of a tree; the first is that of the root.
-
-    A node of several cuts becomes several tests, by halves.
-    """
-    starts, count = [0], 0
-    for node in tree.nodes:
-        count += len(node.cuts)
-        starts.append(count)
-    result: list[CTreeTest] = []
-    for node in tree.nodes:
-        targets = [
-            count + branch.leaf - 1 if branch.leaf else starts[(branch.node or 1) - 1]
-            for branch in node.branches
-        ]
-        ends = [targets[owner] for owner in node.owners]
-        result += _halved(node, line[node.variable], ends, len(result))
-    return result
-
-
-def _halved(node: Node, line: int, ends: list[int], start: int) -> list[CTreeTest]:
-    """Return a node's tests, numbered from `start`, each half behind its whole."""
-
-    def arrange(first: int, last: int, place: int) -> list[CTreeTest]:
-        middle = (first + last) // 2
-        left = arrange(first, middle, place + 1) if first < middle else []
-        behind = place + 1 + len(left)
-        right = arrange(middle + 1, last, behind) if middle + 1 < last else []
-        no = place + 1 if left else ends[first]
-        yes = behind if right else ends[last]
-        return [CTreeTest(line, node.cuts[middle], no, yes), *left, *right]
-
-    return arrange(0, len(node.cuts), start)
-
-
 class CModel:
     """A model with the tables of its file.
 
@@ -275,9 +225,9 @@ class CModel:
     def __init__(self, model: Model, numbers: CNumbers) -> None:
         self.model, self.numbers = model, numbers
         self.line = places_of(model.variables)
-        self.tests: list[CTreeTest] = []
+        self.tests: list[TreeTest] = []
         self.tables: Tables | None = None
         if isinstance(model, RuleBase):
             self.tables = tables_of(model, self.line, numbers)
         else:
-            self.tests = cut_tests(model, self.line)
+            self.tests = tree_tests(model)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import msgspec
 import numpy as np
 import onnx
 from onnx import numpy_helper
@@ -21,22 +20,12 @@ from fuzzytree.exporters.onnx_ends import (
     is_known,
 )
 from fuzzytree.exporters.onnx_graph import TREES, Constant, OnnxGraph
-from fuzzytree.model import FuzzyTree, Node
+from fuzzytree.exporters.program_text import TreeTest, tree_tests
+from fuzzytree.model import FuzzyTree
 from fuzzytree.numerics import rounded
 
 _MOST_QUESTIONS = 1_000_000
 _MOST_LEAVES = 2**24  # as float32 counts
-
-
-class OnnxTreeTest(msgspec.Struct, frozen=True):
-    """`variable <= cut`: on to the left if so, else to the right.
-
-    A way on is the position of a test, or minus the number of a leaf.
-    """
-
-    variable: str
-    cut: float
-    ways: tuple[int, int]
 
 
 def tree_graph(
@@ -52,7 +41,7 @@ def tree_graph(
     Returns:
         The values of the variables, with a flat guard.
     """
-    tests = cut_tests(tree)
+    tests = tree_tests(tree)
     is_direct = not (is_plain and tests) and not any(
         variable.parts for variable in tree.variables
     )
@@ -64,14 +53,14 @@ def tree_graph(
         leaf = graph.constant(np.array(1, np.int64), "leaf")
     elif is_plain:
         with graph.about("path"):
-            leaf = _walk(graph, tests, frame, start=_root(tree))
+            leaf = _walk(graph, tests, frame)
     else:
         place = {name: columns.index(name) for name in tree.inputs}
         values = graph.source
         if not is_direct:
             place = frame.order
             values = graph.node("Transpose", frame.block, hint="values", perm=[1, 0])
-        leaf = _ensemble(graph, tests, values, place, start=_root(tree))
+        leaf = _ensemble(graph, tests, values, place)
     zero = graph.constant(np.array(0, np.int64), "nothing")
     known = is_known(graph, frame)
     graph.node("Where", known, leaf, zero, named=named)
@@ -88,69 +77,29 @@ def needs_plain(tree: FuzzyTree) -> bool:
     return sizes.get(1, 0) > _MOST_QUESTIONS or len(tree.leaves) > _MOST_LEAVES
 
 
-def _root(tree: FuzzyTree) -> int:
-    return len(tree.nodes[0].cuts) // 2
-
-
-def cut_tests(tree: FuzzyTree) -> list[OnnxTreeTest]:
-    """Return the cuts of all nodes in order, each with its two ways on.
-
-    A node is entered at its middle cut.
-    """
-    first = [0]
-    for node in tree.nodes:
-        first.append(first[-1] + len(node.cuts))
-
-    def way(node: Node, interval: int) -> int:
-        branch = node.branches[node.owners[interval]]
-        if branch.node is None:
-            return -(branch.leaf or 0)
-        return first[branch.node - 1] + len(tree.nodes[branch.node - 1].cuts) // 2
-
-    tests: list[OnnxTreeTest] = []
-    for start, node in zip(first, tree.nodes, strict=False):
-        ways: dict[int, tuple[int, int]] = {}
-        todo = [(0, len(node.cuts))]
-        while todo:
-            low, high = todo.pop()
-            middle = (low + high) // 2
-            left, right = (low, middle), (middle + 1, high)
-            ways[middle] = (
-                start + sum(left) // 2 if left[0] < left[1] else way(node, middle),
-                start + sum(right) // 2 if right[0] < right[1] else way(node, high),
-            )
-            todo += [span for span in (left, right) if span[0] < span[1]]
-        tests += [
-            OnnxTreeTest(node.variable, cut, ways[i]) for i, cut in enumerate(node.cuts)
-        ]
-    return tests
-
-
 def _ensemble(
     graph: OnnxGraph,
-    tests: Sequence[OnnxTreeTest],
+    tests: Sequence[TreeTest],
     values: str,
     place: dict[str, int],
-    *,
-    start: int,
 ) -> str:
     """Add one `TreeEnsemble`; a subtree with two ways to it stands in it twice."""
     numbers = graph.types
     order: list[int] = []
     leaves: list[int] = []
-    todo: list[tuple[int, int, bool]] = [(start, -1, False)]
+    todo: list[tuple[int, int, bool]] = [(0, -1, False)]
     targets: dict[tuple[int, bool], tuple[int, int]] = {}
     while todo:
         way, parent, is_left = todo.pop()
-        if way < 0:
+        if way >= len(tests):
             targets[parent, is_left] = (len(leaves), 1)
-            leaves.append(-way)
+            leaves.append(way - len(tests) + 1)
             continue
         targets[parent, is_left] = (len(order), 0)
         number = len(order)
         order.append(way)
-        left, right = tests[way].ways
-        todo += [(left, number, True), (right, number, False)]
+        one = tests[way]
+        todo += [(one.no, number, True), (one.yes, number, False)]
     yes = [targets[number, True] for number in range(len(order))]
     no = [targets[number, False] for number in range(len(order))]
     ordered = [tests[position] for position in order]
@@ -184,45 +133,38 @@ def _tensor(values: Constant) -> onnx.TensorProto:
 
 def _walk(
     graph: OnnxGraph,
-    tests: Sequence[OnnxTreeTest],
+    tests: Sequence[TreeTest],
     frame: InputBlock,
-    *,
-    start: int,
 ) -> str:
     """Add one step for each level; a row that has reached its leaf stays there."""
     count = len(tests)
-    leaves = 1 + max(-way for q in tests for way in q.ways)
-
-    def state(way: int) -> int:
-        return way if way >= 0 else count - way
-
-    own = range(count, count + leaves)
-    places = [frame.order[q.variable] for q in tests] + [0] * leaves
-    cuts = rounded([q.cut for q in tests] + [0.0] * leaves, graph.types.axis)
+    ends = {way for one in tests for way in (one.no, one.yes) if way >= count}
+    own = range(count, max(ends) + 1)
+    places = [frame.order[one.variable] for one in tests] + [0] * len(own)
+    cuts = rounded([one.cut for one in tests] + [0.0] * len(own), graph.types.axis)
     place = graph.numbers(places, "variables")
     cut = graph.constant(cuts, "cuts")
-    left, right = (
-        graph.numbers([*(state(q.ways[k]) for q in tests), *own], name)
-        for k, name in enumerate(("left", "right"))
-    )
-    value = graph.take(frame.block, [places[start]])
-    here = graph.node("Less", graph.constant(cuts[[start]], "cut"), value)
-    there = [graph.numbers([state(w)], "way") for w in tests[start].ways]
-    here = graph.node("Where", here, there[1], there[0])
-    for _ in range(_depth(tests, start) - 1):
+    left = graph.numbers([*(one.no for one in tests), *own], "left")
+    right = graph.numbers([*(one.yes for one in tests), *own], "right")
+    value = graph.take(frame.block, places[:1])
+    here = graph.node("Less", graph.constant(cuts[:1], "cut"), value)
+    no, yes = (graph.numbers([way], "way") for way in (tests[0].no, tests[0].yes))
+    here = graph.node("Where", here, yes, no)
+    for _ in range(_depth(tests) - 1):
         column = graph.node("Gather", place, here, axis=0)
         value = graph.node("GatherElements", frame.block, column, axis=0)
         is_right = graph.node("Less", graph.node("Gather", cut, here, axis=0), value)
         onward = [graph.node("Gather", way, here, axis=0) for way in (right, left)]
         here = graph.node("Where", is_right, *onward)
     flat = graph.node("Reshape", here, graph.numbers([-1], "flat"))
-    return graph.node("Sub", flat, graph.constant(np.array(count), "questions"))
+    return graph.node("Sub", flat, graph.constant(np.array(count - 1), "questions"))
 
 
-def _depth(tests: Sequence[OnnxTreeTest], start: int) -> int:
+def _depth(tests: Sequence[TreeTest]) -> int:
     """Return how many tests the longest path has."""
-    level, depth = {start}, 0
+    level, depth = {0}, 0
     while level:
         depth += 1
-        level = {w for p in level for w in tests[p].ways if w >= 0}
+        ways = {way for place in level for way in tests[place][2:]}
+        level = {way for way in ways if way < len(tests)}
     return depth

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -299,3 +299,50 @@ def node_rows(
             names.append(node.branches[owner].terms[counts[owner]])
             counts[owner] += 1
         yield (places[node.variable], node.cuts, targets_of(node)), node, names
+
+
+class TreeTest(NamedTuple):
+    """Whether a value lies above a cut, and where no and yes lead.
+
+    A place below the number of tests is a test, and k places behind is leaf k + 1.
+    """
+
+    variable: str
+    cut: float
+    no: int
+    yes: int
+
+
+def tree_tests(tree: FuzzyTree) -> list[TreeTest]:
+    """Return the tests of a tree; the first is that of the root.
+
+    A node of several cuts becomes several tests, by halves.
+    """
+    starts, count = [0], 0
+    for node in tree.nodes:
+        count += len(node.cuts)
+        starts.append(count)
+    result: list[TreeTest] = []
+    for node in tree.nodes:
+        targets = [
+            count + branch.leaf - 1 if branch.leaf else starts[(branch.node or 1) - 1]
+            for branch in node.branches
+        ]
+        ends = [targets[owner] for owner in node.owners]
+        result += _halved(node, ends, len(result))
+    return result
+
+
+def _halved(node: Node, ends: list[int], start: int) -> list[TreeTest]:
+    """Return a node's tests, numbered from `start`, each half behind its whole."""
+
+    def arrange(first: int, last: int, place: int) -> list[TreeTest]:
+        middle = (first + last) // 2
+        left = arrange(first, middle, place + 1) if first < middle else []
+        behind = place + 1 + len(left)
+        right = arrange(middle + 1, last, behind) if middle + 1 < last else []
+        no = place + 1 if left else ends[first]
+        yes = behind if right else ends[last]
+        return [TreeTest(node.variable, node.cuts[middle], no, yes), *left, *right]
+
+    return arrange(0, len(node.cuts), start)
