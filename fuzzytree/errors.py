@@ -50,15 +50,11 @@ class MissingExtraError(FuzzyTreeError, ImportError):
     """A verb that needs an optional package which is not installed."""
 
 
-def install_hint(extra: str) -> str:
-    """Return which packages an optional part needs, and the command that gets them.
+def requirements() -> dict[str, list[str]]:
+    """Return what the installation requires: for each extra, and for `""` always.
 
-    The packages come from the metadata of the installation, so the command works
-    whether fuzzytree came from an index, a wheel or a checkout.
-
-    Example:
-        >>> install_hint("serial")
-        "pyserial: pip install 'pyserial>=3.5'"
+    It comes from the metadata of the installation, so it is the same whether fuzzytree
+    came from an index, a wheel or a checkout; empty if there is none.
     """
     import importlib.metadata
     import re
@@ -66,15 +62,39 @@ def install_hint(extra: str) -> str:
     try:
         listed = importlib.metadata.requires("fuzzytree-toolkit") or []
     except importlib.metadata.PackageNotFoundError:
+        return {}
+    needed: dict[str, list[str]] = {}
+    for one in listed:
+        package, _, condition = one.partition(";")
+        extra = re.search(r"""extra == ['"](.+?)['"]""", condition)
+        needed.setdefault(extra[1] if extra else "", []).append(package.strip())
+    return needed
+
+
+def package_name(requirement: str) -> str:
+    """Return the name of the package that is required.
+
+    Example:
+        >>> package_name("dask[dataframe]>=2025.1")
+        'dask'
+    """
+    import re
+
+    return re.split(r"[^\w.-]", requirement)[0]
+
+
+def install_hint(extra: str) -> str:
+    """Return which packages an optional part needs, and the command that gets them.
+
+    Example:
+        >>> install_hint("serial")
+        "pyserial: pip install 'pyserial>=3.5'"
+    """
+    needed = requirements().get(extra, [])
+    if not needed:
         return f"the packages that pyproject.toml lists for the extra {extra!r}"
-    needed = [
-        one.partition(";")[0].strip()
-        for one in listed
-        if re.search(rf"""extra == ['"]{re.escape(extra)}['"]""", one)
-    ]
-    names = [re.split(r"[^\w.-]", one)[0] for one in needed]
     command = " ".join(f"'{one}'" for one in needed)
-    return f"{' and '.join(names)}: pip install {command}"
+    return f"{' and '.join(map(package_name, needed))}: pip install {command}"
 
 
 class PortError(FuzzyTreeError, OSError):

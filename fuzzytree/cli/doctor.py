@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-import importlib.util
 import platform
-from collections.abc import Mapping
-from types import MappingProxyType
 
 import click
 
@@ -18,64 +15,40 @@ from fuzzytree.cli.console import (
     takes,
     verbose_option,
 )
-from fuzzytree.errors import FuzzyTreeError, install_hint
-
-CORE = (
-    *("numpy", "pyarrow", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark"),
-    *("lazy-loader", "jinja2", "markupsafe"),
+from fuzzytree.errors import (
+    FuzzyTreeError,
+    install_hint,
+    package_name,
+    requirements,
 )
-
-EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
-    {
-        "onnx": {"onnx": "onnx", "onnxruntime": "onnxruntime"},
-        "sklearn": {"scikit-learn": "sklearn"},
-        "skfuzzy": {
-            "scikit-fuzzy": "skfuzzy",
-            "scipy": "scipy",
-            "networkx": "networkx",
-        },
-        "plots": {"matplotlib": "matplotlib"},
-        "serial": {"pyserial": "serial"},
-        "polars": {"polars": "polars"},
-        "duckdb": {"duckdb": "duckdb"},
-        "ibis": {"ibis-framework": "ibis"},
-        "dask": {"dask": "dask", "distributed": "distributed"},
-        "spark": {"pyspark": "pyspark"},
-        "witnesses": {
-            "blark": "blark",
-            "ferrifuzz": "ferrifuzz",
-            "jpmml-evaluator": "jpmml_evaluator",
-            "lxml": "lxml",
-            "opencv-python-headless": "cv2",
-            "pyit2fls": "pyit2fls",
-            "scikit-image": "skimage",
-            "selenium": "selenium",
-            "sqlglot": "sqlglot",
-            "tree-sitter": "tree_sitter",
-            "tree-sitter-iec61131-3-st": "tree_sitter_iec61131_3_st",
-        },
-        "peers": {
-            "m2cgen": "m2cgen",
-            "simpful": "simpful",
-            "skl2onnx": "skl2onnx",
-            "treelite": "treelite",
-        },
-    }
-)
-"""The packages of each extra and their modules; a test compares it with the project."""
 
 ABSENT = "not installed"
 
 FOR_TESTS = ("witnesses", "peers")
 """The extras that only the test suite and the benchmarks use."""
 
+_COLLECTIONS = (
+    "all",
+    "dev",
+    "docs",
+)  # extras of other extras, and of the docs
+
+
+def packages() -> dict[str, list[str]]:
+    """Return the packages of each extra; `""` has those that are always needed."""
+    return {
+        extra: [*map(package_name, needed)]
+        for extra, needed in requirements().items()
+        if extra not in _COLLECTIONS
+    }
+
 
 def missing_extras() -> set[str]:
     """Return the extras of which a package is not installed."""
     return {
         extra
-        for extra, packages in EXTRAS.items()
-        if not all(importlib.util.find_spec(module) for module in packages.values())
+        for extra, names in packages().items()
+        if any(_version(name) == ABSENT for name in names)
     }
 
 
@@ -96,11 +69,11 @@ def command(options: DoctorOptions) -> int:
     """
     from fuzzytree import report
 
-    packages = [*CORE, *(name for extra in EXTRAS.values() for name in extra)]
+    known = packages()
     versions = {
         "fuzzytree": fuzzytree.__version__,
         "python": platform.python_version(),
-        **{name: _version(name) for name in packages},
+        **{name: _version(name) for names in known.values() for name in names},
     }
     missing = sorted(missing_extras())
     faults = self_test("onnx" not in missing)
@@ -111,7 +84,7 @@ def command(options: DoctorOptions) -> int:
         answer(f"self-test failed: {fault}")
     if not faults:
         answer("self-test passed: learning, writing, reading and running agree")
-    hidden = {name for extra in FOR_TESTS for name in EXTRAS[extra]}
+    hidden = {name for extra in FOR_TESTS for name in known.get(extra, ())}
     hidden |= {name for name, version in versions.items() if version == ABSENT}
     shown = [one for one in versions.items() if options.verbose or one[0] not in hidden]
     answer("\n".join(report.aligned(shown)))

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
+import importlib.metadata
 import json
-import re
-import tomllib
-from importlib.machinery import ModuleSpec
-from pathlib import Path
 
 import pytest
 
 from fuzzytree.checking.abilities import Ability, abilities_of
-from fuzzytree.cli.doctor import CORE, EXTRAS
 from fuzzytree.exporters.table import TABLE, all_formats, find_format
 from fuzzytree.runtimes.predictions import Predictions
 from fuzzytree.runtimes.table import all_runtimes
 from tests.cli.conftest import Call
-
-ROOT = Path(__file__).resolve().parent.parent.parent
 
 
 @functools.cache
@@ -35,27 +28,15 @@ def _one_format_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def _without(monkeypatch: pytest.MonkeyPatch, module: str) -> None:
-    real = importlib.util.find_spec
+def _without(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
+    real = importlib.metadata.version
 
-    def find(name: str, package: str | None = None) -> ModuleSpec | None:
-        return None if name == module else real(name, package)
+    def version(name: str) -> str:
+        if name == package:
+            raise importlib.metadata.PackageNotFoundError(name)
+        return real(name)
 
-    monkeypatch.setattr(importlib.util, "find_spec", find)
-
-
-def test_the_packages_are_those_of_the_project() -> None:
-    text = (ROOT / "pyproject.toml").read_text("utf-8")
-    project = tomllib.loads(text)["project"]
-
-    def names(requirements: list[str]) -> set[str]:
-        return {re.split(r"[<>=\[]", one)[0].lower() for one in requirements}
-
-    assert names(project["dependencies"]) == {name.lower() for name in CORE}
-    extras = project["optional-dependencies"]
-    assert set(EXTRAS) == set(extras) - {"all", "dev", "docs"}
-    for extra, packages in EXTRAS.items():
-        assert names(extras[extra]) == set(packages)
+    monkeypatch.setattr(importlib.metadata, "version", version)
 
 
 def test_every_format_and_runtime_is_listed(call: Call) -> None:
