@@ -16,8 +16,6 @@ import numpy as np
 
 from fuzzytree.learning.units import FloatArray, IntArray
 
-_BRUTE = 512
-
 
 @dataclass(frozen=True)
 class Grouping:
@@ -104,9 +102,8 @@ def components(
 ) -> IntArray:
     """Return the connected component of each pattern on one feature.
 
-    In the coordinates `alpha M + beta SD` and `alpha M - beta SD` the distance is the
-    larger of two differences, so squares of side T hold connected patterns only, and
-    only neighbouring squares need to be compared: nothing is quadratic.
+    Patterns are compared with those behind them in the order of `alpha M`, as far as
+    that alone does not part them.
 
     Args:
         means: M, shape (patterns,).
@@ -124,10 +121,7 @@ def components(
     labels = np.empty(len(means), np.int64)
     total = 0
     for piece in np.split(order, np.flatnonzero(breaks)):
-        if len(piece) <= _BRUTE:
-            found = _brute_components(first[piece], second[piece], limit)
-        else:
-            found = _square_components(first[piece], second[piece], limit)
+        found = _connected(first[piece], second[piece], limit)
         labels[piece] = found + total
         total += int(found.max()) + 1
     return _ranked(labels, first)
@@ -140,63 +134,25 @@ def _ranked(labels: IntArray, values: FloatArray) -> IntArray:
     return rank[labels].astype(np.int64)
 
 
-def _brute_components(first: FloatArray, second: FloatArray, limit: float) -> IntArray:
-    apart = np.abs(first[:, None] - first) + np.abs(second[:, None] - second)
-    linked = apart <= limit
-    labels = np.arange(len(first))
-    while True:
-        lowest = np.where(linked, labels, len(first)).min(axis=1)
-        lowest = lowest[lowest]
-        if (lowest == labels).all():
-            break
-        labels = lowest
-    return np.unique(labels, return_inverse=True)[1].astype(np.int64)
+def _connected(first: FloatArray, second: FloatArray, limit: float) -> IntArray:
+    """Return the component of each pattern of a piece, which is ordered by `first`.
 
-
-def _square_components(first: FloatArray, second: FloatArray, limit: float) -> IntArray:
-    if limit <= 0:
-        pairs = np.stack([first, second], axis=1)
-        return np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
-    u, v = first + second, first - second
-    cells = np.stack([np.floor(u / limit), np.floor(v / limit)], axis=1)
-    kinds, square = np.unique(cells, axis=0, return_inverse=True)
-    square = square.ravel()
-    order = np.argsort(square, kind="stable")
-    pieces = np.split(order, np.flatnonzero(np.diff(square[order])) + 1)
-    place = {(int(a), int(b)): k for k, (a, b) in enumerate(kinds)}
-    root = list(range(len(kinds)))
-
-    def find(k: int) -> int:
-        while root[k] != k:
-            root[k] = root[root[k]]
-            k = root[k]
-        return k
-
-    for (a, b), k in place.items():
-        for across, up in ((1, -1), (1, 0), (1, 1), (0, 1)):
-            other = place.get((a + across, b + up))
-            if other is None or find(k) == find(other):
-                continue
-            left, right = pieces[k], pieces[other]
-            ahead = across * u, (up or 1) * v
-            if _touch(*ahead, left, right, limit):
-                root[find(other)] = find(k)
-    return np.array([find(k) for k in range(len(root))], np.int64)[square]
-
-
-def _touch(
-    u: FloatArray, v: FloatArray, left: IntArray, right: IntArray, limit: float
-) -> bool:
-    """Return whether a pattern of the right square is near one of the left square.
-
-    The right square is ahead in u and in v, or level in one of them, where two
-    patterns are never further apart than the limit.
+    No two neighbours of a piece are further apart than the limit in `first`.
     """
-    order = left[np.argsort(-u[left], kind="stable")]
-    furthest = np.maximum.accumulate(v[order])
-    count = np.searchsorted(-u[order], limit - u[right], side="right")
-    best = furthest[np.maximum(count, 1) - 1]
-    return bool(((count > 0) & (v[right] - best <= limit)).any())
+    labels = np.zeros(len(first), np.int64)
+    if (second == second[0]).all():
+        return labels
+    labels[:] = np.arange(len(first))
+    ends = np.searchsorted(
+        first, first + limit + 4.0 * np.spacing(np.abs(first) + limit)
+    )
+    for k, end in enumerate(ends.tolist()):
+        behind = slice(k, max(end, k + 1))
+        apart = np.abs(first[behind] - first[k]) + np.abs(second[behind] - second[k])
+        joined = np.unique(labels[behind][apart <= limit])
+        if len(joined) > 1:
+            labels[np.isin(labels, joined)] = joined[0]
+    return np.unique(labels, return_inverse=True)[1].astype(np.int64)
 
 
 def _groups(

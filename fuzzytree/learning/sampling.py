@@ -17,7 +17,7 @@ kept.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -68,12 +68,16 @@ class _Rows:
 
     def at(self, chosen: IntArray) -> _Rows:
         """Return some of the rows."""
+        return _Rows(*(getattr(self, one.name)[chosen] for one in fields(self)))
+
+    @staticmethod
+    def joined(parts: list[_Rows]) -> _Rows:
+        """Return the rows of all parts."""
         return _Rows(
-            self.values[chosen],
-            self.codes[chosen],
-            self.digits[chosen],
-            self.hashes[chosen],
-            self.copies[chosen],
+            *(
+                np.concatenate([getattr(part, one.name) for part in parts])
+                for one in fields(_Rows)
+            )
         )
 
 
@@ -209,7 +213,7 @@ class DistinctRows:
             return None
         if len(self._parts) == 1 and self._kept == self._settled:
             return self._parts[0]
-        found = _joined(self._parts)
+        found = _Rows.joined(self._parts)
         self._parts = []
         order = np.lexsort((found.hashes, found.digits, found.codes))
         first, copies = _distinct(found, order)
@@ -241,16 +245,6 @@ class DistinctRows:
         self._limits[present] = np.where(is_few[present], refused, refused - _ONE)
         fills = is_few[codes] & (digits == self._refused[codes]) & (rank < self.most)
         return np.flatnonzero(is_before | fills)
-
-
-def _joined(parts: list[_Rows]) -> _Rows:
-    return _Rows(
-        np.concatenate([part.values for part in parts]),
-        np.concatenate([part.codes for part in parts]),
-        np.concatenate([part.digits for part in parts]),
-        np.concatenate([part.hashes for part in parts]),
-        np.concatenate([part.copies for part in parts]),
-    )
 
 
 def _distinct(found: _Rows, order: IntArray) -> tuple[IntArray, IntArray]:

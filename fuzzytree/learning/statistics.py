@@ -271,68 +271,42 @@ def narrow(codes: IntArray, classes: int) -> npt.NDArray[np.integer]:
     return codes.astype(np.uint16) if classes <= 1 << 16 else codes
 
 
-def _block_moments(
-    values: FloatArray, shift: FloatArray, starts: IntArray, counts: IntArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return shifted means, squared deviations, lows and highs per run of rows."""
-    columns = np.array(values.T, order="C", copy=True)
-    lows = np.minimum.reduceat(columns, starts, axis=1).T
-    highs = np.maximum.reduceat(columns, starts, axis=1).T
-    with np.errstate(over="ignore", invalid="ignore"):
-        columns -= shift[:, None]
-        means = np.add.reduceat(columns, starts, axis=1) / counts
-        columns -= np.repeat(means, counts, axis=1)
-        rest = np.add.reduceat(columns, starts, axis=1)
-        np.multiply(columns, columns, out=columns)
-        squares = np.add.reduceat(columns, starts, axis=1) - rest * rest / counts
-        means += rest / counts
-    return means.T, np.maximum(squares, 0.0).T, lows, highs
-
-
-def finished_moments(
-    counts: IntArray,
-    means: FloatArray,
-    squares: FloatArray,
-    lows: FloatArray,
-    highs: FloatArray,
-) -> Moments:
-    """Return moments from sums of squared deviations.
+def grouped_moments(values: FloatArray, groups: IntArray, size: int) -> Moments:
+    """Return the moments of rows by group number, 0 to `size` - 1.
 
     A spread is 0 where the smallest value equals the largest one, whatever the sums
     say, and above 0 elsewhere, even if the squares underflow.
-    """
-    empty = counts == 0
-    rows = np.maximum(counts - 1, 1)[:, None]
-    with np.errstate(over="ignore", invalid="ignore"):
-        spreads = np.sqrt(squares / rows)
-        half = 0.5 * highs - 0.5 * lows
-    spreads = np.where(spreads > 0, spreads, half)
-    constant = lows == highs
-    spreads = np.where(constant, 0.0, spreads)
-    means = np.where(constant, lows, np.clip(means, lows, highs))
-    means[empty] = np.nan
-    spreads[empty] = np.nan
-    return Moments(counts, means, spreads, lows, highs)
-
-
-def grouped_moments(values: FloatArray, groups: IntArray, size: int) -> Moments:
-    """Return the moments of rows by group number, 0 to `size` - 1.
 
     Args:
         values: Shape (rows, features), finite.
         groups: The group of each row, in ascending order.
         size: How many groups there are; a group may be empty.
     """
-    features = values.shape[1]
     counts = np.bincount(groups, minlength=size).astype(np.int64)
-    means = np.zeros((size, features))
-    squares = np.zeros((size, features))
-    lows = np.full((size, features), np.inf)
-    highs = np.full((size, features), -np.inf)
-    if len(values):
-        present, starts, lengths = runs(groups)
-        shift = values[0].copy()
-        block = _block_moments(values, shift, starts, lengths)
-        means[present] = block[0] + shift
-        squares[present], lows[present], highs[present] = block[1:]
-    return finished_moments(counts, means, squares, lows, highs)
+    shape = (size, values.shape[1])
+    means, spreads = np.full(shape, np.nan), np.full(shape, np.nan)
+    lows, highs = np.full(shape, np.inf), np.full(shape, -np.inf)
+    if not len(values):
+        return Moments(counts, means, spreads, lows, highs)
+    present, starts, lengths = runs(groups)
+    shift = values[0].copy()
+    columns = np.array(values.T, order="C", copy=True)
+    low = np.minimum.reduceat(columns, starts, axis=1).T
+    high = np.maximum.reduceat(columns, starts, axis=1).T
+    with np.errstate(over="ignore", invalid="ignore"):
+        columns -= shift[:, None]
+        middle = np.add.reduceat(columns, starts, axis=1) / lengths
+        columns -= np.repeat(middle, lengths, axis=1)
+        rest = np.add.reduceat(columns, starts, axis=1)
+        np.multiply(columns, columns, out=columns)
+        squares = np.add.reduceat(columns, starts, axis=1) - rest * rest / lengths
+        middle += rest / lengths
+        rows = np.maximum(lengths - 1, 1)[:, None]
+        spread = np.sqrt(np.maximum(squares, 0.0).T / rows)
+        half = 0.5 * high - 0.5 * low
+    spread = np.where(spread > 0, spread, half)
+    constant = low == high
+    spreads[present] = np.where(constant, 0.0, spread)
+    means[present] = np.where(constant, low, np.clip(middle.T + shift, low, high))
+    lows[present], highs[present] = low, high
+    return Moments(counts, means, spreads, lows, highs)

@@ -16,7 +16,6 @@ exact all the same.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -323,19 +322,14 @@ class Sums:
             origins: For each column what `Totals.means` takes; 0 unless given.
             exponents: For each column what both methods take; 0 unless given.
         """
-        self._settle()
-        units = self._unit if exponents is None else self._unit - exponents
-        shifts = units.tolist()
-        starts = [0] * self.features
-        if origins is not None:
-            starts = list(map(whole, origins.tolist(), self._unit.tolist()))
         means = np.empty((self.groups, self.features))
         spreads = np.empty_like(means)
-        for group, count in enumerate(counts):
-            sums, squares = self._sums[group].tolist(), self._squares[group].tolist()
-            rows = itertools.repeat(count)
-            means[group] = list(map(_mean, rows, sums, starts, shifts))
-            spreads[group] = list(map(_spread, rows, sums, squares, shifts))
+        for k in range(self.features):
+            totals = self.totals(k, counts)
+            exponent = 0 if exponents is None else int(exponents[k])
+            origin = 0.0 if origins is None else float(origins[k])
+            means[:, k] = totals.means(origin, exponent)
+            spreads[:, k] = totals.spreads(exponent)
         return means, spreads
 
     def totals(self, feature: int, counts: Sequence[int]) -> Totals:

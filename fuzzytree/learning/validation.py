@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -359,19 +360,8 @@ def _best_rule(
     }
     best = rules
     for value in tried[name]:
-        other = _with_rule(rules, name, value)
+        change: dict[str, Any] = {name: value}
+        other = replace(rules, **change)
         if trials.prefers((numbers, other), (numbers, best)):
             best = other
     return best, float(getattr(best, name))
-
-
-def _with_rule(rules: GrowthRules, name: str, value: float) -> GrowthRules:
-    match name:
-        case "alpha":
-            return replace(rules, alpha=value)
-        case "l_max":
-            return replace(rules, l_max=value)
-        case "shrinkage":
-            return replace(rules, shrinkage=value)
-        case _:
-            return replace(rules, entry=value)

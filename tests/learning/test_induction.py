@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from fuzzytree.learning import induction
 from fuzzytree.learning.induction import components, most_powerful, threshold
 from fuzzytree.learning.units import FloatArray
 
@@ -26,18 +24,6 @@ def test_patterns_are_connected_over_others() -> None:
 def test_a_narrow_pattern_within_a_wide_one_is_apart_by_its_spread() -> None:
     means, spreads = np.zeros(3), np.array([1.0, 1.1, 9.0])
     assert components(means, spreads, 0.5, 0.9).tolist() == [0, 0, 1]
-
-
-def test_squares_find_the_components_that_comparing_all_pairs_finds(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    rng = np.random.default_rng(5)
-    for limit in (0.01, 0.1, 0.5, 2.0):
-        means, spreads = rng.normal(size=150) * 5, rng.exponential(size=150)
-        monkeypatch.setattr(induction, "_BRUTE", 1000)
-        expected = components(means, spreads, limit, 0.9)
-        monkeypatch.setattr(induction, "_BRUTE", 1)
-        assert (components(means, spreads, limit, 0.9) == expected).all()
 
 
 def chosen(means: FloatArray, costs: list[float], *, by_margin: bool) -> int | None:

@@ -34,15 +34,15 @@ def test_what_is_close_to_a_member_belongs_to_its_group() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_groups_do_not_depend_on_how_they_are_sought(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_groups_are_the_connected_components_of_near_pairs(seed: int) -> None:
     chance = np.random.default_rng(seed)
     means, spreads = chance.normal(size=60), chance.exponential(size=60) * 5
     limit = float(chance.uniform(0.01, 0.6))
-    brute = components(means, spreads, limit, 0.7)
-    monkeypatch.setattr("fuzzytree.learning.induction._BRUTE", 0)
-    assert components(means, spreads, limit, 0.7).tolist() == brute.tolist()
+    apart = 0.7 * np.abs(means[:, None] - means)
+    apart += (1.0 - 0.7) * np.abs(spreads[:, None] - spreads)
+    reach = np.linalg.matrix_power((apart <= limit).astype(float), 60) > 0
+    found = components(means, spreads, limit, 0.7)
+    assert np.array_equal(found[:, None] == found, reach)
 
 
 def powerful(costs: list[float], *, by_margin: bool = False) -> int:
