@@ -67,9 +67,7 @@ def _pairs(subject: Subject, *, is_alike: bool) -> Iterator[Pair]:
 
 def _is_one(subject: Subject, one: int, other: int) -> bool:
     """Return whether two rules are two ways in which one rule of a system holds."""
-    names = [subject.rule_name(number) for number in (one, other)]
-    wholes = {name.split(" of ", 1)[1] for name in names if name.startswith("way ")}
-    return len(wholes) == 1 and all(name.startswith("way ") for name in names)
+    return subject.numbers[one - 1] == subject.numbers[other - 1]
 
 
 def _noun(subject: Subject) -> str:

@@ -138,9 +138,6 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Audit
         for term in of.variable.terms:
             subject.clock.check()
             lines = bounds.get((of.variable.name, term.name))
-            if lines is None and _is_full(of, term):
-                clean += 1
-                continue
             axis = of.line(term)
             ((height, at),) = heights(axis)
             if lines is not None:
@@ -159,19 +156,6 @@ def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Audit
         yield audit_answer(
             "FT401.reached", "terms", proof, measures=measures, facts=facts
         )
-
-
-def _is_full(of: VariableRange, term: Term) -> bool:
-    """Return whether a curve is 1 where one of its pieces ends, or the range does."""
-    curve = RuleCurve(term.shape)
-    ends = {of.low, of.high}
-    for piece in pieces(term.shape):
-        ends.update(end for end in (piece.low, piece.high) if end is not None)
-    return any(
-        curve.degree(end) == 1
-        for end in ends
-        if of.low <= end <= of.high and not (of.is_open and end == of.low)
-    )
 
 
 def _low_term(
