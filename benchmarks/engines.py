@@ -45,11 +45,11 @@ from fuzzytree.model import (
     Or,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.model.rulebase import Band, RuleBase
 from fuzzytree.runtimes.table import find_runtime
@@ -144,17 +144,17 @@ def seven_rules() -> FuzzySystem:
         (v.name, t.name): _trapezoid(t.shape) for v in rules.variables for t in v.terms
     }
     inputs = tuple(
-        SystemInput(
+        Variable(
             v.name,
-            tuple(SystemTerm(_word(t.name), curves[v.name, t.name]) for t in v.terms),
-            v.low,
-            v.high,
+            tuple(Term(_word(t.name), curves[v.name, t.name]) for t in v.terms),
+            low=v.low,
+            high=v.high,
         )
         for v in rules.variables
     )
     output = SystemOutput(
         "answer",
-        tuple(SystemTerm(f"rule{k}", Singleton(float(k))) for k in range(1, 8)),
+        tuple(Term(f"rule{k}", Singleton(float(k))) for k in range(1, 8)),
         0.0,
         8.0,
         Defuzzifier("weighted average"),
@@ -209,7 +209,7 @@ def _values(system: FuzzySystem) -> Floats:
     chance = np.random.default_rng(0)
     columns = []
     for one in system.inputs:
-        marks = [m for label in one.labels for m in _marks(label.curve)]
+        marks = [m for label in one.terms for m in _marks(label.function)]
         columns.append(chance.uniform(min(marks), max(marks), ROWS))
     return np.array(columns)
 
@@ -417,15 +417,15 @@ def _ferrifuzz(system: FuzzySystem, _: Path) -> Engine:
     for one in system.inputs:
         low, high = _range(one)
         variable = ff.Variable(one.name, low, high)
-        for label in one.labels:
-            match label.curve:
+        for label in one.terms:
+            match label.function:
                 case Gaussian(mean=mean, deviation=deviation):
                     variable[label.name] = ff.mf.gaussian(mean, deviation)
                 case Trapezoid():
-                    corners = _corners(label.curve, low, high)
+                    corners = _corners(label.function, low, high)
                     variable[label.name] = ff.mf.trapezoid(*corners)
                 case _:
-                    raise ValueError(f"no {type(label.curve).__name__} there")
+                    raise ValueError(f"no {type(label.function).__name__} there")
         made.add_input(variable)
     output = system.outputs[0]
     variable = ff.Variable(output.name, output.low, output.high)
@@ -448,7 +448,7 @@ def _simpful(system: FuzzySystem, _: Path) -> Engine:
     made = sf.FuzzySystem(show_banner=False)
     for one in system.inputs:
         low, high = _range(one)
-        sets = [_simpful_set(sf, label, low, high) for label in one.labels]
+        sets = [_simpful_set(sf, label, low, high) for label in one.terms]
         variable = sf.LinguisticVariable(sets, universe_of_discourse=[low, high])
         made.add_linguistic_variable(one.name, variable)
     output = system.outputs[0]
@@ -473,13 +473,15 @@ def _simpful(system: FuzzySystem, _: Path) -> Engine:
     return Engine(many, single, note="a loop over rows in Python")
 
 
-def _simpful_set(sf: Any, label: SystemTerm, low: float, high: float) -> Any:
-    if isinstance(label.curve, Gaussian):
-        shape = sf.GaussianFuzzySet(label.curve.mean, label.curve.deviation, label.name)
+def _simpful_set(sf: Any, label: Term, low: float, high: float) -> Any:
+    if isinstance(label.function, Gaussian):
+        shape = sf.GaussianFuzzySet(
+            label.function.mean, label.function.deviation, label.name
+        )
         return shape
-    if not isinstance(label.curve, Trapezoid):
-        raise ValueError(f"no {type(label.curve).__name__} there")
-    corners = _corners(label.curve, low, high)
+    if not isinstance(label.function, Trapezoid):
+        raise ValueError(f"no {type(label.function).__name__} there")
+    corners = _corners(label.function, low, high)
     points = [[x, y] for x, y in zip(corners, (0.0, 1.0, 1.0, 0.0), strict=True)]
     if corners[0] == corners[1]:
         points = points[1:]
@@ -493,11 +495,11 @@ def _skfuzzy(system: FuzzySystem, _: Path) -> Engine:
     inputs = {}
     for one in system.inputs:
         low, high = _range(one)
-        knots = {m for label in one.labels for m in _marks(label.curve)}
+        knots = {m for label in one.terms for m in _marks(label.function)}
         grid = np.unique([*np.linspace(low, high, 1001), *knots])
         made = inputs[one.name] = control.Antecedent(grid, one.name)
-        for label in one.labels:
-            made[label.name] = np.array([curve_degree(label.curve, x) for x in grid])
+        for label in one.terms:
+            made[label.name] = np.array([curve_degree(label.function, x) for x in grid])
     output = system.outputs[0]
     universe = np.linspace(output.low or 0.0, output.high or 0.0, 301)
     made = control.Consequent(universe, output.name)
@@ -544,8 +546,8 @@ def _skfuzzy_condition(condition: Condition | None, inputs: Mapping[str, Any]) -
             raise ValueError("no such condition there")
 
 
-def _range(one: SystemInput) -> tuple[float, float]:
-    marks = [m for label in one.labels for m in _marks(label.curve)]
+def _range(one: Variable) -> tuple[float, float]:
+    marks = [m for label in one.terms for m in _marks(label.function)]
     low, high = min(marks), max(marks)
     return low - (high - low), high + (high - low)
 
@@ -559,10 +561,10 @@ def _corners(curve: Trapezoid, low: float, high: float) -> tuple[float, ...]:
 
 
 def _numbers(output: SystemOutput) -> Iterator[tuple[str, float]]:
-    for label in output.labels:
-        if not isinstance(label.curve, Singleton):
+    for label in output.terms:
+        if not isinstance(label.function, Singleton):
             raise ValueError("only numbers are concluded there")
-        yield label.name, label.curve.value
+        yield label.name, label.function.value
 
 
 def _sentence(

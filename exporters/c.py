@@ -42,7 +42,6 @@ from fuzzytree.model import (
     FuzzyTree,
     Model,
     RuleBase,
-    SystemInput,
     SystemOutput,
     Variable,
     Written,
@@ -324,7 +323,7 @@ def _heading(model: Document) -> Iterator[str]:
             yield f" * {remark(line)}\n"
 
 
-def _described(one: Variable | SystemInput | SystemOutput) -> str:
+def _described(one: Variable | SystemOutput) -> str:
     return remark(f"{one.name} ({one.unit})" if one.unit else one.name)
 
 

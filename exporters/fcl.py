@@ -38,8 +38,8 @@ from fuzzytree.model import (
     NameMap,
     Or,
     RuleBase,
-    SystemInput,
     SystemOutput,
+    Variable,
     Written,
     refusal,
 )
@@ -170,7 +170,7 @@ def _naming(system: FuzzySystem, words: FclWords) -> _FclNames:
         title=named([system.name], variables.accepted.values())[system.name],
         variables=variables,
         labels={
-            one.name: named([label.name for label in one.labels])
+            one.name: named([label.name for label in one.terms])
             for one in system.variables
         },
         blocks=tuple(named([name])[name] for name in blocks),
@@ -248,7 +248,7 @@ def _text(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator[st
     yield "END_FUNCTION_BLOCK"
 
 
-def _range(variable: SystemInput | SystemOutput, words: FclWords) -> Iterator[str]:
+def _range(variable: Variable | SystemOutput, words: FclWords) -> Iterator[str]:
     low, high = variable.low, variable.high
     if low is not None and high is not None:
         yield f"  RANGE := ({number(low)} .. {number(high)});"
@@ -259,9 +259,9 @@ def _range(variable: SystemInput | SystemOutput, words: FclWords) -> Iterator[st
 
 
 def _terms(
-    variable: SystemInput | SystemOutput, names: _FclNames, words: FclWords
+    variable: Variable | SystemOutput, names: _FclNames, words: FclWords
 ) -> Iterator[str]:
-    for label in variable.labels:
+    for label in variable.terms:
         name = names.labels[variable.name][label.name]
         text = term_text(variable, label, words, names.variables.accepted)
         yield f"  TERM {name} := {text};"

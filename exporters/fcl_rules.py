@@ -30,7 +30,7 @@ from fuzzytree.model import (
     SNorm,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     joints,
     questions,
     unlike,
@@ -48,12 +48,12 @@ def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
     if words.has_hedges or not is_needed or not system.inputs:
         return system
     first = system.inputs[0]
-    name = unlike("always", [label.name for label in first.labels])
-    label = SystemTerm(name, ALWAYS)
+    name = unlike("always", [label.name for label in first.terms])
+    label = Term(name, ALWAYS)
     always = Is(first.name, name)
     return replace(
         system,
-        inputs=(replace(first, labels=(*first.labels, label)), *system.inputs[1:]),
+        inputs=(replace(first, terms=(*first.terms, label)), *system.inputs[1:]),
         blocks=tuple(
             replace(
                 block,
@@ -251,8 +251,8 @@ def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
     constants = {
         (one.name, label.name)
         for one in system.inputs
-        for label in one.labels
-        if set(getattr(label.curve, "degrees", ())) == {1.0}
+        for label in one.terms
+        if set(getattr(label.function, "degrees", ())) == {1.0}
     }
     for rule in system.rules:
         if rule.weight == 0.0 or output.name not in {one.output for one in rule.then}:
@@ -284,7 +284,7 @@ def _accu_losses(
             file_norm = None
     elif is_weighted:
         file_norm = None
-    curves = {one.name: one.curve for one in output.labels}
+    curves = {one.name: one.function for one in output.terms}
     counts = Counter(
         curves[one.label]
         for rule in system.rules
@@ -341,16 +341,18 @@ def check_list(document: RuleBase | FuzzySystem) -> str:
 
 def _lines(system: FuzzySystem) -> Iterator[str]:
     variables = system.variables
-    labels = [label for one in variables for label in one.labels]
+    labels = [label for one in variables for label in one.terms]
     rules = system.rules
     yield "data check list (IEC 61131-7)"
     yield f"inputs: {len(system.inputs)}"
     yield f"outputs: {len(system.outputs)}"
-    yield f"terms of an input: {_span(len(one.labels) for one in system.inputs)}"
-    yield f"terms of an output: {_span(len(one.labels) for one in system.outputs)}"
-    points = [len(one.curve.values) for one in labels if isinstance(one.curve, Points)]
+    yield f"terms of an input: {_span(len(one.terms) for one in system.inputs)}"
+    yield f"terms of an output: {_span(len(one.terms) for one in system.outputs)}"
+    points = [
+        len(one.function.values) for one in labels if isinstance(one.function, Points)
+    ]
     yield f"points of a term: {_span(points)}"
-    others = sorted({type(one.curve).__name__ for one in labels} - {"Points"})
+    others = sorted({type(one.function).__name__ for one in labels} - {"Points"})
     yield f"other terms: {', '.join(others) or 'none'}"
     yield f"rule blocks: {len(system.blocks)}"
     yield f"rules: {len(rules)}"
@@ -404,7 +406,7 @@ def _operator_names(system: FuzzySystem) -> Iterator[str]:
     yield from dict.fromkeys(result)
 
 
-def _beyond_basic(system: FuzzySystem, labels: list[SystemTerm]) -> Iterator[str]:
+def _beyond_basic(system: FuzzySystem, labels: list[Term]) -> Iterator[str]:
     if any(_most_points(label) > _MOST_BASIC for label in labels):
         yield f"terms of more than {_MOST_BASIC} points"
     if any(not output.defuzzifier.is_weighted for output in system.outputs):
@@ -422,18 +424,21 @@ def _beyond_basic(system: FuzzySystem, labels: list[SystemTerm]) -> Iterator[str
         yield "numbers that are summed, and not joined by ACCU maximum"
 
 
-def _beyond_extension(system: FuzzySystem, labels: list[SystemTerm]) -> Iterator[str]:
+def _beyond_extension(system: FuzzySystem, labels: list[Term]) -> Iterator[str]:
     if any(_most_points(label) > _MOST_EXTENDED for label in labels):
         yield f"terms of more than {_MOST_EXTENDED} points"
     degrees = {
         degree
         for label in labels
-        if isinstance(label.curve, Points)
-        for degree in label.curve.degrees
+        if isinstance(label.function, Points)
+        for degree in label.function.degrees
     }
     if degrees - {0.0, 1.0}:
         yield "points of degrees between 0 and 1"
-    kinds = {type(label.curve).__name__ for label in labels} - {"Points", "Singleton"}
+    kinds = {type(label.function).__name__ for label in labels} - {
+        "Points",
+        "Singleton",
+    }
     if kinds:
         yield f"terms that are no points ({', '.join(sorted(kinds))})"
     hedges = {
@@ -450,5 +455,5 @@ def _beyond_extension(system: FuzzySystem, labels: list[SystemTerm]) -> Iterator
         yield "weighted sums"
 
 
-def _most_points(label: SystemTerm) -> int:
-    return len(label.curve.values) if isinstance(label.curve, Points) else 0
+def _most_points(label: Term) -> int:
+    return len(label.function.values) if isinstance(label.function, Points) else 0

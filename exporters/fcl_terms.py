@@ -22,9 +22,9 @@ from fuzzytree.model import (
     Number,
     Points,
     Singleton,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.semantics import has_numbers, pointed
 
@@ -37,14 +37,14 @@ def number(value: float) -> str:
 
 
 def term_text(
-    variable: SystemInput | SystemOutput,
-    label: SystemTerm,
+    variable: Variable | SystemOutput,
+    label: Term,
     words: FclWords,
     names: Names,
 ) -> str | None:
     """Return the curve of a label; None if the dialect has none for it."""
     is_weighted = has_numbers(variable)
-    curve = label.curve
+    curve = label.function
     if isinstance(curve, Singleton) and (is_weighted or words.name == "jfuzzylogic"):
         return number(curve.value)
     if isinstance(curve, Points) and not is_weighted and label.height == 1.0:
@@ -110,7 +110,7 @@ def as_points(
         LossError: With every curve that points cannot stand for.
     """
 
-    def is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+    def is_known(variable: Variable | SystemOutput, term: Term) -> bool:
         return has_numbers(variable) or term_text(variable, term, words, {}) is not None
 
     system, lost = pointed(system, tolerance, keeps=is_known)
@@ -124,9 +124,9 @@ def unspeakable(system: FuzzySystem, words: FclWords) -> Iterator[str]:
     """Yield the terms that a dialect has no words for."""
     names = {one.name: one.name for one in system.variables}
     for variable in system.variables:
-        for label in variable.labels:
+        for label in variable.terms:
             if term_text(variable, label, words, names) is None:
-                kind = type(label.curve).__name__
+                kind = type(label.function).__name__
                 where = f"term {label.name!r} of {variable.name!r}"
                 yield f"{where}: the dialect {words.name} has no {kind} there"
 
@@ -134,17 +134,17 @@ def unspeakable(system: FuzzySystem, words: FclWords) -> Iterator[str]:
 def plain_linear(system: FuzzySystem) -> FuzzySystem:
     """Return a system whose weighted sums of inputs are formulas."""
 
-    def formula(label: SystemTerm) -> SystemTerm:
-        if not isinstance(label.curve, Linear):
+    def formula(label: Term) -> Term:
+        if not isinstance(label.function, Linear):
             return label
         total: Expression = Number(0.0)
-        pairs = zip(label.curve.weights, system.columns, strict=True)
+        pairs = zip(label.function.weights, system.columns, strict=True)
         parts = [Call("*", (Number(weight), Name(name))) for weight, name in pairs]
         if parts:
             total = parts[0]
         for part in parts[1:]:
             total = Call("+", (total, part))
-        total = Call("+", (total, Number(label.curve.offset)))
-        return replace(label, curve=Formula(total))
+        total = Call("+", (total, Number(label.function.offset)))
+        return replace(label, function=Formula(total))
 
-    return with_labels(system, lambda one: map(formula, one.labels))
+    return with_labels(system, lambda one: map(formula, one.terms))

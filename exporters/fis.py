@@ -44,9 +44,9 @@ from fuzzytree.model import (
     NameMap,
     RuleBase,
     SNorm,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
+    Variable,
     Written,
     refusal,
 )
@@ -122,7 +122,7 @@ def write(
         system = model
     system, lost = flattened(system)
     losses += lost
-    if any(one.height != 1.0 for v in system.variables for one in v.labels):
+    if any(one.height != 1.0 for v in system.variables for one in v.terms):
         system, lost = pointed(system, 1e-6)
         losses += lost
         system = without_heights(system, "FIS", losses)
@@ -144,7 +144,7 @@ def write(
 
 
 def _naming(system: FuzzySystem, terms: FisTerms) -> FileNames:
-    labels = {**terms.labels, **{one.name: one.labels for one in system.outputs}}
+    labels = {**terms.labels, **{one.name: one.terms for one in system.outputs}}
     return FileNames(
         NameMap.of([one.name for one in system.variables], reserved=_RESERVED),
         {
@@ -177,7 +177,7 @@ def _lines(system: FuzzySystem, terms: FisTerms) -> list[FisRule]:
                 "and the first output is the other"
             )
             continue
-        for label in output.labels:
+        for label in output.terms:
             if not _terms(output, [label], terms.dialect):
                 reasons.append(
                     f"term {label.name!r} of {output.name!r}: {terms.dialect} has no "
@@ -234,7 +234,7 @@ def _default_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             what = f"FIS has no default, {output.default!r}, where no rule fires"
             yield Loss(where, what)
         elif dialect == "matlab" and output.name not in always:
-            number = middle(*_range(output, _terms(output, output.labels, dialect)))
+            number = middle(*_range(output, _terms(output, output.terms, dialect)))
             if number != output.default:
                 default = output.default
                 other = "no number" if default is None else repr(default)
@@ -287,7 +287,7 @@ def _s_norm(norm: SNorm, dialect: Dialect) -> str:
 def _private_losses(terms: FisTerms, dialect: Dialect) -> Iterator[Loss]:
     for name, labels in terms.labels.items():
         for label in labels:
-            result = term_of(label.curve, dialect)
+            result = term_of(label.function, dialect)
             if result is not None and result[0] in PRIVATE:
                 yield Loss(
                     f"term {label.name!r} of {name!r}",
@@ -296,14 +296,14 @@ def _private_losses(terms: FisTerms, dialect: Dialect) -> Iterator[Loss]:
 
 
 def _terms(
-    one: SystemInput | SystemOutput, labels: Sequence[SystemTerm], dialect: Dialect
+    one: Variable | SystemOutput, labels: Sequence[Term], dialect: Dialect
 ) -> list[tuple[str, str]]:
     """Return the terms of a variable; those that a dialect has none for are left out.
 
     `_lines` and `with_known_curves` refuse or replace them before a file is written.
     """
     find = number_of if has_numbers(one) else term_of
-    results = (find(label.curve, dialect) for label in labels)
+    results = (find(label.function, dialect) for label in labels)
     return [result for result in results if result is not None]
 
 
@@ -332,7 +332,7 @@ def _text(
         blocks.append(_variable(f"Input{number}", one, labels, names, dialect))
     for number, output in enumerate(system.outputs, 1):
         title = f"Output{number}"
-        block = _variable(title, output, output.labels, names, dialect)
+        block = _variable(title, output, output.terms, names, dialect)
         if dialect == "fuzzylite" and output.default is not None:
             block.insert(3, f"Default={output.default!r}")
         blocks.append(block)
@@ -353,8 +353,8 @@ def _section(title: str, entries: Mapping[str, str]) -> list[str]:
 
 def _variable(
     title: str,
-    one: SystemInput | SystemOutput,
-    labels: Sequence[SystemTerm],
+    one: Variable | SystemOutput,
+    labels: Sequence[Term],
     names: FileNames,
     dialect: Dialect,
 ) -> list[str]:
@@ -375,7 +375,7 @@ def _variable(
 
 
 def _range(
-    one: SystemInput | SystemOutput, terms: Iterable[tuple[str, str]]
+    one: Variable | SystemOutput, terms: Iterable[tuple[str, str]]
 ) -> tuple[float, float]:
     """Return a range; an end that is unknown is `FAR` away for an input.
 
@@ -387,7 +387,7 @@ def _range(
             result = [*map(float, text.split())]
             numbers += result[::2] if kind == "discretemf" else result
     near = [number for number in numbers if abs(number) < 1e290]
-    if isinstance(one, SystemInput):
+    if isinstance(one, Variable):
         near = [-FIS_FAR, FIS_FAR]
     low = one.low if one.low is not None else min(near, default=0.0)
     high = one.high if one.high is not None else max(near, default=1.0)

@@ -29,7 +29,7 @@ from fuzzytree.model import (
     RuleBlock,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     questions,
     unlike,
 )
@@ -55,7 +55,7 @@ class FisTerms:
         self.system, self.tolerance = system, tolerance
         self.dialect: Dialect = dialect
         self.inputs = {one.name: one for one in system.inputs}
-        self.labels = {one.name: [*one.labels] for one in system.inputs}
+        self.labels = {one.name: [*one.terms] for one in system.inputs}
         self.losses: list[Loss] = []
         self._made: dict[Condition, tuple[str, str]] = {}
 
@@ -78,9 +78,9 @@ class FisTerms:
     def _added(self, variable: str, name: str, curve: Points) -> int:
         labels = self.labels[variable]
         for number, label in enumerate(labels, 1):
-            if label.curve == curve and label.height == 1.0:
+            if label.function == curve and label.height == 1.0:
                 return number
-        labels.append(SystemTerm(unlike(name, [one.name for one in labels]), curve))
+        labels.append(Term(unlike(name, [one.name for one in labels]), curve))
         return len(labels)
 
     def code(self, proposition: Is) -> str | None:
@@ -150,7 +150,7 @@ class FisTerms:
         label = self.labels[proposition.variable][
             self.place(proposition.variable, proposition.label) - 1
         ]
-        shape = shape_of(label.curve)
+        shape = shape_of(label.function)
         if not isinstance(shape, Points):
             text = f"the term {proposition.label!r} of {proposition.variable!r}"
             raise LossError(f"{text} has several conditions and is no list of points")
@@ -260,7 +260,7 @@ def _conclusions(rule: SystemRule, terms: FisTerms) -> list[tuple[str, str]]:
     result: list[tuple[str, str]] = []
     for one in rule.then:
         output = outputs[one.output]
-        place = [label.name for label in output.labels].index(one.label) + 1
+        place = [label.name for label in output.terms].index(one.label) + 1
         # Hedges act on the conclusions behind them too; in Octave on each alone.
         so_far = (*one.hedges, *so_far)
         is_shared = terms.dialect == "fuzzylite"

@@ -30,14 +30,14 @@ from fuzzytree.model import (
     SigmoidDifference,
     Singleton,
     SystemCurve,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.semantics import has_numbers, pointed, shape_of
 
-Term = tuple[str, str]
+FisTerm = tuple[str, str]
 """A kind such as `trimf`, and its numbers as text."""
 
 
@@ -50,13 +50,13 @@ def with_known_curves(
         LossError: If a curve cannot become points within the tolerance.
     """
 
-    def is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
-        return has_numbers(variable) or term_of(term.curve, dialect) is not None
+    def is_known(variable: Variable | SystemOutput, term: Term) -> bool:
+        return has_numbers(variable) or term_of(term.function, dialect) is not None
 
     return pointed(system, tolerance, keeps=is_known)
 
 
-def term_of(curve: Curve, dialect: Dialect) -> Term | None:
+def term_of(curve: Curve, dialect: Dialect) -> FisTerm | None:
     """Return a curve as a file writes it; None if the dialect cannot.
 
     Example:
@@ -87,7 +87,7 @@ def term_of(curve: Curve, dialect: Dialect) -> Term | None:
             return _formed(curve, dialect)
 
 
-def number_of(curve: Curve, dialect: Dialect) -> Term | None:
+def number_of(curve: Curve, dialect: Dialect) -> FisTerm | None:
     """Return the term of a weighted output; None if the dialect has none."""
     match curve:
         case Singleton(value=value):
@@ -102,7 +102,7 @@ def number_of(curve: Curve, dialect: Dialect) -> Term | None:
             return term_of(curve, dialect) if dialect == "fuzzylite" else None
 
 
-def _formed(curve: SystemCurve, dialect: Dialect) -> Term | None:
+def _formed(curve: SystemCurve, dialect: Dialect) -> FisTerm | None:
     match curve:
         case SCurve(start=start, end=end) if start != end:
             kind = "smf" if start < end else "zmf"
@@ -172,7 +172,7 @@ def _corners_of(points: Points) -> _Corners | None:
     return corners if is_same else None
 
 
-def _trapezoid(corners: _Corners) -> Term:
+def _trapezoid(corners: _Corners) -> FisTerm:
     a, b, c, d = corners
     return ("trimf", _text((a, b, d))) if b == c else ("trapmf", _text(corners))
 

@@ -46,10 +46,10 @@ from fuzzytree.model import (
     Points,
     RuleBase,
     RuleBlock,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
     Written,
     refusal,
 )
@@ -136,7 +136,7 @@ def _naming(system: FuzzySystem) -> FileNames:
     return FileNames(
         _accepted([one.name for one in system.variables]),
         {
-            one.name: _accepted([label.name for label in one.labels])
+            one.name: _accepted([label.name for label in one.terms])
             for one in system.variables
         },
     )
@@ -149,9 +149,9 @@ def _accepted(names: Sequence[str]) -> NameMap:
     return NameMap.of(names, reserved=reserved, longest=LONGEST_NAME)
 
 
-def _is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
+def _is_known(variable: Variable | SystemOutput, term: Term) -> bool:
     del variable
-    return not isinstance(term.curve, Band | LR)
+    return not isinstance(term.function, Band | LR)
 
 
 def _losses(system: FuzzySystem) -> Iterator[Loss]:
@@ -181,17 +181,17 @@ def _speakable(system: FuzzySystem) -> tuple[RuleBlock, ...]:
         except LossError as error:
             reasons.append(str(error))
     for variable in system.variables:
-        for label in variable.labels:
+        for label in variable.terms:
             if _term_text(variable, label, {}) is None:
                 where = f"term {label.name!r} of {variable.name!r}"
-                kind = type(label.curve).__name__
+                kind = type(label.function).__name__
                 reasons.append(f"{where}: FLL has no {kind} there")
     refuse(system.name, "fll", reasons)
     return tuple(blocks)
 
 
 def _term_text(
-    variable: SystemInput | SystemOutput, label: SystemTerm, names: Mapping[str, str]
+    variable: Variable | SystemOutput, label: Term, names: Mapping[str, str]
 ) -> str | None:
     if isinstance(variable, SystemOutput) and has_numbers(variable):
         return number_text(label, weighted_type(variable), names)
@@ -219,7 +219,7 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
         yield "  lock-previous: false"
         yield from _terms(output, names)
     # One with terms: pyfuzzylite takes a variable without them for none.
-    variable = next((one for one in system.variables if one.labels), system.outputs[0])
+    variable = next((one for one in system.variables if one.terms), system.outputs[0])
     always = f"{names.variables[variable.name]} is any"
     for block in system.blocks:
         yield f"RuleBlock: {_line(block.name)}".rstrip()
@@ -232,7 +232,7 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
             yield f"  rule: {rule_text(rule, names.words, always)}"
 
 
-def _common(variable: SystemInput | SystemOutput) -> Iterator[str]:
+def _common(variable: Variable | SystemOutput) -> Iterator[str]:
     low = -math.inf if variable.low is None else variable.low
     high = math.inf if variable.high is None else variable.high
     yield "  enabled: true"
@@ -240,8 +240,8 @@ def _common(variable: SystemInput | SystemOutput) -> Iterator[str]:
     yield f"  lock-range: {str(variable.clips).lower()}"
 
 
-def _terms(variable: SystemInput | SystemOutput, names: FileNames) -> Iterator[str]:
-    for label in variable.labels:
+def _terms(variable: Variable | SystemOutput, names: FileNames) -> Iterator[str]:
+    for label in variable.terms:
         name = names.labels[variable.name][label.name]
         yield f"  term: {name} {_term_text(variable, label, names.variables.accepted)}"
 
@@ -290,10 +290,10 @@ def _remarks(system: FuzzySystem, names: FileNames) -> Iterator[str]:
         yield "names of rules have no place"
 
 
-def _is_fine(variable: SystemInput | SystemOutput) -> bool:
+def _is_fine(variable: Variable | SystemOutput) -> bool:
     """Return whether 1e-6 is more than a thousandth of a distance between corners."""
-    for label in variable.labels:
-        match label.curve:
+    for label in variable.terms:
+        match label.function:
             case Points(values=values):
                 corners: Sequence[float] = values
             case Trapezoid(a=a, b=b, c=c, d=d):

@@ -33,7 +33,7 @@ from fuzzytree.model import (
     RuleBlock,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     curves,
     joints,
     questions,
@@ -160,9 +160,9 @@ def hedge_losses(rules: Sequence[SystemRule]) -> Iterator[Loss]:
             yield Loss(f"rule {number}", f"FLL has no {names}: left out")
 
 
-def degree_text(label: SystemTerm, names: Mapping[str, str]) -> str | None:
+def degree_text(label: Term, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term; None if FLL has no such term."""
-    match label.curve:
+    match label.function:
         case curves.Formula(expression=expression):
             if label.height != 1.0:
                 expression = Call("*", (Number(label.height), expression))
@@ -170,7 +170,7 @@ def degree_text(label: SystemTerm, names: Mapping[str, str]) -> str | None:
         case curves.Linear() | Band() | LR():
             return None
         case Points():
-            parts = _points(label.curve)
+            parts = _points(label.function)
         case curve:
             parts = term_in_words(curve)
     if label.height != 1.0:
@@ -184,14 +184,14 @@ def weighted_type(output: SystemOutput) -> str:
 
     `Tsukamoto` if it inverts each of them at a degree, else `TakagiSugeno`.
     """
-    functions = [label.curve for label in output.labels]
+    functions = [label.function for label in output.terms]
     is_inverse = [value_at(one, 0.5) is not None for one in functions]
     return "Tsukamoto" if is_inverse and all(is_inverse) else "TakagiSugeno"
 
 
-def number_text(label: SystemTerm, kind: str, names: Mapping[str, str]) -> str | None:
+def number_text(label: Term, kind: str, names: Mapping[str, str]) -> str | None:
     """Return the class and numbers of a term of a weighted output, or None."""
-    match label.curve:
+    match label.function:
         case curves.Singleton(value=value):
             return f"Constant {_number(value)}"
         case curves.Linear(weights=weights, offset=offset):
@@ -246,10 +246,10 @@ def _renamed(expression: Expression, names: Mapping[str, str]) -> Expression:
             return expression
 
 
-def _inverse(label: SystemTerm) -> Expression:
+def _inverse(label: Term) -> Expression:
     """Return where a monotone label has the degree `x`, as a formula."""
     d = "x" if label.height == 1.0 else f"(x / {label.height!r})"
-    match label.curve:
+    match label.function:
         case Points(values=(first, last), degrees=(low, _)):
             start, end = (first, last) if low == 0.0 else (last, first)
             return parse(f"{start!r} + {end - start!r} * {d}")

@@ -37,9 +37,9 @@ from fuzzytree.model import (
     Points,
     RuleBase,
     Singleton,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
+    Variable,
     Written,
     refusal,
 )
@@ -132,7 +132,7 @@ def _naming(system: FuzzySystem, rules: FmlRules) -> _Ids:
     variables = _ids(one.name for one in system.variables)
     labels = {
         one.name: _ids(
-            label.name for label in (*one.labels, *rules.made.get(one.name, ()))
+            label.name for label in (*one.terms, *rules.made.get(one.name, ()))
         )
         for one in system.variables
     }
@@ -151,15 +151,15 @@ def _with_known_curves(
 ) -> tuple[FuzzySystem, tuple[Loss, ...]]:
     """Return a system whose curves FML has; a height is in its points."""
     has_heights = any(
-        label.height != 1.0 for one in system.variables for label in one.labels
+        label.height != 1.0 for one in system.variables for label in one.terms
     )
     if has_heights:
         refuse_singletons(system, "fml with the heights of terms")
 
-    def is_known(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
-        if has_numbers(variable) or isinstance(term.curve, Points):
+    def is_known(variable: Variable | SystemOutput, term: Term) -> bool:
+        if has_numbers(variable) or isinstance(term.function, Points):
             return True
-        return not has_heights and shape_in_words(term.curve) is not None
+        return not has_heights and shape_in_words(term.function) is not None
 
     system, lost = pointed(system, tolerance, keeps=is_known)
     losses = [*lost]
@@ -182,7 +182,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
         if how.is_weighted:
             continue
         has_grid = not all(
-            isinstance(label.curve, Singleton) for label in output.labels
+            isinstance(label.function, Singleton) for label in output.terms
         )
         if has_grid and (how.samples, how.grid) != (USUAL.samples, USUAL.grid):
             yield Loss(
@@ -233,9 +233,9 @@ def _t(norm: str | None) -> str:
     return word_for(FML_TNORMS, norm, "MIN")
 
 
-def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> XmlElement:
-    terms = [_term("fuzzyTerm", one.name, label, names) for label in one.labels]
-    if not one.labels:  # the schema requires one; no rule can use it
+def _input(one: Variable, rules: FmlRules, names: _Ids) -> XmlElement:
+    terms = [_term("fuzzyTerm", one.name, label, names) for label in one.terms]
+    if not one.terms:  # the schema requires one; no rule can use it
         points = element("pointSetShape", element("point", x="0.0", y="1.0"))
         name = f"{names.variables[one.name]}."
         terms.append(element("fuzzyTerm", points, name=name))
@@ -249,26 +249,26 @@ def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> XmlElement:
     return element("fuzzyVariable", *terms, **how)
 
 
-def _head(one: SystemInput | SystemOutput, names: _Ids) -> dict[str, str | None]:
+def _head(one: Variable | SystemOutput, names: _Ids) -> dict[str, str | None]:
     scale = one.unit if one.unit.isprintable() and one.unit else None
     return {"name": names.variables[one.name], "scale": scale}
 
 
-def _domain(one: SystemInput | SystemOutput) -> dict[str, str]:
+def _domain(one: Variable | SystemOutput) -> dict[str, str]:
     low, high = _range(one)
     return {"domainleft": _float(low), "domainright": _float(high)}
 
 
-def _range(one: SystemInput | SystemOutput) -> tuple[float, float]:
+def _range(one: Variable | SystemOutput) -> tuple[float, float]:
     """Return a range; an end that is unknown is endless for an input.
 
     Of an output it is guessed from the points of its terms: engines draw their curves.
     """
     near: list[float] = []
-    for label in one.labels:
-        shape = shape_of(label.curve)
+    for label in one.terms:
+        shape = shape_of(label.function)
         near += shape.values if isinstance(shape, Points) else ()
-    if isinstance(one, SystemInput):
+    if isinstance(one, Variable):
         near = [-math.inf, math.inf]
     low = one.low if one.low is not None else min(near, default=0.0)
     high = one.high if one.high is not None else max(near, default=1.0)
@@ -286,18 +286,18 @@ def _output(one: SystemOutput, names: _Ids) -> XmlElement:
             "defuzzifier": word_for(FML_METHODS, one.defuzzifier.method, "COG"),
             "defaultValue": default,
         }
-    elif all(isinstance(label.curve, Singleton | Linear) for label in one.labels):
+    elif all(isinstance(label.function, Singleton | Linear) for label in one.terms):
         kind, tag = "tskTerm", "tskVariable"
         how = {**_head(one, names), "type": "output"}
     else:
         kind, tag = "tsukamotoTerm", "tsukamotoVariable"
-    terms = [_term(kind, one.name, label, names) for label in one.labels]
+    terms = [_term(kind, one.name, label, names) for label in one.terms]
     return element(tag, *terms, **how, **last)
 
 
-def _term(kind: str, variable: str, label: SystemTerm, names: _Ids) -> XmlElement:
+def _term(kind: str, variable: str, label: Term, names: _Ids) -> XmlElement:
     name = names.term(variable, label.name)
-    match label.curve:
+    match label.function:
         case Singleton(value=value) if kind == "tskTerm":
             return _tsk_term(name, value)
         case Linear(weights=weights, offset=offset) if kind == "tskTerm":
@@ -308,7 +308,7 @@ def _term(kind: str, variable: str, label: SystemTerm, names: _Ids) -> XmlElemen
         word, numbers = result
         texts = {f"param{k}": _float(one) for k, one in enumerate(numbers, 1)}
         return element(kind, element(word, **texts), name=name)
-    shape = shape_of(label.curve)
+    shape = shape_of(label.function)
     assert isinstance(shape, Points)  # others are refused or became points
     tag = "pointSetMonotonicShape" if kind == "tsukamotoTerm" else "pointSetShape"
     pairs = zip(shape.values, shape.degrees, strict=True)

@@ -105,7 +105,7 @@ class FmlRules:
         self._system = system
         self._kinds = {one.name: _kind(one) for one in system.outputs}
         self._taken = {
-            one.name: [label.name for label in one.labels] for one in system.inputs
+            one.name: [label.name for label in one.terms] for one in system.inputs
         }
         reasons: list[str] = []
         number = 0
@@ -231,7 +231,7 @@ class FmlRules:
 def _kind(output: SystemOutput) -> str:
     if not output.defuzzifier.is_weighted:
         return "mamdani"
-    curves = [label.curve for label in output.labels]
+    curves = [label.function for label in output.terms]
     if all(isinstance(curve, Singleton | Linear) for curve in curves):
         return "tsk"
     is_monotone = all(

@@ -19,9 +19,9 @@ from fuzzytree.model import (
     Points,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
+    Variable,
     changes_text,
 )
 from fuzzytree.semantics import has_numbers
@@ -74,11 +74,11 @@ def refuse(name: str, to: str, reasons: Iterable[str]) -> None:
 
 def with_labels(
     system: FuzzySystem,
-    change: Callable[[SystemInput | SystemOutput], Iterable[SystemTerm]],
+    change: Callable[[Variable | SystemOutput], Iterable[Term]],
 ) -> FuzzySystem:
     """Return a system whose variables have other terms."""
-    inputs = tuple(replace(v, labels=tuple(change(v))) for v in system.inputs)
-    outputs = tuple(replace(v, labels=tuple(change(v))) for v in system.outputs)
+    inputs = tuple(replace(v, terms=tuple(change(v))) for v in system.inputs)
+    outputs = tuple(replace(v, terms=tuple(change(v))) for v in system.outputs)
     return replace(system, inputs=inputs, outputs=outputs)
 
 
@@ -92,23 +92,23 @@ def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySy
         LossError: If a term with another height is not a list of points.
     """
 
-    def scaled(variable: SystemInput | SystemOutput, label: SystemTerm) -> SystemTerm:
+    def scaled(variable: Variable | SystemOutput, label: Term) -> Term:
         is_number = has_numbers(variable) and isinstance(
-            label.curve, Singleton | Linear
+            label.function, Singleton | Linear
         )
         if label.height == 1.0 or is_number:
             return replace(label, height=1.0)
         where = f"term {label.name!r} of {variable.name!r}"
-        if not isinstance(label.curve, Points):
+        if not isinstance(label.function, Points):
             raise LossError(
                 f"{where} has the height {label.height!r}, and {to} has no heights"
             )
         what = f"its height {label.height!r} is in its points, which are rounded"
         losses.append(Loss(where, what, 2.0**-52))
-        degrees = tuple(label.height * degree for degree in label.curve.degrees)
-        return SystemTerm(label.name, Points(label.curve.values, degrees))
+        degrees = tuple(label.height * degree for degree in label.function.degrees)
+        return Term(label.name, Points(label.function.values, degrees))
 
-    return with_labels(system, lambda v: [scaled(v, one) for one in v.labels])
+    return with_labels(system, lambda v: [scaled(v, one) for one in v.terms])
 
 
 def operands(condition: Condition, block: RuleBlock) -> list[Condition]:

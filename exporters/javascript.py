@@ -44,7 +44,6 @@ from fuzzytree.model import (
     FuzzyTree,
     Model,
     RuleBase,
-    SystemInput,
     SystemOutput,
     Variable,
     Written,
@@ -149,7 +148,7 @@ def _body(model: Document) -> Iterator[str]:
     yield TEST
 
 
-def _entry_of(one: Variable | SystemInput | SystemOutput) -> str:
+def _entry_of(one: Variable | SystemOutput) -> str:
     """Return the entry of a variable in a table of names."""
     unit = f" // {text_of(one.unit)}" if one.unit else ""
     return f"{text_of(one.name)},{unit}"

@@ -42,7 +42,6 @@ from fuzzytree.model import (
     Node,
     Points,
     RuleBase,
-    SystemInput,
     Variable,
     Written,
     fingerprint,
@@ -200,7 +199,7 @@ def _extension(name: str, value: str) -> XmlElement:
     return element("Extension", extender="fuzzytree", name=name, value=value)
 
 
-def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[XmlElement]:
+def _columns(variables: Iterable[Variable]) -> Iterator[XmlElement]:
     for variable in variables:
         if variable.parts:
             continue

@@ -38,7 +38,6 @@ from fuzzytree.model import (
     Model,
     NameMap,
     RuleBase,
-    SystemInput,
     SystemOutput,
     Variable,
     Written,
@@ -325,9 +324,9 @@ def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Writt
 def _formulas(system: FuzzySystem) -> Iterator[str]:
     """Yield what is wrong with formulas: what may have an infinite result."""
     for variable in system.variables:
-        for label in variable.labels:
-            if isinstance(label.curve, Formula):
-                text = text_of(label.curve.expression)
+        for label in variable.terms:
+            if isinstance(label.function, Formula):
+                text = text_of(label.function.expression)
                 if re.search(r"[/%^]|\*\*|pow", text):
                     yield f"a division or a power ({label.name!r} of {variable.name!r})"
 
@@ -345,7 +344,7 @@ def _system_interface(
 
 
 def _declared(
-    variables: Sequence[Variable | SystemInput | SystemOutput],
+    variables: Sequence[Variable | SystemOutput],
     names: NameMap,
     numbers: StNumbers,
 ) -> Iterator[str]:

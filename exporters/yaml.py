@@ -65,10 +65,8 @@ from fuzzytree.model import (
     SigmoidDifference,
     SigmoidProduct,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
     Term,
     Trapezoid,
     Variable,
@@ -141,8 +139,7 @@ def _names(model: Document) -> Iterator[tuple[str, str]]:
     for variable in model.variables:
         yield "variable", variable.name
         yield "unit", variable.unit
-        terms = variable.terms if isinstance(variable, Variable) else variable.labels
-        yield from (("term", term.name) for term in terms)
+        yield from (("term", term.name) for term in variable.terms)
     if isinstance(model, FuzzyTree):
         yield from (("pattern", leaf.pattern) for leaf in model.leaves)
         yield from (("set", term.name) for group in model.sets for term in group.terms)
@@ -219,31 +216,20 @@ def _body(model: Model) -> dict[str, Entry]:
     return entries
 
 
-def _variable(variable: Variable | SystemInput | SystemOutput) -> dict[str, Entry]:
+def _variable(variable: Variable | SystemOutput) -> dict[str, Entry]:
     entries: dict[str, Entry] = {"name": variable.name}
     if variable.unit:
         entries["unit"] = variable.unit
     ends = range_ends(variable.low, variable.high)
-    if not isinstance(variable, Variable) and variable.clips:
+    if variable.clips:
         ends["outside"] = "clipped"
     if ends:
         entries["range"] = Short(ends)
     if not isinstance(variable, SystemOutput) and variable.parts:
         entries["sum of"] = [*map(summand, variable.parts)]
-    terms = _terms(variable)
-    if terms:
-        entries["terms"] = terms
+    if variable.terms:
+        entries["terms"] = [*map(_term, variable.terms)]
     return entries
-
-
-def _terms(variable: Variable | SystemInput | SystemOutput) -> list[Entry]:
-    if isinstance(variable, Variable):
-        return [*map(_term, variable.terms)]
-    return [*map(_label, variable.labels)]
-
-
-def _term(term: Term) -> dict[str, Entry]:
-    return named_shape(term.name, term.shape)
 
 
 def _proposition(proposition: Proposition, vocabulary: Vocabulary) -> Entry:
@@ -318,8 +304,8 @@ def _system_losses(system: FuzzySystem) -> Iterator[Loss]:
         text = f"{len(system.note)} characters are more than {LONGEST_NOTE}"
         yield Loss("the note", text)
     for variable in system.variables:
-        for label in variable.labels:
-            if isinstance(label.curve, Formula) and not _is_readable(label.curve):
+        for label in variable.terms:
+            if isinstance(label.function, Formula) and not _is_readable(label.function):
                 where = f"term {label.name!r} of {variable.name!r}"
                 yield Loss(where, "its formula is too long or nested too deeply")
     for number, block in enumerate(system.blocks, 1):
@@ -351,18 +337,11 @@ def _output(one: SystemOutput) -> dict[str, Entry]:
     return entries
 
 
-def _label(label: SystemTerm) -> Entry:
-    match label.curve:
-        case Band() | LR() | Points():
-            entries = named_shape(label.name, label.curve)
-            if label.height != 1.0:
-                entries["height"] = float(label.height)
-            return entries
-        case curve:
-            entries = {"name": label.name, **_curve(curve)}
-            if label.height != 1.0:
-                entries["height"] = float(label.height)
-            return Short(entries)
+def _term(term: Term) -> Entry:
+    height = {} if term.height == 1.0 else {"height": float(term.height)}
+    if isinstance(term.function, Band | LR | Points):
+        return {**named_shape(term.name, term.function), **height}
+    return Short({"name": term.name, **_curve(term.function), **height})
 
 
 def _curve(curve: Curve) -> dict[str, Entry]:

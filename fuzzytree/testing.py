@@ -44,10 +44,8 @@ from fuzzytree.model import (
     Shape,
     Side,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
     Term,
     Variable,
     interval_names,
@@ -162,10 +160,8 @@ def _named_rules(names: Sequence[str]) -> RuleBase:
 def _named_system(names: Sequence[str]) -> FuzzySystem:
     """Return a system whose inputs and terms have these names."""
     ramp = Points((0.0, 1.0), (0.0, 1.0))
-    curves = tuple(SystemTerm(name, ramp) for name in names)
-    numbers = tuple(
-        SystemTerm(name, Singleton(float(k))) for k, name in enumerate(names, 1)
-    )
+    curves = tuple(Term(name, ramp) for name in names)
+    numbers = tuple(Term(name, Singleton(float(k))) for k, name in enumerate(names, 1))
     output = SystemOutput(
         f"{names[0]} 2", numbers, 0.0, 9.0, Defuzzifier("weighted average")
     )
@@ -173,7 +169,9 @@ def _named_system(names: Sequence[str]) -> FuzzySystem:
         SystemRule(Is(one, other), (Conclusion(output.name, other),), name=one)
         for one, other in zip(names, names[::-1], strict=True)
     )
-    inputs = tuple(SystemInput(name, curves, 0.0, 1.0, unit=name) for name in names)
+    inputs = tuple(
+        Variable(name, curves, low=0.0, high=1.0, unit=name) for name in names
+    )
     return FuzzySystem(names[0], inputs, (output,), (RuleBlock(rules, name=names[0]),))
 
 
@@ -200,25 +198,25 @@ def _extreme_rules() -> RuleBase:
 def _extreme_system() -> FuzzySystem:
     """Return a system of extreme numbers."""
     degrees = (0.0, 1.0, 5e-324, 0.5, 1.0 - 2.0**-53, 0.1, 1.0, 0.0)
-    label = SystemTerm("wide", Points(_EXTREMES, degrees), height=5e-324)
-    numbers = tuple(SystemTerm(f"n{k}", Singleton(x)) for k, x in enumerate(_EXTREMES))
+    label = Term("wide", Points(_EXTREMES, degrees), height=5e-324)
+    numbers = tuple(Term(f"n{k}", Singleton(x)) for k, x in enumerate(_EXTREMES))
     how = Defuzzifier("weighted average")
     output = SystemOutput("y", numbers, -1e308, 1e308, how, default=-0.0)
     rules = tuple(
         SystemRule(Is("a", "wide"), (Conclusion("y", one.name),), weight)
         for one, weight in zip(numbers, degrees, strict=True)
     )
-    inputs = (SystemInput("a", (label,), -1e308, 1e308),)
+    inputs = (Variable("a", (label,), low=-1e308, high=1e308),)
     return FuzzySystem("extreme", inputs, (output,), (RuleBlock(rules),))
 
 
 def _system_by_lines() -> FuzzySystem:
     """Return a system whose output's curve is made of lines."""
-    ramp = SystemTerm("ramp", Points((0.0, 1.0), (0.0, 1.0)))
+    ramp = Term("ramp", Points((0.0, 1.0), (0.0, 1.0)))
     labels = (
-        SystemTerm("low", Points((0.0, 0.4, 1.0), (1.0, 0.25, 0.0))),
-        SystemTerm("high", Points((0.1, 0.5, 0.9), (0.0, 1.0, 0.3)), height=0.75),
-        SystemTerm("all", Points((0.0,), (0.125,))),
+        Term("low", Points((0.0, 0.4, 1.0), (1.0, 0.25, 0.0))),
+        Term("high", Points((0.1, 0.5, 0.9), (0.0, 1.0, 0.3)), height=0.75),
+        Term("all", Points((0.0,), (0.125,))),
     )
     how = Defuzzifier("centroid", 6, "lines")
     output = SystemOutput("y", labels, 0.0, 1.0, how, aggregation="maximum")
@@ -231,7 +229,7 @@ def _system_by_lines() -> FuzzySystem:
             ("high", 1.0, Is("a", "ramp", ("very",))),
         )
     )
-    inputs = (SystemInput("a", (ramp,), 0.0, 1.0),)
+    inputs = (Variable("a", (ramp,), low=0.0, high=1.0),)
     block = RuleBlock(rules, implication="minimum")
     return FuzzySystem("lines", inputs, (output,), (block,))
 

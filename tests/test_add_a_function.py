@@ -32,7 +32,7 @@ CLASS = '''class Cauchy(MembershipFunction, frozen=True, tag="cauchy"):
 
 '''
 FUNCTION = {
-    "fuzzytree/model/system/curves.py": {
+    "fuzzytree/model/curves.py": {
         "SystemCurve = (\n": CLASS,
         "    | Cosine\n": "    | Cauchy\n",
     },
@@ -62,15 +62,16 @@ from fuzzytree.exporters.table import all_formats
 from fuzzytree.model import *
 from fuzzytree.model import curves
 from fuzzytree.semantics import error_bounds, from_system, infer, system_probes
-far = SystemTerm("far", Points((2.0, 5.0), (0.0, 1.0)))
-small = SystemTerm("small", Points((0.0, 1.0, 2.0), (0.0, 1.0, 0.0)))
-low = SystemTerm("low", Points((0.0, 4.0), (1.0, 0.0)))
+far = Term("far", Points((2.0, 5.0), (0.0, 1.0)))
+small = Term("small", Points((0.0, 1.0, 2.0), (0.0, 1.0, 0.0)))
+low = Term("low", Points((0.0, 4.0), (1.0, 0.0)))
 near, norm = low, "product"
 """
 TRY = """
 system = FuzzySystem(
     "toy",
-    (SystemInput("dirt", (near, far), 0.0, 9.0), SystemInput("load", (low,), 0.0, 9.0)),
+    (Variable("dirt", (near, far), "", 0.0, 9.0),
+     Variable("load", (low,), "", 0.0, 9.0)),
     (SystemOutput("y", (small, far), 0.0, 5.0, Defuzzifier("centroid"), "maximum"),),
     (RuleBlock(
         (SystemRule(And((Is("dirt", near.name), Is("load", "low"))),
@@ -91,7 +92,7 @@ for form in all_formats():
         print(form.name, "written")
         continue
     back = ft.load(path)
-    has_curve = near.curve in [label.curve for label in back.inputs[0].labels]
+    has_curve = near.function in [label.function for label in back.inputs[0].terms]
     has_norm = back.blocks[0].conjunction == norm
     if has_curve and has_norm and form.name in ("yaml", "fll"):
         answers = [infer(back, row).outputs for row in rows]
@@ -165,7 +166,7 @@ def _tried(tmp_path: Path, copy: Path, change: str) -> tuple[str, str]:
 def test_a_membership_function_is_added_in_two_files(tmp_path: Path) -> None:
     assert len(FUNCTION) == 2
     copy = _edited(tmp_path, FUNCTION)
-    near = 'near = SystemTerm("near", curves.Cauchy(2.0, 1.5))'
+    near = 'near = Term("near", curves.Cauchy(2.0, 1.5))'
     result, errors = _tried(tmp_path, copy, near)
     assert (
         result

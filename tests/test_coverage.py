@@ -22,11 +22,11 @@ from fuzzytree.model import (
     Or,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.model.agreement import Coverage
 from fuzzytree.model.contracts import SystemOutcome, SystemRun
@@ -39,13 +39,13 @@ from fuzzytree.semantics.samples import all_samples
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
 
-LOW = SystemTerm("low", Trapezoid(0.0, 0.1, 0.1, 0.2))
-THIN = SystemTerm("thin", Trapezoid(0.5, 0.5, 0.5, 0.5))
-NEVER = SystemTerm("never", Trapezoid(0.7, 0.8, 0.8, 0.9))
-INPUTS = tuple(SystemInput(n, (LOW, THIN, NEVER), 0.0, 1.0) for n in "ab")
+LOW = Term("low", Trapezoid(0.0, 0.1, 0.1, 0.2))
+THIN = Term("thin", Trapezoid(0.5, 0.5, 0.5, 0.5))
+NEVER = Term("never", Trapezoid(0.7, 0.8, 0.8, 0.9))
+INPUTS = tuple(Variable(n, (LOW, THIN, NEVER), low=0.0, high=1.0) for n in "ab")
 OUTPUT = SystemOutput(
     "y",
-    (SystemTerm("one", Singleton(1.0)),),
+    (Term("one", Singleton(1.0)),),
     None,
     None,
     Defuzzifier("weighted average"),
@@ -79,7 +79,7 @@ def test_a_row_aimed_at_a_rule_fires_it(condition: Condition) -> None:
 
 
 def test_a_row_is_aimed_at_a_rule_on_a_combination() -> None:
-    mix = SystemInput("mix", (NEVER,), parts=(Part("a", 2.0, 0.5), Part("b", -3.0)))
+    mix = Variable("mix", (NEVER,), parts=(Part("a", 2.0, 0.5), Part("b", -3.0)))
     rule = SystemRule(Is("mix", "never"), THEN)
     system = FuzzySystem("s", (*INPUTS, mix), (OUTPUT,), (RuleBlock((rule,)),))
     assert infer(system, Aim(system).row(rule)).activations[0] > 0.0
@@ -128,9 +128,9 @@ def test_many_rules_that_do_not_fire_are_named_in_a_line() -> None:
 
 
 def test_rows_are_drawn_from_the_ranges_themselves() -> None:
-    wide = replace(LOW, curve=Trapezoid(-100.0, 0.0, 1.0, 100.0))
+    wide = replace(LOW, function=Trapezoid(-100.0, 0.0, 1.0, 100.0))
     system = system_of(Is("a", "low"))
-    inputs = tuple(replace(one, labels=(wide, THIN, NEVER)) for one in INPUTS)
+    inputs = tuple(replace(one, terms=(wide, THIN, NEVER)) for one in INPUTS)
     rows = range_rows(replace(system, inputs=inputs), 50)
     assert all(0.0 <= value <= 1.0 for row in rows for value in row.values())
 
@@ -138,10 +138,8 @@ def test_rows_are_drawn_from_the_ranges_themselves() -> None:
 def test_probing_thousands_of_rules_runs_fewer_rows_than_rules(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    labels = tuple(
-        SystemTerm(f"t{k}", Trapezoid(k - 1.0, k, k, k + 1.0)) for k in range(7)
-    )
-    inputs = tuple(SystemInput(f"x{k}", labels, 0.0, 6.0) for k in range(4))
+    labels = tuple(Term(f"t{k}", Trapezoid(k - 1.0, k, k, k + 1.0)) for k in range(7))
+    inputs = tuple(Variable(f"x{k}", labels, low=0.0, high=6.0) for k in range(4))
     rules = tuple(
         SystemRule(And(tuple(Is(f"x{k}", f"t{t}") for k, t in enumerate(terms))), THEN)
         for terms in itertools.product(range(7), repeat=4)

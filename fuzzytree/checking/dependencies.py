@@ -255,7 +255,9 @@ def _with_rules(
 def _without_curves(rules: RuleBase) -> RuleBase:
     """Return a rule base whose sides have one number."""
     variables = tuple(
-        replace(v, terms=tuple(replace(t, shape=_straight(t.shape)) for t in v.terms))
+        replace(
+            v, terms=tuple(replace(t, function=_straight(t.shape)) for t in v.terms)
+        )
         for v in rules.variables
     )
     return replace(rules, variables=variables)

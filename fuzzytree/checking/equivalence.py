@@ -37,10 +37,8 @@ from fuzzytree.model import (
     Semantics,
     Sets,
     Shape,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
     Term,
     Trapezoid,
     Variable,
@@ -108,8 +106,8 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
     everywhere = {
         (one.name, label.name)
         for one in system.inputs
-        for label in one.labels
-        if label.height == 1.0 and _is_everywhere(label.curve)
+        for label in one.terms
+        if label.height == 1.0 and _is_everywhere(label.function)
     }
 
     def reduced(when: Condition | None) -> Condition | None:
@@ -141,7 +139,7 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
     idle = everywhere - used
     inputs = tuple(
         replace(
-            one, labels=tuple(x for x in one.labels if (one.name, x.name) not in idle)
+            one, terms=tuple(x for x in one.terms if (one.name, x.name) not in idle)
         )
         for one in system.inputs
     )
@@ -263,11 +261,7 @@ def canonical_form(model: Document) -> Document:
         >>> canonical_form(one) == canonical_form(two)
         True
     """
-    terms: dict[str, tuple[Term | SystemTerm, ...]] = {}
-    if isinstance(model, FuzzySystem):
-        terms = {one.name: one.labels for one in model.variables}
-    else:
-        terms = {one.name: one.terms for one in model.variables}
+    terms = {one.name: one.terms for one in model.variables}
     sets = model.sets if isinstance(model, FuzzyTree) else ()
     classes = () if isinstance(model, FuzzySystem) else model.classes
     names = _NewNames(
@@ -301,11 +295,18 @@ def _renamed(part: Any, names: _NewNames) -> Any:
         case Semantics(uncovered=uncovered, missing=missing):
             answers = names.classes[uncovered], names.classes[missing]
             return Semantics(part.conjunction, *answers)
-        case Variable(name=name, terms=terms, parts=parts):
-            renamed = _terms(terms, names.terms[name])
-            return Variable(names.variables[name], renamed, parts=new(parts))
+        case Variable(name=name, terms=terms):
+            return Variable(
+                names.variables[name],
+                _terms(terms, names.terms[name], names, are_numbers=False),
+                low=part.low if part.clips else None,
+                high=part.high if part.clips else None,
+                clips=part.clips,
+                parts=new(part.parts),
+            )
         case Sets(variable=name, terms=terms):
-            return Sets(names.variables[name], _terms(terms, names.sets[name]))
+            renamed = _terms(terms, names.sets[name], names, are_numbers=False)
+            return Sets(names.variables[name], renamed)
         case Part():
             return Part(names.variables[part.input], part.weight, part.centre)
         case Rule():
@@ -338,10 +339,6 @@ _OWN: Mapping[type[Document], tuple[str, ...]] = {
 """The parts of a model beside variables and semantics."""
 
 
-def _terms(terms: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
-    return tuple(Term(names[one.name], _shape(one.shape)) for one in terms)
-
-
 def _shape(shape: Shape) -> Shape:
     if isinstance(shape, Points):
         return Points(stepped(shape.values), shape.degrees)
@@ -358,21 +355,14 @@ def _renamed_system(part: Any, names: _NewNames) -> Any:
         case FuzzySystem():
             blocks = tuple(_block(one, part, names) for one in part.blocks)
             return FuzzySystem("m", new(part.inputs), new(part.outputs), blocks)
-        case SystemInput():
-            return SystemInput(
-                names.variables[part.name],
-                _labels(part, names, are_numbers=False),
-                low=part.low if part.clips else None,
-                high=part.high if part.clips else None,
-                clips=part.clips,
-                parts=new(part.parts),
-            )
-        case SystemOutput(defuzzifier=how):
+        case SystemOutput(name=name, defuzzifier=how):
             is_free = how.is_weighted and not part.clips
             return replace(
                 part,
-                name=names.variables[part.name],
-                labels=_labels(part, names, are_numbers=how.is_weighted),
+                name=names.variables[name],
+                terms=_terms(
+                    part.terms, names.terms[name], names, are_numbers=how.is_weighted
+                ),
                 low=None if is_free else part.low,
                 high=None if is_free else part.high,
                 defuzzifier=type(how)(how.method) if how.is_weighted else how,
@@ -400,17 +390,16 @@ def _renamed_system(part: Any, names: _NewNames) -> Any:
             return part
 
 
-def _labels(
-    variable: SystemInput | SystemOutput, names: _NewNames, *, are_numbers: bool
-) -> tuple[SystemTerm, ...]:
-    terms = names.terms[variable.name]
-    labels: list[SystemTerm] = []
-    for one in variable.labels:
-        curve = _renamed_system(one.curve, names)
-        shape = None if are_numbers or curve is not one.curve else shape_of(curve)
+def _terms(
+    terms: tuple[Term, ...], renamed: Names, names: _NewNames, *, are_numbers: bool
+) -> tuple[Term, ...]:
+    results: list[Term] = []
+    for one in terms:
+        curve = _renamed_system(one.function, names)
+        shape = None if are_numbers or curve is not one.function else shape_of(curve)
         curve = curve if shape is None else _shape(shape)
-        labels.append(replace(one, name=terms[one.name], curve=curve))
-    return tuple(labels)
+        results.append(replace(one, name=renamed[one.name], function=curve))
+    return tuple(results)
 
 
 def _block(block: RuleBlock, system: FuzzySystem, names: _NewNames) -> RuleBlock:

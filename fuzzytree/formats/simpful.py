@@ -33,13 +33,13 @@ from fuzzytree.model import (
     Sigmoid,
     Singleton,
     SNorm,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
     TwoGaussians,
+    Variable,
 )
 
 _SAMPLES = 1000  # simpful's `subdivisions`, unless the caller of inference() gives some
@@ -148,12 +148,12 @@ def _condition(
     return joined(And if kind == "AND" else Or, left, right)
 
 
-def _input(column: str, source: Any) -> SystemInput:
+def _input(column: str, source: Any) -> Variable:
     variable = source._lvs.get(column)
     if variable is None:  # used by functions alone
-        return SystemInput(column)
+        return Variable(column)
     low, high = _range(variable) or (None, None)
-    return SystemInput(column, _labels(column, variable), low, high)
+    return Variable(column, _labels(column, variable), low=low, high=high)
 
 
 def _mamdani(output: str, source: Any) -> SystemOutput:
@@ -179,14 +179,14 @@ def _sugeno(
     functions: Mapping[str, tuple[Mapping[str, float], float]],
     columns: list[str],
 ) -> SystemOutput:
-    labels: dict[str, SystemTerm] = {}
+    labels: dict[str, Term] = {}
     for end in ends:
         if end.output == output:
             weights, offset = functions[end.term]
             results = [weights.get(column, 0.0) * end.weight for column in columns]
             number = offset * end.weight
             curve = Linear(tuple(results), number) if weights else Singleton(number)
-            labels[end.label] = SystemTerm(end.label, curve)
+            labels[end.label] = Term(end.label, curve)
     how = Defuzzifier("weighted average")
     return SystemOutput(output, (*labels.values(),), None, None, how, default=0.0)
 
@@ -251,9 +251,9 @@ def _range(variable: Any) -> tuple[float, float] | None:
     return float(ends[0]), float(ends[1])
 
 
-def _labels(name: str, variable: Any) -> tuple[SystemTerm, ...]:
+def _labels(name: str, variable: Any) -> tuple[Term, ...]:
     return tuple(
-        SystemTerm(one._term, _curve(one, f"term {one._term!r} of {name!r}"))
+        Term(one._term, _curve(one, f"term {one._term!r} of {name!r}"))
         for one in variable._FSlist
     )
 

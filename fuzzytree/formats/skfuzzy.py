@@ -26,11 +26,11 @@ from fuzzytree.model import (
     Or,
     Points,
     SNorm,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
+    Variable,
 )
 
 _ROUNDING: Final = 2.0**-50
@@ -130,10 +130,10 @@ def _norm(function: Any, names: Mapping[str, _Norm], where: str) -> _Norm:
     return names[name]
 
 
-def _input(variable: Any) -> SystemInput:
+def _input(variable: Any) -> Variable:
     values = _universe(variable)
     low, high = values[0], values[-1]
-    return SystemInput(variable.label, _labels(variable), low, high, clips=True)
+    return Variable(variable.label, _labels(variable), low=low, high=high, clips=True)
 
 
 def _output(variable: Any) -> SystemOutput:
@@ -166,14 +166,14 @@ def _universe(variable: Any) -> list[float]:
     return results
 
 
-def _labels(variable: Any) -> tuple[SystemTerm, ...]:
+def _labels(variable: Any) -> tuple[Term, ...]:
     values = _universe(variable)
-    labels: list[SystemTerm] = []
+    labels: list[Term] = []
     for term in variable.terms.values():
         degrees = np.asarray(term.mf, np.float64).tolist()
         kept = _corners(values, degrees)
         curve = Points(tuple(values[k] for k in kept), tuple(degrees[k] for k in kept))
-        labels.append(SystemTerm(term.label, curve))
+        labels.append(Term(term.label, curve))
     return tuple(labels)
 
 

@@ -245,7 +245,7 @@ def positions_of(
         >>> list(positions_of([], [], [((3, 1), [(4, 7)])]))
         [('blocks', 0), ('blocks', 0, 'rules', 0)]
     """
-    groups = (("inputs", "labels", inputs), ("outputs", "labels", outputs))
+    groups = (("inputs", "terms", inputs), ("outputs", "terms", outputs))
     positions: Positions = {}
     for field, inner, some in (*groups, ("blocks", "rules", blocks)):
         for k, (head, parts) in enumerate(some):
@@ -293,11 +293,11 @@ def in_system(path: Path) -> Path:
 
     Example:
         >>> in_system(("variables", 0, "terms", 2)), in_system(("rules", 1))
-        (('inputs', 0, 'labels', 2), ('blocks', 0, 'rules', 1))
+        (('inputs', 0, 'terms', 2), ('blocks', 0, 'rules', 1))
     """
     match path:
         case ("variables", int(place), "terms", *rest):
-            return ("inputs", place, "labels", *rest)
+            return ("inputs", place, "terms", *rest)
         case ("variables", *rest):
             return ("inputs", *rest)
         case ("rules", *rest):

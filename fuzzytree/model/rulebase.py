@@ -9,33 +9,30 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import itertools
-import math
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Literal
 
 import msgspec
 
-from fuzzytree.errors import InvalidModelError
 from fuzzytree.model.functions import LR as LR
 from fuzzytree.model.functions import MOST_POINTS as MOST_POINTS
 from fuzzytree.model.functions import Band as Band
 from fuzzytree.model.functions import Points as Points
 from fuzzytree.model.functions import Shape as Shape
 from fuzzytree.model.functions import Side as Side
+from fuzzytree.model.mistakes import Mistake as Mistake
+from fuzzytree.model.mistakes import Path as Path
+from fuzzytree.model.mistakes import name_choice as name_choice
+from fuzzytree.model.mistakes import name_mistakes as name_mistakes
+from fuzzytree.model.mistakes import refuse as refuse
+from fuzzytree.model.mistakes import text_fault as text_fault
 from fuzzytree.model.values import Value as Value
-
-_MOST_MISTAKES = 200  # looking for similar names takes long
-_MOST_COMPARED = 1000  # names among which a similar one is sought
-
-_CONTROL = re.compile(
-    r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff]"
-)
-
-Path = tuple[str | int, ...]
-Mistake = tuple[Path, str]
-
+from fuzzytree.model.variables import Part as Part
+from fuzzytree.model.variables import Term as Term
+from fuzzytree.model.variables import Variable as Variable
+from fuzzytree.model.variables import shapes_of as shapes_of
+from fuzzytree.model.variables import term_names as term_names
+from fuzzytree.model.variables import variable_mistakes as variable_mistakes
 
 _ONE = {"leaves": "leaf", "classes": "class", "losses": "loss"}
 
@@ -52,42 +49,6 @@ def summary(name: str, **counts: int) -> str:
         for noun, count in counts.items()
     )
     return f"{name}({', '.join(shown)})"
-
-
-class Term(Value, frozen=True):
-    """A label of a variable and its curve."""
-
-    name: str
-    shape: Shape
-
-
-class Part(Value, frozen=True):
-    """One summand of a combination: `weight * (input - centre)`."""
-
-    input: str
-    weight: float
-    centre: float = 0.0
-
-
-class Variable(Value, frozen=True):
-    """An input column, or a linear combination of input columns.
-
-    Attributes:
-        name: Unique in its rule base.
-        terms: The labels; names are unique within the variable.
-        unit: The unit of its values, for people.
-        low: The smallest value seen or allowed; None if unknown.
-        high: The largest value seen or allowed; None if unknown.
-        parts: Empty for an input column. Otherwise the summands of a combination,
-            added in this order, each operation rounded once to double.
-    """
-
-    name: str
-    terms: tuple[Term, ...] = ()
-    unit: str = ""
-    low: float | None = None
-    high: float | None = None
-    parts: tuple[Part, ...] = ()
 
 
 class Proposition(Value, frozen=True):
@@ -223,11 +184,6 @@ def proposition_text(proposition: Proposition) -> str:
     return f"{proposition.variable} {verb} {' or '.join(proposition.terms)}"
 
 
-def shapes_of(variables: Iterable[Variable]) -> dict[tuple[str, str], Shape]:
-    """Return the shape of each term, by variable and name."""
-    return {(v.name, t.name): t.shape for v in variables for t in v.terms}
-
-
 def fingerprint(value: msgspec.Struct) -> str:
     """Return the SHA-256 of a model's content, as 64 hexadecimal digits.
 
@@ -283,17 +239,6 @@ def is_label(name: str, label_type: LabelType | msgspec.UnsetType) -> bool:
     return True
 
 
-def refuse(*mistakes: Iterable[Mistake]) -> None:
-    """Refuse a model with the first few hundred of its mistakes, if it has any.
-
-    Raises:
-        InvalidModelError: With the mistakes.
-    """
-    first = [*itertools.islice(itertools.chain(*mistakes), _MOST_MISTAKES)]
-    if first:
-        raise InvalidModelError(first)
-
-
 def naming_mistakes(
     name: str, classes: tuple[str, ...], semantics: Semantics
 ) -> Iterator[Mistake]:
@@ -320,97 +265,6 @@ def naming_mistakes(
                 f"the answer for {field} is no class: {answer!r}; "
                 f"{name_choice(answer, classes)}",
             )
-
-
-def variable_mistakes(
-    variables: tuple[Variable, ...], columns: tuple[str, ...] = ()
-) -> Iterator[Mistake]:
-    """Yield what is wrong with variables: names, ranges, shapes, combinations."""
-    yield from name_mistakes(("variables",), "variable", [v.name for v in variables])
-    yield from name_mistakes(("columns",), "column", columns)
-    named = set(columns)
-    known: dict[str, bool] = {}
-    for position, variable in enumerate(variables):
-        path: Path = ("variables", position)
-        if not variable.name:
-            yield (*path, "name"), "a variable needs a name"
-        if columns and not variable.parts and variable.name not in named:
-            yield (
-                (*path, "name"),
-                f"input {variable.name!r} is not among the columns; "
-                f"{name_choice(variable.name, columns)}",
-            )
-        yield from unit_mistakes(path, variable.name, variable.unit)
-        yield from range_mistakes(path, variable.name, variable.low, variable.high)
-        yield from part_mistakes(path, variable.name, variable.parts, known)
-        names = [term.name for term in variable.terms]
-        yield from name_mistakes((*path, "terms"), f"term of {variable.name!r}", names)
-        for index, term in enumerate(variable.terms):
-            where = f"term {term.name!r} of {variable.name!r}"
-            if not term.name:
-                yield (
-                    (*path, "terms", index),
-                    f"a term of {variable.name!r} has no name",
-                )
-            for text in term.shape.mistakes():
-                yield (*path, "terms", index, "shape"), f"{where}: {text}"
-        known[variable.name] = bool(variable.parts)
-
-
-def unit_mistakes(path: Path, name: str, unit: str) -> Iterator[Mistake]:
-    """Yield why the unit of a variable is none."""
-    fault = text_fault(unit)
-    if fault:
-        yield (*path, "unit"), f"the unit {unit!r} of {name!r} {fault}"
-
-
-def range_mistakes(
-    path: Path, name: str, low: float | None, high: float | None
-) -> Iterator[Mistake]:
-    """Yield what is wrong with the range of a variable."""
-    for field, value in (("low", low), ("high", high)):
-        if value is not None and not math.isfinite(value):
-            yield (*path, field), f"the range of {name!r} must be finite"
-            return
-    if low is not None and high is not None and low > high:
-        yield (
-            (*path, "low"),
-            f"the range of {name!r} starts at {low!r} and ends below it, at {high!r}",
-        )
-
-
-def part_mistakes(
-    path: Path, name: str, parts: tuple[Part, ...], known: Mapping[str, bool]
-) -> Iterator[Mistake]:
-    """Yield what is wrong with a combination.
-
-    `known` has the variables before it, and whether each is a combination itself.
-    """
-    for index, part in enumerate(parts):
-        where = (*path, "parts", index)
-        if known.get(part.input, True):
-            inputs = [one for one, combined in known.items() if not combined]
-            yield (
-                (*where, "input"),
-                f"combination {name!r} needs input {part.input!r}, "
-                f"which does not stand before it; {name_choice(part.input, inputs)}",
-            )
-        if not math.isfinite(part.weight) or part.weight == 0.0:
-            yield (
-                (*where, "weight"),
-                f"the weight of {part.input!r} in {name!r} must be finite "
-                f"and not 0, not {part.weight!r}",
-            )
-        if not math.isfinite(part.centre):
-            yield (
-                (*where, "centre"),
-                f"the centre of {part.input!r} in {name!r} must be finite",
-            )
-
-
-def term_names(variables: Iterable[Variable]) -> dict[str, dict[str, None]]:
-    """Return the names of each variable's terms, in order and quick to look up."""
-    return {v.name: dict.fromkeys(term.name for term in v.terms) for v in variables}
 
 
 def proposition_mistakes(
@@ -465,51 +319,3 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
                 yield from proposition_mistakes(
                     (*path, "when", index), f"rule {number}", proposition, terms
                 )
-
-
-def name_mistakes(path: Path, what: str, names: Iterable[str]) -> Iterator[Mistake]:
-    """Yield which names stand twice or hold what no name may hold."""
-    seen: set[str] = set()
-    for position, name in enumerate(names):
-        fault = text_fault(name)
-        if fault:
-            yield (*path, position), f"{what} {name!r} {fault}"
-        if name in seen:
-            yield (*path, position), f"{what} {name!r} stands twice"
-        seen.add(name)
-
-
-def text_fault(text: str) -> str:
-    """Return why a text is no name or unit, empty if it may be one.
-
-    Terminals, editors and line-based formats obey control characters, line breaks and
-    marks that change the direction of writing, so that no name holds one.
-
-    Example:
-        >>> text_fault("petal length (µm)"), text_fault("petal" + chr(27) + "[2J")
-        ('', 'has a control character')
-    """
-    if _CONTROL.search(text):
-        return "has a control character"
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return "cannot be written as UTF-8"
-    return ""
-
-
-def name_choice(wrong: str, names: Iterable[str]) -> str:
-    """Return `there is a, b (did you mean 'a'?)`, at most a dozen names long."""
-    import difflib
-
-    known = list(dict.fromkeys(names))
-    # A message has one line, whatever is in a name.
-    lines = [one if one.isprintable() else repr(one) for one in known[:12]]
-    if len(known) > _MOST_COMPARED:
-        return f"there are {len(known)}: {', '.join(lines)}, ..."
-    if not known:
-        return "there is none"
-    shown = ", ".join(lines) + (", ..." if len(known) > 12 else "")
-    close = difflib.get_close_matches(wrong, known, n=1)
-    hint = f" (did you mean {close[0]!r}?)" if close else ""
-    return f"there is {shown}{hint}"

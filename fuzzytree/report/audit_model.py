@@ -90,8 +90,8 @@ def _in_words(model: Audited, name: str) -> list[str]:
     if isinstance(model, FuzzySystem):
         own = next(one for one in model.inputs if one.name == name)
         return [
-            f"{label.name}: {curve_text(label.curve, model.columns)}"
-            for label in own.labels[:_MOST_TERMS]
+            f"{label.name}: {curve_text(label.function, model.columns)}"
+            for label in own.terms[:_MOST_TERMS]
         ]
     variable = next(one for one in model.variables if one.name == name)
     return [

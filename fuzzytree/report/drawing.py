@@ -23,8 +23,7 @@ from fuzzytree.model import (
     Points,
     RuleBase,
     Shape,
-    SystemInput,
-    SystemTerm,
+    Term,
     Variable,
     printable,
 )
@@ -208,9 +207,9 @@ def _axis(variable: Variable) -> Axis:
     return Axis(variable.name, variable.unit, curves, (), None, None, variable.parts)
 
 
-def _system_axis(one: SystemInput) -> Axis:
-    drawn = [label for label in one.labels if not _is_undrawn(label.curve)]
-    others = tuple(label.name for label in one.labels if _is_undrawn(label.curve))
+def _system_axis(one: Variable) -> Axis:
+    drawn = [label for label in one.terms if not _is_undrawn(label.function)]
+    others = tuple(label.name for label in one.terms if _is_undrawn(label.function))
     curves = tuple(map(_labelled, drawn))
     return Axis(one.name, one.unit, curves, others, None, None, one.parts)
 
@@ -239,8 +238,8 @@ def _corners(curve: SystemCurve) -> tuple[float, ...]:
     return tuple(sorted({one for one in curve.knots() if math.isfinite(one)}))
 
 
-def _labelled(label: SystemTerm) -> Curve:
-    curve = label.curve
+def _labelled(label: Term) -> Curve:
+    curve = label.function
     if isinstance(curve, (Band, LR, Points)) and label.height == 1.0:
         return curve_of(label.name, curve)
 

@@ -28,11 +28,11 @@ from fuzzytree.model import (
     SigmoidDifference,
     SigmoidProduct,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.report.text import aligned, counted, kind_text, number, shape_text
 from fuzzytree.runtimes import Outputs
@@ -48,7 +48,7 @@ def document_text(model: Document) -> str:
         'tree, 1 node, 2 leaves, depth 1, 1 input, 3 classes'
     """
     if isinstance(model, FuzzySystem):
-        terms = sum(len(one.labels) for one in model.variables)
+        terms = sum(len(one.terms) for one in model.variables)
         return (
             f"fuzzy system, {counted(len(model.columns), 'input')}, "
             f"{counted(len(model.outputs), 'output')}, "
@@ -68,7 +68,7 @@ def document_facts(model: Document) -> dict[str, object]:
             "inputs": model.columns,
             "outputs": tuple(one.name for one in model.outputs),
             "rules": len(model.rules),
-            "terms": sum(len(one.labels) for one in model.variables),
+            "terms": sum(len(one.terms) for one in model.variables),
         }
     is_tree = isinstance(model, FuzzyTree)
     rules = model.leaves if isinstance(model, FuzzyTree) else model.rules
@@ -202,11 +202,11 @@ def condition_text(condition: Condition, *, level: int = 0) -> str:
             return f"not ({condition_text(part)})"
 
 
-def _input_lines(one: SystemInput, columns: Sequence[str]) -> Iterator[str]:
+def _input_lines(one: Variable, columns: Sequence[str]) -> Iterator[str]:
     yield one.name + _span(one)
     if one.parts:
         yield f"  = {sum_text(one.parts)}"
-    yield from _label_lines(one.labels, columns)
+    yield from _label_lines(one.terms, columns)
 
 
 _GRIDS = {
@@ -228,19 +228,19 @@ def _output_lines(one: SystemOutput, columns: Sequence[str]) -> Iterator[str]:
     facts.append(f"no rule: {default}")
     yield one.name + _span(one)
     yield f"  {'; '.join(facts)}"
-    yield from _label_lines(one.labels, columns)
+    yield from _label_lines(one.terms, columns)
 
 
 def _samples_text(one: SystemOutput) -> str:
     how = one.defuzzifier
-    single = sum(isinstance(label.curve, Singleton) for label in one.labels)
-    if single and single == len(one.labels):
+    single = sum(isinstance(label.function, Singleton) for label in one.terms)
+    if single and single == len(one.terms):
         return "of its singletons"
     text = f"at {how.samples} values {_GRIDS[how.grid]}"
     return f"{text} and at its singletons" if single else text
 
 
-def _span(one: SystemInput | SystemOutput) -> str:
+def _span(one: Variable | SystemOutput) -> str:
     unit = f", in {one.unit}" if one.unit else ""
     if one.low is None or one.high is None:
         return unit
@@ -265,11 +265,11 @@ def sum_text(parts: Sequence[Part], *, is_whole: bool = True) -> str:
     return " + ".join(terms)
 
 
-def _label_lines(labels: Sequence[SystemTerm], columns: Sequence[str]) -> Iterator[str]:
+def _label_lines(labels: Sequence[Term], columns: Sequence[str]) -> Iterator[str]:
     rows = [
         (
             f"  {one.name}",
-            curve_text(one.curve, columns)
+            curve_text(one.function, columns)
             + ("" if one.height == 1.0 else f", times {number(one.height)}"),
         )
         for one in labels

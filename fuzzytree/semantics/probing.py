@@ -223,9 +223,9 @@ class Aim:
         self._points = _system_points(system)
         self._inputs = {one.name: one for one in system.inputs}
         self._curves = {
-            (one.name, label.name): label.curve
+            (one.name, label.name): label.function
             for one in system.inputs
-            for label in one.labels
+            for label in one.terms
         }
         self._known: dict[tuple[str, frozenset[_Wish]], tuple[float, float]] = {}
 
@@ -274,7 +274,7 @@ class Aim:
         one = self._inputs[variable]
         if not one.parts:
             return self._points[variable]
-        numbers = [x for label in one.labels for x in numbers_of(label.curve)]
+        numbers = [x for label in one.terms for x in numbers_of(label.function)]
         return numbers or [0.0, 1.0]
 
     def _ends(self, variable: str) -> Interval:
@@ -321,7 +321,7 @@ def _system_points(system: FuzzySystem) -> dict[str, list[float]]:
     points: dict[str, list[float]] = {name: [] for name in system.columns}
     for one in system.inputs:
         ends = [end for end in (one.low, one.high) if end is not None]
-        own = [value for label in one.labels for value in numbers_of(label.curve)]
+        own = [value for label in one.terms for value in numbers_of(label.function)]
         inner = [a + 0.5 * (b - a) for a, b in itertools.pairwise(sorted(set(own)))]
         if not one.parts:
             points[one.name] += [*ends, *own, *filter(math.isfinite, inner)]

@@ -34,11 +34,11 @@ from fuzzytree.model import (
     RuleBlock,
     Side,
     SNorm,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
+    Variable,
     curves,
 )
 
@@ -159,17 +159,17 @@ class _Maker:
             names.append(plain if name in (*names, *self.scales, "x") else name)
         return names
 
-    def _labels(self, functions: Sequence[Curve]) -> tuple[SystemTerm, ...]:
+    def _labels(self, functions: Sequence[Curve]) -> tuple[Term, ...]:
         names: list[str] = []
         for plain in _PLAIN[: len(functions)]:
             name = self._name(plain)
             names.append(plain if name in names or name in _PLAIN else name)
         return tuple(
-            SystemTerm(name, curve, self.chance.choice((1.0, 1.0, 1.0, 0.75, 0.3)))
+            Term(name, curve, self.chance.choice((1.0, 1.0, 1.0, 0.75, 0.3)))
             for name, curve in zip(names, functions, strict=True)
         )
 
-    def _input(self, name: str, columns: Sequence[str]) -> SystemInput:
+    def _input(self, name: str, columns: Sequence[str]) -> Variable:
         chance, scale = self.chance, self.scales[name]
         low, high = (-scale, scale) if chance.random() < 0.9 else (None, None)
         functions = [
@@ -177,16 +177,18 @@ class _Maker:
         ]
         clips = low is not None and chance.random() < 0.3
         unit = chance.choice(("", "cm"))
-        return SystemInput(name, self._labels(functions), low, high, clips, unit)
+        return Variable(
+            name, self._labels(functions), low=low, high=high, clips=clips, unit=unit
+        )
 
-    def _combination(self, columns: Sequence[str]) -> SystemInput:
+    def _combination(self, columns: Sequence[str]) -> Variable:
         chance = self.chance
         parts = tuple(
             Part(name, chance.uniform(0.2, 2.0) / self.scales[name], chance.random())
             for name in chance.sample(columns, chance.randint(2, len(columns)))
         )
         functions = [self._curve(1.0, columns) for _ in range(3)]
-        return SystemInput("mix", self._labels(functions), parts=parts)
+        return Variable("mix", self._labels(functions), parts=parts)
 
     def _output(
         self, name: str, nameable: Sequence[str], columns: Sequence[str], kind: str
@@ -237,7 +239,7 @@ class _Maker:
     def _block(
         self,
         size: int,
-        inputs: Sequence[SystemInput],
+        inputs: Sequence[Variable],
         outputs: Sequence[SystemOutput],
     ) -> RuleBlock:
         chance = self.chance
@@ -260,21 +262,21 @@ class _Maker:
         )
 
     def _rule(
-        self, inputs: Sequence[SystemInput], outputs: Sequence[SystemOutput]
+        self, inputs: Sequence[Variable], outputs: Sequence[SystemOutput]
     ) -> SystemRule:
         chance = self.chance
-        variables: list[SystemInput | SystemOutput] = [*inputs, *inputs, *outputs]
+        variables: list[Variable | SystemOutput] = [*inputs, *inputs, *outputs]
         when = None if chance.random() < 0.05 else self._condition(variables, 3)
         then: list[Conclusion] = []
         for _ in range(chance.choice((1, 1, 2, 3))):
             output = chance.choice(outputs)
-            label = chance.choice(output.labels).name
+            label = chance.choice(output.terms).name
             then.append(Conclusion(output.name, label, self._hedges(0.2)))
         weight = chance.choice((1.0, 1.0, 0.5, chance.random(), 0.0))
         return SystemRule(when, tuple(then), weight, chance.choice(("", "", "rule")))
 
     def _condition(
-        self, variables: Sequence[SystemInput | SystemOutput], levels: int
+        self, variables: Sequence[Variable | SystemOutput], levels: int
     ) -> Condition:
         chance = self.chance
         if levels and chance.random() < 0.5:
@@ -291,7 +293,7 @@ class _Maker:
         one = chance.choice(variables)
         if chance.random() < 0.05:
             return Is(one.name, None, (*self._hedges(0.5), "any"))
-        return Is(one.name, chance.choice(one.labels).name, self._hedges(0.3))
+        return Is(one.name, chance.choice(one.terms).name, self._hedges(0.3))
 
     def _hedges(self, share: float) -> tuple[Hedge, ...]:
         chance = self.chance

@@ -46,10 +46,8 @@ from fuzzytree.model import (
     Side,
     Sigmoid,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
     Term,
     Trapezoid,
     Variable,
@@ -167,15 +165,15 @@ _HIGH: Condition = Is("heat", "high")
 _DRY: Condition = Is("damp", "dry")
 
 
-def _input(name: str, low: str, high: str) -> SystemInput:
-    return SystemInput(
+def _input(name: str, low: str, high: str) -> Variable:
+    return Variable(
         name,
         (
-            SystemTerm(low, Trapezoid(None, 0.0, 2.0, 6.0)),
-            SystemTerm(high, Trapezoid(4.0, 8.0, 10.0, None)),
+            Term(low, Trapezoid(None, 0.0, 2.0, 6.0)),
+            Term(high, Trapezoid(4.0, 8.0, 10.0, None)),
         ),
-        0.0,
-        10.0,
+        low=0.0,
+        high=10.0,
     )
 
 
@@ -187,8 +185,8 @@ def _sugeno(
 ) -> FuzzySystem:
     """Return a system whose output is a weighted number."""
     labels = (
-        SystemTerm("slow", slow or Singleton(1.0)),
-        SystemTerm("fast", fast or Singleton(3.5)),
+        Term("slow", slow or Singleton(1.0)),
+        Term("fast", fast or Singleton(3.5)),
     )
     output = SystemOutput(
         "fan", labels, 0.0, 5.0, method or Defuzzifier("weighted average")
@@ -225,15 +223,15 @@ def _mamdani(method: Defuzzifier | None = None) -> FuzzySystem:
 def _singletons() -> FuzzySystem:
     """Return a classifier as JFML writes them: terms without width, and a maximum."""
     system = _mamdani(Defuzzifier("smallest of maximum", 1000))
-    labels = (SystemTerm("slow", Singleton(1.0)), SystemTerm("fast", Singleton(3.5)))
-    output = replace(system.outputs[0], labels=labels)
+    labels = (Term("slow", Singleton(1.0)), Term("fast", Singleton(3.5)))
+    output = replace(system.outputs[0], terms=labels)
     return replace(system, outputs=(output,))
 
 
 def _curved(curve: Curve) -> FuzzySystem:
     system = _sugeno()
     heat = replace(
-        system.inputs[0], labels=(system.inputs[0].labels[0], SystemTerm("high", curve))
+        system.inputs[0], terms=(system.inputs[0].terms[0], Term("high", curve))
     )
     return replace(system, inputs=(heat, system.inputs[1]))
 

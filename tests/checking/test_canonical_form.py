@@ -9,18 +9,21 @@ from fuzzytree.checking.equivalence import canonical_form
 from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
+    Document,
     FuzzySystem,
     Hedge,
     Is,
+    Points,
+    Proposition,
+    Rule,
+    RuleBase,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import Points, Proposition, Rule, RuleBase, Term, Variable
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.random_systems import random_system
 from fuzzytree.testing import random_tree
@@ -81,13 +84,13 @@ def test_rules_in_another_order_are_not_equal() -> None:
 def _system(**changes: object) -> FuzzySystem:
     output = SystemOutput(
         "y",
-        (SystemTerm("one", Singleton(1.0)),),
+        (Term("one", Singleton(1.0)),),
         0.0,
         2.0,
         Defuzzifier("weighted average"),
     )
     rule = SystemRule(None, (Conclusion("y", "one"),))
-    system = FuzzySystem("s", (SystemInput("x"),), (output,), (RuleBlock((rule,)),))
+    system = FuzzySystem("s", (Variable("x"),), (output,), (RuleBlock((rule,)),))
     return replace(system, outputs=(replace(output, **changes),))
 
 
@@ -105,8 +108,8 @@ def test_what_no_number_depends_on_is_left_out() -> None:
         {"clips": True},
         {"aggregation": "maximum"},
         {"defuzzifier": Defuzzifier("weighted sum")},
-        {"labels": (SystemTerm("one", Singleton(1.5)),)},
-        {"labels": (SystemTerm("one", Singleton(1.0), height=0.5),)},
+        {"terms": (Term("one", Singleton(1.5)),)},
+        {"terms": (Term("one", Singleton(1.0), height=0.5),)},
     ],
     ids=lambda changes: next(iter(changes)),
 )
@@ -122,10 +125,10 @@ def test_the_range_of_an_output_that_is_clipped_stays() -> None:
 
 def test_very_very_is_very_twice() -> None:
     def asking(*hedges: Hedge) -> FuzzySystem:
-        ramp = SystemTerm("low", Points((0.0, 1.0), (0.0, 1.0)))
+        ramp = Term("low", Points((0.0, 1.0), (0.0, 1.0)))
         rule = SystemRule(Is("x", "low", hedges), (Conclusion("y", "one"),))
         return replace(
-            _system(), inputs=(SystemInput("x", (ramp,)),), blocks=(RuleBlock((rule,)),)
+            _system(), inputs=(Variable("x", (ramp,)),), blocks=(RuleBlock((rule,)),)
         )
 
     assert canonical_form(asking("very very")) == canonical_form(asking("very", "very"))

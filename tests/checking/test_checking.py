@@ -144,7 +144,7 @@ def _with_band(rules: RuleBase, change: Callable[[Band], Band]) -> RuleBase:
         for index, term in enumerate(variable.terms):
             if isinstance(term.shape, Band) and term.shape.right is not None:
                 terms = list(variable.terms)
-                terms[index] = replace(term, shape=change(term.shape))
+                terms[index] = replace(term, function=change(term.shape))
                 variables = list(rules.variables)
                 variables[position] = replace(variable, terms=tuple(terms))
                 return replace(rules, variables=tuple(variables))

@@ -18,10 +18,10 @@ from fuzzytree.model import (
     Is,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import Points
@@ -30,11 +30,11 @@ from fuzzytree.testing import random_system
 
 
 def washer(time: float = 60.0, output: str = "time") -> FuzzySystem:
-    dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+    dirty = Term("dirty", Points((0.0, 10.0), (0.0, 1.0)))
     how = Defuzzifier("weighted sum")
-    one = SystemOutput(output, (SystemTerm("long", Singleton(time)),), None, None, how)
+    one = SystemOutput(output, (Term("long", Singleton(time)),), None, None, how)
     rule = SystemRule(Is("dirt", "dirty"), (Conclusion(output, "long"),))
-    inputs = (SystemInput("dirt", (dirty,)),)
+    inputs = (Variable("dirt", (dirty,)),)
     return FuzzySystem("washer", inputs, (one,), (RuleBlock((rule,)),))
 
 
@@ -110,12 +110,12 @@ def test_a_file_with_other_names_agrees() -> None:
 def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
     system = washer()
     (dirt,) = system.inputs
-    key = SystemTerm("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
+    key = Term("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
     (block,) = system.blocks
     rules = (*block.rules, SystemRule(Is("dirt", "key"), block.rules[0].then))
     other = replace(
         system,
-        inputs=(replace(dirt, labels=(*dirt.labels, key)),),
+        inputs=(replace(dirt, terms=(*dirt.terms, key)),),
         blocks=(replace(block, rules=rules),),
     )
     agreement = check(system, other, limit=50)
@@ -171,16 +171,16 @@ def test_a_slow_runtime_gets_a_share_of_the_rows(
 def shifted(system: FuzzySystem, by: float) -> FuzzySystem:
     """Return a washer of which each answer is larger by a share."""
     (output,) = system.outputs
-    (label,) = output.labels
-    assert isinstance(label.curve, Singleton)
-    moved = replace(label, curve=Singleton(label.curve.value * (1.0 + by)))
-    return replace(system, outputs=(replace(output, labels=(moved,)),))
+    (label,) = output.terms
+    assert isinstance(label.function, Singleton)
+    moved = replace(label, function=Singleton(label.function.value * (1.0 + by)))
+    return replace(system, outputs=(replace(output, terms=(moved,)),))
 
 
 def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> None:
     system = washer()
     (soaked,) = system.inputs
-    bell = replace(soaked, labels=(SystemTerm("dirty", Gaussian(0.0, 1.5)),))
+    bell = replace(soaked, terms=(Term("dirty", Gaussian(0.0, 1.5)),))
     system = replace(system, inputs=(bell,))
     data = np.array([[0.3, 1.0, 2.5]])
     agreement = check(system, shifted(system, 1e-9), limit=50, data=data)
@@ -194,7 +194,7 @@ def test_rows_on_an_edge_are_counted_beside_the_table() -> None:
     # The rule passes from the very degree of dirt 1 on.
     system = washer()
     (soaked,) = system.inputs
-    bell = replace(soaked, labels=(SystemTerm("dirty", Gaussian(0.0, 1.5)),))
+    bell = replace(soaked, terms=(Term("dirty", Gaussian(0.0, 1.5)),))
     edge = math.exp(-0.5 * (1.0 / 1.5) ** 2)
     only = Activation("threshold", threshold=edge)
     (block,) = system.blocks

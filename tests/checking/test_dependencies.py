@@ -296,7 +296,7 @@ def test_a_table_that_cannot_be_read_is_an_omission() -> None:
 
 
 def test_what_float32_cannot_hold_is_an_omission() -> None:
-    huge = replace(HARD, shape=replace(HARD.shape, low=1e300, high=None))
+    huge = replace(HARD, function=replace(HARD.shape, low=1e300, high=None))
     rules = base((force("hard"),), variables=(Variable("force", (huge,)),))
     footprint = report(rules, pruned(rules))
     assert len(footprint.needs.omissions) == len(footprint.omissions) == 1

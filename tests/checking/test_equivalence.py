@@ -8,17 +8,23 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.checking.equivalence import equivalence, is_equivalent
-from fuzzytree.model import LR, FuzzySystem, Is, Side, SystemTerm, Trapezoid
-from fuzzytree.model.contracts import Document, Reading, Written
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    LR,
     Band,
+    Document,
+    FuzzySystem,
+    Is,
     Points,
     Proposition,
+    Reading,
     Rule,
     RuleBase,
     Shape,
+    Side,
     Term,
+    Trapezoid,
     Variable,
+    Written,
 )
 from fuzzytree.semantics import as_system
 from fuzzytree.semantics.conversion.points import straightened
@@ -63,23 +69,23 @@ def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> N
     always = all_samples()["a conclusion without a condition"]
     assert isinstance(always, FuzzySystem)
     heat, damp = always.inputs
-    label = SystemTerm("always", Trapezoid(None, 0.0, 0.0, None))
+    label = Term("always", Trapezoid(None, 0.0, 0.0, None))
     block = always.blocks[0]
 
-    def asking(label: SystemTerm) -> FuzzySystem:
+    def asking(label: Term) -> FuzzySystem:
         rules = tuple(
             replace(one, when=one.when or Is("heat", label.name)) for one in block.rules
         )
         return replace(
             always,
-            inputs=(replace(heat, labels=(*heat.labels, label)), damp),
+            inputs=(replace(heat, terms=(*heat.terms, label)), damp),
             blocks=(replace(block, rules=rules),),
         )
 
     assert is_equivalent(always, asking(label))
     assert not is_equivalent(always, asking(replace(label, height=0.5)))
     assert not is_equivalent(
-        always, asking(SystemTerm("near", Trapezoid(None, 0.0, 9.0, 10.0)))
+        always, asking(Term("near", Trapezoid(None, 0.0, 9.0, 10.0)))
     )
 
 

@@ -30,7 +30,7 @@ from fuzzytree.model import (
     Singleton,
     SystemCurve,
     SystemOutput,
-    SystemTerm,
+    Term,
     Trapezoid,
     TwoGaussians,
     questions,
@@ -43,7 +43,7 @@ PLAIN = Trapezoid(-1.0, 0.0, 1.0, 2.0)
 def tamed(system: FuzzySystem, dialect: Dialect) -> FuzzySystem:
     """Return a system without what FCL has no place for, whatever the dialect."""
     inputs = tuple(
-        replace(one, clips=False, labels=_curved(one.labels, dialect))
+        replace(one, clips=False, terms=_curved(one.terms, dialect))
         for one in system.inputs
         if not one.parts
     )
@@ -77,10 +77,11 @@ CURVES: Mapping[Dialect, set[type]] = {
 }
 
 
-def _curved(labels: tuple[SystemTerm, ...], dialect: Dialect) -> tuple[SystemTerm, ...]:
+def _curved(labels: tuple[Term, ...], dialect: Dialect) -> tuple[Term, ...]:
     kept = {Points, *CURVES.get(dialect, ())}
     return tuple(
-        one if type(one.curve) in kept else replace(one, curve=PLAIN) for one in labels
+        one if type(one.function) in kept else replace(one, function=PLAIN)
+        for one in labels
     )
 
 
@@ -88,16 +89,16 @@ def _tamed_output(output: SystemOutput, dialect: Dialect) -> SystemOutput:
     how = DEFUZZIFIERS[dialect]
     if output.defuzzifier.is_weighted:
         how = Defuzzifier("weighted average")
-    is_odd = {type(one.curve) for one in output.labels} & {SCurve, Concave, Arc}
-    labels = output.labels
+    is_odd = {type(one.function) for one in output.terms} & {SCurve, Concave, Arc}
+    labels = output.terms
     if how.is_weighted and is_odd:
-        labels = tuple(replace(one, curve=Singleton(2.5)) for one in labels)
+        labels = tuple(replace(one, function=Singleton(2.5)) for one in labels)
     if not how.is_weighted:
         labels = _curved(labels, dialect)
     aggregation = None if how.is_weighted else output.aggregation
     return replace(
         output,
-        labels=labels,
+        terms=labels,
         defuzzifier=how,
         aggregation=aggregation,
         default=0.5,

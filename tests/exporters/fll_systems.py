@@ -15,7 +15,7 @@ from fuzzytree.model import (
     Not,
     Or,
     RuleBlock,
-    SystemTerm,
+    Term,
     Trapezoid,
 )
 from fuzzytree.model.rulebase import LR, Band
@@ -38,13 +38,13 @@ def plain_system(seed: int, *, outputs: int = 2, rules: int = 8) -> FuzzySystem:
     return replace(
         system,
         inputs=tuple(
-            replace(one, parts=(), labels=tuple(_label(x, columns) for x in one.labels))
+            replace(one, parts=(), terms=tuple(_label(x, columns) for x in one.terms))
             for one in system.inputs
         ),
         outputs=tuple(
             replace(
                 one,
-                labels=tuple(_label(x, columns) for x in one.labels),
+                terms=tuple(_label(x, columns) for x in one.terms),
                 defuzzifier=Defuzzifier(
                     one.defuzzifier.method, one.defuzzifier.samples
                 ),
@@ -55,13 +55,13 @@ def plain_system(seed: int, *, outputs: int = 2, rules: int = 8) -> FuzzySystem:
     )
 
 
-def _label(label: SystemTerm, columns: int) -> SystemTerm:
-    match label.curve:
+def _label(label: Term, columns: int) -> Term:
+    match label.function:
         case Band() | LR():
-            return replace(label, curve=Trapezoid(-1.0, -0.5, 0.25, 2.0))
+            return replace(label, function=Trapezoid(-1.0, -0.5, 0.25, 2.0))
         case Linear(weights=weights):
             wide = (*weights, *(0.5,) * (columns - len(weights)))
-            return replace(label, curve=replace(label.curve, weights=wide))
+            return replace(label, function=replace(label.function, weights=wide))
         case _:
             return label
 

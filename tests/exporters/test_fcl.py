@@ -305,10 +305,10 @@ def test_several_accus_in_one_block_are_a_loss() -> None:
     first, second = system.outputs
     how = Defuzzifier("centroid", 1000)
     labels = tuple(
-        replace(label, curve=Points((0.0, 1.0), (0.0, 1.0))) for label in first.labels
+        replace(label, function=Points((0.0, 1.0), (0.0, 1.0))) for label in first.terms
     )
     outputs = replace(
-        first, defuzzifier=how, labels=labels, aggregation="maximum", low=0.0
+        first, defuzzifier=how, terms=labels, aggregation="maximum", low=0.0
     )
     outputs = replace(outputs, high=9.0)
     others = replace(
@@ -317,8 +317,9 @@ def test_several_accus_in_one_block_are_a_loss() -> None:
         aggregation="bounded sum",
         low=0.0,
         high=9.0,
-        labels=tuple(
-            replace(one, curve=Points((0.0, 1.0), (0.0, 1.0))) for one in second.labels
+        terms=tuple(
+            replace(one, function=Points((0.0, 1.0), (0.0, 1.0)))
+            for one in second.terms
         ),
     )
     blocks = tuple(replace(one, implication="minimum") for one in system.blocks)
@@ -386,7 +387,7 @@ def test_the_check_list_reports_the_class_of_conformance() -> None:
     outputs = tuple(replace(one, aggregation="maximum") for one in basic.outputs)
     edge = Points((0.0, 1.0), (0.0, 1.0))
     inputs = tuple(
-        replace(one, labels=tuple(replace(label, curve=edge) for label in one.labels))
+        replace(one, terms=tuple(replace(label, function=edge) for label in one.terms))
         for one in basic.inputs
     )
     basic = replace(basic, inputs=inputs, outputs=outputs)

@@ -43,13 +43,13 @@ from fuzzytree.model import (
     Sigmoid,
     SigmoidProduct,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
     TwoGaussians,
+    Variable,
 )
 from fuzzytree.model.contracts import Written
 from fuzzytree.model.rulebase import Points, RuleBase
@@ -92,11 +92,11 @@ def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
     chance = random.Random(seed)
     is_weighted = chance.random() < 0.5
     inputs = tuple(
-        SystemInput(
+        Variable(
             f"x{k}",
-            tuple(SystemTerm(f"t{n}", random_curve(chance)) for n in range(3)),
-            -5.0,
-            5.0,
+            tuple(Term(f"t{n}", random_curve(chance)) for n in range(3)),
+            low=-5.0,
+            high=5.0,
         )
         for k in range(3)
     )
@@ -110,7 +110,7 @@ def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
         SystemOutput(
             f"y{k}",
             tuple(
-                SystemTerm(f"t{n}", numbers[n] if is_weighted else _wide_curve(chance))
+                Term(f"t{n}", numbers[n] if is_weighted else _wide_curve(chance))
                 for n in range(3)
             ),
             -5.0,
@@ -243,14 +243,14 @@ def test_scores_read_back_are_within_the_bounds_of_the_losses(
 
 
 def test_every_line_of_a_small_file() -> None:
-    low = SystemTerm("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
+    low = Term("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
     system = FuzzySystem(
         "tip %1",
-        (SystemInput("food", (low,), 0.0, 10.0),),
+        (Variable("food", (low,), low=0.0, high=10.0),),
         (
             SystemOutput(
                 "tip",
-                (SystemTerm("small", Singleton(0.1)),),
+                (Term("small", Singleton(0.1)),),
                 0.0,
                 30.0,
                 Defuzzifier("weighted average"),
@@ -307,13 +307,16 @@ def _small() -> Conclusion:
 
 def _sugeno(*rules: SystemRule, block: RuleBlock | None = None) -> FuzzySystem:
     labels = (
-        SystemTerm("low", Trapezoid(None, 1.0, 1.0, 2.0)),
-        SystemTerm("high", Trapezoid(1.0, 2.0, 2.0, None)),
+        Term("low", Trapezoid(None, 1.0, 1.0, 2.0)),
+        Term("high", Trapezoid(1.0, 2.0, 2.0, None)),
     )
     output = SystemOutput(
-        "tip", (SystemTerm("small", Singleton(1.0)),), None, None, _AVERAGE, None
+        "tip", (Term("small", Singleton(1.0)),), None, None, _AVERAGE, None
     )
-    inputs = SystemInput("a", labels, 0.0, 3.0), SystemInput("b", labels, 0.0, 3.0)
+    inputs = (
+        Variable("a", labels, low=0.0, high=3.0),
+        Variable("b", labels, low=0.0, high=3.0),
+    )
     return FuzzySystem("s", inputs, (output,), (block or RuleBlock(rules),))
 
 
@@ -362,7 +365,7 @@ def test_an_input_that_is_tested_twice_becomes_a_term_with_a_bound() -> None:
     ]
     again = read_fis(written.content, "s.fis").model
     assert isinstance(again, FuzzySystem)
-    assert again.inputs[0].labels[2].curve == Points((1.0, 1.5, 2.0), (0.0, 0.5, 0.0))
+    assert again.inputs[0].terms[2].function == Points((1.0, 1.5, 2.0), (0.0, 0.5, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -395,13 +398,13 @@ def test_a_rule_without_a_place_in_fis_is_refused(
 
 def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
     one = SystemOutput(
-        "y", (SystemTerm("t", Gaussian(0.0, 1.0)),), 0.0, 1.0,
+        "y", (Term("t", Gaussian(0.0, 1.0)),), 0.0, 1.0,
         Defuzzifier("centroid", 200, "middle"), "maximum", default=0.25, clips=True,
     )  # fmt: skip
     rule = SystemRule(Is("x", "t"), (Conclusion("y", "t"),))
     system = FuzzySystem(
         "s",
-        (SystemInput("x", (SystemTerm("t", Gaussian(0.0, 1.0)),), 0.0, 1.0),),
+        (Variable("x", (Term("t", Gaussian(0.0, 1.0)),), low=0.0, high=1.0),),
         (one,),
         (
             RuleBlock((rule,), "minimum", "maximum", "minimum"),
@@ -446,7 +449,7 @@ def test_terms_of_one_number_are_a_loss_where_octave_joins_their_rules() -> None
     number = Singleton(5.0)
     output = SystemOutput(
         "tip",
-        (SystemTerm("small", number), SystemTerm("tiny", number)),
+        (Term("small", number), Term("tiny", number)),
         0.0,
         9.0,
         _AVERAGE,
@@ -488,8 +491,8 @@ def test_points_are_a_loss_where_standard_curves_are_required() -> None:
     curve = Points((0.0, 1.0, 2.0), (0.0, 0.5, 1.0))
     system = FuzzySystem(
         "s",
-        (SystemInput("x", (SystemTerm("t", curve),), 0.0, 2.0),),
-        (SystemOutput("y", (SystemTerm("t", Singleton(1.0)),), 0.0, 1.0, _AVERAGE),),
+        (Variable("x", (Term("t", curve),), low=0.0, high=2.0),),
+        (SystemOutput("y", (Term("t", Singleton(1.0)),), 0.0, 1.0, _AVERAGE),),
         (RuleBlock((SystemRule(Is("x", "t"), (Conclusion("y", "t"),)),)),),
     )
     assert write(system).losses == ()

@@ -37,12 +37,12 @@ from fuzzytree.model import (
     Sigmoid,
     Singleton,
     SNorm,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.model.rulebase import LR, Part, Points, RuleBase, Side
 from fuzzytree.semantics import FACTS, Scores, as_system, pointed
@@ -54,23 +54,23 @@ from tests.exporters.fll_systems import plain_system
 TANK = FuzzySystem(
     "tank",
     (
-        SystemInput(
+        Variable(
             "water level",
             (
-                SystemTerm("low", Trapezoid(None, 0.0, 1.0, 2.5)),
-                SystemTerm("high", Arc(0.1, 3.0)),
+                Term("low", Trapezoid(None, 0.0, 1.0, 2.5)),
+                Term("high", Arc(0.1, 3.0)),
             ),
-            0.0,
-            3.0,
+            low=0.0,
+            high=3.0,
             clips=True,
             unit="m",
         ),
-        SystemInput("is", (SystemTerm("big", Sigmoid(1e-7, 2.0), 0.5),)),
+        Variable("is", (Term("big", Sigmoid(1e-7, 2.0), 0.5),)),
     ),
     (
         SystemOutput(
             "valve",
-            (SystemTerm("shut", Trapezoid(0.0, 0.0, 0.2, 0.2)),),
+            (Term("shut", Trapezoid(0.0, 0.0, 0.2, 0.2)),),
             0.0,
             1.0,
             Defuzzifier("bisector", 50),
@@ -80,9 +80,9 @@ TANK = FuzzySystem(
         SystemOutput(
             "rate",
             (
-                SystemTerm("none", Singleton(0.0)),
-                SystemTerm("some", Linear((0.5, 1.0 / 3.0), -1.0)),
-                SystemTerm(
+                Term("none", Singleton(0.0)),
+                Term("some", Linear((0.5, 1.0 / 3.0), -1.0)),
+                Term(
                     "most",
                     Formula(Call("negate", (Call("+", (Name("x"), Number(2.0))),))),
                 ),
@@ -232,13 +232,13 @@ def test_what_is_lost_is_listed_and_refused() -> None:
     system = replace(
         TANK,
         inputs=(
-            SystemInput("a", (SystemTerm("low", LR(0.0, SIDE, SIDE)),)),
-            SystemInput("b", parts=(Part("a", 2.0, 0.5),)),
+            Variable("a", (Term("low", LR(0.0, SIDE, SIDE)),)),
+            Variable("b", parts=(Part("a", 2.0, 0.5),)),
         ),
         outputs=(
             SystemOutput(
                 "y",
-                (SystemTerm("t", Trapezoid(0.0, 1.0, 1.0, 2.0)),),
+                (Term("t", Trapezoid(0.0, 1.0, 1.0, 2.0)),),
                 0.0,
                 2.0,
                 Defuzzifier("centroid", 101, "ends"),
@@ -272,7 +272,7 @@ def test_what_is_lost_is_listed_and_refused() -> None:
 
 
 def test_words_are_reserved_in_small_letters_only() -> None:
-    inputs = tuple(SystemInput(name) for name in ("X", "Min", "and", "très", "tres"))
+    inputs = tuple(Variable(name) for name in ("X", "Min", "and", "très", "tres"))
     rule = SystemRule(None, (Conclusion("valve", "shut"),))
     blocks = (replace(TANK.blocks[0], rules=(rule,)),)
     system = replace(TANK, inputs=inputs, blocks=blocks, outputs=TANK.outputs[:1])
@@ -332,7 +332,7 @@ def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
     system = replace(
         TANK,
         inputs=(
-            SystemInput("water level", (SystemTerm("low", STEPS),)),
+            Variable("water level", (Term("low", STEPS),)),
             TANK.inputs[1],
         ),
         blocks=(RuleBlock((rule,)),),
@@ -342,7 +342,7 @@ def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
     assert f"term: low Discrete {points}\n" in text
     model = read_fll(text.encode(), "s.fll").model
     assert isinstance(model, FuzzySystem)
-    assert model.inputs[0].labels[0].curve == STEPS
+    assert model.inputs[0].terms[0].function == STEPS
 
 
 MIXED: list[Curve] = [
@@ -365,12 +365,12 @@ MIXED: list[Curve] = [
 def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
     curve: Curve, height: float, is_mixed: bool
 ) -> None:
-    labels = (SystemTerm("t", curve, height), SystemTerm("n", Singleton(1.0)))
-    output = replace(TANK.outputs[1], labels=labels if is_mixed else labels[:1])
-    ramp = SystemTerm("up", Points((0.0, 4.0), (0.0, 1.0)))
+    labels = (Term("t", curve, height), Term("n", Singleton(1.0)))
+    output = replace(TANK.outputs[1], terms=labels if is_mixed else labels[:1])
+    ramp = Term("up", Points((0.0, 4.0), (0.0, 1.0)))
     rule = SystemRule(Is("a", "up"), (Conclusion("rate", "t"),))
     system = FuzzySystem(
-        "s", (SystemInput("a", (ramp,)),), (output,), (RuleBlock((rule,)),)
+        "s", (Variable("a", (ramp,)),), (output,), (RuleBlock((rule,)),)
     )
     written = write(system)
     kind = "TakagiSugeno" if is_mixed else "Tsukamoto"
@@ -386,7 +386,7 @@ def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
 
 def test_bands_and_lr_sets_as_numbers_become_points_of_their_own() -> None:
     shape = LR(0.5, Side(0.25, (1.0,)), Side(0.25, (1.0,)))
-    output = replace(TANK.outputs[1], labels=(SystemTerm("t", shape),))
+    output = replace(TANK.outputs[1], terms=(Term("t", shape),))
     rule = SystemRule(Is("is", "big"), (Conclusion("rate", "t"),))
     system = replace(TANK, outputs=(output,), blocks=(RuleBlock((rule,)),))
     written = write(system, allow_loss=True)

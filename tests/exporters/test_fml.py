@@ -30,13 +30,13 @@ from fuzzytree.model import (
     RuleBlock,
     SCurve,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
     TwoGaussians,
+    Variable,
 )
 from fuzzytree.model.rulebase import Kind, Points, Proposition, Rule
 from fuzzytree.semantics import pointed
@@ -69,11 +69,11 @@ def random_fml(seed: int) -> FuzzySystem:
     chance = random.Random(seed)
     kind = chance.choice(("mamdani", "tsk", "tsukamoto"))
     inputs = tuple(
-        SystemInput(
+        Variable(
             f"x{k}",
-            tuple(SystemTerm(f"t{n}", random_curve(chance)) for n in range(3)),
-            -5.0,
-            5.0,
+            tuple(Term(f"t{n}", random_curve(chance)) for n in range(3)),
+            low=-5.0,
+            high=5.0,
             unit="mm & <",
         )
         for k in range(3)
@@ -90,7 +90,7 @@ def random_fml(seed: int) -> FuzzySystem:
     is_mamdani = kind == "mamdani"
     output = SystemOutput(
         "y",
-        tuple(SystemTerm(f"t{n}", curve) for n, curve in enumerate(numbers[kind])),
+        tuple(Term(f"t{n}", curve) for n, curve in enumerate(numbers[kind])),
         -5.0,
         5.0,
         USUAL if is_mamdani else Defuzzifier("weighted average"),
@@ -163,14 +163,14 @@ def test_product_and_negated_clauses_are_read_back_equal() -> None:
 
 
 def test_every_line_of_a_small_file() -> None:
-    low = SystemTerm("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
+    low = Term("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
     system = FuzzySystem(
         "tip",
-        (SystemInput("food", (low,), 0.0, 10.0),),
+        (Variable("food", (low,), low=0.0, high=10.0),),
         (
             SystemOutput(
                 "tip %",
-                (SystemTerm("small", Singleton(0.1)),),
+                (Term("small", Singleton(0.1)),),
                 None,
                 None,
                 Defuzzifier("weighted average"),

@@ -28,10 +28,10 @@ from fuzzytree.model import (
     Points,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
@@ -75,9 +75,9 @@ def test_a_degree_of_one_by_something_is_rounded_before_it_is_multiplied() -> No
         Points((0.0, 9.0), (0.0, 1.0)),
     ]
     inputs = tuple(
-        SystemInput(n, (SystemTerm("t", c),)) for n, c in zip("ab", curves, strict=True)
+        Variable(n, (Term("t", c),)) for n, c in zip("ab", curves, strict=True)
     )
-    one = SystemTerm("o", Singleton(1.0))
+    one = Term("o", Singleton(1.0))
     output = SystemOutput("y", (one,), None, None, Defuzzifier("weighted sum"))
     rule = SystemRule(And((Is("a", "t"), Is("b", "t"))), (Conclusion("y", "o"),))
     system = FuzzySystem("s", inputs, (output,), (RuleBlock((rule,), "product"),))
@@ -93,14 +93,14 @@ def test_a_degree_of_one_by_something_is_rounded_before_it_is_multiplied() -> No
 
 def test_hostile_names_become_short_unique_identifiers() -> None:
     hostile = ["outputs", "a; b", "a  b", "\u5ea6" * 40, "x" * 400, "1[2J"]
-    half = SystemTerm("x; DROP", Points((0.0, 1.0), (0.0, 1.0)))
+    half = Term("x; DROP", Points((0.0, 1.0), (0.0, 1.0)))
     rules = [
         SystemRule(Is(name, half.name), (Conclusion("status", "o"),))
         for name in hostile
     ]
-    one = SystemTerm("o", Singleton(1.0))
+    one = Term("o", Singleton(1.0))
     output = SystemOutput("status", (one,), None, None, Defuzzifier("weighted sum"))
-    inputs = tuple(SystemInput(name, (half,)) for name in hostile)
+    inputs = tuple(Variable(name, (half,)) for name in hostile)
     system = FuzzySystem("s", inputs, (output,), (RuleBlock(tuple(rules)),))
     content = write_onnx(system).content
     graph = onnx.load_model_from_string(content).graph
@@ -230,13 +230,13 @@ def grid_system(
     """Return the system of all pairs of the terms of two inputs, a rule each."""
     peaks = [float(place) for place in range(terms)]
     labels = tuple(
-        SystemTerm(f"t{place}", Points((peak - 1.0, peak, peak + 1.0), (0.0, 1.0, 0.0)))
+        Term(f"t{place}", Points((peak - 1.0, peak, peak + 1.0), (0.0, 1.0, 0.0)))
         for place, peak in enumerate(peaks)
     )
-    inputs = SystemInput("a", labels), SystemInput("b", labels)
+    inputs = Variable("a", labels), Variable("b", labels)
     pairs = list(itertools.product(labels, labels))
     numbers = tuple(
-        SystemTerm(f"o{place}", Singleton(place / 7.0)) for place in range(len(pairs))
+        Term(f"o{place}", Singleton(place / 7.0)) for place in range(len(pairs))
     )
     rules = tuple(
         SystemRule(

@@ -20,28 +20,24 @@ from fuzzytree.model import (
     Defuzzifier,
     Formula,
     FuzzySystem,
+    FuzzyTree,
     Gaussian,
     Is,
+    Kind,
     Name,
     Number,
-    RuleBlock,
-    Singleton,
-    SystemInput,
-    SystemOutput,
-    SystemRule,
-    SystemTerm,
-)
-from fuzzytree.model.rulebase import (
-    Kind,
     Points,
     Proposition,
     Rule,
     RuleBase,
+    RuleBlock,
     Semantics,
+    Singleton,
+    SystemOutput,
+    SystemRule,
     Term,
     Variable,
 )
-from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probes
@@ -283,8 +279,8 @@ def test_a_system_has_the_references_bits(seed: int) -> None:
 def test_a_system_may_have_any_names() -> None:
     how = Defuzzifier("weighted average")
     names = ("step 1", "step", "result", "number add")
-    inputs = tuple(map(SystemInput, names))
-    labels = (SystemTerm("four", Singleton(4.0)),)
+    inputs = tuple(map(Variable, names))
+    labels = (Term("four", Singleton(4.0)),)
     output = SystemOutput("a_", labels, None, None, how)
     rule = SystemRule(None, (Conclusion("a_", "four"),))
     written = write(FuzzySystem("s", inputs, (output,), (RuleBlock((rule,)),)))
@@ -297,14 +293,14 @@ def test_a_system_of_too_many_steps_is_refused() -> None:
     curve = Gaussian(0.0, 1.0)
     output = SystemOutput(
         "y",
-        (SystemTerm("all", curve),),
+        (Term("all", curve),),
         0.0,
         1.0,
         Defuzzifier("centroid", 50_000),
         "maximum",
     )
     rule = SystemRule(None, (Conclusion("y", "all"),))
-    dirt = SystemInput("dirt", (SystemTerm("high", curve),))
+    dirt = Variable("dirt", (Term("high", curve),))
     rules = (replace(rule, when=Is("dirt", "high")),)
     block = RuleBlock(rules, implication="minimum")
     with pytest.raises(
@@ -316,8 +312,8 @@ def test_a_system_of_too_many_steps_is_refused() -> None:
 def test_functions_that_pmml_lacks_are_named() -> None:
     angle = Formula(Call("atan2", (Name("dirt"), Number(2.0))))
     how = Defuzzifier("weighted average")
-    output = SystemOutput("y", (SystemTerm("angle", angle),), None, None, how)
-    dirt = SystemInput("dirt")
+    output = SystemOutput("y", (Term("angle", angle),), None, None, how)
+    dirt = Variable("dirt")
     block = RuleBlock((SystemRule(None, (Conclusion("y", "angle"),)),))
     with pytest.raises(LossError) as caught:
         write(FuzzySystem("s", (dirt,), (output,), (block,)))

@@ -88,10 +88,10 @@ def read(text: str, dialect: Dialect | None = None) -> FuzzySystem:
 def test_a_sugeno_system_is_read_whole() -> None:
     system = read(SUGENO)
     assert system.columns == ("food", "service")
-    assert system.inputs[0].labels[0].curve == Trapezoid(-1.0, 0.0, 2.0, 4.0)
-    assert system.inputs[1].labels[0].curve == SCurve(6.0, 3.0)
+    assert system.inputs[0].terms[0].function == Trapezoid(-1.0, 0.0, 2.0, 4.0)
+    assert system.inputs[1].terms[0].function == SCurve(6.0, 3.0)
     (output,) = system.outputs
-    assert output.labels[1].curve == Linear((1.0, 0.5), 2.0)
+    assert output.terms[1].function == Linear((1.0, 0.5), 2.0)
     assert output.defuzzifier == Defuzzifier("weighted average")
     assert output.aggregation is None
     (block,) = system.blocks
@@ -419,7 +419,7 @@ def test_a_system_without_inputs_and_with_a_singleton_is_read() -> None:
         )
     )
     system = read(text)
-    assert system.outputs[0].labels[0].curve == Singleton(1.0)
+    assert system.outputs[0].terms[0].function == Singleton(1.0)
     assert infer(system, {}).outputs == (1.0,)
 
 
@@ -429,7 +429,7 @@ def test_thousands_of_terms_of_one_name_are_read_quickly() -> None:
     start, _, rest = SUGENO.partition("MF1='slow'")
     text = start.replace("NumMFs=1\n", "") + many + rest.partition("\n")[2]
     began = time.process_time()
-    assert len(read(text).inputs[1].labels) == 20_000
+    assert len(read(text).inputs[1].terms) == 20_000
     assert time.process_time() - began < 5.0
     with pytest.raises(ReadError, match="lines are more than the 60,000 that are read"):
         read(text + "1 1, 1 (1) : 1\n" * 60_000)

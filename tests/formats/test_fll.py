@@ -37,12 +37,12 @@ from fuzzytree.model import (
     SigmoidProduct,
     Singleton,
     Spike,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
     TwoGaussians,
+    Variable,
 )
 from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import curve_degree, infer
@@ -108,24 +108,24 @@ def test_every_word_of_a_file_is_in_the_system() -> None:
     )
     assert (system.name, system.note) == ("tipper", "what to give")
     assert system.inputs == (
-        SystemInput(
+        Variable(
             "service",
             (
-                SystemTerm("poor", Trapezoid(None, 0.0, 0.0, 5.0)),
-                SystemTerm("good", Trapezoid(0.0, 5.0, 5.0, None), 0.5),
+                Term("poor", Trapezoid(None, 0.0, 0.0, 5.0)),
+                Term("good", Trapezoid(0.0, 5.0, 5.0, None), 0.5),
             ),
-            0.0,
-            10.0,
+            low=0.0,
+            high=10.0,
             clips=True,
         ),
-        SystemInput("food", (SystemTerm("fine", Points((0.0, 2.5), (0.0, 1.0))),)),
+        Variable("food", (Term("fine", Points((0.0, 2.5), (0.0, 1.0))),)),
     )
     assert system.outputs == (
         SystemOutput(
             "tip",
             (
-                SystemTerm("cheap", Points((0.0, 10.0), (1.0, 0.0))),
-                SystemTerm("generous", Points((10.0, 30.0), (0.0, 1.0))),
+                Term("cheap", Points((0.0, 10.0), (1.0, 0.0))),
+                Term("generous", Points((10.0, 30.0), (0.0, 1.0))),
             ),
             0.0,
             30.0,
@@ -136,8 +136,8 @@ def test_every_word_of_a_file_is_in_the_system() -> None:
         SystemOutput(
             "share",
             (
-                SystemTerm("flat", Singleton(0.1)),
-                SystemTerm("fair", Linear((0.01, 0.02), 0.05)),
+                Term("flat", Singleton(0.1)),
+                Term("fair", Linear((0.01, 0.02), 0.05)),
             ),
             None,
             None,
@@ -219,19 +219,19 @@ CURVES: list[tuple[str, Curve]] = [
 
 @pytest.mark.parametrize(("text", "curve"), CURVES)
 def test_every_class_of_terms_has_its_curve(text: str, curve: Curve) -> None:
-    assert term_of(text) == SystemTerm("t", curve)
+    assert term_of(text) == Term("t", curve)
 
 
-def term_of(text: str, head: str = "") -> SystemTerm:
+def term_of(text: str, head: str = "") -> Term:
     file = f"InputVariable: a\n term: t {text}\nOutputVariable: b\n {head}\n"
     file += "defuzzifier: WeightedSum\n term: one Constant 1"
-    return system_of(with_rule(file, "b is one")).inputs[0].labels[0]
+    return system_of(with_rule(file, "b is one")).inputs[0].terms[0]
 
 
-def output_of(term: str, defuzzifier: str) -> SystemTerm:
+def output_of(term: str, defuzzifier: str) -> Term:
     lines = ["InputVariable: a", "OutputVariable: b", f"defuzzifier: {defuzzifier}"]
     text = "\n".join([*lines, f"term: t {term}"])
-    return system_of(with_rule(text, "b is t")).outputs[0].labels[0]
+    return system_of(with_rule(text, "b is t")).outputs[0].terms[0]
 
 
 MONOTONE = [
@@ -260,7 +260,7 @@ def test_a_number_after_takagi_and_sugeno_is_the_degree_at_the_activation(
     plain = term_of(term)
     for value in (0.5, 1.0, 2.0, 2.5, 4.0):
         degree = value / 4.0
-        expected = degree * plain.height * curve_degree(plain.curve, degree)
+        expected = degree * plain.height * curve_degree(plain.function, degree)
         (found,) = infer(system, {"a": value}).outputs
         assert found == pytest.approx(expected, abs=1e-15)
 
@@ -272,15 +272,15 @@ def test_a_number_after_takagi_and_sugeno_is_the_degree_at_the_activation(
 def test_a_curve_that_ends_before_it_starts_has_degrees_somewhere_all_the_same(
     term: str, curve: Curve
 ) -> None:
-    assert output_of(term, "WeightedAverage").curve == curve
-    assert isinstance(output_of(term, "WeightedAverage TakagiSugeno").curve, Points)
+    assert output_of(term, "WeightedAverage").function == curve
+    assert isinstance(output_of(term, "WeightedAverage TakagiSugeno").function, Points)
 
 
 def test_only_monotone_terms_are_inverted() -> None:
     ramp = Points((1.0, 3.0), (0.0, 1.0))
-    assert output_of("Ramp 1 3", "WeightedAverage Tsukamoto").curve == ramp
-    assert output_of("Ramp 1 3", "WeightedAverage").curve == ramp
-    assert output_of("Discrete 1 0 3 1", "WeightedAverage").curve != ramp
+    assert output_of("Ramp 1 3", "WeightedAverage Tsukamoto").function == ramp
+    assert output_of("Ramp 1 3", "WeightedAverage").function == ramp
+    assert output_of("Discrete 1 0 3 1", "WeightedAverage").function != ramp
 
 
 def test_mixing_numbers_and_monotone_terms_is_a_loss() -> None:
@@ -454,7 +454,7 @@ def test_of_two_terms_with_one_name_the_second_counts_and_the_first_is_a_loss() 
     text = "\n".join([*lines, "term: t Constant 1", "term: t Constant 2"])
     reading = read_fll(with_rule(text, "y is t").encode(), "t.fll")
     assert isinstance(reading.model, FuzzySystem)
-    assert reading.model.outputs[0].labels == (SystemTerm("t", Singleton(2.0)),)
+    assert reading.model.outputs[0].terms == (Term("t", Singleton(2.0)),)
     assert [one.where for one in reading.losses] == ["line 4"]
 
 

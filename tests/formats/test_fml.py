@@ -89,11 +89,11 @@ def test_a_sugeno_system_is_read_whole() -> None:
     system = read(TIPPER)
     assert system.columns == ("food", "service")
     assert system.inputs[0].unit == "points"
-    assert [label.name for label in system.inputs[0].labels] == ["bad", "good"]
+    assert [label.name for label in system.inputs[0].terms] == ["bad", "good"]
     (output,) = system.outputs
     assert output.default == 3.0
-    assert output.labels[0].curve == Singleton(5.0)
-    assert output.labels[1].curve == Linear((1.0, 0.5), 2.0)
+    assert output.terms[0].function == Singleton(5.0)
+    assert output.terms[1].function == Linear((1.0, 0.5), 2.0)
     first, second = system.blocks
     assert (first.conjunction, second.conjunction) == ("product", "minimum")
     assert first.rules[0].when == And(
@@ -128,7 +128,7 @@ def test_every_shape(shape: str, curve: Curve) -> None:
     given = " ".join(f'param{k}="{n}"' for k, n in enumerate(numbers, 1))
     old = '<gaussianShape param1="0" param2="2"/>'
     system = read(TIPPER.replace(old, f"<{name} {given}/>"))
-    assert system.inputs[1].labels[0].curve == curve
+    assert system.inputs[1].terms[0].function == curve
 
 
 def points(method: str) -> str:
@@ -139,7 +139,7 @@ def points(method: str) -> str:
 
 def test_points_are_joined_by_lines_and_other_ways_are_a_loss() -> None:
     curve = Points((1.0, 2.0), (0.5, 1.0))
-    assert read(points("linear")).inputs[1].labels[0].curve == curve
+    assert read(points("linear")).inputs[1].terms[0].function == curve
     found = read_fml(points("spline").encode(), "tip.xml")
     assert [loss.what for loss in found.losses] == [
         "points joined by spline are joined by lines here"

@@ -17,10 +17,10 @@ from fuzzytree.model import (
     FuzzySystem,
     Is,
     RuleBlock,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.model.rulebase import Points
 from fuzzytree.tables import FloatArray
@@ -121,7 +121,7 @@ def allowed(system: FuzzySystem, found: Any) -> FloatArray:
     (output,) = system.outputs
     assert output.low is not None
     assert output.high is not None
-    points = output.defuzzifier.samples * (2 + len(output.labels))
+    points = output.defuzzifier.samples * (2 + len(output.terms))
     highest = np.maximum(found.activations.max(axis=0), 1e-300)
     size = max(abs(output.low), abs(output.high)) + (output.high - output.low)
     bound: FloatArray = size * EPSILON * (4 * points + 64 * points / highest)
@@ -160,7 +160,7 @@ def test_every_runtime_has_the_bits_of_the_reference_on_a_curve_of_lines() -> No
 
 def test_a_term_keeps_only_the_points_where_its_curve_bends() -> None:
     (output,) = ft.from_skfuzzy(tipper()).outputs
-    assert str(output.labels[1].curve) == (
+    assert str(output.terms[1].function) == (
         "Points(values=(0.0, 13.0, 25.0), degrees=(0.0, 1.0, 0.0))"
     )
 
@@ -288,11 +288,11 @@ def test_something_else_is_no_control_system() -> None:
 def test_lines_are_refused_where_they_mean_nothing(
     defuzzifier: Any, aggregation: Any, implication: Any, text: str
 ) -> None:
-    ramp = SystemTerm("ramp", Points((0.0, 1.0), (0.0, 1.0)))
+    ramp = Term("ramp", Points((0.0, 1.0), (0.0, 1.0)))
     how = Defuzzifier(*defuzzifier)
     output = SystemOutput("y", (ramp,), 0.0, 1.0, how, aggregation)
     rule = SystemRule(Is("a", "ramp"), (Conclusion("y", "ramp"),))
     block = RuleBlock((rule,), implication=implication)
     with pytest.raises(InvalidModelError) as caught:
-        FuzzySystem("s", (SystemInput("a", (ramp,)),), (output,), (block,))
+        FuzzySystem("s", (Variable("a", (ramp,)),), (output,), (block,))
     assert str(caught.value) == text

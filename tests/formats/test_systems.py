@@ -26,10 +26,10 @@ from fuzzytree.model import (
     Number,
     Or,
     RuleBlock,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.semantics.inference import infer
 from fuzzytree.testing import random_rows, random_system
@@ -74,13 +74,13 @@ def test_numbers_keep_all_their_digits_and_the_sign_of_zero() -> None:
     text = TIPPER.replace("[0, 5, 10]", "[-0.0, 5e-324, 1.7976931348623157e+308]")
     system = system_of(text.replace("default: 15", "default: 0.1"))
     assert all_of(read_yaml(write(system).content, "x.yaml").model) == all_of(system)
-    assert "-0.0" in repr(system.outputs[0].labels[0].curve)
+    assert "-0.0" in repr(system.outputs[0].terms[0].function)
 
 
 def test_the_example_typed_by_hand_means_what_it_says() -> None:
     system = system_of(TIPPER)
     service, food = system.inputs
-    assert [label.name for label in service.labels] == ["poor", "good", "excellent"]
+    assert [label.name for label in service.terms] == ["poor", "good", "excellent"]
     assert (food.name, food.unit, food.clips) == ("food quality", "points", True)
     assert system.rules[2].when == Or(
         (Is("service", "excellent"), system_of(TIPPER).rules[2].when.parts[1])  # type: ignore[union-attr]
@@ -160,8 +160,8 @@ def test_a_system_that_yaml_cannot_hold_is_not_written() -> None:
     deep: Expression = Name("x1")
     for _ in range(MOST_LEVELS - 1):
         deep = Call("+", (Number(1.0), deep))
-    first = replace(whole.inputs[0], labels=(SystemTerm("deep", Formula(deep)),))
-    rule = SystemRule(None, (Conclusion("y1", whole.outputs[0].labels[0].name),))
+    first = replace(whole.inputs[0], terms=(Term("deep", Formula(deep)),))
+    rule = SystemRule(None, (Conclusion("y1", whole.outputs[0].terms[0].name),))
     text = refusal(
         replace(whole, inputs=(first, *whole.inputs[1:]), blocks=(RuleBlock((rule,)),))
     )
@@ -288,8 +288,8 @@ def test_a_damaged_system_gives_a_read_error_or_a_system(seed: int) -> None:
 def test_a_hedge_of_two_words_is_written_with_a_hyphen() -> None:
     hedges: tuple[Hedge, ...] = ("very very", "cube root")
     system = random_system(0, rules=1)
-    variable: SystemInput | SystemOutput = system.inputs[0]
-    when = Is(variable.name, variable.labels[0].name, hedges)
+    variable: Variable | SystemOutput = system.inputs[0]
+    when = Is(variable.name, variable.terms[0].name, hedges)
     block = replace(system.blocks[0], rules=(replace(system.rules[0], when=when),))
     text = write(replace(system, blocks=(block,))).content.decode()
     assert "is very-very cube-root " in text

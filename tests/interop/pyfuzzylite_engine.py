@@ -43,7 +43,7 @@ from fuzzytree.model import (
     Spike,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
     TwoGaussians,
 )
@@ -200,7 +200,7 @@ def alike(system: FuzzySystem) -> FuzzySystem:
     """
     outputs = tuple(map(_output_alike, system.outputs))
     inputs = tuple(
-        replace(one, labels=tuple(map(_looked_at, one.labels)))
+        replace(one, terms=tuple(map(_looked_at, one.terms)))
         for one in system.inputs
         if not one.parts
     )
@@ -210,10 +210,10 @@ def alike(system: FuzzySystem) -> FuzzySystem:
     return replace(system, inputs=inputs, outputs=outputs, blocks=blocks)
 
 
-def _looked_at(label: SystemTerm) -> SystemTerm:
-    match label.curve:
+def _looked_at(label: Term) -> Term:
+    match label.function:
         case Singleton(value=value):
-            return replace(label, curve=Trapezoid(value, value, value, value))
+            return replace(label, function=Trapezoid(value, value, value, value))
         case Formula():
             return replace(label, height=1.0)
         case Linear():
@@ -222,7 +222,7 @@ def _looked_at(label: SystemTerm) -> SystemTerm:
             try:
                 term(curve)
             except TypeError:
-                return replace(label, curve=Trapezoid(-1.0, -0.5, 0.25, 1.0))
+                return replace(label, function=Trapezoid(-1.0, -0.5, 0.25, 1.0))
             return label
 
 
@@ -234,21 +234,21 @@ def _output_alike(output: SystemOutput) -> SystemOutput:
         is_maximum = output.defuzzifier.method.endswith("maximum")
         method = "centroid" if is_maximum else output.defuzzifier.method
         how = Defuzzifier(method, output.defuzzifier.samples)
-        labels = tuple(map(_looked_at, output.labels))
-        return replace(output, labels=labels, defuzzifier=how)
-    first = output.labels[0].curve
-    labels = output.labels
+        labels = tuple(map(_looked_at, output.terms))
+        return replace(output, terms=labels, defuzzifier=how)
+    first = output.terms[0].function
+    labels = output.terms
     if isinstance(first, _NUMBERS):
         labels = tuple(
             replace(one, height=1.0)
-            if isinstance(one.curve, _NUMBERS)
-            else replace(one, curve=Singleton(0.5), height=1.0)
+            if isinstance(one.function, _NUMBERS)
+            else replace(one, function=Singleton(0.5), height=1.0)
             for one in labels
         )
     else:
         rising = SCurve(0.0, 1.0) if _is_edge(first) else Trapezoid(0.0, 0.2, 0.5, 1.0)
-        labels = tuple(replace(one, curve=rising) for one in labels)
-    return replace(output, labels=labels, aggregation=output.aggregation or "sum")
+        labels = tuple(replace(one, function=rising) for one in labels)
+    return replace(output, terms=labels, aggregation=output.aggregation or "sum")
 
 
 def _is_edge(curve: Curve) -> bool:
@@ -308,7 +308,7 @@ def engine(system: FuzzySystem) -> fl.Engine:
             maximum=math.inf if one.high is None else one.high,
             lock_range=one.clips,
         )
-        variable.terms = _terms(one.labels, system.columns)
+        variable.terms = _terms(one.terms, system.columns)
         made.input_variables.append(variable)
     for output in system.outputs:
         how = getattr(fl, DEFUZZIFIERS[output.defuzzifier.method])()
@@ -323,7 +323,7 @@ def engine(system: FuzzySystem) -> fl.Engine:
             aggregation=norm(output.aggregation),
             defuzzifier=how,
         )
-        concluded.terms = _terms(output.labels, system.columns)
+        concluded.terms = _terms(output.terms, system.columns)
         made.output_variables.append(concluded)
     for held in made.variables:
         for made_term in held.terms:
@@ -342,10 +342,10 @@ def engine(system: FuzzySystem) -> fl.Engine:
     return made
 
 
-def _terms(labels: Sequence[SystemTerm], columns: Sequence[str]) -> list[fl.Term]:
+def _terms(labels: Sequence[Term], columns: Sequence[str]) -> list[fl.Term]:
     terms: list[fl.Term] = []
     for label in labels:
-        made = term(label.curve, columns, label.height)
+        made = term(label.function, columns, label.height)
         made.name = label.name
         terms.append(made)
     return terms

@@ -219,9 +219,9 @@ def _mamdani() -> FuzzySystem:
     blocks = tuple(replace(one, conjunction="minimum") for one in pointy.blocks)
     made = replace(pointy, outputs=outputs, blocks=blocks)
     assert all(
-        isinstance(label.curve, Points)
+        isinstance(label.function, Points)
         for one in made.variables
-        for label in one.labels
+        for label in one.terms
     )
     return made
 

@@ -30,7 +30,7 @@ from fuzzytree.model import (
     Singleton,
     SNorm,
     SystemOutput,
-    SystemTerm,
+    Term,
     TNorm,
 )
 from fuzzytree.semantics.inference import infer
@@ -59,29 +59,30 @@ def alike(system: FuzzySystem) -> FuzzySystem:
     return replace(
         system,
         inputs=tuple(
-            replace(one, labels=tuple(map(_label, one.labels))) for one in system.inputs
+            replace(one, terms=tuple(map(_label, one.terms))) for one in system.inputs
         ),
         outputs=tuple(map(_output, system.outputs)),
         blocks=tuple(map(_block, system.blocks)),
     )
 
 
-def _label(label: SystemTerm) -> SystemTerm:
-    is_new = isinstance(label.curve, Arc | SemiEllipse)  # fuzzylite 6 has none
-    return replace(label, curve=Gaussian(0.0, 0.3)) if is_new else label
+def _label(label: Term) -> Term:
+    is_new = isinstance(label.function, Arc | SemiEllipse)  # fuzzylite 6 has none
+    return replace(label, function=Gaussian(0.0, 0.3)) if is_new else label
 
 
 def _output(output: SystemOutput) -> SystemOutput:
     if output.defuzzifier.is_weighted:
         # It joins no numbers label by label, and inverts S curves wrongly.
         labels = tuple(
-            replace(one, curve=_number(one.curve), height=1.0) for one in output.labels
+            replace(one, function=_number(one.function), height=1.0)
+            for one in output.terms
         )
-        return replace(output, labels=labels, aggregation=None)
+        return replace(output, terms=labels, aggregation=None)
     how = Defuzzifier("centroid", output.defuzzifier.samples)
     joined = _S_NORMS.get(output.aggregation or "", output.aggregation)
-    labels = tuple(map(_label, output.labels))
-    return replace(output, defuzzifier=how, aggregation=joined, labels=labels)
+    labels = tuple(map(_label, output.terms))
+    return replace(output, defuzzifier=how, aggregation=joined, terms=labels)
 
 
 def _number(curve: Curve) -> Curve:

@@ -45,13 +45,13 @@ from fuzzytree.model import (
     Singleton,
     SNorm,
     Spike,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
     TwoGaussians,
+    Variable,
     sampled_values,
 )
 from fuzzytree.model.rulebase import Points
@@ -249,7 +249,7 @@ def polyline(
 
     how = Defuzzifier(method, len(degrees))
     bare = SystemOutput("y", (), -1.5, 2.0, how, "maximum")
-    label = SystemTerm("given", Points(tuple(sampled_values(bare)), degrees))
+    label = Term("given", Points(tuple(sampled_values(bare)), degrees))
     output = SystemOutput("y", (label,), -1.5, 2.0, how, "maximum")
     rule = SystemRule(None, (Conclusion("y", "given"),))
     system = FuzzySystem(
@@ -316,10 +316,10 @@ def test_random_systems_answer_as_pyfuzzylites_engines(part: int) -> None:
 
 def one_rule(output: SystemOutput, *then: Conclusion) -> FuzzySystem:
     """Return a system whose only rule holds as far as x lies in [0, 1]."""
-    ramp = SystemTerm("up", Points((0.0, 1.0), (0.0, 1.0)))
-    rule = SystemRule(Is("a", "up"), then or (Conclusion("y", output.labels[0].name),))
+    ramp = Term("up", Points((0.0, 1.0), (0.0, 1.0)))
+    rule = SystemRule(Is("a", "up"), then or (Conclusion("y", output.terms[0].name),))
     block = RuleBlock((rule,), implication="minimum")
-    return FuzzySystem("one rule", (SystemInput("a", (ramp,)),), (output,), (block,))
+    return FuzzySystem("one rule", (Variable("a", (ramp,)),), (output,), (block,))
 
 
 def pyfuzzylites(system: FuzzySystem, value: float) -> float:
@@ -329,13 +329,13 @@ def pyfuzzylites(system: FuzzySystem, value: float) -> float:
     return float(np.squeeze(engine.output_variables[0].value))
 
 
-def weighted(*labels: SystemTerm) -> SystemOutput:
+def weighted(*labels: Term) -> SystemOutput:
     return SystemOutput("y", labels, 0.0, 1.0, Defuzzifier("weighted sum"), "sum")
 
 
 def test_here_a_rule_of_degree_0_concludes_nothing() -> None:
     system = one_rule(
-        weighted(SystemTerm("one", Singleton(1.0))), Conclusion("y", "one", ("not",))
+        weighted(Term("one", Singleton(1.0))), Conclusion("y", "one", ("not",))
     )
     assert pyfuzzylites(system, 0.0) == 1.0
     assert infer(system, {"a": 0.0}).status == Status.UNCOVERED
@@ -346,7 +346,7 @@ def test_here_a_missing_value_answers_nan_and_no_default() -> None:
     system = one_rule(
         SystemOutput(
             "y",
-            (SystemTerm("one", Singleton(1.0)),),
+            (Term("one", Singleton(1.0)),),
             0.0,
             1.0,
             Defuzzifier("weighted sum"),
@@ -372,7 +372,7 @@ def test_here_a_step_of_points_has_the_first_degree_at_its_value() -> None:
 
 
 def test_conclusions_are_hedged_one_behind_the_other_in_both() -> None:
-    labels = (SystemTerm("one", Singleton(1.0)), SystemTerm("ten", Singleton(10.0)))
+    labels = (Term("one", Singleton(1.0)), Term("ten", Singleton(10.0)))
     then = (Conclusion("y", "one", ("very",)), Conclusion("y", "ten"))
     system = one_rule(weighted(*labels), *then)
     assert infer(system, {"a": 0.5}).outputs[0] == 0.25 + 2.5

@@ -39,21 +39,21 @@ from fuzzytree.model import (
     Sigmoid,
     SigmoidProduct,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
     names_in,
     questions,
 )
 from fuzzytree.model.rulebase import Part, Points
 from fuzzytree.semantics.inference import value_of
 
-LOW = SystemTerm("low", Trapezoid(None, 0.0, 1.0, 2.0))
-INPUT = SystemInput("a", (LOW,))
+LOW = Term("low", Trapezoid(None, 0.0, 1.0, 2.0))
+INPUT = Variable("a", (LOW,))
 WEIGHTED = SystemOutput(
-    "y", (SystemTerm("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
+    "y", (Term("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
 )
 CENTROID = SystemOutput("y", (LOW,), 0.0, 1.0, Defuzzifier("centroid"), "maximum")
 RULE = SystemRule(Is("a", "low"), (Conclusion("y", "one"),))
@@ -74,7 +74,7 @@ def mistakes(**changes: object) -> list[tuple[tuple[str | int, ...], str]]:
 
 
 def test_a_whole_system_names_its_columns_variables_and_rules() -> None:
-    mix = SystemInput("mix", parts=(Part("a", 2.0),))
+    mix = Variable("mix", parts=(Part("a", 2.0),))
     found = replace(WHOLE, inputs=(INPUT, mix))
     assert found.columns == ("a",)
     assert [one.name for one in found.variables] == ["a", "mix", "y"]
@@ -86,8 +86,8 @@ def test_all_mistakes_of_a_system_are_reported_at_once() -> None:
         name="",
         inputs=(
             replace(INPUT, low=2.0, high=1.0),
-            SystemInput("", (LOW, LOW), clips=True),
-            SystemInput("mix", parts=(Part("b", 0.0),)),
+            Variable("", (LOW, LOW), clips=True),
+            Variable("mix", parts=(Part("b", 0.0),)),
         ),
         outputs=(
             replace(WEIGHTED, clips=True, default=math.inf),
@@ -101,7 +101,7 @@ def test_all_mistakes_of_a_system_are_reported_at_once() -> None:
             ("inputs", 0, "low"),
             "the range of 'a' starts at 2.0 and ends below it, at 1.0",
         ),
-        (("inputs", 1, "labels", 1), "term of '' 'low' stands twice"),
+        (("inputs", 1, "terms", 1), "term of '' 'low' stands twice"),
         (("inputs", 1), "input '' is clipped to a range that it lacks"),
         (
             ("inputs", 2, "parts", 0, "input"),
@@ -303,19 +303,19 @@ def test_the_deepest_formula_is_accepted() -> None:
     assert [*Formula(deep(MOST_LEVELS)).mistakes()] == []
 
 
-def labelled(curve: Curve) -> SystemTerm:
-    return SystemTerm("made", curve)
+def labelled(curve: Curve) -> Term:
+    return Term("made", curve)
 
 
 def test_a_formula_names_inputs_earlier_outputs_and_x() -> None:
     def output(name: str, formula: Expression) -> SystemOutput:
-        return replace(WEIGHTED, name=name, labels=(labelled(Formula(formula)),))
+        return replace(WEIGHTED, name=name, terms=(labelled(Formula(formula)),))
 
     fine = (output("y", Name("a")), output("z", Call("+", (Name("y"), Name("x")))))
     blocks = concluding("made")
     assert replace(WHOLE, outputs=fine, blocks=blocks).outputs == fine
     found = mistakes(
-        inputs=(replace(INPUT, labels=(labelled(Formula(Name("y"))),)),),
+        inputs=(replace(INPUT, terms=(labelled(Formula(Name("y"))),)),),
         outputs=(output("y", Name("y")), output("z", Name("yy"))),
         blocks=blocks,
     )
@@ -329,10 +329,10 @@ def test_a_formula_names_inputs_earlier_outputs_and_x() -> None:
 def test_x_is_either_a_variable_or_the_value_itself() -> None:
     named = replace(INPUT, name="x")
     assert replace(WHOLE, inputs=(named,), blocks=concluding("one")).columns == ("x",)
-    formula = replace(named, labels=(labelled(Formula(Name("x"))),))
+    formula = replace(named, terms=(labelled(Formula(Name("x"))),))
     assert mistakes(inputs=(formula,), blocks=concluding("one")) == [
         (
-            ("inputs", 0, "labels", 0),
+            ("inputs", 0, "terms", 0),
             "term 'made' of 'x': 'x' is a variable, and in a formula it is the value "
             "itself",
         )
@@ -340,13 +340,13 @@ def test_x_is_either_a_variable_or_the_value_itself() -> None:
 
 
 def test_a_linear_term_is_a_weighted_number_with_a_weight_for_each_column() -> None:
-    mix = SystemInput("mix", parts=(Part("a", 2.0),))
+    mix = Variable("mix", parts=(Part("a", 2.0),))
     line = labelled(Linear((1.0,)))
-    fine = replace(WEIGHTED, labels=(line,))
+    fine = replace(WEIGHTED, terms=(line,))
     blocks = concluding("made")
     assert replace(WHOLE, inputs=(INPUT, mix), outputs=(fine,), blocks=blocks)
-    two = replace(WEIGHTED, labels=(labelled(Linear((1.0, 2.0))),))
-    curve = replace(CENTROID, name="z", labels=(line,))
+    two = replace(WEIGHTED, terms=(labelled(Linear((1.0, 2.0))),))
+    curve = replace(CENTROID, name="z", terms=(line,))
     found = mistakes(outputs=(two, curve), blocks=blocks)
     assert [text for _, text in found] == [
         "term 'made' of 'y': it needs a weight for each column: 1, not 2",
@@ -356,10 +356,10 @@ def test_a_linear_term_is_a_weighted_number_with_a_weight_for_each_column() -> N
 
 @pytest.mark.parametrize("height", [0.0, -1.0, 1.5, math.nan])
 def test_a_height_lies_above_0_and_at_most_at_1(height: float) -> None:
-    found = mistakes(inputs=(replace(INPUT, labels=(replace(LOW, height=height),)),))
+    found = mistakes(inputs=(replace(INPUT, terms=(replace(LOW, height=height),)),))
     assert found == [
         (
-            ("inputs", 0, "labels", 0),
+            ("inputs", 0, "terms", 0),
             f"term 'low' of 'a': the height must lie in (0, 1], not {height!r}",
         )
     ]

@@ -98,7 +98,7 @@ def test_every_part_of_a_system_is_shown(seed: int) -> None:
     shown = "\n".join(system_lines(system))
     for one in system.variables:
         assert f"\n{one.name}" in shown
-        for label in one.labels:
+        for label in one.terms:
             assert f"  {label.name}" in shown
     for number in range(1, len(system.rules) + 1):
         assert f"{number}. " in shown

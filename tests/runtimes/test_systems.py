@@ -16,10 +16,10 @@ from fuzzytree.model import (
     FuzzySystem,
     Name,
     RuleBlock,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.model.contracts import Runtime, SystemOutcome
 from fuzzytree.runtimes.programs import run_system
@@ -43,10 +43,10 @@ def values_of(system: FuzzySystem, rows: list[dict[str, float]]) -> np.ndarray:
 
 def formula_system(expression: Expression) -> FuzzySystem:
     """Return a system whose output is a formula of x."""
-    label = SystemTerm("f", Formula(expression))
+    label = Term("f", Formula(expression))
     output = SystemOutput("y", (label,), None, None, Defuzzifier("weighted sum"))
     rule = SystemRule(None, (Conclusion("y", "f"),))
-    return FuzzySystem("f", (SystemInput("a"),), (output,), (RuleBlock((rule,)),))
+    return FuzzySystem("f", (Variable("a"),), (output,), (RuleBlock((rule,)),))
 
 
 def test_a_runtime_that_runs_systems_says_so() -> None:
@@ -158,10 +158,10 @@ def test_functions_of_one_number_are_within_their_units(function: str) -> None:
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("function", ["^", "fmod", "%", "min", "max", "/"])
 def test_functions_of_two_numbers_are_within_their_units(function: str) -> None:
-    label = SystemTerm("f", Formula(Call(function, (Name("a"), Name("b")))))
+    label = Term("f", Formula(Call(function, (Name("a"), Name("b")))))
     output = SystemOutput("y", (label,), None, None, Defuzzifier("weighted sum"))
     rule = SystemRule(None, (Conclusion("y", "f"),))
-    inputs = (SystemInput("a"), SystemInput("b"))
+    inputs = (Variable("a"), Variable("b"))
     system = FuzzySystem("f", inputs, (output,), (RuleBlock((rule,)),))
     chance = np.random.default_rng(8)
     values = chance.normal(size=(2, 3000)) * [[5.0], [3.0]]

@@ -218,10 +218,10 @@ def test_names_that_a_target_changed_come_back_by_their_places(
     def labelled(one: object) -> object:
         labels = tuple(
             replace(label, name=f"t {label.name}")
-            for label in one.labels  # type: ignore[attr-defined]
+            for label in one.terms  # type: ignore[attr-defined]
         )
         name = names[one.name]  # type: ignore[attr-defined]
-        return replace(one, name=name, labels=labels, unit="", low=None, high=None)  # type: ignore[type-var]
+        return replace(one, name=name, terms=labels, unit="", low=None, high=None)  # type: ignore[type-var]
 
     (block,) = flat.blocks
     block = replace(
@@ -279,12 +279,12 @@ def changes(system: FuzzySystem) -> Iterator[FuzzySystem]:
     yield replace(system, blocks=(replace(block, rules=(*block.rules[:-1], negated)),))
     one, *rest = system.inputs
     yield replace(system, inputs=(replace(one, clips=True, low=0.0, high=0.5), *rest))
-    half = replace(one.labels[0], height=0.5)
-    yield replace(system, inputs=(replace(one, labels=(half, *one.labels[1:])), *rest))
+    half = replace(one.terms[0], height=0.5)
+    yield replace(system, inputs=(replace(one, terms=(half, *one.terms[1:])), *rest))
     output, *more = system.outputs
-    half = replace(output.labels[-1], curve=Singleton(0.5))
-    labels = (*output.labels[:-1], half)
-    yield replace(system, outputs=(replace(output, labels=labels), *more))
+    half = replace(output.terms[-1], function=Singleton(0.5))
+    labels = (*output.terms[:-1], half)
+    yield replace(system, outputs=(replace(output, terms=labels), *more))
     how = replace(output.defuzzifier, method="weighted sum")
     yield replace(system, outputs=(replace(output, defuzzifier=how), *more))
 

@@ -12,6 +12,7 @@ import pytest
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     Arc,
+    Band,
     Bell,
     Concave,
     Conclusion,
@@ -24,6 +25,7 @@ from fuzzytree.model import (
     Is,
     Name,
     PiCurve,
+    Points,
     RuleBlock,
     SCurve,
     SemiEllipse,
@@ -32,14 +34,13 @@ from fuzzytree.model import (
     SigmoidProduct,
     Singleton,
     Spike,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
     TwoGaussians,
+    Variable,
 )
-from fuzzytree.model.rulebase import Band, Points, Variable
 from fuzzytree.numerics.approximation import by_points
 from fuzzytree.semantics import pointed
 from fuzzytree.semantics.conversion.points import points_for
@@ -183,12 +184,8 @@ def washer(curve: Curve, output: Curve, method: str) -> FuzzySystem:
     rule = SystemRule(Is("dirt", "high"), (Conclusion("time", "long"),))
     return FuzzySystem(
         "washer",
-        (SystemInput("dirt", (SystemTerm("high", curve, 0.5),)),),
-        (
-            SystemOutput(
-                "time", (SystemTerm("long", output),), 0.0, 1.0, how, "maximum"
-            ),
-        ),
+        (Variable("dirt", (Term("high", curve, 0.5),)),),
+        (SystemOutput("time", (Term("long", output),), 0.0, 1.0, how, "maximum"),),
         (RuleBlock((rule,), implication="minimum"),),
     )
 
@@ -196,11 +193,11 @@ def washer(curve: Curve, output: Curve, method: str) -> FuzzySystem:
 def test_terms_of_inputs_and_of_looked_at_outputs_become_points() -> None:
     system = washer(Gaussian(0.0, 1.0), Trapezoid(0.0, 0.5, 0.5, 1.0), "centroid")
     found, losses = pointed(system, 1e-3)
-    label = found.inputs[0].labels[0]
-    assert isinstance(label.curve, Points)
+    label = found.inputs[0].terms[0]
+    assert isinstance(label.function, Points)
     assert label.height == 0.5
     expected = Points((0.0, 0.5, 1.0), (0.0, 1.0, 0.0))
-    assert found.outputs[0].labels[0].curve == expected
+    assert found.outputs[0].terms[0].function == expected
     (loss,) = losses
     assert loss.where == "term 'high' of 'dirt'"
     assert loss.what == (

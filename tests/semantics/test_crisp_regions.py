@@ -83,7 +83,7 @@ def test_a_term_that_stays_one_beyond_its_plateau_is_a_fault() -> None:
         (Leaf("a"), Leaf("b")),
         semantics=Semantics(),
     )
-    wide = replace(high, shape=Band(low=0.5, left=0.0))
+    wide = replace(high, function=Band(low=0.5, left=0.0))
     faulty = _without_checks(tree, (Variable("x", (low, wide)),))
     assert list(node_faults(faulty)) == [
         "node 1: at x = 0.9999999999999999 branch 2 has degree 1.0, "

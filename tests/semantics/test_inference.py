@@ -47,13 +47,13 @@ from fuzzytree.model import (
     Singleton,
     SNorm,
     Spike,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
     TwoGaussians,
+    Variable,
     sampled_values,
 )
 from fuzzytree.model.rulebase import Part, Points
@@ -72,8 +72,8 @@ from fuzzytree.semantics.reference import Status
 from fuzzytree.testing import random_rows, random_system
 
 NAN, INF = math.nan, math.inf
-UP = SystemTerm("up", Points((0.0, 1.0), (0.0, 1.0)))
-DOWN = SystemTerm("down", Points((0.0, 1.0), (1.0, 0.0)))
+UP = Term("up", Points((0.0, 1.0), (0.0, 1.0)))
+DOWN = Term("down", Points((0.0, 1.0), (1.0, 0.0)))
 HALF = math.exp(-0.5)
 
 
@@ -130,10 +130,10 @@ def test_a_curve_has_the_degrees_of_its_formula(
 @pytest.mark.parametrize(
     ("curve", "degree", "value"),
     [
-        (UP.curve, 0.25, 0.25),
-        (DOWN.curve, 0.25, 0.75),
+        (UP.function, 0.25, 0.25),
+        (DOWN.function, 0.25, 0.75),
         (Points((2.0, 6.0), (0.0, 1.0)), 0.5, 4.0),
-        (UP.curve, 2.0, 2.0),
+        (UP.function, 2.0, 2.0),
         (Sigmoid(1.0, 2.0), 0.5, 1.0),
         (Sigmoid(1.0, 2.0), 1.0, INF),
         (Sigmoid(1.0, 2.0), 0.0, -INF),
@@ -326,7 +326,7 @@ def test_a_sum_adds_halves_and_fills_up_with_zeros() -> None:
 
 def system(
     rules: Sequence[SystemRule],
-    labels: Sequence[SystemTerm] = (SystemTerm("one", Singleton(1.0)),),
+    labels: Sequence[Term] = (Term("one", Singleton(1.0)),),
     method: DefuzzifierMethod = "weighted sum",
     *,
     samples: int = 4,
@@ -344,7 +344,7 @@ def system(
     shared = block or RuleBlock((), implication="minimum")
     return FuzzySystem(
         "by hand",
-        (SystemInput("a", (UP, DOWN)), SystemInput("b", (UP, DOWN))),
+        (Variable("a", (UP, DOWN)), Variable("b", (UP, DOWN))),
         (output,),
         (replace(shared, rules=tuple(rules)),),
     )
@@ -405,19 +405,19 @@ def test_a_weight_multiplies_the_degree_and_a_rule_of_weight_0_never_fires() -> 
 
 def test_a_height_multiplies_the_degree() -> None:
     low = replace(system([rule(A_UP)]), inputs=(
-        SystemInput("a", (replace(UP, height=0.5),)), SystemInput("b", (UP, DOWN)),
+        Variable("a", (replace(UP, height=0.5),)), Variable("b", (UP, DOWN)),
     ))  # fmt: skip
     assert infer(low, {"a": 0.5, "b": 0.0}).activations == (0.25,)
 
 
 LABELS = (
-    SystemTerm("one", Singleton(1.0)),
-    SystemTerm("three", Singleton(3.0)),
-    SystemTerm("line", Linear((2.0, -1.0), 0.5)),
-    SystemTerm("formula", Formula(parse("a + 10 * x"))),
-    SystemTerm("ramp", Points((4.0, 8.0), (0.0, 1.0))),
-    SystemTerm("low ramp", Points((4.0, 8.0), (0.0, 1.0)), height=0.5),
-    SystemTerm("bump", Trapezoid(0.0, 0.5, 0.5, 1.0)),
+    Term("one", Singleton(1.0)),
+    Term("three", Singleton(3.0)),
+    Term("line", Linear((2.0, -1.0), 0.5)),
+    Term("formula", Formula(parse("a + 10 * x"))),
+    Term("ramp", Points((4.0, 8.0), (0.0, 1.0))),
+    Term("low ramp", Points((4.0, 8.0), (0.0, 1.0)), height=0.5),
+    Term("bump", Trapezoid(0.0, 0.5, 0.5, 1.0)),
 )
 
 
@@ -472,7 +472,7 @@ def mamdani(degrees: Sequence[float], method: DefuzzifierMethod, grid: Grid) -> 
     bare = SystemOutput("y", (), 0.0, 2.0, how, "maximum")
     points = Points(tuple(sampled_values(bare)), tuple(degrees))
     found = system(
-        [rule(None)], [SystemTerm("one", points)], method,
+        [rule(None)], [Term("one", points)], method,
         samples=len(degrees), grid=grid, aggregation="maximum",
     )  # fmt: skip
     return infer(found, {"a": 0.0, "b": 0.0}).outputs[0]
@@ -507,7 +507,7 @@ def test_a_curve_becomes_a_number(
 def test_where_nothing_is_concluded_the_default_answers(
     method: DefuzzifierMethod,
 ) -> None:
-    labels = (SystemTerm("one", Trapezoid(0.0, 0.5, 1.0, 2.0)),)
+    labels = (Term("one", Trapezoid(0.0, 0.5, 1.0, 2.0)),)
     for default, expected in ((None, NAN), (7.0, 7.0)):
         found = infer(
             system(
@@ -521,7 +521,7 @@ def test_where_nothing_is_concluded_the_default_answers(
 
 
 def test_a_curve_without_area_answers_the_default_too() -> None:
-    labels = (SystemTerm("one", Trapezoid(5.0, 6.0, 6.0, 7.0)),)
+    labels = (Term("one", Trapezoid(5.0, 6.0, 6.0, 7.0)),)
     subject = system([rule(None)], labels, "centroid", aggregation="sum", default=9.0)
     found = infer(subject, {"a": 0.0, "b": 0.0})
     assert (found.outputs, found.status) == ((9.0,), Status.UNCOVERED)
@@ -530,8 +530,8 @@ def test_a_curve_without_area_answers_the_default_too() -> None:
 
 def test_implication_cuts_and_aggregation_joins() -> None:
     labels = (
-        SystemTerm("one", Trapezoid(0.0, 0.0, 1.0, 1.0)),
-        SystemTerm("two", Trapezoid(0.5, 0.5, 2.0, 2.0)),
+        Term("one", Trapezoid(0.0, 0.0, 1.0, 1.0)),
+        Term("two", Trapezoid(0.5, 0.5, 2.0, 2.0)),
     )
     rules = [rule(A_UP, "one"), rule(B_UP, "two")]
     row = {"a": 0.25, "b": 0.5}
@@ -638,16 +638,16 @@ def test_a_later_block_asks_for_the_joined_degrees_of_a_label(
 def test_a_formula_sees_inputs_and_earlier_outputs() -> None:
     first = SystemOutput(
         "y",
-        (SystemTerm("one", Singleton(2.0)),),
+        (Term("one", Singleton(2.0)),),
         None,
         None,
         Defuzzifier("weighted sum"),
     )
-    formula = SystemTerm("sum", Formula(parse("10 * y + mix")))
-    second = replace(first, name="z", labels=(formula,))
+    formula = Term("sum", Formula(parse("10 * y + mix")))
+    second = replace(first, name="z", terms=(formula,))
     found = FuzzySystem(
         "chain",
-        (SystemInput("a", (UP,)), SystemInput("mix", parts=(Part("a", 3.0, 0.5),))),
+        (Variable("a", (UP,)), Variable("mix", parts=(Part("a", 3.0, 0.5),))),
         (first, second),
         (
             RuleBlock(
@@ -662,10 +662,10 @@ def test_a_formula_sees_inputs_and_earlier_outputs() -> None:
 
 
 def test_inputs_are_moved_into_their_range_before_anything_else() -> None:
-    line = SystemTerm("line", Linear((1.0,)))
+    line = Term("line", Linear((1.0,)))
     output = SystemOutput("y", (line,), None, None, Defuzzifier("weighted sum"))
-    clamped = SystemInput("a", (UP,), 0.25, 0.5, clips=True)
-    mix = SystemInput("mix", parts=(Part("a", 2.0),))
+    clamped = Variable("a", (UP,), low=0.25, high=0.5, clips=True)
+    mix = Variable("mix", parts=(Part("a", 2.0),))
     subject = FuzzySystem(
         "clamped", (clamped, mix), (output,),
         (RuleBlock((SystemRule(None, (Conclusion("y", "line"),)),)),),
@@ -678,7 +678,7 @@ def test_inputs_are_moved_into_their_range_before_anything_else() -> None:
 
 
 def test_an_answer_is_moved_into_its_range_and_so_is_the_default() -> None:
-    labels = (SystemTerm("one", Singleton(9.0)),)
+    labels = (Term("one", Singleton(9.0)),)
     high = system([rule(A_UP)], labels, "weighted average", clips=True, default=-5.0)
     assert infer(high, {"a": 1.0, "b": 0.0}).outputs == (2.0,)
     assert infer(high, {"a": 0.0, "b": 0.0}).outputs == (0.0,)
@@ -699,7 +699,7 @@ def test_a_row_without_a_value_makes_everything_nan(value: float) -> None:
 
 def test_a_combination_that_overflows_is_missing() -> None:
     subject = system([rule(A_UP)])
-    mix = SystemInput("mix", (UP,), parts=(Part("a", 1e300),))
+    mix = Variable("mix", (UP,), parts=(Part("a", 1e300),))
     subject = replace(subject, inputs=(*subject.inputs, mix), outputs=subject.outputs)
     assert infer(subject, {"a": 1.0, "b": 0.0}).status == Status.DECIDED
     assert infer(subject, {"a": 1e300, "b": 0.0}).status == Status.MISSING
@@ -711,9 +711,9 @@ def test_a_column_without_a_value_is_a_key_error() -> None:
 
 
 def test_a_degree_that_is_nan_activates_nothing() -> None:
-    root = SystemInput("a", (SystemTerm("up", Formula(parse("sqrt(x)"))),))
+    root = Variable("a", (Term("up", Formula(parse("sqrt(x)"))),))
     subject = replace(system([rule(A_UP), rule(B_UP)]), inputs=(
-        root, SystemInput("b", (UP,)),
+        root, Variable("b", (UP,)),
     ))  # fmt: skip
     found = infer(subject, {"a": -1.0, "b": 0.5})
     assert found.activations == (0.0, 0.5)
@@ -742,7 +742,7 @@ def test_random_systems_show_everything_that_a_system_can_have() -> None:
     for seed in range(100):
         subject = random_system(seed)
         for variable in subject.variables:
-            seen |= {type(label.curve).__name__ for label in variable.labels}
+            seen |= {type(label.function).__name__ for label in variable.terms}
         for output in subject.outputs:
             how = output.defuzzifier
             seen |= {how.method, how.grid, f"joined by {output.aggregation}"}
@@ -794,8 +794,7 @@ def test_degrees_above_1_are_bounded_by_the_aggregation_that_joins_them() -> Non
 @pytest.mark.parametrize("method", ["general", "last", "highest"])
 def test_numbers_are_added_in_the_order_of_the_rules(method: Any) -> None:
     labels = [
-        SystemTerm(f"n{k}", Singleton(value))
-        for k, value in enumerate((1e16, -1e16, 1.0))
+        Term(f"n{k}", Singleton(value)) for k, value in enumerate((1e16, -1e16, 1.0))
     ]
     rules = [rule(None, label.name) for label in labels]
     block = RuleBlock((), activation=Activation(method, 3))
@@ -804,10 +803,10 @@ def test_numbers_are_added_in_the_order_of_the_rules(method: Any) -> None:
 
 
 def test_a_combination_is_of_values_within_their_ranges() -> None:
-    clamped = SystemInput("a", (UP,), 0.0, 0.5, clips=True)
-    mix = SystemInput("mix", (UP,), parts=(Part("a", 2.0, 0.25), Part("b", 1.0)))
+    clamped = Variable("a", (UP,), low=0.0, high=0.5, clips=True)
+    mix = Variable("mix", (UP,), parts=(Part("a", 2.0, 0.25), Part("b", 1.0)))
     subject = system([rule(B_UP)])
-    subject = replace(subject, inputs=(clamped, SystemInput("b", (UP,)), mix))
+    subject = replace(subject, inputs=(clamped, Variable("b", (UP,)), mix))
     block = RuleBlock((rule(Is("mix", "up")),))
     subject = replace(subject, blocks=(block,))
     found = infer(subject, {"a": 9.0, "b": 0.125})
@@ -826,4 +825,4 @@ def test_a_degree_of_an_input_is_computed_once_for_a_row(
     monkeypatch.setattr("fuzzytree.semantics.inference.curve_degree", counted)
     rules = tuple(rule(And((Is("a", "up"), Is("b", "down")))) for _ in range(50))
     infer(system(rules), {"a": 0.25, "b": 0.5})
-    assert calls == [UP.curve, DOWN.curve]
+    assert calls == [UP.function, DOWN.function]

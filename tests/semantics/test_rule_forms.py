@@ -18,15 +18,15 @@ from fuzzytree.model import (
     Not,
     Or,
     RuleBlock,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.semantics.conversion.rule_forms import MOST_RULES, alternatives, split
 from fuzzytree.semantics.inference import infer
 
-TERMS = (SystemTerm("low", Gaussian(0.0, 0.4)), SystemTerm("high", Gaussian(1.0, 0.3)))
+TERMS = (Term("low", Gaussian(0.0, 0.4)), Term("high", Gaussian(1.0, 0.3)))
 
 
 def condition(chance: random.Random, level: int = 0) -> Condition:
@@ -41,7 +41,7 @@ def system(when: Condition) -> FuzzySystem:
     other = SystemRule(Is("a", "low"), (Conclusion("y", "low"),))
     output = SystemOutput("y", TERMS, 0.0, 1.0, Defuzzifier("centroid", 20), "maximum")
     block = RuleBlock((rule, other), "minimum", "maximum", "product")
-    inputs = tuple(SystemInput(name, TERMS) for name in "abc")
+    inputs = tuple(Variable(name, TERMS) for name in "abc")
     return FuzzySystem("s", inputs, (output,), (block,))
 
 

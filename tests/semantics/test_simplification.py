@@ -281,7 +281,7 @@ def test_one_set_that_stands_for_another_stands_in_every_branch() -> None:
     tree = random_tree(2, leaves=3, inputs=1)
     group, *others = tree.sets
     first, *more = group.terms
-    same = (first, *(replace(term, shape=first.shape) for term in more))
+    same = (first, *(replace(term, function=first.shape) for term in more))
     alike = replace(tree, sets=(replace(group, terms=same), *others))
     found = pruned(alike, uses=USES)
     assert isinstance(found.model, FuzzyTree)

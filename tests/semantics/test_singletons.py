@@ -21,11 +21,11 @@ from fuzzytree.model import (
     Is,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
     sampled_values,
 )
 from fuzzytree.model.rulebase import Points
@@ -113,12 +113,12 @@ def test_a_center_of_area_of_singletons_is_refused() -> None:
 def mixed(method: DefuzzifierMethod) -> FuzzySystem:
     """Return a system with an output of one singleton and one trapezoid."""
     ramps = (
-        SystemTerm("low", Points((0.0, 4.0), (1.0, 0.0))),
-        SystemTerm("high", Points((0.0, 4.0), (0.0, 1.0))),
+        Term("low", Points((0.0, 4.0), (1.0, 0.0))),
+        Term("high", Points((0.0, 4.0), (0.0, 1.0))),
     )
     terms = (
-        SystemTerm("one", Singleton(0.123)),
-        SystemTerm("wide", Trapezoid(0.4, 0.5, 0.7, 1)),
+        Term("one", Singleton(0.123)),
+        Term("wide", Trapezoid(0.4, 0.5, 0.7, 1)),
     )
     output = SystemOutput("y", terms, 0.0, 1.0, Defuzzifier(method, 7), "maximum")
     rules = (
@@ -126,7 +126,7 @@ def mixed(method: DefuzzifierMethod) -> FuzzySystem:
         SystemRule(Is("x", "high"), (Conclusion("y", "wide"),)),
     )
     block = RuleBlock(rules, implication="minimum")
-    return FuzzySystem("mixed", (SystemInput("x", ramps),), (output,), (block,))
+    return FuzzySystem("mixed", (Variable("x", ramps),), (output,), (block,))
 
 
 METHODS = [
@@ -159,10 +159,10 @@ def test_every_runtime_answers_singletons_like_the_inference(
 ) -> None:
     system = mixed(method)
     labels = (
-        SystemTerm("one", Singleton(0.5)),
-        SystemTerm("wide", Singleton(0.25 * count)),
+        Term("one", Singleton(0.5)),
+        Term("wide", Singleton(0.25 * count)),
     )
-    output = replace(system.outputs[0], labels=labels)
+    output = replace(system.outputs[0], terms=labels)
     found = check(replace(system, outputs=(output,)), limit=100)
     assert found.ok
     assert {one.representation for one in found.comparisons} >= {"native"}
@@ -271,7 +271,7 @@ def test_a_term_between_two_samples_is_a_remark() -> None:
 def test_a_term_without_width_that_no_rule_concludes_is_read() -> None:
     text = FIS.replace("NumMFs=1\nMF1='third'", "NumMFs=2\nMF2='third'")
     text = text.replace("MF2=", "MF1='wide':'trimf',[0 0.5 1]\nMF2=")
-    assert len(system_of(text.encode(), "fis").outputs[0].labels) == 2
+    assert len(system_of(text.encode(), "fis").outputs[0].terms) == 2
 
 
 @pytest.mark.parametrize(("text", "name"), [(FIS, "fis"), (FLL, "fll")])

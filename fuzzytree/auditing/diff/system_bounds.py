@@ -26,9 +26,9 @@ from fuzzytree.model import (
     Or,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.numerics import exact_degree
 from fuzzytree.semantics import joined_outputs, shape_of
@@ -89,7 +89,7 @@ def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None
             for conclusion in rule.then if degree > 0 else ():
                 degree = _hedged(conclusion.hedges, degree)
                 if conclusion.output == output and degree > 0:
-                    label = _named(one.labels, conclusion.label)
+                    label = _named(one.terms, conclusion.label)
                     total += degree * _number(label, system, values)
                     weight += degree
                     is_number = True
@@ -99,7 +99,7 @@ def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None
     return _answered(one, total / weight if is_average else total)
 
 
-def _values(inputs: Sequence[SystemInput], point: Point) -> dict[str, Fraction]:
+def _values(inputs: Sequence[Variable], point: Point) -> dict[str, Fraction]:
     values: dict[str, Fraction] = {}
     for one in inputs:
         value = point.get(one.name, Fraction(0))
@@ -110,7 +110,7 @@ def _values(inputs: Sequence[SystemInput], point: Point) -> dict[str, Fraction]:
     return values
 
 
-def _clamped(one: SystemInput | SystemOutput, value: Fraction) -> Fraction:
+def _clamped(one: Variable | SystemOutput, value: Fraction) -> Fraction:
     value = value if one.low is None else max(value, Fraction(one.low))
     return value if one.high is None else min(value, Fraction(one.high))
 
@@ -121,7 +121,7 @@ def _answered(one: SystemOutput, number: Fraction | None) -> Fraction | None:
     return _clamped(one, number) if one.clips and number is not None else number
 
 
-_Named = TypeVar("_Named", SystemInput, SystemOutput, SystemTerm)
+_Named = TypeVar("_Named", Variable, SystemOutput, Term)
 _Sum = tuple[Mapping[str, Fraction], Fraction]
 
 
@@ -137,9 +137,9 @@ def _named(parts: Iterable[_Named], name: str) -> _Named:
     raise NotExactError(name)
 
 
-def _linear(label: SystemTerm, system: FuzzySystem) -> _Sum | None:
+def _linear(label: Term, system: FuzzySystem) -> _Sum | None:
     """Return the number of a label as a sum of columns; None if it is none."""
-    match label.curve:
+    match label.function:
         case Singleton(value=value):
             return {}, Fraction(value)
         case Linear(weights=weights, offset=offset):
@@ -149,10 +149,10 @@ def _linear(label: SystemTerm, system: FuzzySystem) -> _Sum | None:
             return None
 
 
-def _number(label: SystemTerm, system: FuzzySystem, values: Point) -> Fraction:
+def _number(label: Term, system: FuzzySystem, values: Point) -> Fraction:
     known = _linear(label, system)
     if known is None:
-        raise NotExactError(str(label.curve))
+        raise NotExactError(str(label.function))
     weights, offset = known
     return sum((w * values[name] for name, w in weights.items()), offset)
 
@@ -172,8 +172,8 @@ def _at(
         case Is(variable=name, label=label, hedges=hedges):
             if label is None:
                 return _hedged(hedges, Fraction(0))  # the last, `any`, makes 1 of it
-            term = _named(_named(system.inputs, name).labels, label)
-            shape = shape_of(term.curve)
+            term = _named(_named(system.inputs, name).terms, label)
+            shape = shape_of(term.function)
             if shape is None:
                 raise NotExactError(name)
             degree = Fraction(term.height) * exact_degree(shape, values[name])
@@ -254,7 +254,7 @@ def _moved(
 
 def _is_small(system: FuzzySystem) -> bool:
     """Return whether no degree of a condition is above 1."""
-    curves = [label.curve for one in system.inputs for label in one.labels]
+    curves = [label.function for one in system.inputs for label in one.terms]
     norms = {block.disjunction for block in system.blocks}
     return "sum" not in norms and not any(isinstance(one, Formula) for one in curves)
 
@@ -278,7 +278,7 @@ def _move(
     return None if ends is None else max(abs(ends[0]), abs(ends[1]))
 
 
-def _weights(system: FuzzySystem, label: SystemTerm) -> _Sum | None:
+def _weights(system: FuzzySystem, label: Term) -> _Sum | None:
     """Return the number of a label as a sum of columns that no range clamps."""
     known = _linear(label, system)
     clipped = {one.name for one in system.inputs if one.clips}

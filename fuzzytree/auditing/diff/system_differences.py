@@ -20,12 +20,12 @@ from fuzzytree.model import (
     FuzzySystem,
     Path,
     RuleBlock,
-    SystemInput,
     SystemOutput,
     SystemRule,
+    Variable,
 )
 
-_Variable = SystemInput | SystemOutput
+_Variable = Variable | SystemOutput
 
 
 def draft_system_changes(old: FuzzySystem, new: FuzzySystem) -> Iterator[Draft]:
@@ -82,7 +82,7 @@ def _fact_drafts(
     """Yield what differs of a variable beside its terms, or of a block beside rules."""
     for key in old[1].__struct_fields__:
         was, now = getattr(old[1], key), getattr(new[1], key)
-        if key in ("labels", "rules") or was == now:
+        if key in ("terms", "rules") or was == now:
             continue
         text = f"the {key}{of} is {_text(now)}, and was {_text(was)}"
         if key == "clips":
@@ -102,10 +102,7 @@ def _label_drafts(
     old: tuple[Path, _Variable], new: tuple[Path, _Variable]
 ) -> Iterator[Draft]:
     mine, theirs = (
-        {
-            label.name: ((*path, "labels", k), label)
-            for k, label in enumerate(one.labels)
-        }
+        {label.name: ((*path, "terms", k), label) for k, label in enumerate(one.terms)}
         for path, one in (old, new)
     )
     for name, one, other in together(mine, theirs):

@@ -23,10 +23,10 @@ from fuzzytree.model import (
     Not,
     Or,
     RuleBlock,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
     checkpoint,
     names_in,
     questions,
@@ -52,7 +52,7 @@ class Contribution(NamedTuple):
     """
 
     strength: Hashable
-    label: SystemTerm | None
+    label: Term | None
     most: float
 
 
@@ -109,29 +109,29 @@ class _Read:
         self.labels = {
             (one.name, label.name): label
             for one in system.variables
-            for label in one.labels
+            for label in one.terms
         }
         self.known: dict[tuple[str, str], Hashable] = {}
         self.sources: dict[str, Hashable] = {}
         for one in system.inputs:
             self.sources[one.name] = self._source(one)
         formulas = [
-            label.curve.expression
+            label.function.expression
             for label in self.labels.values()
-            if isinstance(label.curve, Formula)
+            if isinstance(label.function, Formula)
         ]
         named = {name for one in formulas for name in names_in(one)}
         named |= {a.variable for rule in system.rules for a in questions(rule.when)}
         self.is_chained = not named.isdisjoint(self.outputs)
 
-    def _source(self, one: SystemInput) -> Hashable:
+    def _source(self, one: Variable) -> Hashable:
         ends = (one.low, one.high) if one.clips and not self._contains(one) else None
         parts = tuple(
             (part.weight, part.centre, self.sources[part.input]) for part in one.parts
         )
         return (parts or one.name, ends)
 
-    def _contains(self, one: SystemInput) -> bool:
+    def _contains(self, one: Variable) -> bool:
         """Return whether the range of an input holds its part of the domain."""
         side = self.domain.side(one.name) if self.domain and not one.parts else None
         return side is not None and (
@@ -163,16 +163,16 @@ class _Read:
             entries.sort(key=repr)
         order: tuple[Hashable, ...] = ()
         if is_weighted and joins is not None and not is_free:
-            order = tuple(self._concluded(one, label) for label in one.labels)
+            order = tuple(self._concluded(one, label) for label in one.terms)
         return facts_of(one), joins, order, tuple(entries)
 
-    def _concluded(self, one: SystemOutput, label: SystemTerm) -> Hashable:
+    def _concluded(self, one: SystemOutput, label: Term) -> Hashable:
         """Return what a term of an output is, and which of those that are the same."""
         key = self._curve(label, is_number=one.defuzzifier.is_weighted)
         same = [
             other.name
-            for other in one.labels
-            if (other.curve, other.height) == (label.curve, label.height)
+            for other in one.terms
+            if (other.function, other.height) == (label.function, label.height)
         ]
         return key, same.index(label.name)
 
@@ -183,8 +183,8 @@ class _Read:
             return variable, self._concluded(self.outputs[variable], term)
         return self.sources[variable], self._curve(term)
 
-    def _curve(self, label: SystemTerm, *, is_number: bool = False) -> Hashable:
-        curve = label.curve
+    def _curve(self, label: Term, *, is_number: bool = False) -> Hashable:
+        curve = label.function
         shape = None if is_number else shape_of(curve)
         key: Hashable = curve if shape is None else shape
         if shape is not None and self.curves is not None:
@@ -243,7 +243,7 @@ class _Read:
 
     def _then(
         self, rule: SystemRule, block: RuleBlock, output: str
-    ) -> Iterator[tuple[SystemTerm, Hashable]]:
+    ) -> Iterator[tuple[Term, Hashable]]:
         """Yield the terms of an output that a rule concludes; hedges add up."""
         hedges: tuple[str, ...] = ()
         is_curve = not self.outputs[output].defuzzifier.is_weighted

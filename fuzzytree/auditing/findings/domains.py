@@ -23,7 +23,6 @@ from fuzzytree.model import (
     FuzzyTree,
     Linear,
     Points,
-    SystemInput,
 )
 
 Within = Literal["model", "data"]
@@ -196,12 +195,9 @@ def _axes(model: Document) -> Iterator[_Axis]:
     curves: dict[str, list[Curve]] = {}
     variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
     for one in variables:
-        if isinstance(one, SystemInput):
-            curves[one.name] = [label.curve for label in one.labels]
-        else:
-            curves[one.name] = [term.shape for term in one.terms]
+        curves[one.name] = [term.function for term in one.terms]
     for fitted in model.sets if isinstance(model, FuzzyTree) else ():
-        curves[fitted.variable] += [term.shape for term in fitted.terms]
+        curves[fitted.variable] += [term.function for term in fitted.terms]
     summed = {part.input for one in variables for part in one.parts}
     every = itertools.chain.from_iterable(curves.values())
     if any(isinstance(curve, Formula | Linear) for curve in every):

@@ -90,9 +90,9 @@ def _terms_in(model: Document) -> Iterator[tuple[Path, str, list[str]]]:
     """Yield where a model has terms, the variable, and their names."""
     if isinstance(model, FuzzySystem):
         for position, one in enumerate(model.variables):
-            k, labels = position - len(model.inputs), [term.name for term in one.labels]
+            k, labels = position - len(model.inputs), [term.name for term in one.terms]
             field: Path = ("inputs", position) if k < 0 else ("outputs", k)
-            yield (*field, "labels"), one.name, labels
+            yield (*field, "terms"), one.name, labels
         return
     for k, variable in enumerate(model.variables):
         terms = [term.name for term in variable.terms]

@@ -41,12 +41,11 @@ from fuzzytree.model import (
     Proposition,
     RuleBlock,
     Shape,
-    SystemInput,
     Term,
     Variable,
     questions,
 )
-from fuzzytree.model import SystemTerm as SystemLabel
+from fuzzytree.model import Term as SystemLabel
 from fuzzytree.semantics import shape_of
 
 
@@ -95,7 +94,7 @@ class SystemTerms:
         self.hedged_terms[variable, name] = lines
         return name
 
-    def variable(self, one: SystemInput) -> Variable:
+    def variable(self, one: Variable) -> Variable:
         """Return an input as a variable; an inexact term has its lower line."""
         shapes = {**self.plain[one.name]}
         for (variable, term), lines in {**self.bounds, **self.hedged_terms}.items():
@@ -131,7 +130,7 @@ def terms_of(
     )
     for one in system.inputs:
         plain[one.name] = {}
-        for label in one.labels:
+        for label in one.terms:
             is_moved = bool(one.parts) and one.clips
             shape = None if is_moved else _shape(label)
             if shape is not None:
@@ -149,7 +148,7 @@ def terms_of(
 
 def _shape(label: SystemLabel) -> Shape | None:
     """Return the exact shape of a term, with its height; None if there is none."""
-    shape = shape_of(label.curve)
+    shape = shape_of(label.function)
     if shape is None or label.height == 1.0:
         return None if shape is None or any(shape.mistakes()) else shape
     if not isinstance(shape, Points):
@@ -159,15 +158,15 @@ def _shape(label: SystemLabel) -> Shape | None:
 
 
 def _between(label: SystemLabel, of: Interval | None) -> CurveBounds | None:
-    shape = shape_of(label.curve)
+    shape = shape_of(label.function)
     if shape is not None and any(shape.mistakes()):
         return None
-    lines = curve_bounds(label.curve, of)
+    lines = curve_bounds(label.function, of)
     return lines and (lines if label.height == 1.0 else scale(lines, label.height))
 
 
 def _answer(
-    one: SystemInput,
+    one: Variable,
     label: SystemLabel,
     lines: CurveBounds | None,
     of: Interval | None,
@@ -176,7 +175,7 @@ def _answer(
     """Return what becomes of a term, and why."""
     name, message = f"term {label.name!r} of {one.name!r}", "FTD.left-out"
     facts: dict[str, float] = {}
-    kind = str(label.curve.__struct_config__.tag)
+    kind = str(label.function.__struct_config__.tag)
     reason = f"its curve ({kind}) has no exact method"
     if one.parts and one.clips:
         reason = "a combination that is moved into a range has no exact method"

@@ -102,7 +102,7 @@ def _own_terms(subject: Subject, variable: Variable) -> Iterator[Term]:
     assert subject.system is not None  # nothing else has bounds
     for one in subject.system.inputs:
         if one.name == variable.name:
-            names = {label.name for label in one.labels}
+            names = {label.name for label in one.terms}
             yield from (term for term in variable.terms if term.name in names)
 
 
@@ -236,7 +236,7 @@ def _inventory(
     system = subject.system
     if system is not None and subject.policy.decision == "all":
         return (
-            [(one.name, label.name) for one in system.inputs for label in one.labels],
+            [(one.name, label.name) for one in system.inputs for label in one.terms],
             [one.name for one in system.inputs],
             [
                 (question.variable, question.label or "")

@@ -46,8 +46,8 @@ from fuzzytree.model import (
     RuleBase,
     RuleBlock,
     Semantics,
-    SystemInput,
     SystemRule,
+    Variable,
     joints,
     questions,
 )
@@ -166,7 +166,7 @@ def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[AuditAnsw
     return Domain(tuple(sides)), answers
 
 
-def _moved(one: SystemInput, value: float) -> float:
+def _moved(one: Variable, value: float) -> float:
     value = value if one.low is None else max(value, one.low)
     return value if one.high is None else min(value, one.high)
 

@@ -153,7 +153,7 @@ class Case:
         """The largest degree of each term on the domain."""
         level = Fraction(self.audit.settings.level)
         return {
-            Label(v.name, term.name): height(term.shape, self.line(v), level)
+            Label(v.name, term.name): height(term.function, self.line(v), level)
             for v in self.rules.variables
             for term in v.terms
             if Label(v.name, term.name) in self.terms
@@ -164,7 +164,7 @@ class Case:
         """The shared area of each pair of terms of a variable; None without area."""
         return {
             (Label(v.name, a.name), Label(v.name, b.name)): shared(
-                a.shape, b.shape, self.line(v)
+                a.function, b.function, self.line(v)
             )
             for v in self.rules.variables
             for a, b in itertools.combinations(v.terms, 2)
@@ -423,5 +423,5 @@ def _degree(model: Model, claim: Claim, point: Point) -> Between:
     for variable in model.variables:
         for term in variable.terms:
             if (variable.name, term.name) == (claim.variable, claim.term):
-                return bounds(term.shape, value_of(variable, point))
+                return bounds(term.function, value_of(variable, point))
     raise DoesNotHoldError("a claim of an unknown term")

@@ -336,7 +336,7 @@ def unused(case: Case, answer: Answer) -> None:
     every, used = case.terms, _used_terms(case.rules)
     if case.view is not None:  # the system itself is read, rules left out or not
         inputs = case.view.system.inputs
-        every = [Label(v.name, label.name) for v in inputs for label in v.labels]
+        every = [Label(v.name, label.name) for v in inputs for label in v.terms]
         used = case.view.questions()
     needed = {variable for variable, _ in used}
     names = [v.name for v in case.rules.variables]

@@ -258,7 +258,9 @@ class Grid:
         self.levels = Levels()
         self.marks = {one: self.levels.add((one,), ZERO) for one in (ZERO, ONE, *extra)}
         self.axes: list[Axis] = []
-        shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+        shapes = {
+            (v.name, t.name): t.function for v in rules.variables for t in v.terms
+        }
         every: dict[tuple[Proposition, Fraction], Function] = {}
         for rule, weight in zip(rules.rules, weights, strict=True):
             for c, w in self._weighted(rule.when, weight):

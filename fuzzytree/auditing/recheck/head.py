@@ -17,7 +17,6 @@ from fuzzytree.auditing.recheck.model_records import (
     Band,
     Curve,
     Is,
-    Label,
     Model,
     Not,
     Or,
@@ -26,6 +25,7 @@ from fuzzytree.auditing.recheck.model_records import (
     Rules,
     Shape,
     System,
+    Term,
     Tree,
 )
 from fuzzytree.auditing.recheck.outcomes import Report, UndecidedError
@@ -181,11 +181,11 @@ def check_head(case: Case, report: Report) -> None:
 def _content(case: Case, report: Report) -> None:
     """Check the hash of what the model holds, if all of it is known here."""
     whole = case.model if case.view is None else case.view.system
-    labels: list[Label] = []
+    labels: list[Term] = []
     if isinstance(whole, System):
-        labels += [label for one in whole.inputs for label in one.labels]
-        labels += [label for one in whole.outputs for label in one.labels]
-    curves = [one.curve for one in labels if isinstance(one.curve, Curve)]
+        labels += [label for one in whole.inputs for label in one.terms]
+        labels += [label for one in whole.outputs for label in one.terms]
+    curves = [one.function for one in labels if isinstance(one.function, Curve)]
     if any(curve.kind == "formula" for curve in curves):
         report.undecided["FACT", "the hash of a system with formulas"].append("head")
         return
@@ -315,7 +315,7 @@ def _ids(case: Case, report: Report) -> None:
     representations = [c for c in case.representations.values() if isinstance(c, Rules)]
     shapes: dict[tuple[str, str], Shape] = {}
     for one in representations:  # the rules' own terms come last
-        shapes |= {(v.name, t.name): t.shape for v in one.variables for t in v.terms}
+        shapes |= {(v.name, t.name): t.function for v in one.variables for t in v.terms}
     counts = Counter[str]()
     for number, answer in enumerate(case.audit.answers, 1):
         if any(k not in case.numbers for k in answer.rules):

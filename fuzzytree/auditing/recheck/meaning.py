@@ -21,7 +21,6 @@ from fuzzytree.auditing.recheck.model_records import (
     Branch,
     Conclusion,
     Condition,
-    Input,
     Is,
     Model,
     Node,
@@ -59,7 +58,7 @@ def value_of(variable: Variable, point: Point) -> Fraction:
 def strengths(rules: Rules, point: Point) -> list[Fraction]:
     """Return the strength of every rule at a point."""
     variables = {v.name: v for v in rules.variables}
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = {(v.name, t.name): t.function for v in rules.variables for t in v.terms}
     propositions = dict.fromkeys(
         proposition for rule in rules.rules for proposition in rule.when
     )
@@ -192,7 +191,7 @@ class View:
         self.labels = [
             Label(one.name, label.name)
             for one in system.inputs
-            for label in one.labels
+            for label in one.terms
             if not self._is_left_out(one.name, label.name)
         ]
         kept = dict.fromkeys(proposition for rule in items for proposition in rule.when)
@@ -204,7 +203,7 @@ class View:
             Semantics(self.conjunction, None, None),
         )
         self.shapes = {
-            (v.name, t.name): t.shape for v in self.rules.variables for t in v.terms
+            (v.name, t.name): t.function for v in self.rules.variables for t in v.terms
         }
 
     def _is_left_out(self, variable: str, term: str) -> bool:
@@ -284,7 +283,7 @@ class View:
         if hedges[:1] == ("any",):
             return [] if negated else [()]
         known = self.inputs.get(proposition.variable)
-        if known is None or proposition.label not in {one.name for one in known.labels}:
+        if known is None or proposition.label not in {one.name for one in known.terms}:
             raise UndecidedError("it uses an output")
         term = "\0".join((proposition.label or "", *hedges))
         return [(Proposition(proposition.variable, (term,), negated),)]
@@ -379,9 +378,9 @@ class View:
                 one = (ONE, ONE)
                 if variable not in self.inputs:
                     raise UndecidedError("what is concluded of an output")
-                for term in self.inputs[variable].labels:
+                for term in self.inputs[variable].terms:
                     if term.name == label:
-                        whole = Scaled(term.curve, term.height, ())
+                        whole = Scaled(term.function, term.height, ())
                         one = bounds(whole, values[variable])
                 for hedge in reversed(hedges):
                     one = hedged(hedge, one)
@@ -432,14 +431,14 @@ def _text(then: Iterable[Conclusion]) -> str:
     return " and ".join(texts)
 
 
-def _variable(one: Input, propositions: dict[Proposition, None]) -> Variable:
+def _variable(one: Variable, propositions: dict[Proposition, None]) -> Variable:
     """Return an input with the terms of its propositions, hedged ones by both names."""
-    curves = {label.name: label for label in one.labels}
+    curves = {label.name: label for label in one.terms}
     used = [t for c in propositions if c.variable == one.name for t in c.terms]
     terms: list[Term] = []
     for name in dict.fromkeys([*curves, *used]):
         label, *hedges = name.split("\0")
-        shape = curves[label].curve
+        shape = curves[label].function
         if curves[label].height != 1 or hedges:
             shape = Scaled(shape, curves[label].height, tuple(hedges))
         terms.append(Term(name, shape))

@@ -51,7 +51,8 @@ Shape = Band | LR | Points | Curve | Scaled
 
 class Term(NamedTuple):
     name: str
-    shape: Shape
+    function: Shape
+    height: float = 1.0
 
 
 class Part(NamedTuple):
@@ -67,6 +68,7 @@ class Variable(NamedTuple):
     low: float | None = None
     high: float | None = None
     parts: tuple[Part, ...] = ()
+    clips: bool = False
 
 
 class Proposition(NamedTuple):
@@ -134,22 +136,6 @@ class Tree(NamedTuple):
     columns: tuple[str, ...] = ()
 
 
-class Label(NamedTuple):
-    name: str
-    curve: Shape
-    height: float
-
-
-class Input(NamedTuple):
-    name: str
-    labels: tuple[Label, ...] = ()
-    low: float | None = None
-    high: float | None = None
-    clips: bool = False
-    unit: str = ""
-    parts: tuple[Part, ...] = ()
-
-
 class Defuzzifier(NamedTuple):
     method: str
     samples: int
@@ -158,7 +144,7 @@ class Defuzzifier(NamedTuple):
 
 class Output(NamedTuple):
     name: str
-    labels: tuple[Label, ...]
+    terms: tuple[Term, ...]
     low: float | None
     high: float | None
     defuzzifier: Defuzzifier
@@ -220,7 +206,7 @@ class Block(NamedTuple):
 
 class System(NamedTuple):
     name: str
-    inputs: tuple[Input, ...]
+    inputs: tuple[Variable, ...]
     outputs: tuple[Output, ...]
     blocks: tuple[Block, ...]
     note: str = ""

@@ -247,8 +247,7 @@ KEYS: dict[Any, dict[str, str]] = {
         **{"left": "0 up to", "right": "0 from"},
     },
     records.Variable: {**_RANGE, "parts": "sum of"},
-    records.Input: {**_RANGE, "labels": "terms", "parts": "sum of"},
-    records.Output: {**_RANGE, "labels": "terms"},
+    records.Output: _RANGE,
     records.Rule: {"when": "if"},
     records.Rules: {"kind": "terms"},
     records.Semantics: {"conjunction": "and", "label_type": "label type"},
@@ -285,13 +284,9 @@ def _rule(one: Facts) -> Facts:
 
 
 def _term(one: Facts) -> Facts:
-    return {"name": one.pop("name"), "shape": _shape(one)}
-
-
-def _label(one: Facts) -> Facts:
     name, height = one.pop("name"), one.pop("height", 1.0)
     curve = _curve(*next(iter(one.items()))) if len(one) == 1 else None
-    return {"name": name, "curve": curve or _shape(one), "height": height}
+    return {"name": name, "function": curve or _shape(one), "height": height}
 
 
 def _branch(one: Facts) -> Facts:
@@ -378,9 +373,7 @@ def _real(value: Any) -> Any:
 
 LAYOUTS: dict[Any, Callable[[Facts], Mapping[str, Any]]] = {
     records.Term: _term,
-    records.Label: _label,
     records.Variable: _ranged,
-    records.Input: _ranged,
     records.Output: _output,
     records.Branch: _branch,
     records.Node: _node,
@@ -482,8 +475,8 @@ def _read(top: dict[str, Any], kind: str, name: str) -> Whole:
         if rest:
             raise CannotRunError(f"{name}: its meaning is not known")
         system: records.System = built(records.System, {"inputs": [], **facts}, name)
-        groups = [[t.name for t in one.labels] for one in system.inputs]
-        groups += [[t.name for t in one.labels] for one in system.outputs]
+        groups = [[t.name for t in one.terms] for one in system.inputs]
+        groups += [[t.name for t in one.terms] for one in system.outputs]
         names = [one.name for one in system.inputs] + [o.name for o in system.outputs]
         _check_once([names, *groups], name)
         return system

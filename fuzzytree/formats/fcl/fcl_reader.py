@@ -61,9 +61,9 @@ from fuzzytree.model import (
     FuzzySystem,
     Reading,
     Singleton,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
+    Variable,
     name_choice,
 )
 from fuzzytree.semantics import as_rules, joined_by_number
@@ -105,8 +105,8 @@ def read_fcl(content: bytes, name: str) -> Reading:
     known = known_variables(blocks, dialect, notes)
     inputs = tuple(read_input(one, known) for one in known.inputs)
     outputs = tuple(read_output(one, known) for one in known.outputs)
-    labels = {one.name: [label.name for label in one.labels] for one in inputs}
-    labels |= {one.name: [label.name for label in one.labels] for one in outputs}
+    labels = {one.name: [label.name for label in one.terms] for one in inputs}
+    labels |= {one.name: [label.name for label in one.terms] for one in outputs}
     curved = {one.name for one in outputs if not one.defuzzifier.is_weighted}
     scope = Scope(labels, set(known.outputs), curved, dialect, notes)
     read_blocks = _rule_blocks(blocks, scope)
@@ -317,7 +317,7 @@ def _terms(
             result = fcl_terms.read(text, where, known.dialect)
         except PartError as error:
             known.notes.mistakes.extend(error.mistakes)
-            results.append(FllTerm(SystemTerm(label, Singleton(0.0)), "Constant"))
+            results.append(FllTerm(Term(label, Singleton(0.0)), "Constant"))
             continue
         if result.loss:
             known.notes.loss(f"term {label!r} of {name!r}", result.loss)
@@ -325,12 +325,12 @@ def _terms(
     return results
 
 
-def read_input(name: str, known: FclVariables) -> SystemInput:
+def read_input(name: str, known: FclVariables) -> Variable:
     """Return an input; mistakes are noted."""
     named = known.inputs[name]
     _note_disabled(f"input {name!r}", named, known)
     labels = tuple(term.label for term in _terms(name, named.block, known))
-    return SystemInput(name, labels, named.low, named.high)
+    return Variable(name, labels, low=named.low, high=named.high)
 
 
 def _note_disabled(where: str, named: FclVariable, known: FclVariables) -> None:
@@ -361,7 +361,7 @@ def read_output(name: str, known: FclVariables) -> SystemOutput:
         low, high = _estimated(named, labels, known)
     result = SystemOutput(
         name=name,
-        labels=labels,
+        terms=labels,
         low=low,
         high=high,
         defuzzifier=how,
@@ -398,13 +398,13 @@ def _check_kinds(
 
 
 def _estimated(
-    named: FclVariable, labels: Iterable[SystemTerm], known: FclVariables
+    named: FclVariable, labels: Iterable[Term], known: FclVariables
 ) -> tuple[float, float]:
     """Return the range that an output's terms span, where the file says none."""
     name = str(named.token)
     if known.notes.mistakes:  # a term that was not read is no reason to demand a range
         return 0.0, 1.0
-    ends = [fcl_terms.extent(label.curve) for label in labels]
+    ends = [fcl_terms.extent(label.function) for label in labels]
     spans = [one for one in ends if one is not None]
     if not spans or known.dialect == "fuzzylite":
         known.mistake(named.token, f"output {name!r} needs a RANGE for its METHOD")

@@ -283,9 +283,9 @@ def without_questions(system: FuzzySystem) -> FuzzySystem:
         return system
     first = system.inputs[0]
     proposition: Condition = Is(first.name, None, ("any",))
-    if first.labels and first.labels[-1].curve == ALWAYS:
-        proposition = Is(first.name, first.labels[-1].name)
-        first = replace(first, labels=first.labels[:-1])
+    if first.terms and first.terms[-1].function == ALWAYS:
+        proposition = Is(first.name, first.terms[-1].name)
+        first = replace(first, terms=first.terms[:-1])
     others = [
         one
         for rule in system.rules

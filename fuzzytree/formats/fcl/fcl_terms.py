@@ -25,7 +25,7 @@ from fuzzytree.model import (
     Band,
     Curve,
     Points,
-    SystemTerm,
+    Term,
     curves,
     name_choice,
 )
@@ -96,7 +96,7 @@ def _checked(token: Token, name: str, curve: Curve, where: TermScope) -> FllTerm
     for sentence in curve.mistakes():
         whose = f"term {name!r} of {where.variable!r}"
         raise PartError((*place(token), f"{whose}: {sentence}"))
-    return FllTerm(SystemTerm(name, curve), "")
+    return FllTerm(Term(name, curve), "")
 
 
 _FUNCTIONS = {"LN": "log", "LOG": "log10"}

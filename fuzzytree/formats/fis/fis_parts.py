@@ -38,10 +38,10 @@ from fuzzytree.model import (
     Or,
     SigmoidDifference,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
     name_choice,
     numbered,
 )
@@ -258,7 +258,7 @@ def labels_of(
     count: FisEntry | None,
     about: About,
     notes: ReaderNotes,
-) -> tuple[SystemTerm, ...]:
+) -> tuple[Term, ...]:
     """Return the terms of a variable in the order of their numbers."""
     numbered = {int(entry.key[2:]): entry for entry in reversed(entries)}
     if len(numbered) < len(entries):
@@ -275,7 +275,7 @@ def labels_of(
             notes.remark(f"{about[0]!r}: {what}: fuzzylite reads them all")
         else:
             notes.mistake((count.line, count.column), what)
-    labels: list[SystemTerm] = []
+    labels: list[Term] = []
     taken: dict[str, int] = {}
     for number in sorted(numbered):
         labels.append(_label(numbered[number], about, taken, notes))
@@ -284,17 +284,17 @@ def labels_of(
 
 def _label(
     entry: FisEntry, about: About, taken: dict[str, int], notes: ReaderNotes
-) -> SystemTerm:
+) -> Term:
     written = term_of(entry, notes.mistakes)
     if written is None:
-        return SystemTerm(entry.key, _WRONG)
+        return Term(entry.key, _WRONG)
     name = written.name or entry.key
     result = numbered(name, taken)
     if result != written.name:
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
         notes.remark(f"{what}; here it is {result!r}")
     curve = _curve(written, entry, about, notes)
-    return SystemTerm(result, _WRONG if curve is None else curve)
+    return Term(result, _WRONG if curve is None else curve)
 
 
 def _curve(
@@ -372,7 +372,7 @@ def _formula(
     return curve
 
 
-Variables = tuple[Sequence[SystemInput], Sequence[SystemOutput]]
+Variables = tuple[Sequence[Variable], Sequence[SystemOutput]]
 
 
 class _Line(msgspec.Struct, frozen=True):
@@ -507,16 +507,16 @@ def _rules(
 
 def _code(
     code: float,
-    variable: SystemInput | SystemOutput,
+    variable: Variable | SystemOutput,
     where: tuple[int, FisEntry],
     notes: ReaderNotes,
 ) -> _Code | None:
     """Return what a number means; None if there is no such term."""
     size = abs(code)
-    if not size < len(variable.labels) + 1:  # NaN too
+    if not size < len(variable.terms) + 1:  # NaN too
         number, entry = where
         what = (
-            f"rule {number}: {variable.name!r} has {len(variable.labels)} terms, "
+            f"rule {number}: {variable.name!r} has {len(variable.terms)} terms, "
             f"and no term {size:g}"
         )
         notes.mistake((entry.line, 1), what)
@@ -526,7 +526,7 @@ def _code(
 
 
 def _question(
-    variable: SystemInput,
+    variable: Variable,
     code: float,
     where: tuple[int, FisEntry],
     dialect: Dialect,
@@ -545,7 +545,7 @@ def _question(
         what = f"rule {where[0]}: a hedge of no term of {variable.name!r}"
         notes.mistake((where[1].line, 1), what)
         return None
-    return Is(variable.name, variable.labels[result.place - 1].name, hedges)
+    return Is(variable.name, variable.terms[result.place - 1].name, hedges)
 
 
 def _conclusion(
@@ -572,7 +572,7 @@ def _conclusion(
     if dialect == "octave":
         table = words.CONCLUDING_HEDGES
     hedges = _hedges(table, result, (output.name, where), notes)
-    return Conclusion(output.name, output.labels[result.place - 1].name, hedges)
+    return Conclusion(output.name, output.terms[result.place - 1].name, hedges)
 
 
 def _hedges(

@@ -35,10 +35,10 @@ from fuzzytree.model import (
     Reading,
     RuleBlock,
     SNorm,
-    SystemInput,
     SystemOutput,
     SystemRule,
     TNorm,
+    Variable,
     name_choice,
     numbered,
     printable,
@@ -322,20 +322,22 @@ def _name(
 
 def _input(
     section: FisSection, dialect: Dialect, taken: dict[str, int], notes: ReaderNotes
-) -> SystemInput:
+) -> Variable:
     entries, terms = _keyed(section, _VARIABLE_KEYS, notes)
     name = _name(section, entries, taken, notes)
     low, high = _range(entries, notes)
     _note_enabled(entries, name, notes)
     labels = labels_of(terms, entries.get("NumMFs"), (name, dialect, None), notes)
-    return SystemInput(name, labels, low, high, clips=_is_set(entries, "LockRange"))
+    return Variable(
+        name, labels, low=low, high=high, clips=_is_set(entries, "LockRange")
+    )
 
 
 def _output(
     section: FisSection,
     methods: _Methods,
     dialect: Dialect,
-    known: tuple[tuple[SystemInput, ...], dict[str, int]],
+    known: tuple[tuple[Variable, ...], dict[str, int]],
     notes: ReaderNotes,
 ) -> SystemOutput:
     inputs, taken = known

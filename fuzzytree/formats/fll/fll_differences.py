@@ -22,7 +22,7 @@ from fuzzytree.model import (
     SemiEllipse,
     Singleton,
     SystemOutput,
-    SystemTerm,
+    Term,
     names_in,
 )
 from fuzzytree.semantics import value_at
@@ -37,7 +37,7 @@ def differences(system: FuzzySystem) -> Iterator[str]:
         yield from constant_degrees(output)
         if output.defuzzifier.is_weighted:
             concluded = [
-                label for label in output.labels if counts[output.name, label.name]
+                label for label in output.terms if counts[output.name, label.name]
             ]
             twice = [one for one in concluded if counts[output.name, one.name] > 1]
             yield from _joined_twice(output, twice)
@@ -83,7 +83,7 @@ def _area_remarks(outputs: Sequence[SystemOutput]) -> Iterator[str]:
         )
 
 
-def _joined_twice(output: SystemOutput, twice: Sequence[SystemTerm]) -> Iterator[str]:
+def _joined_twice(output: SystemOutput, twice: Sequence[Term]) -> Iterator[str]:
     """Yield what happens to labels that several rules conclude."""
     names = ", ".join(repr(one.name) for one in twice[:3])
     same = f"output {output.name!r}: rules that conclude the same term ({names})"
@@ -99,9 +99,9 @@ def _joined_twice(output: SystemOutput, twice: Sequence[SystemTerm]) -> Iterator
         )
 
 
-def _depends_on_degree(label: SystemTerm) -> bool:
+def _depends_on_degree(label: Term) -> bool:
     """Return whether a label's number depends on its degree of activation."""
-    match label.curve:
+    match label.function:
         case Singleton() | Linear():
             return False
         case Formula(expression=expression):
@@ -110,23 +110,21 @@ def _depends_on_degree(label: SystemTerm) -> bool:
             return True
 
 
-def _is_infinite_at_zero(label: SystemTerm) -> bool:
+def _is_infinite_at_zero(label: Term) -> bool:
     """Return whether a label's number at degree 0 is, or may be, no finite number."""
-    if isinstance(label.curve, Formula):
-        uses_degree = "x" in names_in(label.curve.expression)
-        functions = {call.function for call in _calls([label.curve])}
+    if isinstance(label.function, Formula):
+        uses_degree = "x" in names_in(label.function.expression)
+        functions = {call.function for call in _calls([label.function])}
         return uses_degree and bool(functions & {"/", "^", "log", "log10", "%", "fmod"})
-    result = value_at(label.curve, 0.0)
+    result = value_at(label.function, 0.0)
     return result is not None and not math.isfinite(result)
 
 
-def _inverse_remarks(
-    output: SystemOutput, concluded: Sequence[SystemTerm]
-) -> Iterator[str]:
+def _inverse_remarks(output: SystemOutput, concluded: Sequence[Term]) -> Iterator[str]:
     """Yield whether fuzzylite 6 finds other values at which a term has a degree."""
     if any(
-        value_at(one.curve, 0.5) is not None
-        and (one.height != 1.0 or not isinstance(one.curve, Points))
+        value_at(one.function, 0.5) is not None
+        and (one.height != 1.0 or not isinstance(one.function, Points))
         for one in concluded
     ):
         yield (
@@ -141,7 +139,7 @@ _SAFE = frozenset({*_TRUTHS, "lt", "gt", "*", "/", "^", "min", "max"})
 
 
 def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
-    curves = [label.curve for one in system.variables for label in one.labels]
+    curves = [label.function for one in system.variables for label in one.terms]
     calls = list(_calls(curves))
     used = {call.function for call in calls}
     if "%" in used:
@@ -159,7 +157,7 @@ def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
             "formulas: what is not 0 is true for 'and', 'or' and 'not', as in "
             "pyfuzzylite; in fuzzylite 6 only 1 is true"
         )
-    degrees = [label.curve for one in system.inputs for label in one.labels]
+    degrees = [label.function for one in system.inputs for label in one.terms]
     formulas = [one.expression for one in degrees if isinstance(one, Formula)]
     if any({*names_in(one)} - {"x"} for one in formulas):
         yield "formulas: fuzzylite 6 knows no variables in those of inputs' terms"
@@ -169,10 +167,10 @@ def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
             "pyfuzzylite counts it"
         )
     looked_at = [
-        label.curve
+        label.function
         for one in system.outputs
         if not one.defuzzifier.is_weighted
-        for label in one.labels
+        for label in one.terms
     ]
     if {"min", "max"} & {call.function for call in _calls(looked_at)}:
         yield "formulas: pyfuzzylite fails at 'min' and 'max' in an output's curve"
@@ -239,9 +237,9 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
     """Yield where fuzzylite 6 finds other numbers for an output of its own dialects.
 
     Example:
-        >>> from fuzzytree.model import Defuzzifier, SystemTerm
+        >>> from fuzzytree.model import Defuzzifier, Term
         >>> how = Defuzzifier("weighted average")
-        >>> falling = SystemTerm("little", Concave(0.5, 0.4))
+        >>> falling = Term("little", Concave(0.5, 0.4))
         >>> output = SystemOutput("tip", (falling,), 0.0, 1.0, how)
         >>> [loss.where for loss in fuzzylite_losses(output)]
         ["output 'tip'"]
@@ -253,7 +251,7 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
             "the mean of all values of the largest degree answers; fuzzylite 6 takes "
             "the first stretch of such values, and degrees within 1e-6 as equal",
         )
-    curves = {type(label.curve) for label in output.labels}
+    curves = {type(label.function) for label in output.terms}
     if output.defuzzifier.is_weighted and curves & {SCurve, Concave, Arc}:
         yield Loss(
             where,
@@ -266,16 +264,16 @@ def constant_degrees(output: SystemOutput) -> Iterator[str]:
     """Yield a remark on each number that is a degree because a curve is sampled.
 
     Example:
-        >>> from fuzzytree.model import Defuzzifier, SystemTerm
-        >>> low = SystemTerm("low", Formula(Number(0.3)))
+        >>> from fuzzytree.model import Defuzzifier, Term
+        >>> low = Term("low", Formula(Number(0.3)))
         >>> how = Defuzzifier("centroid")
         >>> len([*constant_degrees(SystemOutput("tip", (low,), 0.0, 1.0, how))])
         1
     """
     if output.defuzzifier.is_weighted:
         return
-    for label in output.labels:
-        match label.curve:
+    for label in output.terms:
+        match label.function:
             case Formula(Number(value)):
                 yield (
                     f"term {label.name!r} of {output.name!r} has the degree {value!r} "

@@ -50,10 +50,10 @@ from fuzzytree.model import (
     Reading,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
     printable,
 )
 from fuzzytree.semantics import as_written
@@ -113,9 +113,7 @@ def _system(
     try:
         system = FuzzySystem(
             (engine.head.value if engine else "") or stem or "system",
-            tuple(
-                one.variable for one in inputs if isinstance(one.variable, SystemInput)
-            ),
+            tuple(one.variable for one in inputs if isinstance(one.variable, Variable)),
             tuple(_as_meant(one, notes) for one in outputs),
             tuple(one.block for one in blocks),
             described.value if described else "",
@@ -177,7 +175,7 @@ class ReadVariable(msgspec.Struct, frozen=True):
     section: FllSection
     name: str
     terms: tuple[ReadTerm, ...]
-    variable: SystemInput | SystemOutput
+    variable: Variable | SystemOutput
     kind: str = ""
     is_enabled: bool = True
 
@@ -281,7 +279,9 @@ def _variable(
     clips = fll.truth(section.one_of("lock-range"), False, notes)
     labels = tuple(one.term.label for one in terms)
     clips = clips and not (low is None and high is None)
-    variable: SystemInput | SystemOutput = SystemInput(name, labels, low, high, clips)
+    variable: Variable | SystemOutput = Variable(
+        name, labels, low=low, high=high, clips=clips
+    )
     if how is not None:
         variable = SystemOutput(
             name,
@@ -356,7 +356,7 @@ def _term(entry: FllEntry, place: TermScope, notes: ReaderNotes) -> FllTerm | No
     except PartError as error:
         notes.mistakes.extend(error.mistakes)
         # Rules may use it all the same.
-        return FllTerm(SystemTerm(name, Singleton(0.0)), "")
+        return FllTerm(Term(name, Singleton(0.0)), "")
     _note_differences(term, rest, place, notes)
     return term
 
@@ -373,7 +373,7 @@ def _note_differences(
                 f"{where} ends before it starts: its ends are exchanged, as in "
                 "pyfuzzylite; fuzzylite 6 makes it 0 everywhere"
             )
-    curve = term.label.curve
+    curve = term.label.function
     if term.kind != "Discrete" or not isinstance(curve, Points):
         return
     if len(set(curve.values)) < len(curve.values):
@@ -532,4 +532,4 @@ def _as_meant(output: ReadVariable, notes: ReaderNotes) -> SystemOutput:
         as_degree(term.label) if is_sugeno or not term.is_monotone else term.label
         for term in terms
     )
-    return replace(variable, labels=labels)
+    return replace(variable, terms=labels)

@@ -23,7 +23,7 @@ from fuzzytree.model import (
     Name,
     Number,
     Points,
-    SystemTerm,
+    Term,
     curves,
     name_choice,
 )
@@ -53,7 +53,7 @@ class TermScope(msgspec.Struct, frozen=True):
 class FllTerm(msgspec.Struct, frozen=True):
     """A term as it was read."""
 
-    label: SystemTerm
+    label: Term
     kind: str
 
     @property
@@ -79,9 +79,7 @@ def read_term(
         TermError: If it is none.
     """
     if kind.text == "Function":
-        return FllTerm(
-            SystemTerm(name, _function(kind, rest, place, formula)), kind.text
-        )
+        return FllTerm(Term(name, _function(kind, rest, place, formula)), kind.text)
     numbers = _numbers(rest)
     height = 1.0
     match kind.text:
@@ -115,7 +113,7 @@ def read_term(
         case _:
             choice = name_choice(kind.text, CLASSES)
             raise _error(kind, f"no term {kind.text!r}; {choice}")
-    result = SystemTerm(name, curve, height)
+    result = Term(name, curve, height)
     _check(kind, result, place)
     return FllTerm(result, kind.text)
 
@@ -124,9 +122,9 @@ def _error(word: Word, sentence: str) -> PartError:
     return PartError(word.mistake(sentence))
 
 
-def _check(kind: Word, label: SystemTerm, place: TermScope) -> None:
+def _check(kind: Word, label: Term, place: TermScope) -> None:
     where = f"term {label.name!r} of {place.variable!r}"
-    for sentence in label.curve.mistakes():
+    for sentence in label.function.mistakes():
         raise _error(kind, f"{where}: {sentence}")
     if not 0.0 < label.height <= 1.0:
         sentence = f"{where}: the height must lie in (0, 1], not {label.height!r}"
@@ -282,24 +280,24 @@ def term_in_words(curve: curves.SystemCurve) -> tuple[str | float, ...]:
             return name, *numbers
 
 
-def as_degree(label: SystemTerm) -> SystemTerm:
+def as_degree(label: Term) -> Term:
     """Return a monotone term as one whose own degree is a weighted output's number.
 
     Of a monotone term a weighted output takes the value at which it has a degree
     (after Tsukamoto), and of any other term the degree at the activation. The curve
     that comes back has the same degrees and does not count as monotone.
     """
-    match label.curve:
+    match label.function:
         case Points(values=(a, b) as values, degrees=degrees) if a < b:
             # A second point at the end is a step of no height.
             again = Points((*values, values[-1]), (*degrees, degrees[-1]))
-            return msgspec.structs.replace(label, curve=again)
+            return msgspec.structs.replace(label, function=again)
         case curves.SCurve(start=start, end=end) if start < end:
             rising = curves.PiCurve(start, end, _FURTHEST, _FURTHEST)
-            return msgspec.structs.replace(label, curve=rising)
+            return msgspec.structs.replace(label, function=rising)
         case curves.SCurve(start=start, end=end):
             falling = curves.PiCurve(-_FURTHEST, -_FURTHEST, end, start)
-            return msgspec.structs.replace(label, curve=falling)
+            return msgspec.structs.replace(label, function=falling)
         case curves.Sigmoid(inflection=inflection, slope=slope):
             text = f"1 / (1 + exp({-slope!r} * (x - {inflection!r})))"
         case curves.Concave(inflection=inflection, end=end) if inflection <= end:
@@ -315,4 +313,4 @@ def as_degree(label: SystemTerm) -> SystemTerm:
             text = f"sqrt({part} * (2 - {part}))"
         case _:
             return label
-    return SystemTerm(label.name, curves.Formula(parse(f"{label.height!r} * ({text})")))
+    return Term(label.name, curves.Formula(parse(f"{label.height!r} * ({text})")))

@@ -35,9 +35,9 @@ from fuzzytree.model import (
     RuleBlock,
     SCurve,
     Singleton,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
+    Variable,
     name_choice,
     numbered,
 )
@@ -85,7 +85,7 @@ def read_fml(content: bytes, name: str) -> Reading:
 class _Parts(NamedTuple):
     """The parts of a system, each with what it was made of."""
 
-    inputs: Sequence[tuple[FmlElement, SystemInput]]
+    inputs: Sequence[tuple[FmlElement, Variable]]
     outputs: Sequence[tuple[FmlElement, SystemOutput]]
     blocks: tuple[RuleBlock, ...]
     rules: Sequence[tuple[FmlElement, FmlElement]]
@@ -114,7 +114,7 @@ class _Parts(NamedTuple):
         return positions_of(inputs, outputs, blocks)
 
     def _group(
-        self, element: FmlElement, variable: SystemInput | SystemOutput
+        self, element: FmlElement, variable: Variable | SystemOutput
     ) -> PositionGroup:
         names = self.variables.labels[variable.name]
         terms = {
@@ -122,7 +122,7 @@ class _Parts(NamedTuple):
             for child in element.children
             if (name := child.attributes.get("name")) in names
         }
-        return element.position, [terms[one.name] for one in variable.labels]
+        return element.position, [terms[one.name] for one in variable.terms]
 
 
 def _parts(root: FmlElement, notes: ReaderNotes) -> _Parts | None:
@@ -215,9 +215,9 @@ def _is_complement(term: FmlElement) -> bool:
 
 def _input(
     element: FmlElement, variables: FmlVariables, notes: ReaderNotes
-) -> SystemInput:
+) -> Variable:
     name = element.attributes.get("name", "")
-    labels: list[SystemTerm] = []
+    labels: list[Term] = []
     for plain, term in _terms(element, variables, notes):
         key = (name, term.attributes.get("name", ""))
         if _is_complement(term):
@@ -227,10 +227,10 @@ def _input(
             variables.circular[key] = circular[0]
             continue
         curve = curve_of(term, f"term {plain!r} of {name!r}", notes)
-        labels += [SystemTerm(plain, curve)] if curve is not None else []
+        labels += [Term(plain, curve)] if curve is not None else []
     low, high = _range(element, notes)
     unit = element.attributes.get("scale", "")
-    return SystemInput(name, tuple(labels), low, high, unit=unit)
+    return Variable(name, tuple(labels), low=low, high=high, unit=unit)
 
 
 def _range(
@@ -250,7 +250,7 @@ def _output(
     element: FmlElement, inputs: int, variables: FmlVariables, notes: ReaderNotes
 ) -> SystemOutput:
     name = element.attributes.get("name", "")
-    labels: list[SystemTerm] = []
+    labels: list[Term] = []
     for plain, term in _terms(element, variables, notes):
         where = f"term {plain!r} of {name!r}"
         if _is_complement(term) or term.all(CIRCULAR):
@@ -265,7 +265,7 @@ def _output(
                 result = _tsukamoto_term(term, plain, where, notes)
             case _:
                 curve = curve_of(term, where, notes)
-                result = None if curve is None else SystemTerm(plain, curve)
+                result = None if curve is None else Term(plain, curve)
         labels += [result] if result is not None else []
     default = number(element, "defaultValue", notes, 0.0)
     low, high = (
@@ -275,7 +275,7 @@ def _output(
     if element.name == "fuzzyVariable":
         how = _defuzzifier(element, notes)
         aggregation = word_of(element, "accumulation", words.FML_SNORMS, "MAX", notes)
-        if not all(isinstance(label.curve, Singleton) for label in labels):
+        if not all(isinstance(label.function, Singleton) for label in labels):
             notes.remark(
                 f"output {name!r}: FML says nothing of samples; read with {how.samples}"
             )
@@ -302,7 +302,7 @@ def _defuzzifier(element: FmlElement, notes: ReaderNotes) -> Defuzzifier:
 
 def _tsk_term(
     term: FmlElement, plain: str, inputs: int, notes: ReaderNotes
-) -> SystemTerm | None:
+) -> Term | None:
     numbers: list[float] = []
     for value in term.all("tskValue"):
         holder = xml.FmlElement("tskValue", "", {"": value.text}, *value.position, [])
@@ -319,17 +319,17 @@ def _tsk_term(
         notes.mistake(term.position, f"{what}, not {len(numbers)}")
         return None
     if order == "0":
-        return SystemTerm(plain, Singleton(numbers[0]))
-    return SystemTerm(plain, Linear(tuple(numbers[1:]), numbers[0]))
+        return Term(plain, Singleton(numbers[0]))
+    return Term(plain, Linear(tuple(numbers[1:]), numbers[0]))
 
 
 def _tsukamoto_term(
     term: FmlElement, plain: str, where: str, notes: ReaderNotes
-) -> SystemTerm | None:
+) -> Term | None:
     curve = curve_of(term, where, notes)
     is_ramp = isinstance(curve, Points) and sorted(curve.degrees) == [0.0, 1.0]
     if curve is not None and not (is_ramp or isinstance(curve, SCurve)):
         what = "only linear, s and z shapes can be turned round, as Tsukamoto's must"
         notes.mistake(term.position, f"{where}: {what}")
         return None
-    return None if curve is None else SystemTerm(plain, curve)
+    return None if curve is None else Term(plain, curve)

@@ -324,7 +324,6 @@ _KEYS: Final = {
     "variable": ("ask", "variable"),
     "terms": ("is", "is not", "terms"),
     "owners": ("interval owners",),
-    "labels": ("terms",),
 }
 
 

@@ -50,6 +50,17 @@ Answer = Annotated[
         examples=["no class", "class setosa"],
     ),
 ]
+Four = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
+Three = Annotated[tuple[float, ...], Meta(min_length=3, max_length=3)]
+FormulaText = Annotated[
+    str,
+    Meta(
+        min_length=1,
+        max_length=MOST_CHARACTERS,
+        description="`x` is the value whose degree is computed.",
+        examples=["2 * dirt + 1", "max(0, 1 - abs(x) / 3)"],
+    ),
+]
 GoTo = Annotated[
     str,
     Meta(
@@ -84,11 +95,15 @@ class FileRecord(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RangeOfVariable(FileRecord, frozen=True, kw_only=True):
-    """The values seen or allowed, ends included; an unknown end is left out."""
+    """The values seen or allowed, ends included; an unknown end is left out.
+
+    In systems `outside: clipped` moves a value beyond an end to it.
+    """
 
     noun: ClassVar[str] = "a range"
     from_: float | None = field(name="from", default=None)
     to: float | None = None
+    outside: Literal["clipped"] | None = None
 
 
 class PartOfSum(FileRecord, frozen=True, kw_only=True):
@@ -101,7 +116,7 @@ class PartOfSum(FileRecord, frozen=True, kw_only=True):
 
 
 class HalfSet(FileRecord, frozen=True, kw_only=True):
-    """One side of an LR set; see `TermOfVariable`."""
+    """One side of an LR set; see `TermKeys`."""
 
     noun: ClassVar[str] = "a side"
     spread: float
@@ -109,8 +124,56 @@ class HalfSet(FileRecord, frozen=True, kw_only=True):
     reach: float
 
 
-class TermOfVariable(FileRecord, frozen=True, kw_only=True):
-    """A label of a variable, in one of five shapes.
+class SigmoidCurve(FileRecord, frozen=True, kw_only=True):
+    """`1 / (1 + exp(-slope (x - inflection)))`."""
+
+    noun: ClassVar[str] = "a sigmoid"
+    inflection: float
+    slope: float
+
+
+class LinearCurve(FileRecord, frozen=True, kw_only=True):
+    """A weight for each column, in order, and what is added."""
+
+    noun: ClassVar[str] = "a linear term"
+    weights: tuple[float, ...]
+    offset: float = 0.0
+
+
+def _record_of(kind: type[SystemCurve]) -> type[msgspec.Struct]:
+    """Return the record of a membership function: its numbers by their names."""
+    numbers = [
+        (name, float, field(name=name.replace("_", " ")))
+        for name in kind.__struct_fields__
+    ]
+    about = {"__doc__": inspect.getdoc(kind), "noun": f"a {_tag(kind)}"}
+    name = f"{kind.__name__}Numbers"
+    return msgspec.defstruct(
+        name, numbers, bases=(FileRecord,), namespace=about, frozen=True, kw_only=True
+    )
+
+
+def _tag(kind: type[SystemCurve]) -> str:
+    return str(kind.__struct_config__.tag)
+
+
+_OF_NUMBERS: Final = {
+    _tag(kind): _record_of(kind)
+    for kind in get_args(SystemCurve)
+    if kind not in (PiCurve, Singleton)
+    and all(one.type is float for one in msgspec.structs.fields(kind))
+}
+"""The record of each membership function that is written as its numbers by name."""
+
+_CURVES = (
+    *("trapezoid", "triangle", *_OF_NUMBERS, "sigmoid difference", "sigmoid product"),
+    *("pi", "at least", "at most", "singleton", "linear", "formula"),
+)
+Two = Annotated[tuple[SigmoidCurve, ...], Meta(min_length=2, max_length=2)]
+
+
+class TermKeys(FileRecord, frozen=True, kw_only=True):
+    """A label of a variable, with one membership function.
 
     A plateau: degree 1 `above` one value and `up to` another, and `0 up to` a value
     below it and `0 from` a value above it; lines lead from the one to the other.
@@ -121,6 +184,13 @@ class TermOfVariable(FileRecord, frozen=True, kw_only=True):
     Points, joined by lines: `[value, degree]` each, in ascending order; a value that
     stands twice is a step, where the first degree holds.
     `degree: 1` is true everywhere.
+
+    Only systems have the others, and a height, by which the degree is multiplied.
+    A trapezoid `[a, b, c, d]` rises from a to b, is 1 up to c and falls to d; `-.inf`
+    as a and `.inf` as d leave that side open. A triangle `[a, b, d]` has its peak at b.
+    `at least: v` is 1 from v on, `at most: v` up to v, both with v itself. A
+    `singleton` is 1 at one value and, as a conclusion, the number itself. The rest are
+    those of `docs/reference/systems.md`.
     """
 
     noun: ClassVar[str] = "a term"
@@ -131,6 +201,7 @@ class TermOfVariable(FileRecord, frozen=True, kw_only=True):
         KeyForm(("mean", "left", "right")),
         KeyForm(("points",)),
         KeyForm(("degree",)),
+        *(KeyForm((name,)) for name in _CURVES),
     )
     name: Name
     above: float | None = None
@@ -145,6 +216,33 @@ class TermOfVariable(FileRecord, frozen=True, kw_only=True):
     right: HalfSet | None = None
     points: PointList | None = None
     degree: Literal[1] | None = None
+    height: float = 1.0
+    trapezoid: Four | None = None
+    triangle: Three | None = None
+    sigmoid_difference: Two | None = field(name="sigmoid difference", default=None)
+    sigmoid_product: Two | None = field(name="sigmoid product", default=None)
+    pi: Four | None = None
+    at_least: float | None = field(name="at least", default=None)
+    at_most: float | None = field(name="at most", default=None)
+    singleton: float | None = None
+    linear: LinearCurve | None = None
+    formula: FormulaText | None = None
+
+
+if TYPE_CHECKING:
+    TermOfVariable = TermKeys
+else:  # with a field for each function that is written as its numbers
+    TermOfVariable = msgspec.defstruct(
+        "TermOfVariable",
+        [
+            (tag.replace(" ", "_"), record | None, field(name=tag, default=None))
+            for tag, record in _OF_NUMBERS.items()
+        ],
+        bases=(TermKeys,),
+        namespace={"__doc__": TermKeys.__doc__},
+        frozen=True,
+        kw_only=True,
+    )
 
 
 class VariableOfModel(FileRecord, frozen=True, kw_only=True):
@@ -290,18 +388,7 @@ class TreeFile(TreeHead, frozen=True, kw_only=True):
 LONGEST_NOTE = 100_000
 
 Note = Annotated[str, Meta(min_length=1, max_length=LONGEST_NOTE)]
-Four = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
-Three = Annotated[tuple[float, ...], Meta(min_length=3, max_length=3)]
 Samples = Annotated[int, Meta(ge=1, le=MOST_SAMPLES)]
-FormulaText = Annotated[
-    str,
-    Meta(
-        min_length=1,
-        max_length=MOST_CHARACTERS,
-        description="`x` is the value whose degree is computed.",
-        examples=["2 * dirt + 1", "max(0, 1 - abs(x) / 3)"],
-    ),
-]
 ConditionText = Annotated[
     str,
     Meta(
@@ -321,118 +408,6 @@ ConclusionText = Annotated[
 ]
 
 
-class RangeOfSystem(RangeOfVariable, frozen=True, kw_only=True):
-    """The values seen or allowed, ends included; an unknown end is left out.
-
-    With `outside: clipped` a value beyond an end is moved to it.
-    """
-
-    outside: Literal["clipped"] | None = None
-
-
-class SigmoidCurve(FileRecord, frozen=True, kw_only=True):
-    """`1 / (1 + exp(-slope (x - inflection)))`."""
-
-    noun: ClassVar[str] = "a sigmoid"
-    inflection: float
-    slope: float
-
-
-class LinearCurve(FileRecord, frozen=True, kw_only=True):
-    """A weight for each column, in order, and what is added."""
-
-    noun: ClassVar[str] = "a linear term"
-    weights: tuple[float, ...]
-    offset: float = 0.0
-
-
-def _record_of(kind: type[SystemCurve]) -> type[msgspec.Struct]:
-    """Return the record of a membership function: its numbers by their names."""
-    numbers = [
-        (name, float, field(name=name.replace("_", " ")))
-        for name in kind.__struct_fields__
-    ]
-    about = {"__doc__": inspect.getdoc(kind), "noun": f"a {_tag(kind)}"}
-    name = f"{kind.__name__}Numbers"
-    return msgspec.defstruct(
-        name, numbers, bases=(FileRecord,), namespace=about, frozen=True, kw_only=True
-    )
-
-
-def _tag(kind: type[SystemCurve]) -> str:
-    return str(kind.__struct_config__.tag)
-
-
-_OF_NUMBERS: Final = {
-    _tag(kind): _record_of(kind)
-    for kind in get_args(SystemCurve)
-    if kind not in (PiCurve, Singleton)
-    and all(one.type is float for one in msgspec.structs.fields(kind))
-}
-"""The record of each membership function that is written as its numbers by name."""
-
-_CURVES = (
-    *("trapezoid", "triangle", *_OF_NUMBERS, "sigmoid difference", "sigmoid product"),
-    *("pi", "at least", "at most", "singleton", "linear", "formula"),
-)
-Two = Annotated[tuple[SigmoidCurve, ...], Meta(min_length=2, max_length=2)]
-
-
-class TermOfSystem(TermOfVariable, frozen=True, kw_only=True):
-    """A label of a variable of a system, with one curve.
-
-    A trapezoid `[a, b, c, d]` rises from a to b, is 1 up to c and falls to d; `-.inf`
-    as a and `.inf` as d leave that side open. A triangle `[a, b, d]` has its peak at b.
-    `at least: v` is 1 from v on, `at most: v` up to v, both with v itself. A
-    `singleton` is 1 at one value and, as a conclusion, the number itself. The other
-    curves are those of a rule base and those of `docs/reference/systems.md`. The degree
-    is multiplied by the height.
-    """
-
-    forms: ClassVar[tuple[KeyForm, ...]] = (
-        *TermOfVariable.forms,
-        *(KeyForm((name,)) for name in _CURVES),
-    )
-    height: float = 1.0
-    trapezoid: Four | None = None
-    triangle: Three | None = None
-    sigmoid_difference: Two | None = field(name="sigmoid difference", default=None)
-    sigmoid_product: Two | None = field(name="sigmoid product", default=None)
-    pi: Four | None = None
-    at_least: float | None = field(name="at least", default=None)
-    at_most: float | None = field(name="at most", default=None)
-    singleton: float | None = None
-    linear: LinearCurve | None = None
-    formula: FormulaText | None = None
-
-
-if TYPE_CHECKING:
-    LabelOfVariable = TermOfSystem
-else:  # with a field for each function that is written as its numbers
-    LabelOfVariable = msgspec.defstruct(
-        "LabelOfVariable",
-        [
-            (tag.replace(" ", "_"), record | None, field(name=tag, default=None))
-            for tag, record in _OF_NUMBERS.items()
-        ],
-        bases=(TermOfSystem,),
-        namespace={"__doc__": TermOfSystem.__doc__},
-        frozen=True,
-        kw_only=True,
-    )
-
-
-class InputOfSystem(FileRecord, frozen=True, kw_only=True):
-    """An input column, or a sum of weighted inputs, with its terms."""
-
-    noun: ClassVar[str] = "an input"
-    name: Name
-    unit: Name | None = None
-    range: RangeOfSystem | None = None
-    sum_of: tuple[PartOfSum, ...] = field(name="sum of", default=())
-    terms: tuple[LabelOfVariable, ...] = ()
-
-
 class OutputOfSystem(FileRecord, frozen=True, kw_only=True):
     """An output, and how it becomes a number.
 
@@ -443,8 +418,8 @@ class OutputOfSystem(FileRecord, frozen=True, kw_only=True):
     noun: ClassVar[str] = "an output"
     name: Name
     unit: Name | None = None
-    range: RangeOfSystem | None = None
-    terms: tuple[LabelOfVariable, ...] = ()
+    range: RangeOfVariable | None = None
+    terms: tuple[TermOfVariable, ...] = ()
     defuzzifier: DefuzzifierMethod
     samples: Samples = 100
     grid: Grid = "middle"
@@ -511,7 +486,7 @@ class SystemHead(FileRecord, frozen=True, kw_only=True):
 class SystemFile(SystemHead, frozen=True, kw_only=True):
     """A fuzzy system of fuzzytree."""
 
-    inputs: tuple[InputOfSystem, ...] = ()
+    inputs: tuple[VariableOfModel, ...] = ()
     outputs: Annotated[tuple[OutputOfSystem, ...], Meta(min_length=1)]
     blocks: tuple[BlockOfSystem, ...]
     semantics: SystemSemantics

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import get_args
-
-from msgspec.structs import astuple
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import MOST_SHOWN, FileMistake
 from fuzzytree.formats.yaml import layout, values
 from fuzzytree.formats.yaml.binding import (
@@ -32,25 +27,16 @@ from fuzzytree.formats.yaml.conditions import (
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode
 from fuzzytree.model import (
     Activation,
-    Band,
-    Binary,
     Conclusion,
     Condition,
-    Curve,
     Defuzzifier,
-    Formula,
     FuzzySystem,
     Mistake,
-    Part,
     Path,
     RuleBlock,
-    Sigmoid,
-    SystemCurve,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
-    Trapezoid,
+    Variable,
 )
 
 
@@ -69,10 +55,10 @@ def read_system(
     inputs = variables_at(
         kept,
         "inputs",
-        layout.InputOfSystem,
+        layout.VariableOfModel,
         file_mistakes,
-        lambda path, one: _input(path, one, mistakes),
-        lambda name, terms: SystemInput(name, _bare(terms)),
+        lambda path, one: values.variable(path, one, mistakes),
+        lambda name, terms: Variable(name, values.bare(terms)),
         broken,
     )
     outputs = variables_at(
@@ -82,7 +68,7 @@ def read_system(
         file_mistakes,
         lambda path, one: _output(path, one, mistakes),
         lambda name, terms: SystemOutput(
-            name, _bare(terms), None, None, Defuzzifier("weighted sum")
+            name, values.bare(terms), None, None, Defuzzifier("weighted sum")
         ),
         broken,
     )
@@ -97,21 +83,12 @@ def read_system(
         return None
 
 
-def _input(
-    path: Path, one: layout.InputOfSystem, mistakes: list[Mistake]
-) -> SystemInput:
-    low, high, clips = _range(one.range)
-    parts = tuple(Part(p.input, p.weight, p.centre) for p in one.sum_of)
-    labels = _labels(path, one.terms, mistakes)
-    return SystemInput(one.name, labels, low, high, clips, one.unit or "", parts)
-
-
 def _output(
     path: Path, one: layout.OutputOfSystem, mistakes: list[Mistake]
 ) -> SystemOutput:
-    low, high, clips = _range(one.range)
+    low, high, clips = values.range_of(one.range)
     how = Defuzzifier(one.defuzzifier, one.samples, one.grid)
-    labels = _labels(path, one.terms, mistakes)
+    labels = values.terms(path, one.terms, mistakes)
     return SystemOutput(
         *(one.name, labels, low, high, how, one.aggregation, one.default),
         clips=clips,
@@ -119,77 +96,10 @@ def _output(
     )
 
 
-def _bare(names: Sequence[str]) -> tuple[SystemTerm, ...]:
-    return tuple(SystemTerm(name, Band()) for name in names)
-
-
-def _range(
-    one: layout.RangeOfSystem | None,
-) -> tuple[float | None, float | None, bool]:
-    """Return both ends of a range, and whether it clips."""
-    return (
-        (None, None, False) if one is None else (one.from_, one.to, bool(one.outside))
-    )
-
-
-def _labels(
-    path: Path, terms: Sequence[layout.LabelOfVariable], mistakes: list[Mistake]
-) -> tuple[SystemTerm, ...]:
-    labels: list[SystemTerm] = []
-    for index, one in enumerate(terms):
-        curve = _curve(one)
-        if one.formula is not None and len(mistakes) < MOST_SHOWN:
-            try:
-                curve = Formula(parse(one.formula))
-            except FormulaError as error:
-                text = f"term {one.name!r}, character {error.column}: {error.sentence}"
-                mistakes.append(((*path, "labels", index, "formula"), text))
-        labels.append(SystemTerm(one.name, curve, one.height))
-    return tuple(labels)
-
-
-def _curve(one: layout.LabelOfVariable) -> Curve:
-    """Return the one curve that is given; the layout has checked its form."""
-    if one.trapezoid is not None:
-        return _trapezoid(*one.trapezoid)
-    if one.triangle is not None:
-        a, b, d = one.triangle
-        return Trapezoid(a, b, b, d)
-    if one.at_least is not None:
-        return Binary(one.at_least)
-    if one.at_most is not None:
-        return Binary(one.at_most, is_above=False)
-    for kind in get_args(SystemCurve):
-        field = str(kind.__struct_config__.tag).replace(" ", "_")
-        value = getattr(one, field, None)
-        if value is not None and kind is not Formula:
-            curve: Curve = kind(*_arguments(value))
-            return curve
-    return values.shape(one)
-
-
-def _arguments(value: object) -> tuple[object, ...]:
-    """Return the numbers of a curve, and the sigmoids that it consists of."""
-    match value:
-        case layout.FileRecord():
-            return astuple(value)
-        case tuple():
-            both = layout.SigmoidCurve
-            return tuple(
-                Sigmoid(*astuple(v)) if isinstance(v, both) else v for v in value
-            )
-        case _:
-            return (value,)
-
-
-def _trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
-    return Trapezoid(None if a == -math.inf else a, b, c, None if d == math.inf else d)
-
-
 def _spare(outputs: Sequence[SystemOutput]) -> SystemRule | None:
     """Return a rule that is always right, to stand in the place of a broken one."""
     for output in outputs:
-        for label in output.labels:
+        for label in output.terms:
             return SystemRule(None, (Conclusion(output.name, label.name),))
     return None
 

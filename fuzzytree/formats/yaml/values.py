@@ -2,43 +2,127 @@
 
 from __future__ import annotations
 
-import msgspec
+import math
+from collections.abc import Sequence
+from typing import get_args
 
+import msgspec
+from msgspec.structs import astuple
+
+from fuzzytree.formats.formulas import FormulaError, parse
+from fuzzytree.formats.text_files import MOST_SHOWN
 from fuzzytree.formats.yaml import layout
 from fuzzytree.model import (
     LR,
     Band,
+    Binary,
     Branch,
+    Curve,
+    Formula,
     Leaf,
+    Mistake,
     Node,
     Part,
+    Path,
     Points,
     Semantics,
     Sets,
     Shape,
     Side,
+    Sigmoid,
+    SystemCurve,
     Term,
+    Trapezoid,
     Variable,
 )
 
 
-def variable(one: layout.VariableOfModel) -> Variable:
+def variable(
+    path: Path, one: layout.VariableOfModel, mistakes: list[Mistake]
+) -> Variable:
     """Return an input or a combination."""
+    low, high, clips = range_of(one.range)
     return Variable(
         name=one.name,
-        terms=tuple(map(_term, one.terms)),
+        terms=terms(path, one.terms, mistakes),
         unit=one.unit or "",
-        low=one.range.from_ if one.range else None,
-        high=one.range.to if one.range else None,
+        low=low,
+        high=high,
         parts=tuple(Part(p.input, p.weight, p.centre) for p in one.sum_of),
+        clips=clips,
     )
 
 
-def _term(one: layout.TermOfVariable) -> Term:
-    return Term(one.name, shape(one))
+def bare(names: Sequence[str]) -> tuple[Term, ...]:
+    """Return terms of which only the names are known."""
+    return tuple(Term(name, Band()) for name in names)
 
 
-def shape(one: layout.TermOfVariable) -> Shape:
+def range_of(
+    one: layout.RangeOfVariable | None,
+) -> tuple[float | None, float | None, bool]:
+    """Return both ends of a range, and whether it clips."""
+    return (
+        (None, None, False) if one is None else (one.from_, one.to, bool(one.outside))
+    )
+
+
+def terms(
+    path: Path, terms: Sequence[layout.TermOfVariable], mistakes: list[Mistake]
+) -> tuple[Term, ...]:
+    """Return terms; that of a wrong formula stands for any."""
+    results: list[Term] = []
+    for index, one in enumerate(terms):
+        curve = _curve(one)
+        if one.formula is not None and len(mistakes) < MOST_SHOWN:
+            try:
+                curve = Formula(parse(one.formula))
+            except FormulaError as error:
+                text = f"term {one.name!r}, character {error.column}: {error.sentence}"
+                mistakes.append(((*path, "terms", index, "formula"), text))
+        results.append(Term(one.name, curve, one.height))
+    return tuple(results)
+
+
+def _curve(one: layout.TermOfVariable) -> Curve:
+    """Return the one curve that is given; the layout has checked its form."""
+    if one.trapezoid is not None:
+        return _trapezoid(*one.trapezoid)
+    if one.triangle is not None:
+        a, b, d = one.triangle
+        return Trapezoid(a, b, b, d)
+    if one.at_least is not None:
+        return Binary(one.at_least)
+    if one.at_most is not None:
+        return Binary(one.at_most, is_above=False)
+    for kind in get_args(SystemCurve):
+        field = str(kind.__struct_config__.tag).replace(" ", "_")
+        value = getattr(one, field, None)
+        if value is not None and kind is not Formula:
+            curve: Curve = kind(*_arguments(value))
+            return curve
+    return _shape(one)
+
+
+def _arguments(value: object) -> tuple[object, ...]:
+    """Return the numbers of a curve, and the sigmoids that it consists of."""
+    match value:
+        case layout.FileRecord():
+            return astuple(value)
+        case tuple():
+            both = layout.SigmoidCurve
+            return tuple(
+                Sigmoid(*astuple(v)) if isinstance(v, both) else v for v in value
+            )
+        case _:
+            return (value,)
+
+
+def _trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
+    return Trapezoid(None if a == -math.inf else a, b, c, None if d == math.inf else d)
+
+
+def _shape(one: layout.TermOfVariable) -> Shape:
     """Return the shape of a term."""
     if one.points is not None:
         pairs = zip(*one.points, strict=True)
@@ -78,9 +162,9 @@ def leaf(one: layout.End) -> Leaf:
     return Leaf(one.class_, one.pattern or "", one.support)
 
 
-def sets(one: layout.SetsOfVariable) -> Sets:
+def sets(path: Path, one: layout.SetsOfVariable, mistakes: list[Mistake]) -> Sets:
     """Return the fitted sets on a variable."""
-    return Sets(one.variable, tuple(map(_term, one.terms)))
+    return Sets(one.variable, terms(path, one.terms, mistakes))
 
 
 def node(one: layout.NodeOfTree) -> Node:

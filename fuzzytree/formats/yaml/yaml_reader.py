@@ -29,14 +29,12 @@ from fuzzytree.formats.yaml.propositions import (
 )
 from fuzzytree.formats.yaml.system_reader import read_system
 from fuzzytree.model import (
-    Band,
     Document,
     FuzzyTree,
     Mistake,
     Path,
     Reading,
     RuleBase,
-    Term,
     Variable,
     naming_mistakes,
     node_mistakes,
@@ -126,7 +124,7 @@ def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase 
     head = record(kept, layout.RuleBaseHead, file_mistakes)
     semantics = record_at(kept, "semantics", layout.RuleSemantics, file_mistakes)
     bound = records_at(kept, "rules", layout.RuleOfModel, file_mistakes)
-    known = _variables(kept, file_mistakes)
+    known = _variables(kept, root, file_mistakes)
     if head is None or bound is None or known is None:
         return None
     variables, broken = known
@@ -155,7 +153,7 @@ def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | No
     questions = records_at(kept, "nodes", layout.NodeOfTree, file_mistakes)
     ends = records_at(kept, "leaves", layout.End, file_mistakes)
     groups = records_at(kept, "sets", layout.SetsOfVariable, file_mistakes)
-    known = _variables(kept, file_mistakes)
+    known = _variables(kept, root, file_mistakes)
     if questions is not None and ends is not None:
         file_mistakes += located(root, [*_number_mistakes(questions, ends)])
     if head is None or known is None:
@@ -163,7 +161,12 @@ def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | No
     variables, broken = known
     nodes, leaves, fitted = _whole(questions), _whole(ends), _whole(groups)
     tree_nodes = tuple(map(values.node, nodes or ()))
-    sets = tuple(map(values.sets, fitted or ()))
+    wrong: list[Mistake] = []
+    sets = tuple(
+        values.sets(("sets", place), one, wrong)
+        for place, one in enumerate(fitted or ())
+    )
+    file_mistakes += located(root, wrong)
     meaning = values.semantics(semantics)
     if nodes is None or leaves is None or fitted is None or broken:
         of_nodes = node_mistakes(
@@ -224,19 +227,21 @@ def _whole(items: list[R | None] | None) -> list[R] | None:
 
 
 def _variables(
-    kept: Entries, mistakes: list[FileMistake]
+    kept: Entries, root: Node, mistakes: list[FileMistake]
 ) -> tuple[tuple[Variable, ...], set[Path]] | None:
     """Return the variables and which are broken; None if names cannot be known."""
     broken: set[Path] = set()
+    found: list[Mistake] = []
     variables = variables_at(
         kept,
         "variables",
         layout.VariableOfModel,
         mistakes,
-        lambda _, one: values.variable(one),
-        lambda name, terms: Variable(name, tuple(Term(t, Band()) for t in terms)),
+        lambda path, one: values.variable(path, one, found),
+        lambda name, terms: Variable(name, values.bare(terms)),
         broken,
     )
+    mistakes += located(root, found)
     return None if variables is None else (variables, broken)
 
 

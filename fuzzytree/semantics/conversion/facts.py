@@ -272,8 +272,8 @@ def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | No
     results: list[list[Term]] = []
     for one, count in zip(system.inputs, counts, strict=True):
         terms: list[Term] = []
-        for label in one.labels[:count]:
-            shape = shape_of(label.curve)
+        for label in one.terms[:count]:
+            shape = shape_of(label.function)
             if shape is None or label.height != 1.0:
                 return None
             terms.append(Term(label.name, shape))
@@ -298,7 +298,7 @@ def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
         Variable(
             v.name,
             tuple(
-                Term(name, term.shape)
+                replace(term, name=name)
                 for name, term in zip(v.terms, curves.get(place, ()), strict=True)
             ),
             v.unit,
@@ -343,11 +343,11 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
         return None
     output, block = system.outputs[0], system.blocks[0]
     default = output.default
-    is_number = default is None or default in range(1, len(output.labels) + 1)
-    curves = _shapes(system, [len(one.labels) for one in system.inputs])
+    is_number = default is None or default in range(1, len(output.terms) + 1)
+    curves = _shapes(system, [len(one.terms) for one in system.inputs])
     if not is_number or curves is None:
         return None
-    classes = tuple(label.name for label in output.labels)
+    classes = tuple(label.name for label in output.terms)
     variables = tuple(
         Variable(one.name, tuple(terms), one.unit, one.low, one.high, one.parts)
         for one, terms in zip(system.inputs, curves, strict=True)
@@ -409,16 +409,16 @@ def _plain(system: FuzzySystem, *, has_default: bool) -> object:
     """
     places = {one.name: k for k, one in enumerate(system.variables)}
     labels = {
-        one.name: {label.name: k for k, label in enumerate(one.labels)}
+        one.name: {label.name: k for k, label in enumerate(one.terms)}
         for one in system.variables
     }
     inputs = [
-        ([(shape_of(label.curve), label.height) for label in one.labels], one.clips)
+        ([(shape_of(label.function), label.height) for label in one.terms], one.clips)
         for one in system.inputs
     ]
     outputs = [
         (
-            [(label.curve, label.height) for label in one.labels],
+            [(label.function, label.height) for label in one.terms],
             one.defuzzifier.method,
             one.default if has_default else None,
             (one.low, one.high) if one.clips else None,

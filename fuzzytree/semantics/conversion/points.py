@@ -26,11 +26,10 @@ from fuzzytree.model import (
     RuleBase,
     Shape,
     Singleton,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
     Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.numerics import BELOW_ONE, points_of
 from fuzzytree.semantics.conversion.point_plans import plan_of
@@ -39,19 +38,20 @@ EXACT = 2.0**-52
 """Bounds up to this are no loss: rounding alone makes as much."""
 
 D = TypeVar("D", RuleBase, FuzzySystem)
+V = TypeVar("V", Variable, SystemOutput)
 
 
-Keeps = Callable[[SystemInput | SystemOutput, SystemTerm], bool]
+Keeps = Callable[[Variable | SystemOutput, Term], bool]
 """Whether a term of a variable stays as it is; one of rules is one of an input."""
 
 
-def has_numbers(variable: SystemInput | SystemOutput) -> bool:
+def has_numbers(variable: Variable | SystemOutput) -> bool:
     """Return whether a variable is an output of weighted numbers."""
     return isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted
 
 
-def _is_kept(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
-    return has_numbers(variable) or isinstance(term.curve, Points)
+def _is_kept(variable: Variable | SystemOutput, term: Term) -> bool:
+    return has_numbers(variable) or isinstance(term.function, Points)
 
 
 def pointed(
@@ -87,7 +87,7 @@ def pointed(
     check_tolerance(tolerance)
     change: _Change = _Change(tolerance, keeps)
     result: D = (
-        _pointed_rules(document, change)
+        replace(document, variables=change.variables(document.variables))
         if isinstance(document, RuleBase)
         else _pointed_system(document, change)
     )
@@ -109,24 +109,9 @@ def check_tolerance(tolerance: float) -> None:
         )
 
 
-def _pointed_rules(rules: RuleBase, change: _Change) -> RuleBase:
-    variables = tuple(
-        replace(v, terms=tuple(change.term(v.name, term) for term in v.terms))
-        for v in rules.variables
-    )
-    return replace(rules, variables=variables)
-
-
 def _pointed_system(system: FuzzySystem, change: _Change) -> FuzzySystem:
-    inputs = tuple(
-        replace(one, labels=tuple(change.label(one, x) for x in one.labels))
-        for one in system.inputs
-    )
-    outputs = tuple(
-        replace(one, labels=tuple(change.label(one, x) for x in one.labels))
-        for one in system.outputs
-    )
-    return replace(system, inputs=inputs, outputs=outputs)
+    inputs = change.variables(system.inputs)
+    return replace(system, inputs=inputs, outputs=change.variables(system.outputs))
 
 
 class _Change:
@@ -137,19 +122,18 @@ class _Change:
         self.losses: list[Loss] = []
         self.reasons: list[str] = []
 
-    def term(self, variable: str, term: Term) -> Term:
-        result = self.label(SystemInput(variable), SystemTerm(term.name, term.shape))
-        curve = result.curve
-        return Term(term.name, curve) if isinstance(curve, Points) else term
+    def variables(self, variables: tuple[V, ...]) -> tuple[V, ...]:
+        return tuple(
+            replace(one, terms=tuple(self._term(one, term) for term in one.terms))
+            for one in variables
+        )
 
-    def label(
-        self, variable: SystemInput | SystemOutput, label: SystemTerm
-    ) -> SystemTerm:
+    def _term(self, variable: Variable | SystemOutput, label: Term) -> Term:
         if self.keeps(variable, label):
             return label
         where = f"term {label.name!r} of {variable.name!r}"
         try:
-            result = points_for(label.curve, self.tolerance)
+            result = points_for(label.function, self.tolerance)
         except LossError as error:
             self.reasons.append(f"{where}: {error}")
             return label
@@ -158,7 +142,7 @@ class _Change:
             tail = f"; {result.tail}" if result.tail else ""
             what = f"it becomes {count} points joined by lines{tail}"
             self.losses.append(Loss(where, what, result.bound))
-        return replace(label, curve=result.points)
+        return replace(label, function=result.points)
 
 
 class PlacedPoints(NamedTuple):
@@ -314,8 +298,8 @@ def _points_of(left: _Pairs, right: _Pairs) -> Points:
 _COARSE = 0.01  # lines become the same points for every tolerance
 
 
-def _is_no_band(variable: SystemInput | SystemOutput, term: SystemTerm) -> bool:
-    return has_numbers(variable) or not isinstance(term.curve, Band | LR)
+def _is_no_band(variable: Variable | SystemOutput, term: Term) -> bool:
+    return has_numbers(variable) or not isinstance(term.function, Band | LR)
 
 
 def straightened(model: D) -> D | None:

@@ -113,8 +113,8 @@ def _first_terms(system: FuzzySystem) -> dict[tuple[str, str], str]:
         if not output.defuzzifier.is_weighted or output.aggregation in (None, "sum"):
             continue
         earlier: dict[tuple[Curve, float], str] = {}
-        for label in output.labels:
-            result = earlier.setdefault((label.curve, label.height), label.name)
+        for label in output.terms:
+            result = earlier.setdefault((label.function, label.height), label.name)
             first[output.name, label.name] = result
     return first
 

@@ -56,10 +56,9 @@ from fuzzytree.model import (
     RuleBase,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Variable,
     questions,
@@ -98,7 +97,7 @@ def as_system(
         >>> [output.name for output in as_system(rules, "rule").outputs]
         ['score 1 class 1', 'score 2 class 1']
     """
-    inputs = tuple(map(_input, rules.variables))
+    inputs = rules.variables
     tautology: Condition | None = None
     needs_one = scores != "winner" or any(not rule.when for rule in rules.rules)
     if always != "nothing" and needs_one:
@@ -198,8 +197,8 @@ def refuse_singletons(system: FuzzySystem, to: str) -> None:
         LossError: If an output that is not weighted has a singleton.
     """
     for output in system.outputs:
-        for label in output.labels if not output.defuzzifier.is_weighted else ():
-            if isinstance(label.curve, Singleton):
+        for label in output.terms if not output.defuzzifier.is_weighted else ():
+            if isinstance(label.function, Singleton):
                 raise LossError(
                     f"cannot write {system.name[:100]} as {to}: its engines sample the "
                     f"range of {output.name!r} and miss the singleton {label.name!r}; "
@@ -215,12 +214,12 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
 
     Example:
         >>> from fuzzytree.model.rulebase import Part
-        >>> mixed = SystemInput("mix", parts=(Part("a", 2.0, 0.5), Part("b", -1.0)))
-        >>> labels = (SystemTerm("one", Singleton(1.0)),)
+        >>> mixed = Variable("mix", parts=(Part("a", 2.0, 0.5), Part("b", -1.0)))
+        >>> labels = (Term("one", Singleton(1.0)),)
         >>> how = Defuzzifier("weighted average")
         >>> output = SystemOutput("y", labels, 0.0, 1.0, how)
         >>> block = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
-        >>> inputs = SystemInput("a"), SystemInput("b"), mixed
+        >>> inputs = Variable("a"), Variable("b"), mixed
         >>> flat, losses = flattened(FuzzySystem("s", inputs, (output,), (block,)))
         >>> flat.columns
         ('mix',)
@@ -246,31 +245,31 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
         outputs=tuple(
             replace(
                 one,
-                labels=tuple(_widened(label, system.inputs) for label in one.labels),
+                terms=tuple(_widened(label, system.inputs) for label in one.terms),
             )
             for one in system.outputs
         ),
     ), losses
 
 
-def _kept(system: FuzzySystem) -> Iterator[SystemInput]:
+def _kept(system: FuzzySystem) -> Iterator[Variable]:
     """Yield the inputs that something other than a combination uses."""
     summed = {part.input for one in system.inputs for part in one.parts}
     used = {one.variable for r in system.rules for one in questions(r.when)}
-    curves = [label.curve for one in system.variables for label in one.labels]
+    curves = [label.function for one in system.variables for label in one.terms]
     is_computed = any(isinstance(curve, Linear | Formula) for curve in curves)
     for one in system.inputs:
-        if one.labels or one.name not in summed or one.name in used or is_computed:
+        if one.terms or one.name not in summed or one.name in used or is_computed:
             yield one
 
 
-def _widened(label: SystemTerm, inputs: tuple[SystemInput, ...]) -> SystemTerm:
+def _widened(label: Term, inputs: tuple[Variable, ...]) -> Term:
     """Return a conclusion that gives combinations, which are columns now, no weight."""
-    if not isinstance(label.curve, Linear):
+    if not isinstance(label.function, Linear):
         return label
-    left = iter(label.curve.weights)
+    left = iter(label.function.weights)
     weights = tuple(0.0 if one.parts else next(left) for one in inputs)
-    return replace(label, curve=replace(label.curve, weights=weights))
+    return replace(label, function=replace(label.function, weights=weights))
 
 
 def _note(rules: RuleBase, scores: Scores) -> str:
@@ -295,32 +294,21 @@ def _note(rules: RuleBase, scores: Scores) -> str:
             )
 
 
-def _input(variable: Variable) -> SystemInput:
-    return SystemInput(
-        variable.name,
-        tuple(SystemTerm(term.name, term.shape) for term in variable.terms),
-        variable.low,
-        variable.high,
-        unit=variable.unit,
-        parts=variable.parts,
-    )
-
-
 def _with_tautology(
-    inputs: tuple[SystemInput, ...], always: Always
-) -> tuple[tuple[SystemInput, ...], Condition]:
+    inputs: tuple[Variable, ...], always: Always
+) -> tuple[tuple[Variable, ...], Condition]:
     """Return inputs, and a proposition on one of them that is always true."""
     if not inputs:
         raise LossError(
             "a rule without propositions must reference an input, but there is none"
         )
     summed = {part.input for one in inputs for part in one.parts}
-    first = next(one for one in inputs if one.labels or one.name not in summed)
+    first = next(one for one in inputs if one.terms or one.name not in summed)
     if always == "any":
         return inputs, Is(first.name, None, ("any",))
-    name = unlike("always", {label.name for label in first.labels})
-    label = SystemTerm(name, _EVERYWHERE)
-    changed = replace(first, labels=(*first.labels, label))
+    name = unlike("always", {label.name for label in first.terms})
+    label = Term(name, _EVERYWHERE)
+    changed = replace(first, terms=(*first.terms, label))
     return tuple(changed if one is first else one for one in inputs), Is(
         first.name, name
     )
@@ -363,7 +351,7 @@ def _class_output(rules: RuleBase, taken: list[str]) -> SystemOutput:
     uncovered = rules.semantics.uncovered
     return SystemOutput(
         unlike("class", taken),
-        tuple(SystemTerm(name, Singleton(value)) for name, value in number.items()),
+        tuple(Term(name, Singleton(value)) for name, value in number.items()),
         1.0,
         float(len(number)),
         _AVERAGE,
@@ -373,8 +361,8 @@ def _class_output(rules: RuleBase, taken: list[str]) -> SystemOutput:
 
 def _score_outputs(names: list[str], taken: list[str]) -> tuple[SystemOutput, ...]:
     labels = (
-        SystemTerm("absent", Singleton(0.0)),
-        SystemTerm("present", Singleton(1.0)),
+        Term("absent", Singleton(0.0)),
+        Term("present", Singleton(1.0)),
     )
     used = set(taken)
     results: list[SystemOutput] = []

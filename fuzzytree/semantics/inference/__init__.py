@@ -34,10 +34,10 @@ from fuzzytree.model import (
     RuleBlock,
     Singleton,
     SNorm,
-    SystemInput,
     SystemOutput,
-    SystemTerm,
+    Term,
     TNorm,
+    Variable,
     is_drawn_by_lines,
     sampled_values,
 )
@@ -94,10 +94,10 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> from fuzzytree.model import Defuzzifier, SystemRule
-        >>> dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
-        >>> long = SystemTerm("long", Singleton(60.0))
+        >>> dirty = Term("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+        >>> long = Term("long", Singleton(60.0))
         >>> system = FuzzySystem(
-        ...     "washer", (SystemInput("dirt", (dirty,)),),
+        ...     "washer", (Variable("dirt", (dirty,)),),
         ...     (SystemOutput("time", (long,), None, None,
         ...                   Defuzzifier("weighted sum")),),
         ...     (RuleBlock((SystemRule(Is("dirt", "dirty"),
@@ -126,7 +126,7 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
 
 
 def input_values(
-    inputs: Iterable[SystemInput], row: Mapping[str, float]
+    inputs: Iterable[Variable], row: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the value of each input, clamped to its range where it clips.
 
@@ -182,7 +182,7 @@ class _Run:
         self.labels = {
             (variable.name, label.name): label
             for variable in system.variables
-            for label in variable.labels
+            for label in variable.terms
         }
         self.degrees: dict[tuple[str, str], float] = {}
         self.activations: list[float] = []
@@ -249,7 +249,7 @@ class _Run:
 
     def _label_degree(self, variable: str, label: str, value: float) -> float:
         result = self.labels[variable, label]
-        return result.height * curve_degree(result.curve, value, self.values)
+        return result.height * curve_degree(result.function, value, self.values)
 
     def _so_far(self, output: SystemOutput, label: str) -> float:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
@@ -300,7 +300,7 @@ class _Run:
         for one in self._of(output):
             cut = _and(one.implication)
             label = self.labels[output.name, one.conclusion.label]
-            if isinstance(label.curve, Formula):
+            if isinstance(label.function, Formula):
                 degrees = [self._label_degree(output.name, label.name, x) for x in xs]
             else:
                 degrees = sampled_degrees(output, label)
@@ -315,7 +315,7 @@ class _Run:
         twice what they are called.
         """
         known = {one.conclusion.label for one in self._of(output)}
-        labels = [label for label in output.labels if label.name in known]
+        labels = [label for label in output.terms if label.name in known]
         cuts = [
             (self._so_far(output, label.name), line_tables(output, label))
             for label in labels
@@ -355,21 +355,19 @@ class _Run:
             return divide(total, weight)
         return total if weighted else math.nan
 
-    def _weights(self, output: SystemOutput) -> Iterator[tuple[SystemTerm, float]]:
+    def _weights(self, output: SystemOutput) -> Iterator[tuple[Term, float]]:
         """Yield labels and degrees: each conclusion's, or each label's if joined."""
         if output.aggregation is None:
             for one in self._of(output):
                 yield self.labels[output.name, one.conclusion.label], one.degree
             return
         known = {one.conclusion.label for one in self._of(output)}
-        for label in output.labels:
+        for label in output.terms:
             if label.name in known:
                 yield label, self._so_far(output, label.name)
 
-    def _number_of(
-        self, output: SystemOutput, label: SystemTerm, degree: float
-    ) -> float:
-        match label.curve:
+    def _number_of(self, output: SystemOutput, label: Term, degree: float) -> float:
+        match label.function:
             case Singleton(value=value):
                 return value
             case Linear(weights=weights, offset=offset):
@@ -413,7 +411,7 @@ def _chosen(how: Activation, result: Sequence[float]) -> list[float]:
     return [degree if index in ranked else 0.0 for index, degree in enumerate(result)]
 
 
-def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, SystemTerm]]:
+def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, Term]]:
     """Yield the terms that rules conclude and whose degree is 0 at every sample.
 
     A rule that concludes such a term changes no answer. Terms with a formula are left
@@ -424,10 +422,10 @@ def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, SystemT
         if output.defuzzifier.is_weighted:
             continue
         samples = sampled_values(output)
-        for label in output.labels:
+        for label in output.terms:
             if (output.name, label.name) not in concluded:
                 continue
-            curve = label.curve
+            curve = label.function
             if not isinstance(curve, Formula) and not any(
                 curve_degree(curve, x) > 0.0 for x in samples
             ):
@@ -458,14 +456,14 @@ class Lines(msgspec.Struct, frozen=True):
 
 
 @functools.lru_cache(maxsize=256)
-def sampled_degrees(output: SystemOutput, label: SystemTerm) -> list[float]:
+def sampled_degrees(output: SystemOutput, label: Term) -> list[float]:
     """Return the degrees of a term that has no formula, where an output is sampled."""
     xs = sampled_values(output)
-    return [label.height * curve_degree(label.curve, x) for x in xs]
+    return [label.height * curve_degree(label.function, x) for x in xs]
 
 
 @functools.lru_cache(maxsize=256)
-def line_tables(output: SystemOutput, label: SystemTerm) -> Lines:
+def line_tables(output: SystemOutput, label: Term) -> Lines:
     """Return the lines of a label of an output whose grid is `lines`."""
     degrees = sampled_degrees(output, label)
     rows: list[tuple[float, float, float, float, float]] = []

@@ -31,11 +31,11 @@ from fuzzytree.model import (
     Or,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
+    Variable,
     as_number,
     checkpoint,
     hedged,
@@ -78,10 +78,10 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
     Example:
         >>> from fuzzytree.semantics.programs.evaluate import evaluate_program
         >>> from fuzzytree.model import Conclusion, Defuzzifier, Points
-        >>> dirty = SystemTerm("dirty", Points((0.0, 10.0), (0.0, 1.0)))
-        >>> long = SystemTerm("long", Singleton(60.0))
+        >>> dirty = Term("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+        >>> long = Term("long", Singleton(60.0))
         >>> system = FuzzySystem(
-        ...     "washer", (SystemInput("dirt", (dirty,)),),
+        ...     "washer", (Variable("dirt", (dirty,)),),
         ...     (SystemOutput("time", (long,), None, None,
         ...                   Defuzzifier("weighted sum")),),
         ...     (RuleBlock((SystemRule(Is("dirt", "dirty"),
@@ -130,7 +130,7 @@ def _values(make: Maker, system: FuzzySystem) -> tuple[Place, dict[str, Place]]:
         return known_row(make, results), values
 
 
-def _combined(make: Maker, one: SystemInput, values: dict[str, Place]) -> Place:
+def _combined(make: Maker, one: Variable, values: dict[str, Place]) -> Place:
     terms: list[Place] = []
     for part in one.parts:
         offset = values[part.input] - part.centre
@@ -138,7 +138,7 @@ def _combined(make: Maker, one: SystemInput, values: dict[str, Place]) -> Place:
     return make.chain("add", terms)
 
 
-def _clamped(make: Maker, one: SystemInput | SystemOutput, value: Place) -> Place:
+def _clamped(make: Maker, one: Variable | SystemOutput, value: Place) -> Place:
     """Return a value moved into a range; NaN stays NaN."""
     clamped = value
     if one.high is not None:
@@ -186,7 +186,7 @@ class _Run:
         self.labels = {
             (variable.name, label.name): label
             for variable in system.variables
-            for label in variable.labels
+            for label in variable.terms
         }
         self.activations: list[Place] = []
         self.concluded: dict[str, dict[tuple[int, int], _Concluded]] = {
@@ -320,15 +320,15 @@ class _Run:
             self.propositions[proposition] = result
         return self._unit(result, if_all=[degree])
 
-    def _label_degree(self, variable: str, label: SystemTerm, x: Place) -> Place:
+    def _label_degree(self, variable: str, label: Term, x: Place) -> Place:
         key = variable, label.name, x
         if key not in self.degrees:
             with self.make.topic(f"{variable} is {label.name}"):
-                degree = label.curve.degree(self.make, x)
+                degree = label.function.degree(self.make, x)
                 height = self.make.constant(label.height)
                 result = height * degree
                 self.make.titled(result, f"{variable} is {label.name}")
-            if label.curve.is_unit:
+            if label.function.is_unit:
                 self.units.add(result)
             self.degrees[key] = result
         return self.degrees[key]
@@ -383,7 +383,7 @@ class _Run:
             concluded = {one.label for one in self._of(output)}
             cuts = [
                 (self._so_far(output, label.name), line_tables(output, label))
-                for label in output.labels
+                for label in output.terms
                 if label.name in concluded
             ]
             return centroid_of_lines(self.make, output, cuts)
@@ -430,7 +430,7 @@ class _Run:
         for one in result:
             if one.implication not in ("minimum", "product"):
                 return result
-            if not self.labels[output.name, one.label].curve.is_unit:
+            if not self.labels[output.name, one.label].function.is_unit:
                 return result
             key = one.label, one.implication
             if key in gathered:
@@ -465,7 +465,7 @@ class _Run:
 
     def _weights(
         self, output: SystemOutput
-    ) -> Iterator[tuple[SystemTerm, Place, list[_Concluded]]]:
+    ) -> Iterator[tuple[Term, Place, list[_Concluded]]]:
         """Yield labels and degrees, and the conclusions that they come from."""
         result = self._of(output)
         if output.aggregation is None:
@@ -475,7 +475,7 @@ class _Run:
         owners: dict[str, list[_Concluded]] = {}
         for one in result:
             owners.setdefault(one.label, []).append(one)
-        for label in output.labels:
+        for label in output.terms:
             if own := owners.get(label.name):
                 yield label, self._aggregate(output, own), own
 
@@ -485,11 +485,9 @@ class _Run:
         tests = [self.make.less(zero, one.degree) for one in concluded]
         return self.make.chain("or", tests)
 
-    def _number_of(
-        self, output: SystemOutput, label: SystemTerm, degree: Place
-    ) -> Place:
+    def _number_of(self, output: SystemOutput, label: Term, degree: Place) -> Place:
         make = self.make
-        match label.curve:
+        match label.function:
             case Singleton(value=value):
                 return make.constant(value)
             case Linear(weights=weights, offset=offset):
@@ -510,7 +508,7 @@ class _Run:
 
 def samples_of(make: Maker, output: SystemOutput) -> Place:
     """Return the values at which an output's curve is sampled."""
-    if any(isinstance(label.curve, Singleton) for label in output.labels):
+    if any(isinstance(label.function, Singleton) for label in output.terms):
         values = sampled_values(output)
         return make.table("pick", make.index(len(values)), values)
     low, high = output.low or 0.0, output.high or 0.0

@@ -42,12 +42,12 @@ from fuzzytree.model import (
     RuleBlock,
     Singleton,
     SNorm,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import infer
@@ -64,21 +64,23 @@ def rule(when: Condition, *labels: str, weight: float = 1.0) -> SystemRule:
 
 def tipper(
     *,
-    inputs: Sequence[SystemInput] = (),
+    inputs: Sequence[Variable] = (),
     outputs: Sequence[SystemOutput] = (),
     numbers: Mapping[str, float] = MappingProxyType({}),
 ) -> FuzzySystem:
     """Return a system of two inputs and three rules, with some parts changed."""
-    bad = SystemTerm("bad", Trapezoid(0.0, 0.0, 2.0, 6.0))
-    good = SystemTerm("good", Trapezoid(2.0, 6.0, 10.0, 10.0))
+    bad = Term("bad", Trapezoid(0.0, 0.0, 2.0, 6.0))
+    good = Term("good", Trapezoid(2.0, 6.0, 10.0, 10.0))
     values = {"low": 5.0, "middle": 12.5, "high": 25.0, **numbers}
-    labels = tuple(SystemTerm(name, Singleton(value)) for name, value in values.items())
+    labels = tuple(Term(name, Singleton(value)) for name, value in values.items())
     rules = (
         rule(Is("food", "bad"), "low"),
         rule(And((Is("food", "good"), Is("service", "good"))), "high"),
         rule(Is("service", "bad"), "middle"),
     )
-    usual = [SystemInput(name, (bad, good), 0.0, 10.0) for name in ("food", "service")]
+    usual = [
+        Variable(name, (bad, good), low=0.0, high=10.0) for name in ("food", "service")
+    ]
     tip = SystemOutput("tip", labels, 0.0, 30.0, AVERAGE, default=0.0)
     return FuzzySystem(
         "tipper", tuple(inputs or usual), tuple(outputs or (tip,)), (RuleBlock(rules),)
@@ -109,7 +111,7 @@ def test_what_no_number_depends_on_leaves_the_operations_the_same() -> None:
     never = rule(Is("food", "bad"), "high", weight=0.0)
     other = with_rules(other, *other.blocks[0].rules, never)
     wide = replace(other.inputs[0], unit="points", high=11.0)
-    service = replace(other.inputs[1], labels=other.inputs[1].labels[::-1])
+    service = replace(other.inputs[1], terms=other.inputs[1].terms[::-1])
     other = replace(other, name="b", note="new", inputs=(service, wide))
     found = results(system, other)
     assert (found.verdict, found.ok) == ("equal", True)
@@ -134,10 +136,10 @@ def test_rules_in_another_order_are_alike_but_for_rounding() -> None:
 
 
 def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
-    points = SystemTerm("bad", Points((2.0, 6.0), (1.0, 0.0)))
-    long = SystemTerm("bad", Points((2.0, 4.0, 6.0), (1.0, 0.5, 0.0)))
-    one = replace(tipper().inputs[0], labels=(points, tipper().inputs[0].labels[1]))
-    other = replace(one, labels=(long, one.labels[1]))
+    points = Term("bad", Points((2.0, 6.0), (1.0, 0.0)))
+    long = Term("bad", Points((2.0, 4.0, 6.0), (1.0, 0.5, 0.0)))
+    one = replace(tipper().inputs[0], terms=(points, tipper().inputs[0].terms[1]))
+    other = replace(one, terms=(long, one.terms[1]))
     service = tipper().inputs[1]
     old, new = (tipper(inputs=(each, service)) for each in (one, other))
     assert operation_keys(old) != operation_keys(new)
@@ -162,7 +164,7 @@ def test_a_range_that_holds_the_domain_moves_no_value() -> None:
 
 
 def test_columns_of_one_model_alone_are_reported() -> None:
-    more = (*tipper().inputs, SystemInput("music", (), 0.0, 1.0))
+    more = (*tipper().inputs, Variable("music", (), low=0.0, high=1.0))
     found = results(tipper(), tipper(inputs=more))
     assert found.answers[0].sentence == (
         "both systems compute alike, where no value is missing"
@@ -215,8 +217,8 @@ def test_a_constant_that_is_changed_back_is_no_difference() -> None:
 
 
 def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
-    wide = SystemTerm("bad", Trapezoid(0.0, 0.0, 3.0, 7.0))
-    food = replace(tipper().inputs[0], labels=(wide, tipper().inputs[0].labels[1]))
+    wide = Term("bad", Trapezoid(0.0, 0.0, 3.0, 7.0))
+    food = replace(tipper().inputs[0], terms=(wide, tipper().inputs[0].terms[1]))
     found = results(tipper(), tipper(inputs=(food, tipper().inputs[1])))
     (bound,) = (a.state for a in found.answers if isinstance(a.state, Bracket))
     assert bound.high == 25.0  # from 0, the default, to 25
@@ -225,10 +227,10 @@ def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
 
 
 def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
-    labels = (*tipper().outputs[0].labels, SystemTerm("top", Singleton(30.0)))
-    output = replace(tipper().outputs[0], labels=labels)
-    sliver = SystemTerm("sliver", Trapezoid(5.0, 5.0 + 1e-12, 5.0 + 2e-12, 5.0 + 3e-12))
-    food = replace(tipper().inputs[0], labels=(*tipper().inputs[0].labels, sliver))
+    labels = (*tipper().outputs[0].terms, Term("top", Singleton(30.0)))
+    output = replace(tipper().outputs[0], terms=labels)
+    sliver = Term("sliver", Trapezoid(5.0, 5.0 + 1e-12, 5.0 + 2e-12, 5.0 + 3e-12))
+    food = replace(tipper().inputs[0], terms=(*tipper().inputs[0].terms, sliver))
     old = tipper(inputs=(food, tipper().inputs[1]), outputs=(output,))
     new = with_rules(old, ONE, TWO, THREE, rule(Is("food", "sliver"), "top"))
     found = results(old, new)
@@ -239,9 +241,9 @@ def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
 
 
 def test_numbers_without_fractions_are_shown_as_they_are_computed() -> None:
-    bell = replace(tipper().inputs[0], labels=(
-        SystemTerm("bad", Gaussian(0.0, 2.0)),
-        tipper().inputs[0].labels[1]))  # fmt: skip
+    bell = replace(tipper().inputs[0], terms=(
+        Term("bad", Gaussian(0.0, 2.0)),
+        tipper().inputs[0].terms[1]))  # fmt: skip
     old = tipper(inputs=(bell, tipper().inputs[1]))
     new = tipper(inputs=old.inputs, numbers={"low": 6.0})
     witness = results(old, new).answers[0]
@@ -256,9 +258,7 @@ def test_an_output_that_stays_is_proved_beside_one_that_differs() -> None:
     both = (tipper().outputs[0], output)
     rules = (ONE, SystemRule(TWO.when, (Conclusion("other", "high"),)), THREE)
     old = with_rules(tipper(outputs=both), *rules)
-    moved = replace(
-        output, labels=(*output.labels[:2], SystemTerm("high", Singleton(9.0)))
-    )
+    moved = replace(output, terms=(*output.terms[:2], Term("high", Singleton(9.0))))
     found = results(old, replace(old, outputs=(both[0], moved)))
     assert found.verdict == "changed"
     states = {answer.subject: answer.state for answer in found.answers}
@@ -308,8 +308,8 @@ def made(chance: random.Random) -> FuzzySystem:
         return Trapezoid(*sorted(float(chance.randrange(9)) for _ in range(4)))
 
     inputs = tuple(
-        SystemInput(name, tuple(SystemTerm(f"t{k}", curve()) for k in range(3)),
-                    0.0, 8.0, clips=chance.random() < 0.2)
+        Variable(name, tuple(Term(f"t{k}", curve()) for k in range(3)),
+                    low=0.0, high=8.0, clips=chance.random() < 0.2)
         for name in "ab"
     )  # fmt: skip
     curves = [
@@ -320,7 +320,7 @@ def made(chance: random.Random) -> FuzzySystem:
     ]
     output = SystemOutput(
         "tip",
-        tuple(SystemTerm(f"o{k}", curve) for k, curve in enumerate(curves)),
+        tuple(Term(f"o{k}", curve) for k, curve in enumerate(curves)),
         0.0,
         30.0,
         chance.choice([AVERAGE, AVERAGE, Defuzzifier("weighted sum")]),
@@ -357,13 +357,13 @@ def altered(system: FuzzySystem, chance: random.Random) -> FuzzySystem:
     elif kind == 1:
         rules[0] = replace(rules[0], weight=0.25)
     elif kind == 2:
-        first = replace(output.labels[0], curve=Singleton(3.5))
-        moved = replace(output, labels=(first, *output.labels[1:]))
+        first = replace(output.terms[0], function=Singleton(3.5))
+        moved = replace(output, terms=(first, *output.terms[1:]))
         return replace(system, outputs=(moved, *system.outputs[1:]))
     elif kind == 3:
         queries, *others = system.inputs
-        labels = tuple(replace(label, height=0.5) for label in queries.labels)
-        return replace(system, inputs=(replace(queries, labels=labels), *others))
+        labels = tuple(replace(label, height=0.5) for label in queries.terms)
+        return replace(system, inputs=(replace(queries, terms=labels), *others))
     changed = replace(block, rules=tuple(rules))
     return replace(system, blocks=(changed, *system.blocks[1:]))
 

@@ -26,6 +26,7 @@ from fuzzytree.auditing.findings.rule_bounds import bounded_rules
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model import (
+    LR,
     And,
     Bell,
     Conclusion,
@@ -38,27 +39,22 @@ from fuzzytree.model import (
     Is,
     Not,
     Or,
-    RuleBlock,
-    SCurve,
-    Sigmoid,
-    Singleton,
-    SystemInput,
-    SystemOutput,
-    SystemRule,
-    SystemTerm,
-    TNorm,
-)
-from fuzzytree.model.rulebase import (
-    LR,
     Points,
     Proposition,
     Rule,
     RuleBase,
+    RuleBlock,
+    SCurve,
+    Sigmoid,
+    Singleton,
+    SystemOutput,
+    SystemRule,
     Term,
+    TNorm,
     Variable,
     sentence,
 )
-from fuzzytree.model.rulebase import Side as Flank
+from fuzzytree.model import Side as Flank
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.semantics.inference import infer
 from tests.auditing.findings.grids import check_on_grid
@@ -80,13 +76,13 @@ def system_of(
     **others: Curve,
 ) -> FuzzySystem:
     """Return a system of two inputs from 0 to 4, with one output."""
-    labels: tuple[SystemTerm, ...] = (SystemTerm("low", low), SystemTerm("high", high))
-    labels += tuple(SystemTerm(name, curve) for name, curve in others.items())
-    inputs = tuple(SystemInput(name, labels, 0.0, 4.0) for name in ("a", "b"))
+    labels: tuple[Term, ...] = (Term("low", low), Term("high", high))
+    labels += tuple(Term(name, curve) for name, curve in others.items())
+    inputs = tuple(Variable(name, labels, low=0.0, high=4.0) for name in ("a", "b"))
     thens = dict.fromkeys(then for _, then, _ in rules)
     output = SystemOutput(
         "power",
-        tuple(SystemTerm(then, Singleton(float(k))) for k, then in enumerate(thens)),
+        tuple(Term(then, Singleton(float(k))) for k, then in enumerate(thens)),
         None,
         None,
         Defuzzifier("weighted average"),

@@ -9,7 +9,9 @@ from fuzzytree.auditing.engine.domain import DomainSide, limited
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model import (
+    LR,
     Arc,
+    Band,
     Bell,
     Binary,
     Concave,
@@ -17,45 +19,39 @@ from fuzzytree.model import (
     Cosine,
     Curve,
     Defuzzifier,
+    Document,
     Formula,
     FuzzySystem,
     Gaussian,
     Is,
     Name,
-    PiCurve,
-    RuleBlock,
-    SCurve,
-    SemiEllipse,
-    Sigmoid,
-    SigmoidDifference,
-    Singleton,
-    Spike,
-    SystemInput,
-    SystemOutput,
-    SystemRule,
-    SystemTerm,
-    TwoGaussians,
-)
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import (
-    LR,
-    Band,
     Part,
+    PiCurve,
     Points,
     Proposition,
     Rule,
     RuleBase,
+    RuleBlock,
+    SCurve,
+    SemiEllipse,
     Shape,
+    Sigmoid,
+    SigmoidDifference,
+    Singleton,
+    Spike,
+    SystemOutput,
+    SystemRule,
     Term,
+    TwoGaussians,
     Variable,
 )
-from fuzzytree.model.rulebase import Side as SideOfSet
+from fuzzytree.model import Side as SideOfSet
 from tests.cli.conftest import grip
 
 SET = LR(5.0, SideOfSet(1.0, (0.5,), 4.0), SideOfSet(2.0, (0.5,), 4.0))
 POWER = SystemOutput(
     "power",
-    (SystemTerm("on", Singleton(1.0)),),
+    (Term("on", Singleton(1.0)),),
     0.0,
     1.0,
     Defuzzifier("weighted average"),
@@ -122,8 +118,8 @@ def test_spreads_are_counted_from_the_rows_where_there_are_no_sets() -> None:
 
 def test_a_system_is_audited_on_its_ranges_and_curves() -> None:
     inputs = (
-        SystemInput("dirt", (SystemTerm("much", Gaussian(5.0, 1.0)),)),
-        SystemInput("load", (), 0.0, 3.0),
+        Variable("dirt", (Term("much", Gaussian(5.0, 1.0)),)),
+        Variable("load", (), low=0.0, high=3.0),
     )
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
@@ -231,7 +227,7 @@ def test_an_input_on_which_nothing_depends_may_be_any_number(
 def test_every_curve_of_a_system_has_a_span(
     curve: Curve, low: float, high: float
 ) -> None:
-    inputs = (SystemInput("dirt", (SystemTerm("much", curve),)),)
+    inputs = (Variable("dirt", (Term("much", curve),)),)
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     found = side(system)
@@ -239,8 +235,8 @@ def test_every_curve_of_a_system_has_a_span(
 
 
 def test_an_input_that_a_formula_may_name_needs_limits() -> None:
-    label = SystemTerm("much", Formula(Name("load")))
-    inputs = (SystemInput("dirt", (label,), 0.0, 1.0), SystemInput("load", ()))
+    label = Term("much", Formula(Name("load")))
+    inputs = (Variable("dirt", (label,), low=0.0, high=1.0), Variable("load", ()))
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     with pytest.raises(ValueError, match="input 'load' has neither a range nor"):

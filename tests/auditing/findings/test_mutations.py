@@ -20,31 +20,27 @@ from fuzzytree.auditing.engine.states import Bracket, Proved, Sampled, State, Wi
 from fuzzytree.auditing.findings.codes import AUDITED
 from fuzzytree.auditing.findings.records import AuditAnswer, Severity
 from fuzzytree.model import (
+    LR,
     Conclusion,
     Defuzzifier,
+    Document,
     FuzzySystem,
+    FuzzyTree,
     Is,
-    RuleBlock,
-    Singleton,
-    SystemInput,
-    SystemOutput,
-    SystemRule,
-    SystemTerm,
-    Trapezoid,
-)
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import (
-    LR,
     Points,
     Proposition,
     Rule,
     RuleBase,
+    RuleBlock,
     Semantics,
     Side,
+    Singleton,
+    SystemOutput,
+    SystemRule,
     Term,
+    Trapezoid,
     Variable,
 )
-from fuzzytree.model.tree import FuzzyTree
 from tests.auditing.findings.small_trees import one_cut, two_cuts
 
 LOW = Term("low", Points((0.0, 1.0, 2.5), (1.0, 1.0, 0.0)))
@@ -206,24 +202,24 @@ PLANTED = (
 def system(
     *others: tuple[str, str, float],
     falls: tuple[float, float] = (1.0, 2.5),
-    more: tuple[SystemTerm, ...] = (),
+    more: tuple[Term, ...] = (),
 ) -> FuzzySystem:
     """Return the clean rules as a system, with more rules: term, conclusion, weight."""
-    low = SystemTerm("low", Trapezoid(None, 0.0, *falls))
-    high = SystemTerm("high", Trapezoid(1.5, 3.0, 4.0, None))
+    low = Term("low", Trapezoid(None, 0.0, *falls))
+    high = Term("high", Trapezoid(1.5, 3.0, 4.0, None))
     entries = (("low", "weak", 1.0), ("high", "strong", 1.0), *others)
     rules = tuple(
         SystemRule(Is("force", term), (Conclusion("grip", then),), weight)
         for term, then, weight in entries
     )
-    ends = SystemTerm("weak", Singleton(0.0)), SystemTerm("strong", Singleton(1.0))
+    ends = Term("weak", Singleton(0.0)), Term("strong", Singleton(1.0))
     output = SystemOutput("grip", ends, None, None, Defuzzifier("weighted average"))
-    force = SystemInput("force", (low, high, *more), 0.0, 4.0)
+    force = Variable("force", (low, high, *more), low=0.0, high=4.0)
     return FuzzySystem("grip", (force,), (output,), (RuleBlock(rules),))
 
 
-FAR = SystemTerm("far", Trapezoid(120.0, 130.0, 140.0, 150.0))
-LIKE = SystemTerm("like", Trapezoid(None, 0.0, 1.0, 2.6))
+FAR = Term("far", Trapezoid(120.0, 130.0, 140.0, 150.0))
+LIKE = Term("like", Trapezoid(None, 0.0, 1.0, 2.6))
 OF_SYSTEMS = (
     Planted("FT101", system(("low", "strong", 0.0)), "error", Proved),
     Planted("FT106", system(("low", "strong", 1.0)), "info", Proved, (1, 3)),

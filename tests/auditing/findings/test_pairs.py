@@ -445,8 +445,8 @@ def test_only_conclusions_about_one_output_conflict(
     conclusions: tuple[tuple[str, str], ...], count: int
 ) -> None:
     (power,) = system_of(block_of(A_LOW)).outputs
-    labels = (*power.labels, replace(power.labels[0], name="small"))
-    outputs = tuple(replace(power, name=n, labels=labels) for n in ("power", "fan"))
+    labels = (*power.terms, replace(power.terms[0], name="small"))
+    outputs = tuple(replace(power, name=n, terms=labels) for n in ("power", "fan"))
     rules = tuple(
         SystemRule(Is(name, "high"), (Conclusion(output, label),))
         for name, (output, label) in zip("ab", conclusions, strict=True)

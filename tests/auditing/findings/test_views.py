@@ -30,11 +30,11 @@ from fuzzytree.model import (
     Points,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.model.rulebase import sentence
 from fuzzytree.numerics.exact import exact_answer
@@ -59,11 +59,13 @@ def block_of(*conditions: Condition | None, **others: object) -> RuleBlock:
 
 
 def system_of(*blocks: RuleBlock, low: Curve = LOW, clips: bool = False) -> FuzzySystem:
-    labels = (SystemTerm("low", low), SystemTerm("high", HIGH))
-    inputs = tuple(SystemInput(n, labels, 0.0, 4.0, clips=clips) for n in ("a", "b"))
+    labels = (Term("low", low), Term("high", HIGH))
+    inputs = tuple(
+        Variable(n, labels, low=0.0, high=4.0, clips=clips) for n in ("a", "b")
+    )
     output = SystemOutput(
         "power",
-        (SystemTerm("big", Singleton(1.0)),),
+        (Term("big", Singleton(1.0)),),
         None,
         None,
         Defuzzifier("weighted average"),
@@ -237,7 +239,7 @@ def test_a_height_is_carried_where_no_degree_is_rounded() -> None:
         (lines, 0.7, None),
     ):
         system = system_of(block_of(A_LOW))
-        one = replace(system.inputs[0], labels=(SystemTerm("low", curve, height),))
+        one = replace(system.inputs[0], terms=(Term("low", curve, height),))
         found = view(replace(system, inputs=(one, system.inputs[1])), BOX)
         assert found.rules is not None
         assert (found.bounds is not None) is (expected is None)

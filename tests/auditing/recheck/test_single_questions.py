@@ -26,25 +26,21 @@ from fuzzytree.model import (
     And,
     Conclusion,
     Condition,
+    Conjunction,
     Defuzzifier,
     FuzzySystem,
     Is,
     Not,
     Or,
-    RuleBlock,
-    Singleton,
-    SystemInput,
-    SystemOutput,
-    SystemRule,
-    SystemTerm,
-)
-from fuzzytree.model.rulebase import (
-    Conjunction,
     Points,
     Proposition,
     Rule,
     RuleBase,
+    RuleBlock,
     Semantics,
+    Singleton,
+    SystemOutput,
+    SystemRule,
     Term,
     Variable,
     proposition_text,
@@ -99,16 +95,13 @@ def random_numeric_system(seed: int) -> FuzzySystem:
     """Return a system with rules that are equal, weigh nothing or hold in two ways."""
     chance = random.Random(seed)
     curves = tuple(
-        SystemTerm(name, random_points(chance))
-        for name in ("low", "mid", "high", "spare")
+        Term(name, random_points(chance)) for name in ("low", "mid", "high", "spare")
     )
     inputs = tuple(
-        SystemInput(name, curves, 0.0, float(TOP))
+        Variable(name, curves, low=0.0, high=float(TOP))
         for name in ("x", "y")[: chance.randint(1, 2)]
     )
-    labels = tuple(
-        SystemTerm(name, Singleton(x)) for name, x in (("s", 1.0), ("l", 2.0))
-    )
+    labels = tuple(Term(name, Singleton(x)) for name, x in (("s", 1.0), ("l", 2.0)))
     how = Defuzzifier("weighted average")
     outputs = tuple(
         SystemOutput(name, labels, None, None, how)

@@ -34,12 +34,12 @@ from fuzzytree.model import (
     Or,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     TNorm,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.model.rulebase import fingerprint as our_fingerprint
 from fuzzytree.semantics.inference import hedged as hedged_degree
@@ -81,11 +81,11 @@ def test_its_degrees_enclose_ours_on_every_curve() -> None:
         for mine, ours in zip(read(system).inputs, system.inputs, strict=True):
             low, high = ours.low or 0.0, ours.high or 1.0
             points = [low + (high - low) * k / 6 for k in range(-1, 8)]
-            for one, label in zip(mine.labels, ours.labels, strict=True):
-                kinds.add(str(label.curve.__struct_config__.tag))
+            for one, label in zip(mine.terms, ours.terms, strict=True):
+                kinds.add(str(label.function.__struct_config__.tag))
                 for x in points:
-                    least, most = bounds(one.curve, Fraction(x))
-                    degree = curve_degree(label.curve, x)
+                    least, most = bounds(one.function, Fraction(x))
+                    degree = curve_degree(label.function, x)
                     assert 0 <= most - least < Fraction(1, 2**100)
                     assert least - CLOSE <= degree <= most + CLOSE, (label, x)
     assert len(kinds) > 15
@@ -123,13 +123,13 @@ def test_sentences_are_read_as_conditions() -> None:
 LEFT, RIGHT = Trapezoid(None, 0.0, 1.0, 3.0), Trapezoid(1.0, 3.0, 4.0, None)
 TIP = SystemOutput(
     "tip",
-    (SystemTerm("small", Singleton(1.0)), SystemTerm("large", Singleton(2.0))),
+    (Term("small", Singleton(1.0)), Term("large", Singleton(2.0))),
     None,
     None,
     Defuzzifier("weighted average"),
 )
 INPUTS = tuple(
-    SystemInput(name, (SystemTerm("left", LEFT), SystemTerm("right", RIGHT)), 0.0, 4.0)
+    Variable(name, (Term("left", LEFT), Term("right", RIGHT)), low=0.0, high=4.0)
     for name in ("x", "y")
 )
 

@@ -18,10 +18,10 @@ from fuzzytree.model import (
     Points,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
+    Variable,
 )
 from fuzzytree.semantics import probing
 from fuzzytree.semantics.programs import evaluate
@@ -95,11 +95,11 @@ def tank(
     method: DefuzzifierMethod, curves: dict[str, Points | Singleton]
 ) -> FuzzySystem:
     low, high = (
-        SystemTerm("low", Gaussian(0.0, 1.5)),
-        SystemTerm("high", Gaussian(10.0, 1.5)),
+        Term("low", Gaussian(0.0, 1.5)),
+        Term("high", Gaussian(10.0, 1.5)),
     )
-    level = SystemInput("level", (low, high), 0.0, 10.0)
-    labels = tuple(SystemTerm(name, curve) for name, curve in curves.items())
+    level = Variable("level", (low, high), low=0.0, high=10.0)
+    labels = tuple(Term(name, curve) for name, curve in curves.items())
     output = SystemOutput(
         "valve", labels, 0.0, 30.0, Defuzzifier(method, 20), "maximum", default=7.0
     )

@@ -16,11 +16,11 @@ from fuzzytree.model import (
     Or,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.runtimes import programs as runtimes
 from fuzzytree.semantics.programs import system_program as systems
@@ -40,24 +40,24 @@ SWAPS = {
     "total": "highest",
 }
 
-SERVICE = SystemInput(
+SERVICE = Variable(
     "service",
     (
-        SystemTerm("poor", Trapezoid(0.0, 0.0, 2.0, 5.0)),
-        SystemTerm("good", Trapezoid(2.0, 5.0, 5.0, 8.0)),
-        SystemTerm("excellent", Trapezoid(5.0, 8.0, 10.0, 10.0)),
+        Term("poor", Trapezoid(0.0, 0.0, 2.0, 5.0)),
+        Term("good", Trapezoid(2.0, 5.0, 5.0, 8.0)),
+        Term("excellent", Trapezoid(5.0, 8.0, 10.0, 10.0)),
     ),
-    0.0,
-    10.0,
+    low=0.0,
+    high=10.0,
 )
-FOOD = SystemInput(
+FOOD = Variable(
     "food",
     (
-        SystemTerm("rancid", Gaussian(0.0, 1.5)),
-        SystemTerm("delicious", Trapezoid(7.0, 9.0, 10.0, 10.0)),
+        Term("rancid", Gaussian(0.0, 1.5)),
+        Term("delicious", Trapezoid(7.0, 9.0, 10.0, 10.0)),
     ),
-    0.0,
-    10.0,
+    low=0.0,
+    high=10.0,
 )
 
 
@@ -81,9 +81,9 @@ SUGENO = tipper(
     SystemOutput(
         "tip",
         (
-            SystemTerm("cheap", Singleton(5.0)),
-            SystemTerm("average", Singleton(15.0)),
-            SystemTerm("generous", Singleton(25.0)),
+            Term("cheap", Singleton(5.0)),
+            Term("average", Singleton(15.0)),
+            Term("generous", Singleton(25.0)),
         ),
         0.0,
         30.0,
@@ -94,9 +94,9 @@ MAMDANI = tipper(
     SystemOutput(
         "tip",
         (
-            SystemTerm("cheap", Trapezoid(0.0, 5.0, 5.0, 10.0)),
-            SystemTerm("average", Trapezoid(10.0, 15.0, 15.0, 20.0)),
-            SystemTerm("generous", Trapezoid(20.0, 25.0, 25.0, 30.0)),
+            Term("cheap", Trapezoid(0.0, 5.0, 5.0, 10.0)),
+            Term("average", Trapezoid(10.0, 15.0, 15.0, 20.0)),
+            Term("generous", Trapezoid(20.0, 25.0, 25.0, 30.0)),
         ),
         0.0,
         30.0,

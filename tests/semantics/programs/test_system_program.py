@@ -16,11 +16,11 @@ from fuzzytree.model import (
     Number,
     RuleBlock,
     Singleton,
-    SystemInput,
     SystemOutput,
     SystemRule,
-    SystemTerm,
+    Term,
     Trapezoid,
+    Variable,
 )
 from fuzzytree.model.rulebase import Points
 from fuzzytree.semantics.inference import infer
@@ -30,7 +30,7 @@ from fuzzytree.semantics.programs.operations import INEXACT
 from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.testing import random_rows, random_system
 
-RAMP = SystemTerm("up", Points((0.0, 1.0), (0.0, 1.0)))
+RAMP = Term("up", Points((0.0, 1.0), (0.0, 1.0)))
 
 
 def equal(one: float, two: float) -> bool:
@@ -54,7 +54,7 @@ def a_system(
     then = [(Conclusion("y", name),) for name in conclusions]
     rules = tuple(SystemRule(Is("x", "up"), one) for one in then)
     kept = replace(block or RuleBlock(()), rules=rules, implication="minimum")
-    return FuzzySystem("test", (SystemInput("x", (RAMP,)),), (output,), (kept,))
+    return FuzzySystem("test", (Variable("x", (RAMP,)),), (output,), (kept,))
 
 
 @pytest.mark.one_in(5)
@@ -73,11 +73,9 @@ def test_a_program_has_the_bits_of_the_inference(seed: int) -> None:
 
 def test_a_conclusion_that_is_not_activated_has_no_part_even_if_it_is_nan() -> None:
     nan = Formula(Call("asin", (Number(2.0),)))
-    labels = (SystemTerm("nan", nan), SystemTerm("one", Singleton(1.0)))
+    labels = (Term("nan", nan), Term("one", Singleton(1.0)))
     output = SystemOutput("y", labels, None, None, Defuzzifier("weighted average"))
-    inputs = (
-        SystemInput("x", (RAMP, SystemTerm("down", Points((0.0, 1.0), (1.0, 0.0))))),
-    )
+    inputs = (Variable("x", (RAMP, Term("down", Points((0.0, 1.0), (1.0, 0.0))))),)
     rules = (
         SystemRule(Is("x", "up"), (Conclusion("y", "nan"),)),
         SystemRule(Is("x", "down"), (Conclusion("y", "one"),)),
@@ -88,7 +86,7 @@ def test_a_conclusion_that_is_not_activated_has_no_part_even_if_it_is_nan() -> N
 
 
 def test_a_curve_that_is_the_same_everywhere_is_sampled_all_the_same() -> None:
-    level = SystemTerm("level", Points((0.0,), (0.5,)))
+    level = Term("level", Points((0.0,), (0.5,)))
     how = Defuzzifier("largest of maximum", samples=5, grid="ends")
     output = SystemOutput("y", (level,), 0.0, 4.0, how, "maximum")
     assert_equal(a_system("level", output=output), [{"x": 0.25}, {"x": 0.0}])
@@ -98,14 +96,14 @@ def test_a_curve_that_is_the_same_everywhere_is_sampled_all_the_same() -> None:
 def test_samples_between_neighbouring_doubles_need_not_rise(method: str) -> None:
     low = 1.0
     high = low + 3 * math.ulp(low)
-    label = SystemTerm("level", Points((0.0,), (0.5,)))
+    label = Term("level", Points((0.0,), (0.5,)))
     how = Defuzzifier(method, samples=9, grid="ends")  # type: ignore[arg-type] # a name
     output = SystemOutput("y", (label,), low, high, how, "maximum")
     assert_equal(a_system("level", output=output), [{"x": 0.25}])
 
 
 def test_rules_of_one_label_are_cut_once_where_the_largest_counts() -> None:
-    label = SystemTerm("hill", Gaussian(0.5, 0.1))
+    label = Term("hill", Gaussian(0.5, 0.1))
     how = Defuzzifier("centroid", samples=64)
     output = SystemOutput("y", (label,), 0.0, 1.0, how, "maximum")
     once = from_system(a_system("hill", output=output))
@@ -118,7 +116,7 @@ def test_rules_of_one_label_are_cut_once_where_the_largest_counts() -> None:
 def test_an_activation_that_lies_in_its_range_needs_no_test() -> None:
     output = SystemOutput(
         "y",
-        (SystemTerm("one", Singleton(1.0)),),
+        (Term("one", Singleton(1.0)),),
         None,
         None,
         Defuzzifier("weighted sum"),
@@ -146,8 +144,8 @@ def test_a_trapezoid_is_the_smaller_of_its_slopes(curve: Trapezoid) -> None:
     values = [near for one in corners for near in _near(one)]
     values += [one for one in SPECIAL if math.isfinite(one)]
     how = Defuzzifier("weighted sum")
-    output = SystemOutput("y", (SystemTerm("one", Singleton(1.0)),), None, None, how)
-    inputs = (SystemInput("x", (SystemTerm("in", curve),)),)
+    output = SystemOutput("y", (Term("one", Singleton(1.0)),), None, None, how)
+    inputs = (Variable("x", (Term("in", curve),)),)
     rule = SystemRule(Is("x", "in"), (Conclusion("y", "one"),))
     system = FuzzySystem("test", inputs, (output,), (RuleBlock((rule,)),))
     assert_equal(system, [{"x": value} for value in values])
@@ -160,7 +158,7 @@ def _near(value: float) -> list[float]:
 def test_systems_without_library_functions_have_programs_without_them() -> None:
     output = SystemOutput(
         "y",
-        (SystemTerm("one", Singleton(1.0)),),
+        (Term("one", Singleton(1.0)),),
         None,
         None,
         Defuzzifier("weighted sum"),

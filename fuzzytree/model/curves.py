@@ -15,7 +15,7 @@ from fuzzytree.model.functions import (
     scaled,
     smaller_slope,
 )
-from fuzzytree.model.rulebase import name_choice
+from fuzzytree.model.mistakes import name_choice
 from fuzzytree.model.values import Value
 
 MOST_LEVELS = 100

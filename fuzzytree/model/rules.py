@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
 
+from fuzzytree.model.curves import MOST_LEVELS
+from fuzzytree.model.mistakes import Mistake, Path, name_choice
 from fuzzytree.model.norms import Hedge, SNorm, TNorm
-from fuzzytree.model.rulebase import Mistake, Path, Value, name_choice
-from fuzzytree.model.system.curves import MOST_LEVELS
+from fuzzytree.model.values import Value
 
 
 class Is(Value, frozen=True, tag="is"):

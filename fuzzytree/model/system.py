@@ -15,23 +15,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
-from fuzzytree.model.norms import SNorm
-from fuzzytree.model.rulebase import (
-    Mistake,
-    Part,
-    Path,
-    Value,
-    name_choice,
-    name_mistakes,
-    part_mistakes,
-    range_mistakes,
-    refuse,
-    summary,
-    text_fault,
-    unit_mistakes,
-)
-from fuzzytree.model.system.curves import (
-    Curve,
+from fuzzytree.model.curves import (
     Expression,
     Formula,
     Linear,
@@ -40,7 +24,17 @@ from fuzzytree.model.system.curves import (
     names_in,
     width_mistakes,
 )
-from fuzzytree.model.system.rules import (
+from fuzzytree.model.mistakes import (
+    Mistake,
+    Path,
+    name_choice,
+    name_mistakes,
+    refuse,
+    text_fault,
+)
+from fuzzytree.model.norms import SNorm
+from fuzzytree.model.rulebase import summary
+from fuzzytree.model.rules import (
     Conclusion,
     RuleBlock,
     SystemRule,
@@ -49,23 +43,18 @@ from fuzzytree.model.system.rules import (
     condition_mistakes,
     reference_mistakes,
 )
+from fuzzytree.model.values import Value
+from fuzzytree.model.variables import (
+    Term,
+    Variable,
+    input_mistakes,
+    range_mistakes,
+    term_mistakes,
+    unit_mistakes,
+)
 
 MOST_SAMPLES = 100_000
 """The most values at which an output's range is looked at."""
-
-
-class SystemTerm(Value, frozen=True):
-    """A term of a system's variable.
-
-    Attributes:
-        name: Unique within its variable.
-        curve: The degree at each value.
-        height: What the degree is multiplied by; above 0, at most 1.
-    """
-
-    name: str
-    curve: Curve
-    height: float = 1.0
 
 
 DefuzzifierMethod = Literal[
@@ -130,11 +119,11 @@ def sampled_values(output: SystemOutput) -> list[float]:
         >>> sampled_values(output)
         [0.25, 0.75, 1.25, 1.75]
         >>> from msgspec.structs import replace
-        >>> labels = (SystemTerm("a", Singleton(0.3)), SystemTerm("b", Singleton(1.7)))
-        >>> sampled_values(replace(output, labels=labels))
+        >>> terms = (Term("a", Singleton(0.3)), Term("b", Singleton(1.7)))
+        >>> sampled_values(replace(output, terms=terms))
         [0.3, 1.7]
     """
-    curves = [label.curve for label in output.labels]
+    curves = [label.function for label in output.terms]
     singles = {one.value for one in curves if isinstance(one, Singleton)}
     if len(singles) > 1 and all(isinstance(one, Singleton) for one in curves):
         return sorted(singles)
@@ -149,36 +138,12 @@ def sampled_values(output: SystemOutput) -> list[float]:
     return sorted({*values, *singles}) if singles else values
 
 
-class SystemInput(Value, frozen=True):
-    """A column of numbers, or a combination of columns.
-
-    Attributes:
-        name: Unique among inputs and outputs.
-        labels: Its terms.
-        low: The low end of its range, if known and finite.
-        high: The high end.
-        clips: Whether values are first moved into the range, of which one end may be
-            open.
-        unit: For people.
-        parts: Empty for a column; the summands of a combination, as in
-            `fuzzytree.model.rulebase.Variable`, of inputs that stand before it.
-    """
-
-    name: str
-    labels: tuple[SystemTerm, ...] = ()
-    low: float | None = None
-    high: float | None = None
-    clips: bool = False
-    unit: str = ""
-    parts: tuple[Part, ...] = ()
-
-
 class SystemOutput(Value, frozen=True):
     """A number that the system computes.
 
     Attributes:
         name: Unique among inputs and outputs.
-        labels: Its terms.
+        terms: Its terms.
         low: The low end of its range; needed where a curve is looked at.
         high: The high end.
         defuzzifier: How it becomes a number.
@@ -192,7 +157,7 @@ class SystemOutput(Value, frozen=True):
     """
 
     name: str
-    labels: tuple[SystemTerm, ...]
+    terms: tuple[Term, ...]
     low: float | None
     high: float | None
     defuzzifier: Defuzzifier
@@ -219,7 +184,7 @@ class FuzzySystem(Value, frozen=True):
     """
 
     name: str
-    inputs: tuple[SystemInput, ...]
+    inputs: tuple[Variable, ...]
     outputs: tuple[SystemOutput, ...]
     blocks: tuple[RuleBlock, ...]
     note: str = ""
@@ -234,7 +199,7 @@ class FuzzySystem(Value, frozen=True):
         return tuple(one.name for one in self.inputs if not one.parts)
 
     @property
-    def variables(self) -> tuple[SystemInput | SystemOutput, ...]:
+    def variables(self) -> tuple[Variable | SystemOutput, ...]:
         """The inputs, then the outputs."""
         return (*self.inputs, *self.outputs)
 
@@ -276,18 +241,16 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     count = len(system.columns)
     for position, one in enumerate(system.inputs):
         path: Path = ("inputs", position)
-        yield from unit_mistakes(path, one.name, one.unit)
-        yield from range_mistakes(path, one.name, one.low, one.high)
-        yield from part_mistakes(path, one.name, one.parts, known)
-        yield from _label_mistakes(path, one, count, nameable)
+        yield from input_mistakes(path, one, known)
+        yield from _term_mistakes(path, one, count, nameable)
         if one.clips and one.low is None and one.high is None:
             yield path, f"input {one.name!r} is clipped to a range that it lacks"
-        known[one.name] = bool(one.parts)
     for position, output in enumerate(system.outputs):
         path = ("outputs", position)
         yield from unit_mistakes(path, output.name, output.unit)
         yield from range_mistakes(path, output.name, output.low, output.high)
-        yield from _label_mistakes(path, output, count, nameable)
+        yield from term_mistakes(path, output.name, output.terms)
+        yield from _term_mistakes(path, output, count, nameable)
         nameable[output.name] = None
         yield from _defuzzifier_mistakes(path, output)
     yield from _rule_mistakes(system)
@@ -310,28 +273,19 @@ def _variable_name_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
             yield (*place, "name"), "a variable needs a name"
 
 
-def _label_mistakes(
+def _term_mistakes(
     path: Path,
-    variable: SystemInput | SystemOutput,
+    variable: Variable | SystemOutput,
     columns: int,
     nameable: Mapping[str, None],
 ) -> Iterator[Mistake]:
-    """Yield what is wrong with terms, whose formulas may use some names."""
-    labels = variable.labels
-    where = f"term of {variable.name!r}"
-    yield from name_mistakes((*path, "labels"), where, [one.name for one in labels])
+    """Yield what is wrong with linear terms and formulas, which may use some names."""
     is_weighted = (
         isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted
     )
-    for index, label in enumerate(labels):
-        place = (*path, "labels", index)
-        if not label.name:
-            yield place, f"a term of {variable.name!r} has no name"
-        where = f"term {label.name!r} of {variable.name!r}"
-        if not 0.0 < label.height <= 1.0:
-            yield place, f"{where}: the height must lie in (0, 1], not {label.height!r}"
-        texts = [*label.curve.mistakes()]
-        match label.curve:
+    for index, term in enumerate(variable.terms):
+        texts: list[str] = []
+        match term.function:
             case Linear(weights=weights):
                 count = len(weights)
                 if count != columns:
@@ -340,17 +294,18 @@ def _label_mistakes(
                 if not is_weighted:
                     text = "only a weighted average or sum takes a linear term"
                     texts.append(text)
-            case Formula(expression=expression) if not texts:
+            case Formula(expression=expression) if not any(term.function.mistakes()):
                 texts += _name_mistakes(expression, nameable)
                 if is_drawn_by_lines(variable):
                     texts.append("the grid 'lines' takes no formula")
             case _:
                 pass
         for text in texts:
-            yield place, f"{where}: {text}"
+            where = f"term {term.name!r} of {variable.name!r}"
+            yield (*path, "terms", index), f"{where}: {text}"
 
 
-def is_drawn_by_lines(variable: SystemInput | SystemOutput) -> bool:
+def is_drawn_by_lines(variable: Variable | SystemOutput) -> bool:
     """Return whether it is an output whose curve consists of lines."""
     return (
         isinstance(variable, SystemOutput)
@@ -398,8 +353,8 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
             f"output {output.name!r}: {how.samples} samples; "
             f"there must be 2 to {MOST_SAMPLES}",
         )
-    for label in output.labels:
-        if isinstance(label.curve, Singleton) and (
+    for label in output.terms:
+        if isinstance(label.function, Singleton) and (
             how.method == "bisector" or how.grid in ("half ends", "lines")
         ):
             what = how.method if how.method == "bisector" else f"grid {how.grid}"
@@ -418,10 +373,10 @@ def _width_mistakes(
 ) -> Iterator[Mistake]:
     """Yield the terms without width that rules conclude and that no sample shows."""
     thin = {
-        label.name: (index, label.curve.b)
-        for index, label in enumerate(output.labels)
-        if isinstance(label.curve, Trapezoid)
-        and label.curve.a == label.curve.b == label.curve.d
+        label.name: (index, label.function.b)
+        for index, label in enumerate(output.terms)
+        if isinstance(label.function, Trapezoid)
+        and label.function.a == label.function.b == label.function.d
     }
     if not thin or output.defuzzifier.is_weighted:
         return
@@ -431,7 +386,7 @@ def _width_mistakes(
     for name, (index, value) in thin.items():
         if name in concluded and value not in samples:
             yield (
-                (*path, "labels", index),
+                (*path, "terms", index),
                 (
                     f"term {name!r} of {output.name!r} has no width, and none of the "
                     f"{len(samples)} values at which the range is sampled is "
@@ -442,7 +397,7 @@ def _width_mistakes(
 
 def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     terms: Terms = {
-        one.name: dict.fromkeys(label.name for label in one.labels)
+        one.name: dict.fromkeys(label.name for label in one.terms)
         for one in system.variables
     }
     outputs = {one.name: one for one in system.outputs}
