@@ -32,6 +32,8 @@ from fuzzytree.tactile.report.live import PALETTE, headline, shades, status
 if TYPE_CHECKING:
     from socketserver import BaseServer
 
+    from fuzzytree.tactile.sensor import Cells
+
 ADDRESS = "127.0.0.1"
 """The page is for this computer only."""
 
@@ -262,7 +264,7 @@ def hello_facts(view: LiveView) -> dict[str, object]:
 def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object]:
     """Return what a page shows at one moment, the last one if it is over.
 
-    The picture has at most `times` points for a cell on each side.
+    The picture has at most `times` points for a cell on each side; `cells` has one.
     """
     answer = view.answer
     state = answer.state if answer else None
@@ -279,10 +281,15 @@ def view_facts(view: LiveView, times: int, *, is_over: bool) -> dict[str, object
     if view.cells is not None:
         while times > 1 and view.cells.size * times**2 > _MOST_POINTS:
             times -= 1
-        points = shades(view.cells, view.full, times)
-        facts["shape"] = points.shape
-        facts["points"] = base64.b64encode(points.tobytes()).decode()
+        facts |= _points(view, view.cells, times)
+        facts["cells"] = _points(view, view.cells, 1)
     return facts
+
+
+def _points(view: LiveView, cells: Cells, times: int) -> dict[str, object]:
+    points = shades(cells, view.full, times)
+    packed = base64.b64encode(points.tobytes()).decode()
+    return {"shape": points.shape, "points": packed}
 
 
 def _sentence(answer: LiveResult | None) -> str:

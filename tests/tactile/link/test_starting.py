@@ -7,8 +7,9 @@ import pytest
 
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import Board, Marker, Start
+from fuzzytree.tactile.link import start
 from fuzzytree.tactile.link.starting import measured, remarks, still
-from fuzzytree.tactile.sensor import Cells, Sensor, pressed
+from fuzzytree.tactile.sensor import Cells, Frame, Sensor, pressed
 
 BOARD = Board("mat", Sensor(3, 4), Marker("AA 55"))
 
@@ -107,3 +108,14 @@ def test_bytes_as_a_board_sends_them_do_not_wrap_around() -> None:
 def test_a_baseline_of_nothing_is_refused() -> None:
     with pytest.raises(TableError, match="a baseline needs 1 frame or more, not 0"):
         measured(BOARD, np.zeros((0, 3, 4), int))
+
+
+def test_without_frames_to_measure_an_object_at_the_start_is_seen() -> None:
+    lying = np.full((4, 4), 90, np.uint8)
+    frames = (Frame(lying, number / 10, number) for number in range(40))
+    sensor = Sensor(4, 4, threshold=3)
+    seen = Board("mat", sensor, Marker("AA"), start=Start(frames=0))
+    assert pressed(start(seen, frames).board.sensor, lying).all()
+    assert next(frames).number == 0
+    measured_away = Board("mat", sensor, Marker("AA"))
+    assert not pressed(start(measured_away, frames).board.sensor, lying).any()

@@ -173,6 +173,8 @@ def test_events_bring_the_names_then_the_picture_and_the_answer(
     points = view["points"]
     assert isinstance(points, str)
     assert base64.b64decode(points) == b"\xff" * 144
+    cells = base64.b64encode(b"\xff" * 16).decode()
+    assert view["cells"] == {"shape": [4, 4], "points": cells}
     assert view["status"] == "16 cells take no more: the frame is saturated"
     assert view["over"] is False
 
