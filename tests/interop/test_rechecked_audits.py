@@ -13,7 +13,7 @@ from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import AuditSelection, AuditSettings
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import recheck
-from fuzzytree.auditing.recheck.head import digest_of
+from fuzzytree.auditing.recheck.checks import digest_of
 from fuzzytree.checking.converting import load_content
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import yaml

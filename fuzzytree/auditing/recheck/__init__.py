@@ -4,32 +4,32 @@
 
 This folder needs Python 3.11 and nothing else, and imports nothing of the rest of
 fuzzytree: copy it, read it, run it alone (docs/how-to/recheck.md). It reads the audit
-and the model itself, evaluates every witness again in fractions, decides again what it
-can, and says what it could not. Exit 0: all holds; 1: something does not, and all of
-that is listed; 2: it could not be run.
+and the model itself, evaluates every witness again in fractions, decides every proof
+again, and says what it could not decide. Exit 0: all holds; 1: something does not, and
+all of that is listed; 2: it could not be run.
 
-Read it in this order: the records (`audit_records`, `model_records`) and how files
-become them (`yaml`, `models`); what a model means (`polynomials`, `enclosing`,
-`meaning`); how a "never" is decided again (`grid`); the checks
-(`cases`, `head`, `forms`, `deciding`, `answers`) and how they end (`outcomes`).
+Read it in this order: how files become records and models (`records`, `yaml`,
+`sentences_of_rules`, `models`); degrees (`curves`); the one question (`cells`, and
+`boxes` for products); what a check needs (`case`); the checks (`deciding`, `checks`)
+and how they end (`outcomes`).
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from fuzzytree.auditing.recheck.answers import check_answer
-from fuzzytree.auditing.recheck.audit_records import Audit
-from fuzzytree.auditing.recheck.cases import Case
-from fuzzytree.auditing.recheck.head import check_files, check_head
-from fuzzytree.auditing.recheck.model_records import System
-from fuzzytree.auditing.recheck.models import built, read_file, read_json
+from fuzzytree.auditing.recheck.case import Case
+from fuzzytree.auditing.recheck.checks import check_answer, check_files, check_head
+from fuzzytree.auditing.recheck.deciding import without
+from fuzzytree.auditing.recheck.models import Model
 from fuzzytree.auditing.recheck.outcomes import (
-    MOST_BYTES,
     CannotRunError,
     DoesNotHoldError,
     Report,
+    UndecidedError,
 )
+from fuzzytree.auditing.recheck.records import Audit, Declined, built, read_json
+from fuzzytree.auditing.recheck.yaml import MOST_BYTES
 
 __all__ = ["CannotRunError", "Report", "recheck", "recheck_files"]
 
@@ -43,21 +43,28 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
         CannotRunError: If one of them cannot be read.
     """
     facts = read_json(audit, names[0])
-    result = built(Audit, facts, names[0])
-    whole, places = read_file(model, names[1])
-    if isinstance(whole, System) and result.policy.decision == "strongest":
+    result: Audit = built(Audit, facts, names[0])
+    left_out = [
+        one.subject for one in result.answers if isinstance(one.state, Declined)
+    ]
+    whole = Model(model, names[1], left_out)
+    if whole.form == "system" and result.policy.decision == "strongest":
         text = "a system that stands for rules is not checked again; audit these"
         raise CannotRunError(f"{names[0]}: {text}")
-    report = Report()
+    report, case = Report(), Case(result, whole)
+    report.codes = [one.code for one in result.answers]
     try:
-        case = Case(result, whole, places)
         check_files(case, report, facts, model, names[1])
         check_head(case, report)
-        for number, answer in enumerate(case.audit.answers, 1):
-            where = f"answer {number} ({answer.code}, {answer.subject:.60})"
-            check_answer(case, report, answer, where)
-    except DoesNotHoldError as error:
+        for position, answer in enumerate(result.answers):
+            if answer.message == "FT107.irrelevant":
+                case.shorter[position] = without(case, answer)
+        for number, answer in enumerate(result.answers, 1):
+            check_answer(case, report, answer, number)
+    except (DoesNotHoldError, UndecidedError) as error:
         report.wrong.append(str(error))
+    except (LookupError, TypeError, ValueError):
+        report.wrong.append("an answer names what there is not")
     return report
 
 

@@ -1,565 +1,808 @@
-"""The check of each code: of a proof, and of the claims of a witness."""
+"""Every message that can be PROVED, decided again."""
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 
-from fuzzytree.auditing.recheck.audit_records import (
-    Answer,
-    Declined,
-    Label,
-    Witness,
-    fraction,
+from fuzzytree.auditing.recheck import boxes
+from fuzzytree.auditing.recheck.case import STEPS, Case
+from fuzzytree.auditing.recheck.cells import Axis, Cell, Cells, Function, Interval
+from fuzzytree.auditing.recheck.curves import bounds, is_straight, knots
+from fuzzytree.auditing.recheck.models import (
+    ONE,
+    ZERO,
+    Curve,
+    Proposition,
+    Rule,
+    Rules,
+    Variable,
 )
-from fuzzytree.auditing.recheck.cases import (
-    LEVELS,
-    NEAR,
-    Case,
-    counted,
-    end_of,
-    level_of,
-    point_of,
-)
-from fuzzytree.auditing.recheck.forms import proposition_text, propositions_of
-from fuzzytree.auditing.recheck.grid import FINE, RuleBits
-from fuzzytree.auditing.recheck.meaning import (
-    Point,
-    View,
-    answer_of,
-    leaf_of,
-    strengths,
-)
-from fuzzytree.auditing.recheck.model_records import Proposition, Rules, Tree, Variable
-from fuzzytree.auditing.recheck.outcomes import (
-    DoesNotHoldError,
-    UndecidedError,
-    require,
-)
-from fuzzytree.auditing.recheck.polynomials import ZERO
+from fuzzytree.auditing.recheck.outcomes import UndecidedError, require
+from fuzzytree.auditing.recheck.records import Answer
 
-Interval = tuple[Fraction, Fraction, bool]  # True opens the low end
+NEARLY = Fraction(1, 10**6)
+SHALLOW, TRACE = Fraction(1, 100), Fraction(1, 10**12)
+ROUNDED = Fraction(1, 2**40)
+"""How far a measure may be from what is worked out here."""
 
 
-def dead_leaf(case: Case, tree: Tree, answer: Answer) -> None:
-    """Check that a leaf is not reached, or that the audit has all such leaves."""
-    reached = {
-        number
-        for number in case.numbers
-        if all(_ways(case, number, variable) for variable in tree.variables)
-    }
-    if answer.is_finding:
-        case.never(not reached.isdisjoint(answer.rules), "the leaf is reached")
-    elif not answer.rules:
-        entries = {one.rules for one in case.coded("FT101") if one.is_finding}
-        hidden = {(number,) for number in {*case.numbers} - reached}
-        missing = [number for (number,) in sorted(hidden - entries)]
-        require(not missing, f"leaves that are not reached are missing: {missing}")
+def near(value: float, low: Fraction, high: Fraction, what: str) -> None:
+    """Refuse a number outside of what is worked out here, but for its rounding."""
+    slack = ROUNDED * max(ONE, abs(low))
+    require(low - slack <= value <= high + slack, f"{what} is {float(low):.6g}")
 
 
-def shows_region(case: Case, answer: Answer, state: Witness) -> None:
-    """Compare the region of a leaf with the intervals on the path to it."""
-    tree = case.model
-    if not isinstance(tree, Tree) or len(answer.rules) != 1:
-        raise DoesNotHoldError("it is of no leaf")
-    number = answer.rules[0]
-    is_there = leaf_of(tree, point_of(state.point)) == number
-    require(is_there, "the witness reaches another leaf")
-    label = tree.leaves[number - 1].label
-    require([c.label for c in state.claims] == [label], "it is not the leaf's class")
-    used = {node.variable for node, _ in case.paths[number]}
-    require({s.variable for s in state.region} == used, "not the variables of its path")
-    for span in state.region:
-        is_one = any(
-            math.isclose(span.low or 0.0, low, rel_tol=2.0**-50)
-            and math.isclose(span.high or 0.0, high, rel_tol=2.0**-50)
-            for low, high, _ in _ways(case, number, case.variables[span.variable])
-        )
-        require(is_one, f"the path leads elsewhere in {span.variable!r}")
+def counted(answer: Answer, **counts: float) -> None:
+    """Refuse an answer whose measures are other counts than these."""
+    for name, count in counts.items():
+        name = name.replace("_", " ")
+        require(answer.measure(name) == count, f"{name}: {count:g} are counted here")
 
 
-def shows_difference(case: Case, answer: Answer, state: Witness) -> None:
-    """Check the claim that the tree and its raw rules predict two classes."""
-    said = {claim.of: claim.label for claim in state.claims if claim.kind == "decides"}
-    require(said.keys() == {"tree", "raw rules"}, "it is not claimed what both answer")
-    is_near = not answer.rules  # the nearest to a row is no finding
-    require(answer.is_finding or is_near, "two answers that differ are a finding")
-    require(said["tree"] != said["raw rules"], "the two answers are the same")
+# --- rules that win, fire or tie nowhere: FT101, FT103, FT202, FT204
 
 
-def _ways(case: Case, number: int, variable: Variable) -> list[Interval]:
-    """Return the values of a variable that lead to a leaf."""
-    line = case.line(variable)
-    met: list[Interval] = [(line.low, line.high, False)]
-    for node, way in case.paths[number]:
-        if node.variable == variable.name:
-            ends = zip((None, *node.cuts), (*node.cuts, None), node.owners, strict=True)
-            place = node.branches.index(way)
-            mine = [(low, high) for low, high, owner in ends if owner == place]
-            met = [_met(one, low, high) for one in met for low, high in mine]
+def never_wins(case: Case, answer: Answer) -> None:
+    """Check that a rule is nowhere stronger than those of other classes."""
+    (number,) = answer.rules
+    rivals = case.rivals(number)
+    require(not case.beats([number], rivals), "the rule wins somewhere")
+    if answer.message == "FT101.never-wins":
+        later = [n for n in rivals if n > number]
+        is_tie = any(case.tie(number, n, rivals) for n in later)
+        require(not is_tie or any(n < number for n in rivals), "its place decides")
+        if is_tie:
+            raise UndecidedError("where it ties, an earlier rule of another class may")
+
+
+def never_fires(case: Case, answer: Answer) -> None:
+    """Check that a rule is 0 everywhere."""
+    require(not case.beats(answer.rules, ()), "the rule fires somewhere")
+
+
+def silent(case: Case, answer: Answer) -> None:
+    """Check that a rule of a system never fires, as its text says."""
+    require(answer.subject in case.model.silent, "its text lets it fire")
+
+
+def ways_to(
+    case: Case, number: int, variable: Variable
+) -> list[tuple[Fraction, Fraction, bool]]:
+    """Return the intervals of a variable that lead to a leaf; True is an open start."""
+    low, high = case.ends(variable)
+    met = [(low, high, False)]
+    for node, place in case.model.paths[number - 1]:
+        if node["ask"] == variable.name:
+            cuts = [*map(Fraction, node["cuts"])]
+            owners = zip(
+                (None, *cuts), (*cuts, None), node["interval owners"], strict=True
+            )
+            mine = [(a, b) for a, b, owner in owners if owner == place + 1]
+            met = [
+                (
+                    start if a is None else max(start, a),
+                    end if b is None else min(end, b),
+                    is_open if a is None or a < start else True,
+                )
+                for start, end, is_open in met
+                for a, b in mine
+            ]
     return [one for one in met if one[0] < one[1] or (one[0] == one[1] and not one[2])]
 
 
-def _met(one: Interval, low: float | None, high: float | None) -> Interval:
-    """Return what an interval has in common with `low < x <= high`."""
-    start, end, is_open = one
-    if low is not None and low >= start:
-        start, is_open = Fraction(low), True
-    return start, end if high is None else min(end, Fraction(high)), is_open
+def live_leaves(case: Case) -> set[int]:
+    """Return the leaves that values of each variable, taken alone, lead to."""
+    variables = case.model.variables.values()
+    return {n for n in case.numbers if all(ways_to(case, n, v) for v in variables)}
+
+
+def dead_leaf(case: Case, answer: Answer) -> None:
+    """Check that no values lead to a leaf."""
+    if answer.rules[0] in live_leaves(case):
+        require(not case.is_free, "the leaf is reached")
+        raise UndecidedError("variables share inputs, which needs more than cells")
+
+
+def reached_leaves(case: Case, answer: Answer) -> None:
+    """Check that the findings are all leaves that are not reached."""
+    live, dead = live_leaves(case), {one.rules[0] for one in case.coded("FT101.leaf-")}
+    require(
+        answer.facts["live"] == len(case.numbers) - len(dead),
+        "other leaves are reached",
+    )
+    require(answer.facts["leaves"] == len(case.numbers), "there are other leaves")
+    shown = {one.rules[0] for one in case.coded("FT205.region")}
+    if not case.is_free and not live - dead <= shown:
+        raise UndecidedError("variables share inputs, which needs more than cells")
+    require({*case.numbers} - live <= dead, "leaves that are not reached are missing")
+
+
+def superfluous(case: Case, answer: Answer) -> None:
+    """Check that a rule is nowhere stronger than all, or first of the strongest."""
+    (number,) = answer.rules
+    others, rivals = [n for n in case.numbers if n != number], case.rivals(number)
+    require(not case.beats([number], others), "it is stronger than all somewhere")
+    later = [n for n in rivals if n > number]
+    for other in (n for n in others if n not in rivals):
+        # one that hides it, with no other class between the two
+        if not any(n < other for n in later) and not case.beats([number], [other]):
+            return
+    is_tie = any(case.tie(number, n, others) for n in later)
+    require(not is_tie, "it ties with a later rule, and its place decides")
+
+
+def no_other_ties(case: Case, answer: Answer) -> None:
+    """Check that no other pair of rules of two classes ties."""
+    pairs, known = (
+        case.pairs(alike=False),
+        {one.rules for one in case.coded("FT202.tie")},
+    )
+    counted(answer, pairs=len(pairs), pairs_listed=len(known), pairs_left_open=0)
+    if answer.measure("pairs that tie") != len(known):
+        raise UndecidedError("which pairs are left out is not known")
+    for pair in pairs:
+        if pair not in known:
+            text = f"rules {pair[0]} and {pair[1]} tie as the strongest"
+            require(not case.tie(*pair, case.numbers), text)
+
+
+def one_class(case: Case, answer: Answer) -> None:
+    """Check that one class is decided everywhere."""
+    label = answer.facts.get("then")
+    own = case.own(label)
+    others = [n for n in case.numbers if n not in own]
+    is_other = any(case.beats([n], own) for n in others)
+    if case.rules.uncovered != label:
+        is_other |= case.refined(lambda cells: cells.is_bare())
+    require(not is_other, "another class is decided somewhere")
 
 
 # --- pairs of rules, and propositions: FT104 to FT107, FT201
 
 
 def hidden(case: Case, answer: Answer) -> None:
-    """Check the rules that hide another; or all pairs without a finding."""
-    is_alike = answer.code == "FT104"
-    if not answer.rules:
-        _check_not_hidden(case, answer, is_alike=is_alike)
-        return
+    """Check that each of some rules is at least as strong as the first one."""
     weak, *strong = answer.rules
+    is_alike = answer.code == "FT104"
+    counted(
+        answer, **{f"rules_that_{'subsume' if is_alike else 'mask'}_it": len(strong)}
+    )
     for number in strong:
-        is_one = case.then(number) == case.then(weak)
-        require(is_one == is_alike, "the classes are not so")
-        beats = case.beats(weak, [number])
-        case.never(beats, f"rule {weak} is somewhere stronger than rule {number}")
+        require(
+            (case.then(number) == case.then(weak)) is is_alike, "the classes are not so"
+        )
+        beats = case.beats([weak], [number])
+        require(not beats, f"rule {weak} is somewhere stronger than rule {number}")
         if not is_alike and number > weak:
-            text = "that it is always strictly weaker is not checked here"
-            raise UndecidedError(text)
-    counted(answer, {"rules that subsume it": len(strong)}, is_alike)
-    counted(answer, {"rules that mask it": len(strong)}, not is_alike)
+            is_tie = case.tie(weak, number, ())
+            require(not is_tie, f"rule {weak} is somewhere as strong as rule {number}")
+    is_before = is_alike or (strong[0] < weak) is (answer.message == "FT105.masked")
+    require(is_before, "the order of the rules is another one")
 
 
-def _check_not_hidden(case: Case, answer: Answer, *, is_alike: bool) -> None:
-    pairs = [pair for pair in case.pairs(alike=is_alike) if case.fire(*pair)]
-    silent = sum(not case.fire(number) for number in case.numbers)
-    counts = {"pairs": len(pairs), "pairs too near to compare": 0}
-    counted(answer, counts | {"rules that never fire": silent}, 3)
-    entries = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
+def no_other_hidden(case: Case, answer: Answer) -> None:
+    """Check that each rule of other pairs is somewhere the stronger one."""
+    is_alike = answer.code == "FT104"
+    fires = {n for n in case.numbers if case.fires(n)}
+    pairs = [pair for pair in case.pairs(alike=is_alike) if {*pair} <= fires]
+    silent_count = len(case.numbers) - len(fires)
+    counted(
+        answer,
+        pairs=len(pairs),
+        pairs_too_near_to_compare=0,
+        rules_that_never_fire=silent_count,
+    )
+    listed = case.coded("FT104.sub") if is_alike else case.coded("FT105.")
+    known = {(one.rules[0], n) for one in listed for n in one.rules[1:]}
     for pair in pairs:
-        if pair in entries or pair[::-1] in entries:
+        if pair not in known and pair[::-1] not in known:
+            for first, second in (pair, pair[::-1]) if is_alike else (pair,):
+                beats = case.beats([second], [first])
+                require(beats, f"rule {second} hides behind {first}")
+
+
+def distance(
+    case: Case, one: int, other: int, step: int = 8, *, least: bool = False
+) -> tuple[Fraction, Fraction]:
+    """Return how far two rules' degrees are apart on one axis, and on all together.
+
+    Lower bounds with `least`, else upper ones.
+    """
+    cells = case.cells(step)
+    each, total = ZERO, ZERO
+    for place, axis in enumerate(cells.axes):
+        both = [
+            [f for n, f in enumerate(axis.functions) if cells.of[k - 1][place] >> n & 1]
+            for k in (one, other)
+        ]
+        gap = ZERO
+        if {*both[0]} != {*both[1]}:
+            for cell in axis.cells:
+                a, b = (
+                    [_whole(case, f, cell, is_upper=up) for up in (False, True)]
+                    for f in both
+                )
+                for k in (0, 1):
+                    far = max(a[0][k] - b[1][k], b[0][k] - a[1][k])
+                    far = far if least else max(a[1][k] - b[0][k], b[1][k] - a[0][k])
+                    gap = max(gap, far)
+                if least and gap > NEARLY:
+                    return gap, gap
+        each, total = max(each, gap), total + gap
+    return each, total if case.rules.is_product else each
+
+
+def _whole(
+    case: Case, functions: Iterable[Function], cell: Cell, *, is_upper: bool
+) -> Interval:
+    """Return a rule's degree on an axis at both ends of a cell."""
+    ends = [f.ends(cell, is_upper=is_upper) for f in functions]
+    if case.rules.is_product:
+        if len(ends) > 1 and cell.low < cell.high and any(p != q for p, q in ends):
+            raise UndecidedError("products of several degrees of one variable")
+        return math.prod((p for p, _ in ends), start=ONE), math.prod(
+            (q for _, q in ends), start=ONE
+        )
+    return min((p for p, _ in ends), default=ONE), min(
+        (q for _, q in ends), default=ONE
+    )
+
+
+def same(case: Case, answer: Answer) -> None:
+    """Check that two rules have nearly the same antecedent."""
+    each, whole = distance(case, *answer.rules)
+    require(whole <= NEARLY, "the two antecedents differ")
+    near(answer.measure("largest distance"), each, each, "their largest distance")
+    is_one = case.then(answer.rules[0]) == case.then(answer.rules[1])
+    kind = "contradiction" if case.model.form != "system" else "different"
+    require(
+        answer.message == f"FT106.{'same' if is_one else kind}",
+        "the classes are not so",
+    )
+
+
+def no_others_same(case: Case, answer: Answer) -> None:
+    """Check that the antecedents of all other pairs of rules differ."""
+    pairs, known = (
+        case.pairs(),
+        {one.rules for one in case.coded("FT106.") if one.rules},
+    )
+    counted(answer, pairs=len(pairs))
+    for pair in pairs:
+        if pair in known:
             continue
-        for first, second in (pair, pair[::-1]) if is_alike else (pair,):
-            beats = case.beats(second, [first])
-            require(beats, f"rule {second} hides behind {first}")
+        if all(
+            distance(case, *pair, step, least=True)[1] <= NEARLY for step in STEPS[:2]
+        ):
+            is_same = distance(case, *pair)[1] <= NEARLY
+            require(
+                not is_same, f"rules {pair[0]} and {pair[1]} have the same antecedent"
+            )
+            raise UndecidedError("curves that are nearly equal")
 
 
-def copied(case: Case, answer: Answer) -> None:
-    """Check that neither of two equal rules is ever stronger."""
-    if not answer.rules:
-        pairs = case.pairs(alike=True) + case.pairs(alike=False)
-        counted(answer, {"pairs": len(pairs)}, 1)
-        text = "that no other two rules are nearly alike is not checked here"
-        raise UndecidedError(text)
-    first, second = answer.rules
-    is_one = case.then(first) == case.then(second)
-    graver = "error" if case.view is None else "info"
-    severity = "warning" if is_one else graver
-    require(answer.severity == severity, "the classes are not so")
-    if all(measure.exact != "0" for measure in answer.measures):  # their distance
-        raise UndecidedError("the distance of curves that differ is not measured here")
-    if case.bits_of(first) != case.bits_of(second):
-        is_more = case.beats(first, [second]) or case.beats(second, [first])
-        require(not is_more, "the two rules are not alike")
+def without(case: Case, answer: Answer) -> Rule:
+    """Return the rule of an answer without the proposition that it is about."""
+    rule = case.rules.rules[answer.rules[0] - 1]
+    labels = [tuple(one) for one in answer.terms]
+    for place, proposition in enumerate(rule.when):
+        is_it = [(proposition.variable, term) for term in proposition.terms] == labels
+        if is_it and answer.facts.get("proposition") == str(proposition):
+            return rule._replace(when=(*rule.when[:place], *rule.when[place + 1 :]))
+    require(False, "it is of no proposition of the rule")
+    raise AssertionError
 
 
-def apart(case: Case, answer: Answer) -> None:
-    """Check that no pair without a finding can reach the level together."""
-    if case.rules.semantics.conjunction != "minimum":
-        raise UndecidedError("conflicts under product are not decided again here")
-    entries = {one.rules for one in case.coded("FT201")}
-    level, grid = Fraction(case.audit.settings.level), case.grid
-    rest = [pair for pair in case.pairs(alike=False) if pair not in entries]
-    if case.view is not None:
-        rest = [pair for pair in rest if case.view.may_conflict(*pair)]
-    omitted = next((m.value for m in answer.measures if "not listed" in m.name), 0)
-    require(answer.is_finding == (omitted > 0), "a finding that is none")
-    counted(answer, {"pairs that never do": len(rest) - omitted}, 1)
-    if omitted:
-        raise UndecidedError("which pairs are left out is not known")
-    for one, other in rest:
-        both = _union(case.bits_of(one), case.bits_of(other))
-        if not grid.leaves(both, (), grid.gap(level, is_above=False)):
-            continue
-        is_met = level < 1 and grid.leaves(both, (), grid.gap(level, is_above=True))
-        case.never(is_met, f"rules {one} and {other} reach the level together")
-        raise UndecidedError(f"rules {one} and {other} touch the level")
-
-
-def highest(case: Case, answer: Answer) -> None:
-    """Check that two rules reach no higher level together than the reported one."""
-    if case.rules.semantics.conjunction != "minimum":
-        raise UndecidedError("conflicts under product are not decided again here")
-    tops = [one for one in answer.measures if one.name in LEVELS]
-    require(len(tops) == 1 and len(answer.rules) == 2, "it has no highest level")
-    top, grid = end_of(tops[0]), case.grid
-    both = _union(*map(case.bits_of, answer.rules))
-    require(0 <= top <= 1 + NEAR, "a level outside 0 to 1")
-    if 0 < top <= 1 and case.is_free and tops[0].exact is not None:
-        is_near = grid.leaves(both, (), grid.gap(top, is_above=False))
-        require(is_near, "both do not reach so high a level together")
-    if top >= 1:
-        return
-    band = grid.gap(top, is_above=True)
-    case.never(grid.leaves(both, (), band), "both reach a higher level together")
-    low, high = grid.levels.bands[band]
-    if low < high and grid.leaves(both, (), band, is_gap=False):
-        raise UndecidedError("two critical levels are too near to distinguish")
-
-
-def needless(case: Case, answer: Answer) -> None:
-    """Check that a rule without a proposition is nowhere stronger than with it."""
-    if not answer.rules:
-        raise UndecidedError("which other propositions matter is not known")
-    require(len(answer.rules) == 1, "it is of no rule")
-    if not answer.terms:
-        require(not answer.is_finding, "it is of no proposition of the rule")
-        require(not case.fire(*answer.rules), "the rule fires somewhere")
-        return
-    rest, number = case.grid.bits_of(_without(case, answer)), answer.rules[0]
-    if case.beats(rest, [number]):
-        _decides_alike(case, number, rest)
-
-
-def _decides_alike(case: Case, number: int, rest: RuleBits) -> None:
-    """Check that a rule that becomes stronger changes no decision.
+def irrelevant(case: Case, answer: Answer) -> None:
+    """Check that a rule without a proposition decides no input that it did not decide.
 
     It does where it wins and a rule of another class was above all of its own class;
     or where no rule fired; it may where it ties with a later rule of another class.
     """
-    grid, then = case.grid, case.then(number)
-    own = [n for n in case.numbers if case.then(n) == then]
-    is_more = any(
-        case.beats(_union(rest, case.bits_of(n)), own)
-        or (
-            n > number
-            and case.ties.tie(rest, case.bits_of(n), [*map(case.bits_of, own)])
-        )
-        for n in case.rivals(number)
+    position = case.audit.answers.index(answer)
+    rest = len(case.numbers) + 1 + [*case.shorter].index(position)
+    (number,) = answer.rules
+    own, rivals = case.own(case.then(number)), case.rivals(number)
+    if not case.beats([rest], [number]):
+        return
+    later = [n for n in rivals if n > number]
+    if any(case.tie(rest, n, case.numbers) for n in later):
+        raise UndecidedError("the rule ties without it, and its place may decide")
+    if not case.may(lambda: case.beats([rest], case.numbers)):
+        return
+    is_more = case.rules.uncovered != case.then(number) or any(
+        case.beats([rest, n], own) for n in rivals
     )
-    if case.rules.semantics.uncovered != then:
-        is_more |= grid.leaves(rest, grid.of, grid.gap(ZERO, is_above=True))
     if is_more:
         raise UndecidedError("the rule is stronger without it, if not in its answers")
 
 
-def _union(one: RuleBits, other: RuleBits) -> RuleBits:
-    """Return the functions that either of two rules uses."""
-    return tuple(a | b for a, b in zip(one, other, strict=True))
+def never_fires_at_all(case: Case, answer: Answer) -> None:
+    """Check that a rule never fires."""
+    require(not case.fires(answer.rules[0]), "the rule fires somewhere")
 
 
-def _without(case: Case, answer: Answer) -> tuple[Proposition, ...]:
-    """Return a rule's propositions without the one that an answer is about."""
-    when, result = (
-        case.rules.rules[answer.rules[0] - 1].when,
-        propositions_of(case, answer),
-    )
-    if len(result) > 1:  # one of them is negated: only the subject says which
-        result = [
-            c for c in result if answer.subject.endswith(repr(proposition_text(c)))
-        ]
-    require(len(result) == 1, "it is of no proposition of the rule")
-    place = when.index(result.pop())
-    return (*when[:place], *when[place + 1 :])
-
-
-def shows_need(case: Case, answer: Answer, state: Witness) -> None:
-    """Check that the prediction at the witness differs without the proposition."""
-    rest, point = _without(case, answer), point_of(state.point)
-    every, place = list(case.rules.rules), answer.rules[0] - 1
-    every[place] = every[place]._replace(when=rest)
-    other = answer_of(case.rules._replace(rules=tuple(every)), point)
-    is_other = other != answer_of(case.rules, point) and not answer.is_finding
-    require(is_other, "the proposition does not matter there")
-
-
-def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
-    """Check the claim that two rules of two classes reach the level together."""
+def apart(case: Case, answer: Answer) -> None:
+    """Check that no pair without a finding reaches the level together."""
     level = Fraction(case.audit.settings.level)
-    met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
-    is_high = any(fraction(claim.level or "0") >= level for claim in met)
-    is_claimed = is_high and answer.is_finding
-    require(is_claimed, "it is not claimed that both reach the level")
-    require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
-    if case.rules.semantics.conjunction == "minimum":
-        highest(case, answer)
+    listed = {one.rules for one in case.coded("FT201.") if one.rules}
+    rest = [
+        p
+        for p in case.pairs(alike=False)
+        if p not in listed and case.model.may_conflict(*p)
+    ]
+    omitted = answer.measure("pairs not listed")
+    counted(answer, pairs_that_never_do=len(rest) - omitted)
+    together = []
+    for pair in rest:
+        if case.rules.is_product:
+            is_met = case.beats(pair, (), low=level)
+        else:
+            is_met = case.refined(functools.partial(_meet, pair, level))
+        together += [pair] if is_met else []
+    text = f"{together[:3]} reach the level together" if together else "fewer do"
+    require(len(together) == omitted, text)
 
 
-# --- terms, and their use: FT401, FT403, FT404, FT501
+def _meet(pair: tuple[int, int], level: Fraction, cells: Cells) -> bool:
+    return cells.highest(*(cells.of[n - 1] for n in pair)) >= level
 
 
-def heights(case: Case, answer: Answer) -> None:
-    """Compare the terms that do not reach the level with the findings."""
-    level = case.audit.settings.level
-    low = {label: height for label, height in case.heights.items() if height < level}
-    entries = [one.terms[0] for one in case.coded("FT401") if one.terms]
-    entries = [label for label in entries if label in case.heights]
-    require(entries == list(low), "other terms are too low")
-    if any(label not in case.heights for label in answer.terms):
-        raise UndecidedError("the height of a curve that is no polynomial")
-    for label in answer.terms:
-        is_empty = answer.severity == "error"
-        require(is_empty == (not low[label]), f"{label.term!r} is empty, or is not")
-        value = next((m.value for m in answer.measures if m.name == "height"), -1.0)
-        require(abs(value - low[label]) <= 2.0**-30, f"the height of {label.term!r}")
+def top(case: Case, answer: Answer) -> None:
+    """Check the highest level that two rules reach together."""
+    if case.rules.is_product:
+        raise UndecidedError("the highest common level of products")
+    cells = case.cells(STEPS[-1])
+    highest = cells.highest(*(cells.of[n - 1] for n in answer.rules))
+    is_one = len(answer.measures) == 1 and cells.is_exact and case.is_free
+    value = answer.measures[-1].value
+    if is_one:
+        near(value, highest - NEARLY, highest + NEARLY, "the highest common level")
+        exact = answer.measures[0].exact
+        require(
+            exact in (None, str(highest)), "the highest common level is another one"
+        )
 
 
-def overlaps(case: Case, answer: Answer) -> None:
-    """Compare the shared areas of pairs of terms with the findings."""
-    limit = Fraction(case.audit.settings.overlap)
-    known = {labels: share for labels, share in case.shares.items() if share}
-    near = {labels: share for labels, share in known.items() if share[1] >= limit}
-    if any(low < limit for low, _ in near.values()):
-        raise UndecidedError("a shared area is too near to the limit to decide")
-    entries = [one for one in case.coded("FT403") if one.terms]
-    entries = [one for one in entries if not isinstance(one.state, Declined)]
-    is_near = {one.terms for one in entries} <= near.keys()
-    require(is_near, "two terms are easy to distinguish")
-    if not answer.terms:
-        is_more = len(near) > len(entries)
-        require(answer.is_finding == is_more, "a finding that is none")
-        counts = {
-            "pairs not listed": len(near) - len(entries),
-            "pairs apart": len(known) - len(near),
-            "pairs without area": len(case.shares) - len(known),
-        }
-        counted(answer, counts, len(counts))
-        return
-    low, high = near[answer.terms]
-    value = Fraction(next(m.value for m in answer.measures if "shared" in m.name))
-    require(low - FINE <= value <= high + FINE, "the share is another one")
+# --- where no rule fires: FT301, FT203
 
 
-def unused(case: Case, answer: Answer) -> None:
-    """Compare the terms and variables that no rule uses with the findings."""
-    every, used = case.terms, _used_terms(case.rules)
-    if case.view is not None:  # the system itself is read, rules left out or not
-        inputs = case.view.system.inputs
-        every = [Label(v.name, label.name) for v in inputs for label in v.terms]
-        used = case.view.questions()
-    needed = {variable for variable, _ in used}
-    names = [v.name for v in case.rules.variables]
-    for variable in case.rules.variables:
-        if variable.name in needed:
-            needed |= {part.input for part in variable.parts}
-    idle = [f"variable {name!r}" for name in names if name not in needed]
-    rest = [pair for pair in every if pair[0] in needed and pair not in used]
-    idle += [f"term {term!r} of {name!r}" for name, term in rest]
-    needed, used = needed.intersection(names), used.intersection(every)
-    entries = [one.subject for one in case.coded("FT404") if one.is_finding]
-    require(entries == idle, "other terms or variables are unused")
-    counts = {"variables in use": len(needed), "terms in use": len(used)}
-    counted(answer, counts, 0 if answer.is_finding else 2)
+def fires(case: Case, answer: Answer) -> None:
+    """Check that some rule fires everywhere."""
+    require(case.model.is_whole, "rules that are left out may fire")
+    is_bare = case.refined(lambda cells: cells.is_bare())
+    require(not is_bare, "there are points at which no rule fires")
 
 
-def complexity(case: Case, answer: Answer) -> None:
-    """Count rules, propositions, terms and variables."""
-    lengths, used = [len(r.when) for r in case.rules.rules], _used_terms(case.rules)
-    counts: dict[str, float] = {
-        "rules": len(lengths),
-        "propositions": sum(lengths),
-        "most propositions of a rule": max(lengths),
-        "propositions per rule": sum(lengths) / len(lengths),
-        "distinct terms in use": len(used),
-        "variables in use": len({variable for variable, _ in used}),
-    }
-    if isinstance(case.model, Tree):
-        counts["depth of the tree"] = max(map(len, case.paths.values()))
-    counted(answer, counts, len(counts))
-    text = "its counts are right; the index of Nauck is not worked out here"
-    raise UndecidedError(text)
-
-
-def _used_terms(rules: Rules) -> set[tuple[str, str]]:
-    """Return the variable and term of every proposition of the rules."""
-    propositions = [proposition for rule in rules.rules for proposition in rule.when]
-    return {
-        (proposition.variable, term)
-        for proposition in propositions
-        for term in proposition.terms
-    }
-
-
-# --- rules that win, tie or fire nowhere: FT101 to FT103, FT202, FT301
-
-
-def dead(case: Case, answer: Answer) -> None:
-    """Check that a rule is nowhere stronger than those of other classes."""
-    if isinstance(case.model, Tree):
-        dead_leaf(case, case.model, answer)
-        return
-    if case.view is not None:
-        silent(case, case.view, answer)
-        return
-    require(len(answer.rules) > 0, "no rule is named")
-    number = answer.rules[0]
-    wins = case.beats(number, case.rivals(number))
-    case.never(wins, "the rule wins somewhere")
-
-
-def silent(case: Case, view: View, answer: Answer) -> None:
-    """Check that a rule of a system never fires, in any of its ways."""
-    require(answer.is_finding, "a finding that is none")
-    if not answer.rules:
-        require(answer.subject in view.silent, "its text lets it fire")
-        return
-    case.never(case.fire(*answer.rules), "the rule fires somewhere")
-
-
-def superfluous(case: Case, answer: Answer) -> None:
-    """Check that a rule is nowhere stronger than all, or first of the strongest."""
-    require(len(answer.rules) == 1 and answer.is_finding, "it is of no rule")
-    number = answer.rules[0]
-    others, rivals = [n for n in case.numbers if n != number], case.rivals(number)
-    case.never(case.beats(number, others), "it is stronger than all somewhere")
-    later = [n for n in rivals if n > number]
-    for other in (n for n in others if n not in rivals):
-        # one that hides it, with no other class between the two
-        is_between = any(n < other for n in later)
-        if not is_between and not case.beats(number, [other]):
-            return
-    if any(case.tie(number, other) for other in later):
-        raise UndecidedError("it ties with a later rule, and its place may decide")
-
-
-def ties_of_classes(case: Case, answer: Answer) -> None:
-    """Count the pairs of rules of two classes, and those with a finding."""
-    pairs = case.pairs(alike=False)
-    known = [one.rules for one in case.coded("FT202") if one.rules]
-    counted(answer, {"pairs": len(pairs), "pairs listed": len(known)}, 2)
-    require(not answer.is_finding, "that others do not tie is no finding")
-    totals = [m.value for m in answer.measures if m.name == "pairs that tie"]
-    if totals and totals[0] != len(known):
-        raise UndecidedError("which pairs are left out is not known")
-    for pair in pairs:
-        if pair not in known:
-            text = f"rules {pair[0]} and {pair[1]} tie as the strongest"
-            case.never(case.tie(*pair), text)
-
-
-def covered(case: Case, answer: Answer) -> None:
-    """Check that some rule fires everywhere, or reaches epsilon everywhere."""
-    grid = case.grid
-    if answer.subject == "cover":
-        is_gap = grid.is_bare(grid.of)
-        if is_gap is None:
-            raise UndecidedError("a curve may touch 0 where it is not known exactly")
-        case.never(is_gap, "there are points at which no rule fires")
-        return
-    if case.rules.semantics.conjunction != "minimum":
-        raise UndecidedError("gaps under product are not decided again here")
-    below = grid.gap(Fraction(case.audit.settings.epsilon), is_above=False)
-    is_gap = grid.leaves(None, grid.of, below)
-    case.never(is_gap, "there are points at which every rule is below epsilon")
+def reaches(case: Case, answer: Answer) -> None:
+    """Check that some rule reaches epsilon everywhere, and how little is least."""
+    epsilon = Fraction(case.audit.settings.epsilon)
+    is_less = case.beats((), case.numbers, high=epsilon)
+    require(not is_less, "there are points at which every rule is below epsilon")
     least_cover(case, answer)
 
 
 def least_cover(case: Case, answer: Answer) -> None:
     """Check that the strength where it is least lies between the reported bounds."""
-    grid, ends = case.grid, [m for m in answer.measures if m.name in LEVELS]
-    entries = [*map(level_of, ends)]
-    is_one = len(entries) == 2 and 0 <= entries[0] <= entries[1] <= 1
-    require(is_one, "no least strength")
-    if entries[0] > 0:
-        is_less = grid.leaves(None, grid.of, grid.gap(entries[0], is_above=False))
-        case.never(is_less, "somewhere every rule is weaker than reported")
-    if entries[1] < 1 and case.is_free:
-        is_low = grid.leaves(None, grid.of, grid.gap(entries[1], is_above=True))
-        require(is_low, "everywhere some rule is stronger than reported")
+    low, high = (
+        Fraction(answer.measure(f"strength where it is least, at {end}"))
+        for end in ("least", "most")
+    )
+    require(0 <= low <= high <= 1, "no least strength")
+    is_less = bool(low) and case.beats((), case.numbers, high=low)
+    require(not is_less, "somewhere every rule is weaker than reported")
+    if not case.rules.is_product and high < 1:
+        cells = case.cells(STEPS[-1])
+        if cells.is_exact and case.is_free:
+            text = "everywhere some rule is stronger than reported"
+            require(cells.least_cover() <= high + ROUNDED, text)
 
 
-def shows_win(case: Case, answer: Answer, state: Witness) -> None:
-    """Check that a claim compares the rule with all of its rivals."""
-    require(len(answer.rules) == 1, "it is of no rule")
-    number = answer.rules[0]
-    if case.view is not None:
-        fired = [claim.rules for claim in state.claims if claim.kind == "beats"]
-        is_claimed = (number,) in fired and not answer.is_finding
-        require(is_claimed, "it is not claimed that the rule fires")
+def alike_leaves(case: Case, answer: Answer) -> None:
+    """Check that the raw rules decide as the tree does in all other leaves."""
+    listed = {one.rules[0] for one in case.coded("FT203.") if one.rules}
+    live = live_leaves(case)
+    count = len(case.numbers)
+    require(answer.facts["leaves"] == count, "there are other leaves")
+    require(answer.facts["alike"] == count - len(listed), "in other leaves")
+    for number in sorted(live - listed):
+        _alike(case, number)
+
+
+def _alike(case: Case, number: int) -> None:
+    raw, label = case.model.raw, case.model.leaves[number - 1]
+    require(raw is not None, "there are no raw rules")
+    assert raw is not None
+    used = [
+        v
+        for v in case.model.variables.values()
+        if any(v.name == node["ask"] for node, _ in case.model.paths[number - 1])
+    ]
+    ways = [[(a, b) for a, b, _ in ways_to(case, number, v)] for v in used]
+    if math.prod(map(len, ways)) > 64:
+        raise UndecidedError("a leaf of too many boxes")
+    for way in itertools.product(*ways):
+        ends = {v.name: case.ends(v) for v in raw.variables.values()}
+        ends |= {v.name: one for v, one in zip(used, way, strict=True)}
+        own = [n for n, rule in enumerate(raw.rules) if rule.then == label]
+        for step in STEPS:
+            cells = Cells(raw.rules, raw.variables, ends, step=step)
+            if not _may_differ(cells, raw, own, label):
+                break
+        else:
+            raise UndecidedError("curves that are no lines, and too near to each other")
+
+
+def _may_differ(cells: Cells, raw: Rules, own: list[int], label: str) -> bool:
+    if raw.uncovered != label and cells.is_bare():
+        return True
+    others = [n for n in range(len(raw.rules)) if n not in own]
+    if raw.is_product:
+        return any(
+            boxes.exists(cells, [cells.of[n]], [cells.of[m] for m in own])
+            for n in others
+        )
+    return any(cells.exists([cells.of[n]], sum(1 << m for m in own)) for n in others)
+
+
+# --- terms, and their use: FT401 to FT404, FT501
+
+
+def plain_terms(case: Case) -> list[tuple[Variable, str, Curve]]:
+    """Return the terms whose curves are compared with each other."""
+    aside = {tuple(t) for one in case.coded("FTD.") for t in one.terms}
+    return [
+        (v, term, curve)
+        for v in case.model.variables.values()
+        for term, curve in v.curves.items()
+        if (v.name, term) not in aside
+    ]
+
+
+def axis_of(
+    case: Case, variable: Variable, terms: Iterable[str], step: int = 32
+) -> Axis:
+    """Return the cells of a variable with some of its terms."""
+    propositions = [Proposition(variable.name, (term,)) for term in terms]
+    return Axis(variable, case.ends(variable), propositions, step)
+
+
+def height(case: Case, variable: Variable, term: str) -> Interval:
+    """Return between which numbers the largest degree of a term in the domain lies."""
+    curve, (low, high) = variable.curves[term], case.ends(variable)
+    ends = [x for x in (low, *knots(curve), high) if low <= x <= high]
+    best = max(bounds(curve, x, x)[0] for x in ends)
+    if best == curve.height:
+        return best, best
+    axis = axis_of(case, variable, [term])
+    most = max(max(axis.functions[0].ends(cell, is_upper=True)) for cell in axis.cells)
+    return (most if is_straight(curve) else best), most
+
+
+def heights(case: Case, answer: Answer) -> None:
+    """Check that the findings are the terms that do not reach the level."""
+    level = Fraction(case.audit.settings.level)
+    listed = {tuple(one.terms[0]) for one in case.coded("FT401.") if one.terms}
+    every = {
+        (v.name, t): v
+        for v in case.model.variables.values()
+        for t, c in v.curves.items()
+        if c.kind != "formula"
+    }
+    rest = [height(case, v, key[1]) for key, v in every.items() if key not in listed]
+    require(answer.facts["count"] == len(rest), "other terms reach it")
+    if any(low < level <= high for low, high in rest):
+        raise UndecidedError("a height too near to the level")
+    require(all(low >= level for low, _ in rest), "a term does not reach the level")
+    least = min(low for low, _ in rest) - SHALLOW, min(high for _, high in rest)
+    if all(is_straight(v.curves[key[1]]) for key, v in every.items()):
+        least = least[1], least[1]
+    near(answer.measure("lowest height"), *least, "the lowest height")
+
+
+def low_term(case: Case, answer: Answer) -> None:
+    """Check the height of a term that does not reach the level."""
+    variable = case.model.variables[answer.terms[0].variable]
+    low, high = height(case, variable, answer.terms[0].term)
+    require(high < Fraction(case.audit.settings.level), "the term reaches the level")
+    require((answer.message == "FT401.empty") == (high == 0), "it is empty, or is not")
+    near(answer.measure("height"), low, high, "the height")
+    require(
+        answer.facts["low"] == float(case.ends(variable)[0]), "the range is another one"
+    )
+    require(
+        answer.facts["high"] == float(case.ends(variable)[1]),
+        "the range is another one",
+    )
+
+
+def shape_defects(case: Case, variable: Variable, term: str) -> tuple[set[str], int]:
+    """Return the kinds of defects of a term's shape, and how many small ones it has."""
+    curve = variable.curves[term]
+    if not is_straight(curve):
+        raise UndecidedError("the turning points of curves that are no lines")
+    axis, result = axis_of(case, variable, [term]), set[str]()
+    walk = [y for cell in axis.cells for y in cell.lines[0]]
+    deep, every = (_dips(walk, least) for least in (SHALLOW, TRACE))
+    result |= {"peaks"} if deep else set()
+    if largest(curve) < 1:
+        result.add("subnormal")
+    share = _share(case, variable, term)
+    result |= {"outside"} if share is not None and 0 < share < Fraction(1, 2) else set()
+    return result, every - deep
+
+
+def largest(curve: Curve) -> Fraction:
+    """Return the largest degree of a straight curve anywhere."""
+    top = max(curve.numbers[1]) if curve.kind == "points" else 1
+    return Fraction(top) * curve.height
+
+
+def _dips(walk: list[Fraction], least: Fraction) -> int:
+    """Return how often values fall by so much and rise by so much again."""
+    count, high, low = 0, walk[0], walk[0]
+    for y in walk:
+        if high - low >= least and y - low >= least:
+            count, high, low = count + 1, y, y
+        if y > high and high - low < least:
+            high = low = y
+        low = min(low, y)
+    return count
+
+
+def _share(case: Case, variable: Variable, term: str) -> Fraction | None:
+    """Return the share of a curve's area that is in the domain; None without an end."""
+    curve, (low, high) = variable.curves[term], case.ends(variable)
+    ends = knots(curve)
+    if low == high or not ends or ends[0] == ends[-1]:
+        return None
+    if any(bounds(curve, x, x)[1] for x in (ends[0] - 1, ends[-1] + 1)):
+        return None
+    parts = []
+    for a, b in ((max(low, ends[0]), min(high, ends[-1])), (ends[0], ends[-1])):
+        proposition = Proposition(variable.name, (term,))
+        cells = Axis(variable, (a, b), [proposition], 1).cells if a < b else []
+        parts.append(
+            sum(((c.high - c.low) * sum(c.lines[0]) / 2 for c in cells), start=ZERO)
+        )
+    return parts[0] / parts[1] if parts[1] else None
+
+
+def well_shaped(case: Case, answer: Answer) -> None:
+    """Check that the findings are all defects of shape."""
+    listed = {
+        (*one.terms[0], one.message[6:]) for one in case.coded("FT402.") if one.terms
+    }
+    found, small, sound = set[tuple[str, str, str]](), 0, 0
+    for variable, term, _ in plain_terms(case):
+        kinds, shallow = shape_defects(case, variable, term)
+        found |= {(variable.name, term, kind) for kind in kinds}
+        small, sound = small + shallow, sound + (not kinds)
+    require(listed == found, "other terms have defects of shape")
+    require(answer.facts["count"] == sound, "other terms are well shaped")
+    counted(answer, smaller_excesses_and_dips=small)
+
+
+def defect(case: Case, answer: Answer) -> None:
+    """Check a defect of a term's shape."""
+    name, term = answer.terms[0]
+    variable, kind = case.model.variables[name], answer.message[6:]
+    require(
+        kind in shape_defects(case, variable, term)[0], "the term has no such defect"
+    )
+    curve = variable.curves[term]
+    if kind == "subnormal":
+        most = largest(curve)
+        near(answer.measure("largest degree"), most, most, "the largest degree")
+    if kind == "outside":
+        share = _share(case, variable, term) or ZERO
+        near(
+            answer.measure("share of its area on the domain"), share, share, "the share"
+        )
+    if kind == "peaks":
+        walk = [
+            y for cell in axis_of(case, variable, [term]).cells for y in cell.lines[0]
+        ]
+        counted(answer, peaks=_dips(walk, SHALLOW) + 1)
+
+
+@functools.lru_cache(maxsize=1)
+def shared_areas(case: Case) -> dict[tuple[tuple[str, str], ...], Interval | None]:
+    """Return the shared area of each pair of terms of a variable; None without area."""
+    result: dict[tuple[tuple[str, str], ...], Interval | None] = {}
+    for (v, one, _), (w, other, _) in itertools.combinations(plain_terms(case), 2):
+        if v.name != w.name:
+            continue
+        axis, sums = axis_of(case, v, [one, other]), [ZERO] * 4
+        pair = [axis.function(v.curves[term]) for term in (one, other)]
+        for cell in axis.cells:
+            width = (cell.high - cell.low) / 2
+            areas = [
+                sorted(width * sum(f.ends(cell, is_upper=up)) for f in pair)
+                for up in (False, True)
+            ]
+            sums = [s + x for s, x in zip(sums, areas[0] + areas[1], strict=True)]
+        least, joined, most, joined_most = sums
+        share = None
+        if joined_most:
+            share = least / joined_most, min(most / joined, ONE) if joined else ONE
+        result[(v.name, one), (w.name, other)] = share
+    return result
+
+
+def overlaps(case: Case, answer: Answer) -> None:
+    """Check that the findings are the pairs of terms that share so much area."""
+    limit, shares = Fraction(case.audit.settings.overlap), shared_areas(case)
+    listed = {tuple(map(tuple, one.terms)) for one in case.coded("FT403.") if one.terms}
+    known = {key: one for key, one in shares.items() if one is not None}
+    if any(
+        low < limit <= high for key, (low, high) in known.items() if key not in listed
+    ):
+        raise UndecidedError("a shared area too near to the limit")
+    near_ones = {key for key, (low, _) in known.items() if low >= limit} | listed
+    counted(
+        answer,
+        pairs_apart=len(known) - len(near_ones),
+        pairs_not_listed=len(near_ones) - len(listed),
+        pairs_without_area=len(shares) - len(known),
+    )
+
+
+def overlap(case: Case, answer: Answer) -> None:
+    """Check the share of their area that two terms have in common."""
+    share = shared_areas(case)[tuple((name, term) for name, term in answer.terms)]
+    limit = Fraction(case.audit.settings.overlap)
+    require(share is not None and share[1] >= limit, "they are easy to distinguish")
+    assert share is not None
+    near(answer.measure("shared area by joined area"), *share, "their share")
+    if share[0] < limit:
+        raise UndecidedError("a shared area too near to the limit")
+
+
+def unused(case: Case, answer: Answer) -> None:
+    """Check that the findings are the terms and variables that no rule uses."""
+    model, used = case.model, case.model.asked
+    needed = {variable for variable, _ in used}
+    for variable in model.variables.values():
+        if variable.name in needed:
+            needed |= {name for name, *_ in variable.parts}
+    idle = [f"variable {name!r}" for name in model.variables if name not in needed]
+    rest = [pair for pair in model.labels if pair[0] in needed and pair not in used]
+    idle += [f"term {term!r} of {name!r}" for name, term in rest]
+    listed = [one.subject for one in case.coded("FT404.unused")]
+    require(listed == idle, "other terms or variables are unused")
+    if answer.message == "FT404.used":
+        counts = needed.intersection(model.variables), used.intersection(model.labels)
+        counted(answer, variables_in_use=len(counts[0]), terms_in_use=len(counts[1]))
+
+
+def size(case: Case, answer: Answer) -> None:
+    """Check the counts of rules, propositions and terms, and the index of Nauck."""
+    rules = case.rules.rules
+    lengths = case.model.lengths
+    used = {(c.variable, t) for rule in rules for c in rule.when for t in c.terms if t}
+    counted(
+        answer,
+        rules=len(lengths),
+        propositions=sum(lengths),
+        most_propositions_of_a_rule=max(lengths),
+        propositions_per_rule=sum(lengths) / len(lengths),
+        distinct_terms_in_use=len(used),
+        variables_in_use=len({variable for variable, _ in used}),
+    )
+    if case.model.form == "tree":
+        counted(answer, depth_of_the_tree=max(map(len, case.model.paths)))
+    if not any(one.name == "index of Nauck" for one in answer.measures):
         return
-    rivals = {*case.rivals(number)}
-    if answer.code == "FT103":
-        rivals = {*case.numbers} - {number}
-    ties = [c for c in state.claims if c.kind == "ties" and number in c.rules]
-    if answer.is_finding or (answer.code == "FT103" and ties):  # it ties, and is first
-        require(bool(ties), "it is not claimed that the rule ties")
-        return
-    beats = [c for c in state.claims if (c.kind, c.rules) == ("beats", (number,))]
-    is_all = any(rivals <= {*claim.rivals} for claim in beats)
-    require(is_all, "it is not claimed that the rule beats all these others")
+    names = [name for name in case.rules.variables if any(v == name for v, _ in used)]
+    complexity = Fraction(
+        case.model.class_count,
+        sum(len({c.variable for c in rule.when}) for rule in rules),
+    )
+    low = high = partition = ZERO
+    for name in names:
+        count, ends = coverage(case, case.model.variables[name])
+        low, high = low + ends[0] / len(names), high + ends[1] / len(names)
+        partition += Fraction(1, max(count - 1, 1)) / len(names)
+    for name, least, most in (
+        ("complexity", complexity, complexity),
+        ("coverage", low, high),
+        ("partition", partition, partition),
+    ):
+        near(answer.measure(f"{name} of Nauck"), least, most, name)
+    whole = complexity * partition
+    near(answer.measure("index of Nauck"), whole * low, whole * high, "the index")
 
 
-def lead(case: Case, number: int, point: Point) -> Fraction:
-    """Return by how much a rule is above those of other classes at a point."""
-    every = strengths(case.rules, point)
-    others = (every[n - 1] for n in case.rivals(number))
-    return every[number - 1] - max(others, default=ZERO)
+def coverage(case: Case, variable: Variable) -> tuple[int, Interval]:
+    """Return how many terms a variable has, and how well they cover its range.
 
+    With the sum s of the degrees of p terms: the mean of s up to 1, (p - s) / (p - 1)
+    beyond.
+    """
+    terms = [t for v, t, _ in plain_terms(case) if v.name == variable.name]
+    axis, count = axis_of(case, variable, terms), len(terms)
+    curves = [axis.function(variable.curves[term]) for term in terms]
+    totals = [ZERO, ZERO]
 
-def shows_lead(case: Case, answer: Answer, state: Witness) -> None:
-    """Check that the rule leads at the witness by the reported lead."""
-    require(len(answer.rules) == 1 and not answer.is_finding, "it is of no rule")
-    result = lead(case, answer.rules[0], point_of(state.point))
-    entries = [m.value for m in answer.measures if m.name == "largest lead, at least"]
-    is_so = len(entries) == 1 and entries[0] >= case.audit.settings.lead
-    is_so = is_so and result >= Fraction(entries[0])
-    require(is_so, "the rule does not lead by so much there")
-    shows_win(case, answer, state)
+    def covers(s: Fraction) -> Fraction:
+        return s if s <= 1 or count == 1 else (count - s) / (count - 1)
 
+    for cell in axis.cells:
+        sums = [
+            [
+                sum((f.ends(cell, is_upper=up)[k] for f in curves), start=ZERO)
+                for k in (0, 1)
+            ]
+            for up in (False, True)
+        ]
+        width = cell.high - cell.low
+        if sums[0] == sums[1]:
+            (a, b), ends = sums[0], [ZERO, ONE]
+            if (a - 1) * (b - 1) < 0:
+                ends.insert(1, (1 - a) / (b - a))
+            values = [covers(a + u * (b - a)) for u in ends]
+            pairs = zip(
+                itertools.pairwise(ends), itertools.pairwise(values), strict=True
+            )
+            area = sum(((v - u) * (p + q) / 2 for (u, v), (p, q) in pairs), start=ZERO)
+            totals = [total + width * area for total in totals]
+            continue
+        every = [*map(covers, (*sums[0], *sums[1]))]
+        most = ONE if min(sums[0]) <= 1 <= max(sums[1]) else max(every)
+        totals = [totals[0] + width * min(every), totals[1] + width * most]
+    low, high = case.ends(variable)
+    return count, (totals[0] / (high - low), min(totals[1] / (high - low), ONE))
 
-def shows_tie(case: Case, answer: Answer, state: Witness) -> None:
-    """Check that a claim compares two rules of two classes with all others."""
-    ties = [c for c in state.claims if c.kind == "ties"]
-    met = [c for c in ties if {*answer.rules} <= {*c.rules}]
-    is_all = any({*c.rules, *c.rivals} == {*case.numbers} for c in met)
-    require(is_all and answer.is_finding, "it is not claimed that the two tie")
-    require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
-
-
-def shows_gap(case: Case, answer: Answer, state: Witness) -> None:
-    """Check the claim that every rule is low enough."""
-    is_gap = answer.subject.startswith("gap ")
-    level = ZERO if is_gap else Fraction(case.audit.settings.epsilon)
-    below = [c for c in state.claims if c.kind == "below"]
-    met = [c for c in below if {*c.rules} == {*case.numbers}]
-    is_low = any(fraction(claim.level or "1") <= level for claim in met)
-    require(is_low and answer.is_finding, "it is not claimed that all rules are below")
-    if not is_gap and case.rules.semantics.conjunction == "minimum":
-        least_cover(case, answer)
-
-
-# --- the check of each code
 
 PROOFS: dict[str, Callable[[Case, Answer], None]] = {
-    "FT101": dead,
-    "FT103": superfluous,
-    "FT104": hidden,
-    "FT105": hidden,
-    "FT106": copied,
-    "FT107": needless,
-    "FT201": apart,
-    "FT202": ties_of_classes,
-    "FT301": covered,
-    "FT401": heights,
-    "FT403": overlaps,
-    "FT404": unused,
-    "FT501": complexity,
+    "FT101.never-wins": never_wins,
+    "FT101.may-decide-by-place": never_wins,
+    "FT101.never-fires": never_fires,
+    "FT101.weight-0": silent,
+    "FT101.never-true": silent,
+    "FT101.leaves": reached_leaves,
+    "FT101.leaf-excluded": dead_leaf,
+    "FT101.leaf-outside": dead_leaf,
+    "FT101.leaf-unmet": dead_leaf,
+    "FT103.superfluous": superfluous,
+    "FT104.subsumed": hidden,
+    "FT104.others": no_other_hidden,
+    "FT105.masked": hidden,
+    "FT105.weaker": hidden,
+    "FT105.others": no_other_hidden,
+    "FT106.same": same,
+    "FT106.contradiction": same,
+    "FT106.different": same,
+    "FT106.others": no_others_same,
+    "FT107.irrelevant": irrelevant,
+    "FT107.silent": never_fires_at_all,
+    "FT201.never": apart,
+    "FT201.unlisted": apart,
+    "FT202.others": no_other_ties,
+    "FT203.leaves": alike_leaves,
+    "FT204.alike": one_class,
+    "FT301.fires": fires,
+    "FT301.reaches": reaches,
+    "FT401.reached": heights,
+    "FT401.low": low_term,
+    "FT401.empty": low_term,
+    "FT402.sound": well_shaped,
+    "FT402.subnormal": defect,
+    "FT402.outside": defect,
+    "FT402.peaks": defect,
+    "FT403.equal": overlap,
+    "FT403.within": overlap,
+    "FT403.similar": overlap,
+    "FT403.others": overlaps,
+    "FT403.unlisted": overlaps,
+    "FT404.unused": unused,
+    "FT404.used": unused,
+    "FT501.size": size,
+    "FT501.size-of-view": size,
 }
-SHOWS: dict[str, Callable[[Case, Answer, Witness], None]] = {
-    "FT101": shows_win,
-    "FT102": shows_lead,
-    "FT103": shows_win,
-    "FT107": shows_need,
-    "FT201": shows_conflict,
-    "FT202": shows_tie,
-    "FT203": shows_difference,
-    "FT205": shows_region,
-    "FT301": shows_gap,
-}
-WHY = {
-    "FT402": "the turning points of curves are not looked at here",
-    "FT601": "nothing is run here but the model itself",
-    "FT602": "nothing is run here but the model itself",
-}
-"""Why proofs of these codes are not decided again."""
+"""How each message that can be PROVED is decided again."""

@@ -1,424 +1,442 @@
-"""A model from its file: facts as records, sentences, places of rules and terms.
-
-A condition of a fuzzy system is a sentence: `dirt is very high and (load is small or
-not (load is big))`. AND binds closer than OR; a name of several words stands as it is,
-one with a word of the language in quotes.
-"""
+"""A model from its YAML file, and its rules as an audit numbers them."""
 
 from __future__ import annotations
 
 import itertools
-import json
 import math
-import re
-import sys
-import types
-from collections.abc import Callable, Collection, Iterator, Mapping
-from functools import lru_cache
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
 
-from fuzzytree.auditing.recheck import model_records as records
-from fuzzytree.auditing.recheck.audit_records import Label, State
-from fuzzytree.auditing.recheck.model_records import (
-    And,
-    Conclusion,
+from fuzzytree.auditing.recheck.outcomes import CannotRunError, UndecidedError
+from fuzzytree.auditing.recheck.sentences_of_rules import (
     Condition,
     Is,
-    Not,
-    Or,
+    Joint,
+    read_conclusions,
+    read_condition,
+    readings,
 )
-from fuzzytree.auditing.recheck.outcomes import MOST_BYTES, CannotRunError
 from fuzzytree.auditing.recheck.yaml import Items, read_yaml
 
-MOST_LEVELS = 100
-HEDGES = (
-    *("any", "not", "very", "somewhat", "extremely", "seldom", "cubed", "very very"),
-    *("plus", "minus", "cube root"),
-)
-_HEDGES = {hedge.replace(" ", "-"): hedge for hedge in HEDGES}
-_WORDS = {"is", "and", "or", "not", "always", *_HEDGES}
-_TOKEN = re.compile(
-    r"""\s*(?:('(?:[^']|'')*'|"(?:[^"]|"")*")|([()])|([^\s()'"][^\s()]*)|$)"""
-)
-
-
-class _Sentence:
-    """The words of a sentence, from the last to the first one that is not yet read."""
-
-    def __init__(self, text: str) -> None:
-        result: list[tuple[str, bool]] = []
-        place = 0
-        while text[place:].strip():
-            token = _TOKEN.match(text, place)
-            if token is None:
-                raise ValueError("a quote that is not closed")
-            quoted, place = token[1], token.end()
-            name = quoted[1:-1].replace(quoted[0] * 2, quoted[0]) if quoted else ""
-            result.append((name, True) if quoted else (token[2] or token[3], False))
-        self.rest = result[::-1]
-
-    def takes(self, *words: str) -> str:
-        """Read a word that is the next one, and return it; an empty text if not."""
-        if self.rest and not self.rest[-1][1] and self.rest[-1][0] in words:
-            return self.rest.pop()[0]
-        return ""
-
-    def needs(self, word: str) -> None:
-        if not self.takes(word):
-            raise ValueError(f"{word!r} is missing")
-
-    def name(self) -> str | None:
-        """Read a name, in quotes or of several words; None if there is none."""
-        if self.rest and self.rest[-1][1]:
-            return self.rest.pop()[0]
-        words: list[str] = []
-        while self.rest and not self.rest[-1][1]:
-            if self.rest[-1][0] in _WORDS | {"(", ")"}:
-                break
-            words.append(self.rest.pop()[0])
-        return " ".join(words) or None
-
-    def proposition(self) -> tuple[str, tuple[str, ...], str | None]:
-        """Read `variable is hedge ... term`; the term may be missing."""
-        variable, hedges = self.name(), list[str]()
-        self.needs("is")
-        while hedge := self.takes(*_HEDGES):
-            hedges.append(_HEDGES[hedge])
-        if variable is None:
-            raise ValueError("a variable is missing")
-        return variable, tuple(hedges), self.name()
-
-    def joined(self, level: int) -> Condition:
-        """Read parts that OR joins, each of parts that AND joins."""
-        if level > MOST_LEVELS:
-            raise ValueError(f"more than {MOST_LEVELS} levels")
-        every: list[Condition] = []
-        while not every or self.takes("or"):
-            parts = [self.part(level)]
-            while self.takes("and"):
-                parts.append(self.part(level))
-            every.append(parts[0] if len(parts) == 1 else And(tuple(parts)))
-        return every[0] if len(every) == 1 else Or(tuple(every))
-
-    def part(self, level: int) -> Condition:
-        """Read a proposition, or a condition in parentheses."""
-        if level > MOST_LEVELS:
-            raise ValueError(f"more than {MOST_LEVELS} levels")
-        if self.takes("not"):
-            if self.rest[-1:] != [("(", False)]:
-                raise ValueError("'(' is missing")
-            return Not(self.part(level + 1))
-        if not self.takes("("):
-            variable, hedges, label = self.proposition()
-            if label is None and hedges[-1:] != ("any",):
-                raise ValueError("a term is missing")
-            return Is(variable, label, hedges)
-        word = self.takes("and", "or")
-        result = self.part(level + 1) if word else self.joined(level + 1)
-        self.needs(")")
-        return And((result,)) if word == "and" else Or((result,)) if word else result
-
-
-def read_condition(text: str) -> Condition | None:
-    """Return the condition of a sentence; None for `always`.
-
-    Raises:
-        ValueError: If it is none.
-
-    Example:
-        >>> read_condition("speed is not very high")
-        Is(variable='speed', label='high', hedges=('not', 'very'))
-    """
-    sentence = _Sentence(text)
-    result = None if sentence.takes("always") else sentence.joined(1)
-    if sentence.rest:
-        raise ValueError("more behind the condition")
-    return result
-
-
-def read_conclusions(text: str) -> tuple[Conclusion, ...]:
-    """Return what a sentence concludes.
-
-    Raises:
-        ValueError: If it is none.
-    """
-    sentence, result = _Sentence(text), list[Conclusion]()
-    while not result or sentence.takes("and"):
-        output, hedges, label = sentence.proposition()
-        if label is None:
-            raise ValueError("a term is missing")
-        result.append(Conclusion(output, label, hedges))
-    if sentence.rest:
-        raise ValueError("more behind the conclusions")
-    return tuple(result)
-
-
-STATES: dict[object, Any] = {kind.__name__.upper(): kind for kind in get_args(State)}
-
-
-def built(kind: Any, value: Any, where: str) -> Any:
-    """Return facts as a record: every field must be there, and no other.
-
-    Raises:
-        CannotRunError: If a fact has another type.
-    """
-    if hasattr(value, "_fields"):
-        return value  # a record already
-    if kind == State and isinstance(value, dict):
-        tag = value.get("state")
-        if isinstance(tag, str) and tag in STATES:
-            rest = {key: one for key, one in value.items() if key != "state"}
-            return built(STATES[tag], rest, where)
-    origin, choices = get_origin(kind), get_args(kind)
-    if origin is types.UnionType and type(None) in choices:
-        return None if value is None else built(choices[0], value, where)
-    if origin is tuple and isinstance(value, list | tuple):
-        every = enumerate(value, 1)
-        return tuple(built(choices[0], one, f"{where} {n}") for n, one in every)
-    if origin is Literal and isinstance(value, str) and value in choices:
-        return value
-    if origin is dict and isinstance(value, dict):
-        return value  # their kinds are those of the message
-    if hasattr(kind, "_fields") and isinstance(value, dict):
-        return _record(kind, value, where)
-    is_real = isinstance(value, int | float) and not isinstance(value, bool)
-    number: float = value if isinstance(value, int | float) else 0
-    if kind is float and is_real and abs(number) <= sys.float_info.max:
-        return float(number)
-    if kind in (str, int, bool) and type(value) is kind:
-        return value
-    raise CannotRunError(f"{where}: it cannot be {value!r:.60}")
-
-
-def _record(kind: Any, value: dict[str, Any], where: str) -> Any:
-    facts = LAYOUTS[kind](dict(value)) if kind in LAYOUTS else value
-    fields: tuple[str, ...] = kind._fields
-    names = {KEYS.get(kind, {}).get(field, field): field for field in fields}
-    needed = {key for key, name in names.items() if name not in kind._field_defaults}
-    wrong = sorted((facts.keys() - names.keys()) | (needed - facts.keys()))
-    if wrong:
-        shown = ", ".join(one if one.isidentifier() else repr(one) for one in wrong)
-        raise CannotRunError(f"{where}: missing or unknown: {shown:.200}")
-    hints = _hints(kind)
-    parts = {names[key]: one for key, one in facts.items()}
-    return kind(**{n: built(hints[n], v, f"{where}, {n}") for n, v in parts.items()})
-
-
-_hints = lru_cache(get_type_hints)
-
-
-def read_json(content: bytes, name: str) -> dict[str, Any]:
-    """Return the facts of a file of JSON.
-
-    Raises:
-        CannotRunError: If it is no JSON object, or a key stands twice, or a number is
-            not finite.
-    """
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        result = dict(pairs)
-        if len(result) < len(pairs):
-            raise CannotRunError(f"{name}: a key stands twice in one object")
-        return result
-
-    def refuse(text: str) -> Any:
-        raise CannotRunError(f"{name}: {text} is no number that JSON knows")
-
-    if len(content) > MOST_BYTES:
-        raise CannotRunError(f"{name}: more than {MOST_BYTES:,} bytes")
-    try:
-        facts = json.loads(content, object_pairs_hook=once, parse_constant=refuse)
-        json.dumps(facts, ensure_ascii=False, allow_nan=False).encode()
-    except CannotRunError:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise CannotRunError(f"{name}: not JSON: {error!s:.100}") from error
-    if not isinstance(facts, dict):
-        raise CannotRunError(f"{name}: an object is needed")
-    return facts
-
-
-# --- the layout of a model's file
-
-_RANGE = {"low": "range/from", "high": "range/to", "clips": "range/outside"}
-KEYS: dict[Any, dict[str, str]] = {
-    records.Band: {
-        **{"low": "above", "high": "up to"},
-        **{"left": "0 up to", "right": "0 from"},
-    },
-    records.Variable: {**_RANGE, "parts": "sum of"},
-    records.Output: _RANGE,
-    records.Rule: {"when": "if"},
-    records.Rules: {"kind": "terms"},
-    records.Semantics: {"conjunction": "and", "label_type": "label type"},
-    records.Branch: {"terms": "is", "node": "go to/node", "leaf": "go to/leaf"},
-    records.Node: {"variable": "ask", "owners": "interval owners"},
-    records.Leaf: {"label": "class"},
-    records.SystemRule: {"when": "if"},
-    records.Activation: {"count_": "count"},
-    records.Block: {"conjunction": "and", "disjunction": "or"},
-}
-"""What a file calls the fields of records, where it has another name for them."""
-
+ZERO, ONE = Fraction(0), Fraction(1)
+MOST_WAYS = 64
 Facts = dict[str, Any]
-
-
-def _ranged(one: Facts) -> Facts:
-    ends = {**one.pop("range", {})}
-    if "outside" in ends:
-        ends["outside"] = {"clipped": True}.get(ends["outside"])
-    return one | {f"range/{key}": end for key, end in ends.items()}
-
-
-def _output(one: Facts) -> Facts:
-    how = (one.pop("defuzzifier"), one.pop("samples", 100), one.pop("grid", "middle"))
-    facts = dict(zip(records.Defuzzifier._fields, how, strict=True))
-    blank: Facts = {"terms": [], "aggregation": None, "default": None}
-    blank |= dict.fromkeys(("range/from", "range/to"))
-    return blank | _ranged(one) | {"defuzzifier": facts}
-
-
-def _rule(one: Facts) -> Facts:
-    then = read_conclusions(one["then"])
-    return one | {"if": read_condition(one["if"]), "then": then}
-
-
-def _term(one: Facts) -> Facts:
-    name, height = one.pop("name"), one.pop("height", 1.0)
-    curve = _curve(*next(iter(one.items()))) if len(one) == 1 else None
-    return {"name": name, "function": curve or _shape(one), "height": height}
-
-
-def _branch(one: Facts) -> Facts:
-    """Return a branch with the number of its node or leaf."""
-    end = re.fullmatch("(node|leaf) ([1-9][0-9]{0,8})", one.pop("go to"))
-    if end is None:
-        raise CannotRunError("a branch leads nowhere")
-    ends = {"go to/node": None, "go to/leaf": None, f"go to/{end[1]}": int(end[2])}
-    return {"sets": []} | one | ends
-
-
-def _node(one: Facts) -> Facts:
-    owners = [owner - 1 for owner in one.get("interval owners", [])]
-    return one | {"interval owners": owners or [*range(len(one["branches"]))]}
-
-
-def _shape(one: Facts) -> Any:
-    """Return the shape of a term."""
-    if "points" in one:
-        values, degrees = zip(*one.pop("points"), strict=True)
-        return built(records.Points, one | {"values": values, "degrees": degrees}, "it")
-    if "mean" in one:
-        if "left" not in one:
-            side = {key: one.pop(key) for key in records.Side._fields}
-            one |= {"left": side, "right": side}
-        return built(records.LR, one, "a term")
-    is_whole = "degree" in one
-    if one.pop("degree", 1) != 1 or is_whole == bool(one):
-        raise CannotRunError("a term has no shape")
-    return built(records.Band, one, "a term")
-
-
-CURVES = {
-    "gaussian": "mean, deviation",
-    "two gaussians": "left, left deviation, right, right deviation",
-    "bell": "center, width, slope",
-    "sigmoid": "inflection, slope",
-    "s": "start, end",
-    "cosine": "center, width",
-    "concave": "inflection, end",
-    "spike": "center, width",
-    "arc": "start, end",
-    "semi ellipse": "start, end",
-}
-"""The curves whose numbers have names, and these names in order."""
-
-
-def _curve(kind: str, data: Any) -> records.Curve | None:
-    """Return a curve that is none of the shapes; None if it is one of these."""
-    facts: Facts
-    if kind in CURVES:
-        if data.keys() != {*CURVES[kind].split(", ")}:
-            raise CannotRunError(f"a curve ({kind}) has other numbers")
-        names = CURVES[kind].split(", ")
-        facts = {name.replace(" ", "_"): _real(data[name]) for name in names}
-    elif kind in ("trapezoid", "triangle"):
-        a, *inner, d = data
-        b, c = map(_real, inner if kind == "trapezoid" else inner * 2)
-        facts = {"a": None if a == -math.inf else _real(a), "b": b, "c": c}
-        kind, facts["d"] = "trapezoid", None if d == math.inf else _real(d)
-    elif kind in ("sigmoid difference", "sigmoid product"):
-        first, second = data
-        facts = {"first": _curve("sigmoid", first), "second": _curve("sigmoid", second)}
-    elif kind == "pi":
-        facts = dict(zip("abcd", map(_real, data), strict=True))
-    elif kind == "singleton":
-        facts = {"value": _real(data)}
-    elif kind in ("at least", "at most"):
-        facts = {"start": _real(data), "is_above": kind == "at least"}
-        kind = "binary"
-    elif kind == "linear" and data.keys() == {"weights", "offset"}:
-        weights = tuple(map(_real, data["weights"]))
-        facts = {"weights": weights, "offset": _real(data["offset"])}
-    elif kind == "formula":
-        facts = {"text": str(data)}
-    else:
-        return None
-    return records.Curve(kind, tuple(facts.items()))
-
-
-def _real(value: Any) -> Any:
-    return built(float, value, "a curve")
-
-
-LAYOUTS: dict[Any, Callable[[Facts], Mapping[str, Any]]] = {
-    records.Term: _term,
-    records.Variable: _ranged,
-    records.Output: _output,
-    records.Branch: _branch,
-    records.Node: _node,
-    records.SystemRule: _rule,
-    records.Block: lambda one: {"and": None, "or": None, "implication": None} | one,
-}
-"""How the facts of a record are laid out in a file, where it is not field by field."""
-
-
 Place = tuple[int, int]  # line and column, from 1
+Point = Mapping[str, Fraction]
 
 
-class Places:
-    """The lines and columns of rules and terms, as a file was read.
+class Curve(NamedTuple):
+    """A membership function: its kind and numbers, its height, and hedges."""
+
+    kind: str
+    numbers: tuple[Any, ...]
+    height: Fraction = ONE
+    hedges: tuple[str, ...] = ()
+
+
+class Proposition(NamedTuple):
+    """`variable is a or b`, or its negation; times a weight."""
+
+    variable: str
+    terms: tuple[str, ...]
+    negated: bool = False
+    weight: Fraction = ONE
+
+    def __str__(self) -> str:
+        """Return it as answers show it."""
+        verb = "is not" if self.negated else "is"
+        return f"{self.variable} {verb} {' or '.join(self.terms)}"
+
+
+class Rule(NamedTuple):
+    """A rule: what must hold, and the class or the text of what it concludes."""
+
+    when: tuple[Proposition, ...]
+    then: str
+
+
+class Variable(NamedTuple):
+    """An input, or a combination of inputs: of each its name, weight and centre."""
+
+    name: str
+    curves: dict[str, Curve]
+    unit: str
+    low: float | None
+    high: float | None
+    parts: tuple[tuple[str, Fraction, Fraction], ...]
+    is_clipped: bool = False
+
+    def at(self, point: Point) -> Fraction:
+        """Return its value at a point."""
+        if not self.parts:
+            return point[self.name]
+        return sum((w * (point[name] - c) for name, w, c in self.parts), start=ZERO)
+
+
+class Rules(NamedTuple):
+    """Rules with all that they mean."""
+
+    variables: dict[str, Variable]
+    rules: tuple[Rule, ...]
+    is_product: bool
+    uncovered: str | None
+
+
+Steps = tuple[tuple[Facts, int], ...]
+"""A path in a tree: nodes, and the position of the branch that is taken."""
+
+
+class Model:
+    """A rule base, a tree or a fuzzy system, as its audit sees it.
 
     Attributes:
-        rules: Of each rule; of a tree's leaves; of the rules of all blocks.
-        terms: Of each term; of a name that two lists have, the first.
+        form: What an audit calls it.
+        rules: The rules; of a tree the relative ones, of a system its ways.
+        raw: The raw rules of a tree.
+        nodes: The nodes of a tree, from the root.
+        paths: The path to each leaf of a tree.
+        names: What answers call each rule.
+        numbers: The number in the file of each rule, from 1.
+        silent: The names of rules of a system that never fire, as their text says.
+        absent: The numbers in the file of rules that are not audited, by name.
+        labels: Every term of an input, by its variable.
+        asked: The variables and terms that the file's rules use.
+        places: The lines and columns of rules and terms in the file.
     """
 
-    def __init__(self, top: dict[str, Any]) -> None:
-        self.rules = [*_of(top.get("rules", top.get("leaves", [])))]
+    def __init__(self, content: bytes, name: str, left_out: Iterable[str] = ()) -> None:
+        try:
+            top = read_yaml(content, name)
+        except CannotRunError as error:
+            if name.lower().endswith((".yaml", ".yml")):
+                raise
+            text = "convert it (fuzzytree convert), and audit that"
+            raise CannotRunError(f"{error}; only YAML is read here: {text}") from error
+        kind = top.get("kind") if isinstance(top, dict) else None
+        if str(kind) not in MEANINGS:
+            text = f"rule bases, trees and systems are checked, not {kind!r:.60}"
+            raise CannotRunError(f"{name}: {text}")
+        try:
+            self._read(top, str(kind), {*left_out})
+        except CannotRunError as error:
+            raise CannotRunError(f"{name}: {error}") from error
+        except (TypeError, LookupError, ArithmeticError, AttributeError, ValueError):
+            text = f"{name}: not a {kind} that fuzzytree writes"
+            raise CannotRunError(text) from None
+
+    def _read(self, top: Facts, kind: str, left_out: set[str]) -> None:
+        meaning = top.get("semantics", {})
+        if top.get("format") != "fuzzytree/1" or not (
+            MEANINGS[kind].items() <= meaning.items()
+        ):
+            raise CannotRunError("its meaning is not known")
+        keys(top, f"format, kind, name, semantics, {NEEDED[kind]}", OPTIONAL[kind])
+        self.name, self.kind = str(top["name"]), kind
+        self.raw: Rules | None = None
+        self.nodes: list[Facts] = []
+        self.paths: list[Steps] = []
+        self.silent: list[str] = []
+        self.absent: dict[str, int] = {}
+        self.is_whole = True
+        self.places: list[Place] = [*_places(top.get("rules", top.get("leaves")))]
         for block in top.get("blocks", []):
-            self.rules += _of(block["rules"])
-        self.terms: dict[Label, Place] = {}
-        for key in ("variables", "inputs", "outputs", "sets"):
-            for one in top.get(key, []):
-                name = one.get("name", one.get("variable"))
-                terms = one.get("terms", [])
-                for term, place in zip(terms, _of(terms), strict=False):
-                    self.terms.setdefault(Label(name, term["name"]), place)
+            self.places += _places(block["rules"])
+        self.term_places: dict[tuple[str, str], Place] = {}
+        for one in (
+            o
+            for k in ("variables", "inputs", "outputs", "sets")
+            for o in top.get(k, [])
+        ):
+            terms, of = one.get("terms", []), one.get("name", one.get("variable"))
+            for term, place in zip(terms, _places(terms), strict=False):
+                self.term_places.setdefault((of, term["name"]), place)
+        variables = [
+            _variable(one) for one in top.get("variables") or top.get("inputs") or []
+        ]
+        self.variables = {one.name: one for one in variables}
+        once([one.name for one in variables])
+        self.labels = [(v.name, term) for v in variables for term in v.curves]
+        if kind == "system":
+            self._read_system(top, left_out)
+            return
+        self.missing = _class(meaning["missing"])
+        self.uncovered = _class(meaning["uncovered"])
+        keys(
+            meaning,
+            f"and, uncovered, missing, {', '.join(MEANINGS[kind])}",
+            "label type",
+        )
+        if meaning["and"] not in ("minimum", "product"):
+            raise CannotRunError("its AND is not known")
+        self.is_product = meaning["and"] == "product"
+        self.form = f"{top['terms']} rules" if "terms" in top else "rules"
+        if kind == "tree":
+            self._read_tree(top)
+        else:
+            rules = [_rule(one, self.variables) for one in top["rules"]]
+            self.rules = self._rules(rules, self.variables)
+        self.numbers = [*range(1, len(self.rules.rules) + 1)]
+        self.names = [f"rule {number}" for number in self.numbers]
+        self.asked = _used(self.rules)
+        self.lengths = [len(rule.when) for rule in self.rules.rules]
+        once(top["classes"])
+        self.class_count = len(top["classes"])
+        if not {rule.then for rule in self.rules.rules} <= {*top["classes"]}:
+            raise CannotRunError("a class that is not declared")
+
+    def _rules(self, rules: Sequence[Rule], variables: Mapping[str, Variable]) -> Rules:
+        known = {(v.name, term) for v in variables.values() for term in v.curves}
+        used = {(c.variable, t) for rule in rules for c in rule.when for t in c.terms}
+        if not rules or not used <= known:
+            raise CannotRunError("rules of unknown terms, or none")
+        return Rules({**variables}, tuple(rules), self.is_product, self.uncovered)
+
+    # --- trees
+
+    def _read_tree(self, top: Facts) -> None:
+        self.form, self.nodes = "tree", top.get("nodes", [])
+        leaves, count = top["leaves"], 0
+        for number, leaf in enumerate(leaves, 1):
+            keys(leaf, "leaf, class", "pattern, support")
+            count += leaf["leaf"] == number
+        for number, node in enumerate(self.nodes, 1):
+            keys(node, "node, ask, cuts, branches", "interval owners")
+            ways = range(1, len(node["branches"]) + 1)
+            node["interval owners"] = node.get("interval owners", [*ways])
+            is_whole = {*node["interval owners"]} == {*ways} and node["node"] == number
+            is_whole &= sorted(node["cuts"]) == node["cuts"]
+            is_whole &= len(node["interval owners"]) == len(node["cuts"]) + 1
+            count += is_whole
+        if count != len(leaves) + len(self.nodes):
+            raise CannotRunError("nodes, leaves or intervals that lead nowhere")
+        ends: list[tuple[int, Steps]] = [(1 if self.nodes else -1, ())]
+        met: list[int] = []
+        while ends:
+            number, path = ends.pop()
+            met.append(number)
+            if len(met) > len(self.nodes) + len(leaves):
+                break
+            if number < 0:
+                self.paths.append(path)
+                continue
+            node = self.nodes[number - 1]
+            for place in reversed(range(len(node["branches"]))):
+                kind, to = node["branches"][place]["go to"].split(" ")
+                sign = {"leaf": -1, "node": 1}[kind]
+                ends.append((sign * int(to), (*path, (node, place))))
+        order = [*range(1, len(self.nodes) + 1)]
+        is_once = [n for n in met if n > 0] == order
+        if not is_once or [-n for n in met if n < 0] != [*range(1, len(leaves) + 1)]:
+            raise CannotRunError("nodes, leaves or intervals that lead nowhere")
+        self.leaves: list[str] = [leaf["class"] for leaf in leaves]
+        self.rules = self._rules([*self._of_leaves("is")], self.variables)
+        sets = {one["variable"]: _curves(one["terms"]) for one in top.get("sets", [])}
+        fitted = {
+            one.name: one._replace(curves=sets.get(one.name, {}))
+            for one in self.variables.values()
+        }
+        if sets:
+            self.raw = self._rules([*self._of_leaves("sets")], fitted)
+
+    def _of_leaves(self, key: str) -> Iterator[Rule]:
+        for path, label in zip(self.paths, self.leaves, strict=True):
+            when = [(node["ask"], node["branches"][way][key]) for node, way in path]
+            yield Rule(
+                tuple(Proposition(name, tuple(terms)) for name, terms in when), label
+            )
+
+    def leaf_at(self, point: Point) -> int:
+        """Return the number of the leaf of a tree that a point reaches."""
+        number = 1 if self.nodes else -1
+        while number > 0:
+            node = self.nodes[number - 1]
+            x = self.variables[node["ask"]].at(point)
+            owner = node["interval owners"][sum(x > cut for cut in node["cuts"])]
+            kind, to = node["branches"][owner - 1]["go to"].split(" ")
+            number = int(to) if kind == "node" else -int(to)
+        return -number
+
+    # --- systems: a rule of `a and (b or c)` becomes two rules of an audit, its ways
+
+    def _read_system(self, top: Facts, left_out: set[str]) -> None:
+        self.form, self.missing, self.uncovered = "system", None, None
+        keys(top["semantics"], ", ".join(MEANINGS["system"]))
+        self.outputs = [one["name"] for one in top["outputs"]]
+        once([*self.variables, *self.outputs])
+        owners: list[tuple[str, Facts, Facts, Condition | None]] = []
+        counts = {"minimum": 0, "product": 0}
+        for place, block in enumerate(top["blocks"], 1):
+            keys(block, "rules, activation", "and, or, implication, name")
+            end = f" of block {place}" if len(top["blocks"]) > 1 else ""
+            for index, rule in enumerate(block["rules"], 1):
+                keys(rule, "if, then", "weight, name")
+                condition = read_condition(rule["if"])
+                owners.append((f"rule {index}{end}", block, rule, condition))
+                if block.get("and") in counts:
+                    has_and = any(
+                        isinstance(o, Joint) and o.word == "and"
+                        for o in parts(condition)
+                    )
+                    counts[block["and"]] += has_and
+        self.is_product = counts["product"] > counts["minimum"]
+        rules: list[Rule] = []
+        self.lengths = list[int]()
+        self.names, self.numbers = list[str](), list[int]()
+        self.thens: list[tuple[Is, ...]] = []
+        self.asked = {
+            (one.variable, one.term or "")
+            for *_, condition in owners
+            for one in parts(condition)
+            if isinstance(one, Is)
+        }
+        for number, (name, block, rule, condition) in enumerate(owners, 1):
+            weight, then = (
+                number_of(rule.get("weight", 1)),
+                read_conclusions(rule["then"]),
+            )
+            text = " and ".join(
+                " ".join((c.variable, "is", *c.hedges, c.term or "")) for c in then
+            )
+            try:
+                ways = self.ways(condition, block) if weight else []
+            except UndecidedError:
+                ways = []
+                self.is_whole = False
+                left_out.add(name)
+            if name in left_out:
+                self.is_whole = False
+                ways = []
+            elif not ways:
+                self.silent.append(name)
+            if not ways:
+                self.absent[name] = number
+            for place, way in enumerate(ways, 1):
+                rules.append(Rule(self._weighted(way, Fraction(weight)), text))
+                self.lengths.append(len(way))
+                several = len(ways) > 1
+                self.names.append(f"way {place} of {name}" if several else name)
+                self.numbers.append(number)
+                self.thens.append(then)
+        hedged = {
+            v.name: v._replace(curves={**v.curves}) for v in self.variables.values()
+        }
+        for proposition in (c for rule in rules for c in rule.when):
+            for term in proposition.terms:
+                plain, *hedges = term.split("\0")
+                curves = hedged[proposition.variable].curves
+                whole = Curve("band", (None,) * 4) if not plain else curves[plain]
+                curves[term] = whole._replace(hedges=tuple(hedges))
+        self.rules = Rules(hedged, tuple(rules), self.is_product, None)
+        self.class_count = len({rule.then for rule in rules})
+
+    def _weighted(
+        self, way: tuple[Proposition, ...], weight: Fraction
+    ) -> tuple[Proposition, ...]:
+        """Return propositions with a weight: all of a minimum, one of a product."""
+        if weight == 1:
+            return way
+        way = way or (Proposition(next(iter(self.variables)), ("",)),)
+        if self.is_product:
+            return (way[0]._replace(weight=weight), *way[1:])
+        return tuple(proposition._replace(weight=weight) for proposition in way)
+
+    def ways(
+        self, condition: Condition | None, block: Facts, *, negated: bool = False
+    ) -> list[tuple[Proposition, ...]]:
+        """Return the ways in which a condition holds, or does not; none if never.
+
+        Raises:
+            UndecidedError: If it does not hold by its ways.
+        """
+        if condition is None:
+            return [()]
+        if isinstance(condition, Is):
+            return self._ways_of_proposition(condition, negated=negated)
+        word, inner = condition
+        if word == "not" or len(inner) == 1:
+            return self.ways(inner[0], block, negated=negated is not (word == "not"))
+        norm = "product" if self.is_product else "minimum"
+        if word == "and":
+            is_fit = block.get("and") == "minimum" or not negated
+            is_fit &= negated or block.get("and") == norm
+        else:
+            one = self._one_proposition(condition, block, negated=negated)
+            if one is not None:
+                return [(one,)]
+            is_fit = block.get("or") == "maximum" and not (negated and self.is_product)
+        if not is_fit:
+            raise UndecidedError("a condition that does not hold by its ways")
+        is_union = (word == "or") is not negated
+        result: list[tuple[Proposition, ...]] = [] if is_union else [()]
+        for part in inner:
+            ways = self.ways(part, block, negated=negated)
+            if is_union:
+                result += ways
+            else:
+                result = [one + way for one in result for way in ways]
+            if not self.is_product:  # a minimum does not change by repetition
+                result = [tuple(dict.fromkeys(way)) for way in result]
+            result = [*dict.fromkeys(result)]
+            if len(result) > MOST_WAYS:
+                raise UndecidedError("a condition that holds in too many ways")
+        return result
+
+    def _ways_of_proposition(
+        self, one: Is, *, negated: bool
+    ) -> list[tuple[Proposition, ...]]:
+        hedges = one.hedges
+        while hedges[:1] == ("not",):
+            negated, hedges = not negated, hedges[1:]
+        if hedges[:1] == ("any",):
+            return [] if negated else [()]
+        known = self.variables.get(one.variable)
+        if known is None or one.term not in known.curves:
+            raise UndecidedError("it uses an output")
+        term = "\0".join((one.term, *hedges))
+        return [(Proposition(one.variable, (term,), negated),)]
+
+    def _one_proposition(
+        self, whole: Joint, block: Facts, *, negated: bool
+    ) -> Proposition | None:
+        """Return `x is a or b` as one proposition, if it is that and a maximum."""
+        every = [
+            o for o in parts(whole) if not (isinstance(o, Joint) and o.word == "or")
+        ]
+        names = {(o.variable, bool(o.hedges)) for o in every if isinstance(o, Is)}
+        is_plain = all(isinstance(o, Is) and o.term for o in every)
+        if block.get("or") != "maximum" or not is_plain or len(names) != 1:
+            return None
+        ((name, is_hedged),) = names
+        terms = dict.fromkeys(o.term or "" for o in every if isinstance(o, Is))
+        if is_hedged or name not in self.variables:
+            return None
+        return Proposition(name, tuple(terms), negated)
+
+    def may_conflict(self, one: int, other: int) -> bool:
+        """Return whether two rules of a system say different things of one output."""
+        if self.form != "system":
+            return True
+        thens = self.thens[one - 1], self.thens[other - 1]
+        shared = set.intersection(*({c.variable for c in then} for then in thens))
+        return any(c.variable in shared for c in {*thens[0]} ^ {*thens[1]})
 
 
-def _of(items: Any) -> Iterator[Place]:
-    """Yield the places of a list that has a line for each item."""
-    if isinstance(items, Items):
-        yield from items.places
+def parts(condition: Condition | None) -> Iterator[Condition]:
+    """Yield a condition and all of its parts."""
+    if condition is not None:
+        yield condition
+    for part in condition.parts if isinstance(condition, Joint) else ():
+        yield from parts(part)
 
 
-# --- models
+def _used(rules: Rules) -> set[tuple[str, str]]:
+    return {(c.variable, t) for rule in rules.rules for c in rule.when for t in c.terms}
 
-Whole = records.Model | records.System
-Known = Mapping[str, Collection[str]]  # the terms of variables
 
-MEANINGS = {
+# --- the layout of a file
+
+MEANINGS: dict[str, dict[str, str]] = {
     "rule base": {
         "or": "maximum",
         "not": "1 - degree",
@@ -435,174 +453,198 @@ MEANINGS = {
     },
 }
 """What models of each kind always mean."""
+NEEDED = {
+    "rule base": "classes, rules",
+    "tree": "classes, leaves",
+    "system": "outputs, blocks",
+}
+OPTIONAL = {
+    "rule base": "variables, columns, terms",
+    "tree": "variables, columns, nodes, sets",
+    "system": "inputs, note",
+}
+
+SHAPES = {
+    "gaussian": "mean, deviation",
+    "two gaussians": "left, left deviation, right, right deviation",
+    "bell": "center, width, slope",
+    "sigmoid": "inflection, slope",
+    "s": "start, end",
+    "cosine": "center, width",
+    "concave": "inflection, end",
+    "spike": "center, width",
+    "arc": "start, end",
+    "semi ellipse": "start, end",
+}
+"""The curves whose numbers have names, and these names in order."""
 
 
-def read_file(content: bytes, name: str) -> tuple[Whole, Places]:
-    """Return the model of a YAML file, and where its rules and terms stand.
+def keys(one: Facts, needed: str, optional: str = "") -> None:
+    """Refuse facts that lack a key, or have another one.
 
     Raises:
-        CannotRunError: If it is something else, or holds what is not known here.
+        CannotRunError: If they do.
     """
-    try:
-        top = read_yaml(content, name)
-    except CannotRunError as error:
-        if name.lower().endswith((".yaml", ".yml")):
-            raise
-        text = "only YAML is read here: convert it (fuzzytree convert), and audit that"
-        raise CannotRunError(f"{error}; {text}") from error
-    kind = top.get("kind") if isinstance(top, dict) else None
-    if not isinstance(top, dict) or kind not in ("rule base", "tree", "system"):
-        text = f"{name}: rule bases, trees and systems are checked, not {kind!r:.60}"
-        raise CannotRunError(text)
-    try:
-        result = _read(top, str(kind), name)
-        return result, Places(top)
-    except CannotRunError as error:
-        if str(error).startswith(name):
-            raise
-        raise CannotRunError(f"{name}: {error}") from error
-    except (TypeError, AttributeError, KeyError, ValueError) as error:
-        raise CannotRunError(f"{name}: not a {kind} that fuzzytree writes") from error
+    must = {*needed.split(", ")}
+    wrong = sorted(must - one.keys() | one.keys() - must - {*optional.split(", ")})
+    if wrong:
+        raise CannotRunError(f"missing or unknown: {', '.join(map(repr, wrong)):.200}")
 
 
-def _read(top: dict[str, Any], kind: str, name: str) -> Whole:
-    facts = {key: one for key, one in top.items() if key not in ("format", "kind")}
-    meant = MEANINGS[kind]
-    if top["format"] != "fuzzytree/1" or not meant.items() <= top["semantics"].items():
-        raise CannotRunError(f"{name}: its meaning is not known")
-    rest = {key: one for key, one in facts.pop("semantics").items() if key not in meant}
-    if kind == "system":
-        if rest:
-            raise CannotRunError(f"{name}: its meaning is not known")
-        system: records.System = built(records.System, {"inputs": [], **facts}, name)
-        groups = [[t.name for t in one.terms] for one in system.inputs]
-        groups += [[t.name for t in one.terms] for one in system.outputs]
-        names = [one.name for one in system.inputs] + [o.name for o in system.outputs]
-        _check_once([names, *groups], name)
-        return system
-    for key in ("uncovered", "missing"):
-        text = rest[key]
-        if text != "no class" and not text.startswith("class "):
-            raise CannotRunError(f"not an answer: {text!r:.60}")
-        rest[key] = None if text == "no class" else text.removeprefix("class ")
-    facts = {"variables": [], **facts, "semantics": rest}
-    result: records.Model
-    if kind == "tree":
-        facts["nodes"] = [*_numbered(top.get("nodes", []), "node")]
-        facts["leaves"] = [*_numbered(top["leaves"], "leaf")]
-        facts.setdefault("sets", [])
-        tree: records.Tree = built(records.Tree, facts, name)
-        _check_numbers(tree, name)
-        result = tree
-    else:
-        known = {
-            v["name"]: [t["name"] for t in v.get("terms", [])]
-            for v in facts["variables"]
-        }
-        facts["rules"] = [
-            one | {"if": [_proposition(text, known) for text in one["if"]]}
-            for one in facts["rules"]
-        ]
-        result = built(records.Rules, facts, name)
-    _check_names(result, name)
-    return result
+def once(names: Sequence[str]) -> None:
+    """Refuse a name that stands twice.
 
-
-def _numbered(items: list[dict[str, Any]], kind: str) -> Iterator[dict[str, Any]]:
-    """Yield nodes or leaves without their numbers, which are those of their order."""
-    for number, one in enumerate(items, 1):
-        if one[kind] != number:
-            raise CannotRunError(f"{kind} {number} has another number")
-        yield {key: value for key, value in one.items() if key != kind}
-
-
-def _proposition(result: Any, known: Known) -> dict[str, Any]:
-    if isinstance(result, dict):
-        verb = "is not" if "is not" in result else "is"
-        if result.keys() != {"variable", verb}:
-            raise CannotRunError(f"not a proposition: {result!r:.200}")
-        return records.Proposition(
-            result["variable"], result[verb], verb == "is not"
-        )._asdict()
-    read = [*itertools.islice(readings(result, known), 2)]
-    if len(read) != 1:
-        raise CannotRunError(f"{len(read)} readings of {result!r:.200}")
-    return read[0]._asdict()
-
-
-def readings(text: str, known: Known) -> Iterator[records.Proposition]:
-    """Yield every proposition that a sentence can mean.
-
-    Example:
-        >>> list(readings("grip is not firm", {"grip": ["soft", "firm"]}))
-        [Proposition(variable='grip', terms=('firm',), negated=True)]
+    Raises:
+        CannotRunError: If one does.
     """
-    for place in re.finditer("(?= is )", text):
-        variable, rest = text[: place.start()], text[place.start() + 4 :]
-        if variable in known:
-            for terms in _lists(rest, known[variable]):
-                yield records.Proposition(variable, terms)
-            if rest.startswith("not "):
-                for terms in _lists(rest[4:], known[variable]):
-                    yield records.Proposition(variable, terms, negated=True)
+    if len({*names}) < len(names):
+        raise CannotRunError("a name stands twice")
 
 
-def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
-    """Yield every list of terms, joined by ` or `, that a text can mean."""
-    todo: list[tuple[int, tuple[str, ...]]] = [(0, ())]
-    while todo:
-        start, terms = todo.pop()
-        for name in known:
-            end = start + len(name)
-            if text.startswith(name, start) and end == len(text):
-                yield (*terms, name)
-            elif text.startswith(name, start) and text.startswith(" or ", end):
-                todo.append((end + 4, (*terms, name)))
+def number_of(value: Any) -> float:
+    """Return a finite number.
+
+    Raises:
+        CannotRunError: If it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise CannotRunError(f"no number: {value!r:.60}")
+    if not math.isfinite(value):
+        raise CannotRunError(f"not finite: {value!r:.60}")
+    return float(value)
 
 
-def _check_once(groups: list[list[str]], name: str) -> None:
-    if any(len(set(group)) < len(group) for group in groups):
-        raise CannotRunError(f"{name}: a name stands twice")
+def _class(text: str) -> str | None:
+    if text == "no class":
+        return None
+    if not text.startswith("class "):
+        raise CannotRunError(f"not an answer: {text!r:.60}")
+    return text.removeprefix("class ")
 
 
-def _check_names(model: records.Model, name: str) -> None:
-    """Refuse a model that uses what it does not declare, or declares it twice."""
-    groups = [[*model.classes], [v.name for v in model.variables]]
-    _check_once(groups + [[t.name for t in v.terms] for v in model.variables], name)
-    known = {(v.name, t.name) for v in model.variables for t in v.terms}
-    used, labels = set[tuple[str, str]](), set[str]()
-    if isinstance(model, records.Rules):
-        propositions = [
-            proposition for rule in model.rules for proposition in rule.when
-        ]
-        used = {(c.variable, term) for c in propositions for term in c.terms}
-        labels = {rule.then for rule in model.rules}
-        is_empty = not model.rules or not all(c.terms for c in propositions)
-    else:
-        labels = {leaf.label for leaf in model.leaves}
-        is_empty = not model.leaves
-        used = {
-            (n.variable, t) for n in model.nodes for b in n.branches for t in b.terms
-        }
-    if is_empty or not used <= known or not labels <= set(model.classes):
-        raise CannotRunError(
-            f"{name}: a rule or leaf that is empty, or uses unknown names"
+def _places(items: Any) -> list[Place]:
+    """Return the places of a list that has a line for each item."""
+    return items.places if isinstance(items, Items) else []
+
+
+def _variable(one: Facts) -> Variable:
+    keys(one, "name", "terms, unit, range, sum of")
+    ends = one.get("range", {})
+    if ends.keys() - {"from", "to", "outside"}:
+        raise CannotRunError("a range with other ends")
+    low, high = (None if k not in ends else number_of(ends[k]) for k in ("from", "to"))
+    inputs = [
+        (
+            p["input"],
+            Fraction(number_of(p["weight"])),
+            Fraction(number_of(p.get("centre", 0))),
         )
-
-
-def _check_numbers(tree: records.Tree, name: str) -> None:
-    """Refuse a tree whose branches do not meet every node and leaf once, in order."""
-    nodes = [b.node for node in tree.nodes for b in node.branches if b.leaf is None]
-    leaves = [
-        b.leaf for node in tree.nodes for b in node.branches if b.leaf is not None
+        for p in one.get("sum of", [])
     ]
-    is_once = sorted(nodes, key=str) == sorted(range(2, len(tree.nodes) + 1), key=str)
-    is_once &= sorted(leaves) == [*range(1, len(tree.leaves) + 1)] or not tree.nodes
-    for number, node in enumerate(tree.nodes, 1):
-        is_once &= all(b.node is None or b.node > number for b in node.branches)
-        is_once &= len(node.owners) == len(node.cuts) + 1 and list(node.cuts) == sorted(
-            node.cuts
+    curves = _curves(one.get("terms", []))
+    unit, is_clipped = one.get("unit", ""), "outside" in ends
+    return Variable(one["name"], curves, unit, low, high, tuple(inputs), is_clipped)
+
+
+def _curves(terms: Iterable[Facts]) -> dict[str, Curve]:
+    terms = [{**one} for one in terms]
+    names = [one.pop("name") for one in terms]
+    once(names)
+    return dict(zip(names, map(curve_of, terms), strict=True))
+
+
+def curve_of(one: Facts) -> Curve:
+    """Return the membership function of a term.
+
+    Raises:
+        CannotRunError: If it is not known here.
+    """
+    height = Fraction(number_of(one.pop("height", 1)))
+    if one == {"degree": 1}:
+        return Curve("band", (None,) * 4, height)
+    if "mean" in one and one.keys() & {"spread", "left"}:
+        keys(
+            one, "mean, left, right" if "left" in one else "mean, spread, curve, reach"
         )
-        is_once &= set(node.owners) == set(range(len(node.branches)))
-    if not is_once:
-        raise CannotRunError(f"{name}: nodes, leaves or intervals that lead nowhere")
+        sides = []
+        for side in (one.get("left", one), one.get("right", one)):
+            spread, reach = number_of(side["spread"]), number_of(side["reach"])
+            if spread <= 0 or reach <= 1 or not 1 <= len(side["curve"]) <= 8:
+                raise CannotRunError("a side of no set")
+            sides.append((spread, tuple(map(number_of, side["curve"])), reach))
+        return Curve("lr", (number_of(one["mean"]), *sides), height)
+    if one and one.keys() <= {"0 up to", "above", "up to", "0 from"}:
+        names = ("above", "up to", "0 up to", "0 from")
+        ends = tuple(None if n not in one else number_of(one[n]) for n in names)
+        order = [end for end in (ends[2], ends[0], ends[1], ends[3]) if end is not None]
+        if order != sorted({*order}):
+            raise CannotRunError("a plateau whose ends are swapped")
+        return Curve("band", ends, height)
+    ((kind, data),) = one.items()
+    if kind == "formula":
+        return Curve(kind, (str(data),), height)
+    return Curve(*_numbers(kind, data), height)
+
+
+def _numbers(kind: str, data: Any) -> tuple[str, tuple[Any, ...]]:
+    if kind == "points":
+        values, degrees = zip(*data, strict=True)
+        points = tuple(map(number_of, values)), tuple(map(number_of, degrees))
+        if [*points[0]] != sorted(points[0]) or not all(0 <= y <= 1 for y in points[1]):
+            raise CannotRunError("points that are no function")
+        return kind, points
+    if kind in SHAPES:
+        keys(data, SHAPES[kind])
+        numbers = tuple(number_of(data[name]) for name in SHAPES[kind].split(", "))
+        is_wide = all(
+            numbers[i] > 0
+            for i, n in enumerate(SHAPES[kind].split(", "))
+            if n in ("width",) or n.endswith("deviation")
+        )
+        if not is_wide:
+            raise CannotRunError("a curve without width")
+        return kind, numbers
+    if kind in ("trapezoid", "triangle"):
+        a, *inner, d = data
+        b, c = map(number_of, inner if kind == "trapezoid" else inner * 2)
+        ends = (
+            None if a == -math.inf else number_of(a),
+            b,
+            c,
+            None if d == math.inf else number_of(d),
+        )
+        order = [end for end in ends if end is not None]
+        if order != sorted(order):
+            raise CannotRunError("a trapezoid whose ends are swapped")
+        return "trapezoid", ends
+    if kind in ("sigmoid difference", "sigmoid product"):
+        first, second = data
+        return kind, (_numbers("sigmoid", first)[1], _numbers("sigmoid", second)[1])
+    if kind == "pi":
+        a, b, c, d = map(number_of, data)
+        return kind, (a, b, c, d)
+    x = number_of(data)
+    if kind == "singleton":
+        return "trapezoid", (x, x, x, x)
+    if kind in ("at least", "at most"):
+        return "trapezoid", (x, x, x, None) if kind == "at least" else (None, x, x, x)
+    raise CannotRunError(f"a curve ({kind:.60}) is not known")
+
+
+def _rule(one: Facts, variables: Mapping[str, Variable]) -> Rule:
+    keys(one, "if, then", "support")
+    known = {name: variable.curves for name, variable in variables.items()}
+    when: list[Proposition] = []
+    for result in one["if"]:
+        if isinstance(result, dict):
+            verb = "is not" if "is not" in result else "is"
+            keys(result, f"variable, {verb}")
+            when.append(
+                Proposition(result["variable"], tuple(result[verb]), verb != "is")
+            )
+        else:
+            read = [*itertools.islice(readings(result, known), 2)]
+            if len(read) != 1:
+                raise CannotRunError(f"{len(read)} readings of {result!r:.200}")
+            when.append(Proposition(*read[0]))
+    return Rule(tuple(when), one["then"])

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
-MOST_BYTES = 64 * 2**20
-
 
 class CannotRunError(ValueError):
     """A file cannot be read: nothing is checked."""
@@ -17,7 +15,7 @@ class DoesNotHoldError(Exception):
 
 
 class UndecidedError(Exception):
-    """Something cannot be decided again here; the text says why."""
+    """Something is beyond the limits of what is decided here; the text says which."""
 
 
 def require(is_so: bool, otherwise: str) -> None:
@@ -30,21 +28,11 @@ def require(is_so: bool, otherwise: str) -> None:
         raise DoesNotHoldError(otherwise)
 
 
-# --- the report
-
 UNCHECKED = (
-    "the version, the table, how many rows and how long, how proofs were made, why "
-    "something is open or left out, the commands"
+    "the version, the hash of the model's content, the table, how many rows and how "
+    "long, how proofs were made, why something is open or left out, ids, the commands"
 )
-"""What of an audit is read and cannot be compared with anything."""
-
-
-OTHERS = {
-    "SENTENCE": "sentences, not checked",
-    "ID": "ids of findings, not checked",
-    "FACT": "facts about the model, not checked",
-}
-"""What of an audit is not checked beside answers."""
+"""What of an audit is read and compared with nothing."""
 
 
 class Report:
@@ -53,13 +41,15 @@ class Report:
     Attributes:
         wrong: What does not hold, a sentence each.
         counts: How often each kind of check was made.
-        undecided: The codes of the answers not decided again, by state and reason.
+        undecided: The positions of the answers not decided again, by state and reason.
+        codes: The code of each answer.
     """
 
     def __init__(self) -> None:
         self.wrong: list[str] = []
         self.counts = Counter[str]()
-        self.undecided = defaultdict[tuple[str, str], list[str]](list)
+        self.undecided = defaultdict[tuple[str, str], list[int]](list)
+        self.codes: list[str] = []
 
     def expect(self, is_so: bool, otherwise: str) -> None:
         """Note what does not hold, unless it is so."""
@@ -73,14 +63,15 @@ class Report:
         yield what if many else "the audit is right as far as it was checked again"
         yield from (f"WRONG: {text}" for text in self.wrong)
         counts = dict(sorted(self.counts.items()))
-        for (state, _), codes in self.undecided.items():
-            name = OTHERS.get(state, f"answers {state}, not decided again")
-            counts[name] = counts.get(name, 0) + len(codes)
+        for (state, _), numbers in self.undecided.items():
+            name = f"answers {state}, not decided again"
+            counts[name] = counts.get(name, 0) + len(numbers)
         width = max(map(len, counts), default=0)
-        yield from (f"{what:<{width}}  {number}" for what, number in counts.items())
+        yield from (f"{name:<{width}}  {number}" for name, number in counts.items())
         if self.undecided:
             yield "not decided again:"
-        for (_, why), codes in self.undecided.items():
-            size = f" ({len(codes)} answers)" if len(codes) > 1 else ""
-            yield f"  {', '.join(dict.fromkeys(codes))}{size}: {why}"
+        for (_, why), numbers in self.undecided.items():
+            size = f" ({len(numbers)} answers)" if len(numbers) > 1 else ""
+            codes = dict.fromkeys(self.codes[number] for number in numbers)
+            yield f"  {', '.join(codes)}{size}: {why}"
         yield f"read, and compared with nothing: {UNCHECKED}"

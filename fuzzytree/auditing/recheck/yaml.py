@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
-from fuzzytree.auditing.recheck.outcomes import MOST_BYTES, CannotRunError
+from fuzzytree.auditing.recheck.outcomes import CannotRunError
 
+MOST_BYTES = 64 * 2**20
 MOST_LEVELS = 32
 
-Yaml = str | int | float | list["Yaml"] | dict[str, "Yaml"]
 _KEY = re.compile(r"((?:0 )?[a-z][a-z ]*):(?: +|$)")
 _QUOTED = re.compile(r"'((?:[^']|'')*)'|\"((?:[^\"\\]|\\.)*)\"")
 _PART = re.compile(
@@ -22,14 +21,16 @@ _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "\\": "\\", '"': '"', "/
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")
 _NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _INFINITE = {".inf": math.inf, "-.inf": -math.inf}
-_ALIEN = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)|0[ox].*")
-_NOTHING = re.compile("~?|null|Null|NULL|true|True|TRUE|false|False|FALSE")
+_ALIEN = re.compile(
+    r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)|0[ox].*"
+    "|~?|null|Null|NULL|true|True|TRUE|false|False|FALSE"
+)
 _FORBIDDEN = re.compile(
     "[^\n\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 )
 
 
-class Items(list[Yaml]):
+class Items(list[Any]):
     """A list with a line for each item, and the lines and columns of these."""
 
     def __init__(self) -> None:
@@ -42,7 +43,7 @@ class _Line(NamedTuple):
     text: str
 
 
-def read_yaml(content: bytes, name: str) -> Yaml:
+def read_yaml(content: bytes, name: str) -> Any:
     r"""Return what a file of YAML holds: mappings, lists, texts and numbers.
 
     Raises:
@@ -52,14 +53,14 @@ def read_yaml(content: bytes, name: str) -> Yaml:
         >>> read_yaml(b"classes: [a, 'b']\nrange: {from: 1.5}\n", "x.yaml")
         {'classes': ['a', 'b'], 'range': {'from': 1.5}}
     """
-    return _Blocks(content, name).document()
+    return _Reader(content, name).document()
 
 
-class _Blocks:
+class _Reader:
     """The lines of a file, and how far they are read."""
 
     def __init__(self, content: bytes, name: str) -> None:
-        self.name, self.at = name, 0
+        self.name, self.at, self.number = name, 0, 1
         if len(content) > MOST_BYTES:
             raise CannotRunError(f"{name}: more than {MOST_BYTES:,} bytes")
         try:
@@ -68,90 +69,87 @@ class _Blocks:
             raise CannotRunError(f"{name}: not UTF-8: {error.reason}") from error
         wrong = _FORBIDDEN.search(text)
         if wrong:
-            line = text.count("\n", 0, wrong.start()) + 1
-            raise self.error(line, f"character U+{ord(wrong[0]):04X} is not read")
+            self.number = text.count("\n", 0, wrong.start()) + 1
+            self.fail(f"character U+{ord(wrong[0]):04X} is not read")
         self.lines: list[_Line] = []
-        for number, whole in enumerate(text.split("\n"), 1):
-            kept = self._without_comment(whole, number)
-            if kept.strip(" "):
+        for self.number, whole in enumerate(text.split("\n"), 1):
+            kept = self._without_comment(whole).rstrip(" ")
+            if kept:
                 indent = len(kept) - len(kept.lstrip(" "))
-                self.lines.append(_Line(number, indent, kept.strip(" ")))
+                self.lines.append(_Line(self.number, indent, kept[indent:]))
 
-    def error(self, number: int, what: str) -> CannotRunError:
-        return CannotRunError(f"{self.name}:{number}: {what:.200}")
+    def fail(self, what: str) -> NoReturn:
+        raise CannotRunError(f"{self.name}:{self.number}: {what:.200}")
 
-    def _without_comment(self, line: str, number: int) -> str:
+    def _without_comment(self, line: str) -> str:
         """Cut a comment off: a `#` at the start or behind a blank, not in quotes."""
         for part in _PART.finditer(line) if "#" in line else ():
             if part["comment"]:
                 return line[: part.start()]
             if part["open"]:
-                raise self.error(number, "a quote that does not end on its line")
+                self.fail("a quote that does not end on its line")
         return line
 
-    def document(self) -> Yaml:
+    def document(self) -> Any:
         if not self.lines:
             raise CannotRunError(f"{self.name}: the file is empty")
-        result = self.block(self.lines[0].indent, 1)
+        result = self._block(self.lines[0].indent, 1)
         if self.at < len(self.lines):
-            line = self.lines[self.at]
-            raise self.error(line.number, f"{line.text[:40]!r} is not understood here")
+            self.number = self.lines[self.at].number
+            self.fail(f"{self.lines[self.at].text[:40]!r} is not understood here")
         return result
-
-    def block(self, indent: int, level: int) -> Yaml:
-        """Return the list or mapping whose lines begin at this indent."""
-        line = self.lines[self.at]
-        if level > MOST_LEVELS:
-            raise self.error(line.number, f"more than {MOST_LEVELS} levels")
-        if line.text == "-" or line.text.startswith("- "):
-            return self._list(indent, level)
-        if _KEY.match(line.text):
-            return self._mapping(indent, level)
-        raise self.error(line.number, f"no key and no list: {line.text[:40]!r}")
 
     def _next(self, indent: int) -> _Line | None:
         line = self.lines[self.at] if self.at < len(self.lines) else None
-        return line if line is not None and line.indent == indent else None
+        if line is None or line.indent != indent:
+            return None
+        self.number = line.number
+        return line
 
-    def _list(self, indent: int, level: int) -> list[Yaml]:
+    def _block(self, indent: int, level: int) -> Any:
+        """Return the list or mapping whose lines begin at this indent."""
+        line = self._next(indent)
+        text = line.text if line else ""
+        if level > MOST_LEVELS:
+            self.fail(f"more than {MOST_LEVELS} levels")
+        if text == "-" or text.startswith("- "):
+            return self._list(indent, level)
+        if _KEY.match(text):
+            return self._mapping(indent, level)
+        self.fail(f"no key and no list: {text[:40]!r}")
+
+    def _list(self, indent: int, level: int) -> Items:
         items = Items()
-        while line := self._next(indent):
-            if not (line.text == "-" or line.text.startswith("- ")):
-                break
+        while (line := self._next(indent)) and f"{line.text} ".startswith("- "):
             rest = line.text[1:].lstrip(" ")
-            place = line.number, indent + len(line.text) - len(rest) + 1
-            items.places.append(place)
-            if _KEY.match(rest) or rest.startswith("- ") or not rest:
-                inner = indent + len(line.text) - len(rest)
-                if not rest:
-                    raise self.error(line.number, "an empty item")
+            inner = indent + len(line.text) - len(rest)
+            items.places.append((line.number, inner + 1))
+            if not rest:
+                self.fail("an empty item")
+            if _KEY.match(rest) or rest.startswith("- "):
                 self.lines[self.at] = _Line(line.number, inner, rest)
-                items.append(self.block(inner, level + 1))
+                items.append(self._block(inner, level + 1))
             else:
-                items.append(self._value(line, rest, indent))
+                items.append(self._value(rest, indent))
         return items
 
-    def _mapping(self, indent: int, level: int) -> dict[str, Yaml]:
-        pairs: dict[str, Yaml] = {}
-        while line := self._next(indent):
-            key = _KEY.match(line.text)
-            if key is None:
-                break
+    def _mapping(self, indent: int, level: int) -> dict[str, Any]:
+        pairs: dict[str, Any] = {}
+        while (line := self._next(indent)) and (key := _KEY.match(line.text)):
             if key[1] in pairs:
-                raise self.error(line.number, f"the key {key[1]!r} stands twice")
-            rest = line.text[key.end() :]
-            if rest:
-                pairs[key[1]] = self._value(line, rest, indent)
+                self.fail(f"the key {key[1]!r} stands twice")
+            if key.end() < len(line.text):
+                pairs[key[1]] = self._value(line.text[key.end() :], indent)
                 continue
             self.at += 1
             below = self.lines[self.at] if self.at < len(self.lines) else line
             is_list = below.indent == indent and below.text.startswith("- ")
             if below.number == line.number or not (below.indent > indent or is_list):
-                raise self.error(line.number, f"the key {key[1]!r} has no value")
-            pairs[key[1]] = self.block(below.indent, level + 1)
+                self.fail(f"the key {key[1]!r} has no value")
+            pairs[key[1]] = self._block(below.indent, level + 1)
         return pairs
 
-    def _value(self, line: _Line, text: str, indent: int) -> Yaml:
+    def _value(self, text: str, indent: int) -> Any:
         """Return a text, number, or list or mapping in brackets, over several lines."""
         parts = [text]
         self.at += 1
@@ -160,92 +158,76 @@ class _Blocks:
             self.at += 1
         whole = " ".join(parts)
         if text[0] in "'\"" and len(parts) > 1:
-            raise self.error(line.number, "a quoted text over several lines")
-        flow = _Flow(whole, lambda what: self.error(line.number, what))
-        result = flow.value(0) if text[0] in "[{" else flow.scalar(whole)
-        if text[0] in "[{" and flow.at != len(whole):
-            raise self.error(
-                line.number, f"more behind the bracket: {whole[flow.at :]!r}"
-            )
+            self.fail("a quoted text over several lines")
+        if text[0] not in "[{":
+            return self._scalar(whole)
+        result, end = self._flow(whole, 0, 0)
+        if end != len(whole):
+            self.fail(f"more behind the bracket: {whole[end:]!r}")
         return result
 
-
-class _Flow:
-    """A value in one line: brackets, braces, quotes, words and numbers."""
-
-    def __init__(self, text: str, error: Callable[[str], CannotRunError]) -> None:
-        self.text, self.error, self.at = text, error, 0
-
-    def _skip(self) -> str:
-        while self.text[self.at : self.at + 1] == " ":
-            self.at += 1
-        return self.text[self.at : self.at + 1]
-
-    def value(self, level: int) -> Yaml:
+    def _flow(self, text: str, at: int, level: int) -> tuple[Any, int]:
+        """Return a value in brackets, braces or quotes, or a word, and its end."""
         if level > MOST_LEVELS:
-            raise self.error(f"more than {MOST_LEVELS} levels")
-        if self._skip() == "[":
-            return [item for _, item in self._items("]", level)]
-        if self._skip() == "{":
-            pairs: dict[str, Yaml] = {}
-            for key, item in self._items("}", level):
-                if key in pairs:
-                    raise self.error(f"the key {key!r} stands twice")
-                pairs[key] = item
-            return pairs
-        quoted = _QUOTED.match(self.text, self.at)
-        if quoted:
-            self.at = quoted.end()
-            return self.scalar(quoted[0])
-        word = re.split(r"[,\]}\[{]", self.text[self.at :], maxsplit=1)[0]
-        self.at += len(word)
-        return self.scalar(word.rstrip(" "))
+            self.fail(f"more than {MOST_LEVELS} levels")
+        if text[at : at + 1] not in ("[", "{"):
+            quoted = _QUOTED.match(text, at)
+            word = (
+                quoted[0]
+                if quoted
+                else re.split(r"[,\]}\[{]", text[at:], maxsplit=1)[0]
+            )
+            return self._scalar(word.rstrip(" ")), at + len(word)
+        is_list, pairs, items = text[at] == "[", dict[str, Any](), list[Any]()
+        close, at = "]" if is_list else "}", _behind_blanks(text, at + 1)
+        while text[at : at + 1] != close:
+            key = None if is_list else _KEY.match(text, at)
+            if key is None and not is_list:
+                self.fail(f"no key: {text[at : at + 40]!r}")
+            if key and key[1] in pairs:
+                self.fail(f"the key {key[1]!r} stands twice")
+            item, at = self._flow(text, key.end() if key else at, level + 1)
+            items.append(item)
+            pairs |= {key[1]: item} if key else {}
+            at = _behind_blanks(text, at)
+            if text[at : at + 1] == ",":
+                at = _behind_blanks(text, at + 1)
+            elif text[at : at + 1] != close:
+                self.fail(f"{close!r} or ',' is missing")
+        return items if is_list else pairs, at + 1
 
-    def _items(self, close: str, level: int) -> Iterator[tuple[str, Yaml]]:
-        self.at += 1
-        while self._skip() != close:
-            key = _KEY.match(self.text, self.at) if close == "}" else None
-            if close == "}":
-                if key is None:
-                    raise self.error(f"no key: {self.text[self.at : self.at + 40]!r}")
-                self.at = key.end()
-            yield key[1] if key else "", self.value(level + 1)
-            if self._skip() == ",":
-                self.at += 1
-            elif self._skip() != close:
-                raise self.error(f"{close!r} or ',' is missing")
-        self.at += 1
-
-    def scalar(self, text: str) -> str | int | float:
-        if text[:1] in "'\"" and text:
+    def _scalar(self, text: str) -> str | int | float:
+        if text[:1] in ("'", '"'):
             return self._unquoted(text)
         if text in _INFINITE:  # an open end of a trapezoid; no number elsewhere
             return _INFINITE[text]
-        if _NOTHING.fullmatch(text) or _ALIEN.fullmatch(text):
-            raise self.error(f"{text!r} has no place in a model")
+        if _ALIEN.fullmatch(text):
+            self.fail(f"{text!r} has no place in a model")
         if text[0] in "&*!|>@%`?,[]{}#" or text[:2] in ("- ", "--") or ": " in text:
-            raise self.error(f"{text[:40]!r} is not read; quotes make it a text")
+            self.fail(f"{text[:40]!r} is not read; quotes make it a text")
         if _INTEGER.fullmatch(text):
             return int(text)
-        if _NUMBER.fullmatch(text):
-            return float(text)
-        return text
+        return float(text) if _NUMBER.fullmatch(text) else text
 
     def _unquoted(self, text: str) -> str:
         whole = _QUOTED.fullmatch(text)
         if whole is None:
-            raise self.error(f"a quote that does not end: {text[:40]!r}")
+            self.fail(f"a quote that does not end: {text[:40]!r}")
         if whole[2] is None:
             return whole[1].replace("''", "'")
         return _ESCAPE.sub(self._escaped, whole[2])
 
     def _escaped(self, result: re.Match[str]) -> str:
         code = result[1]
-        if len(code) == 1:
-            if code not in _ESCAPES:
-                raise self.error(f"no escape: {result[0]!r}")
-            return _ESCAPES[code]
-        number = int(code[1:], 16)
+        number = int(code[1:], 16) if len(code) > 1 else -1
         if number > 0x10FFFF or 0xD800 <= number < 0xE000:
-            raise self.error(f"no character: {result[0]!r}")
-        return chr(number)
+            self.fail(f"no character: {result[0]!r}")
+        if len(code) == 1 and code not in _ESCAPES:
+            self.fail(f"no escape: {result[0]!r}")
+        return chr(number) if len(code) > 1 else _ESCAPES[code]
+
+
+def _behind_blanks(text: str, at: int) -> int:
+    while text[at : at + 1] == " ":
+        at += 1
+    return at

@@ -1,0 +1,442 @@
+"""An audit beside its model: what every check needs, and claims of points."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+
+from fuzzytree.auditing.recheck import boxes
+from fuzzytree.auditing.recheck.cells import Cells, Interval
+from fuzzytree.auditing.recheck.curves import Between, bounds, is_straight
+from fuzzytree.auditing.recheck.models import (
+    ONE,
+    ZERO,
+    Model,
+    Point,
+    Proposition,
+    Rule,
+    Rules,
+    Variable,
+)
+from fuzzytree.auditing.recheck.outcomes import (
+    DoesNotHoldError,
+    Report,
+    UndecidedError,
+    require,
+)
+from fuzzytree.auditing.recheck.records import (
+    Answer,
+    Audit,
+    Claim,
+    Coordinate,
+    Span,
+    Witness,
+    fraction,
+)
+
+STEPS = (8, 32)
+"""Into so many steps from 0 to 1 a curve that is no line is cut, coarsely first."""
+MOST_POINTS = 200
+CLOSE = Fraction(1, 2**70)
+"""How far beside a point curves that are no lines are evaluated, where many are."""
+
+Extra = Mapping[Proposition, Proposition]
+
+
+class Case:
+    """An audit and its model.
+
+    Attributes:
+        sides: The sides of the domain by name.
+        is_free: Whether no variable is a combination of others.
+        numbers: The numbers of the rules, from 1.
+        shorter: By the position of an answer of FT107, the rule that it is about.
+    """
+
+    def __init__(self, audit: Audit, model: Model) -> None:
+        self.audit, self.model, self.rules = audit, model, model.rules
+        self.sides = {side.variable: side for side in audit.domain.sides}
+        self.is_free = not any(v.parts for v in model.variables.values())
+        self.numbers = range(1, len(self.rules.rules) + 1)
+        self.shorter: dict[int, Rule] = {}
+        self._strengths: dict[tuple[object, ...], list[Between]] = {}
+        self._cells: dict[int, Cells | UndecidedError] = {}
+
+    def ends(self, variable: Variable) -> Interval:
+        """Return the values of a variable in the domain; of a combination, at most."""
+        side = self.sides.get(variable.name)
+        if not variable.parts:
+            require(side is not None, f"the domain has no side {variable.name!r}")
+            assert side is not None
+            return Fraction(side.low), Fraction(side.high)
+        weights = dict.fromkeys((name for name, *_ in variable.parts), ZERO)
+        low = high = -sum((w * c for _, w, c in variable.parts), start=ZERO)
+        for name, weight, _ in variable.parts:  # an input may stand several times
+            weights[name] += weight
+        for name, weight in weights.items():
+            both = [weight * end for end in self.ends(self.model.variables[name])]
+            low, high = low + min(both), high + max(both)
+        if side is not None:
+            low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
+        return low, high
+
+    def then(self, number: int) -> str:
+        """Return the class of a rule."""
+        return self.rules.rules[number - 1].then
+
+    def name(self, number: int) -> str:
+        """Return what answers call a rule."""
+        return self.model.names[number - 1]
+
+    def rivals(self, number: int) -> list[int]:
+        """Return the rules of other classes."""
+        return [n for n in self.numbers if self.then(n) != self.then(number)]
+
+    def own(self, label: str | None) -> list[int]:
+        """Return the rules of a class."""
+        return [n for n in self.numbers if self.then(n) == label]
+
+    def pairs(self, *, alike: bool | None = None) -> list[tuple[int, int]]:
+        """Return the pairs of rules, of one class or of two; not ways of one rule."""
+        of = self.model.numbers
+        return [
+            (one, other)
+            for one, other in itertools.combinations(self.numbers, 2)
+            if of[one - 1] != of[other - 1]
+            and alike in (None, self.then(one) == self.then(other))
+        ]
+
+    def coded(self, start: str) -> list[Answer]:
+        """Return the answers whose message begins so."""
+        return [one for one in self.audit.answers if one.message.startswith(start)]
+
+    # --- what can be
+
+    def cells(self, step: int) -> Cells:
+        """Return the rules in cells; behind them those of `shorter`.
+
+        Raises:
+            UndecidedError: If there are too many.
+        """
+        if step not in self._cells:
+            rules = [*self.rules.rules, *self.shorter.values()]
+            settings = self.audit.settings
+            levels = {Fraction(settings.epsilon), Fraction(settings.level)}
+            for one in self.audit.answers:
+                levels.update(
+                    Fraction(m.value)
+                    for m in one.measures
+                    if one.code == "FT301" and 0 <= m.value <= 1
+                )
+            ends = {v.name: self.ends(v) for v in self.rules.variables.values()}
+            try:
+                self._cells[step] = Cells(
+                    rules, self.rules.variables, ends, levels, step
+                )
+            except UndecidedError as error:  # known once, for every question
+                self._cells[step] = error
+        result = self._cells[step]
+        if isinstance(result, UndecidedError):
+            raise result
+        return result
+
+    def refined(
+        self, question: Callable[[Cells], bool], *, is_sure: bool = False
+    ) -> bool:
+        """Return whether something can be, for certain.
+
+        Raises:
+            UndecidedError: If it is not known; with finer steps it might be.
+        """
+        for step in STEPS:
+            cells = self.cells(step)
+            if not question(cells):
+                return False
+            if cells.is_exact or is_sure:
+                break
+        else:
+            raise UndecidedError("curves that are no lines, and too near to each other")
+        if not self.is_free:
+            raise UndecidedError("variables share inputs, which needs more than cells")
+        return True
+
+    def may(self, question: Callable[[], bool]) -> bool:
+        """Return whether something can be, or is not known not to be."""
+        try:
+            return question()
+        except UndecidedError:
+            return True
+
+    def beats(
+        self,
+        mine: Sequence[int],
+        rivals: Iterable[int],
+        low: Fraction = ZERO,
+        high: Fraction = ONE,
+    ) -> bool:
+        """Return whether some rules reach a level together that no rival does."""
+        others = [*rivals]
+
+        def question(cells: Cells) -> bool:
+            ours = [cells.of[n - 1] for n in mine]
+            if self.rules.is_product:
+                return boxes.exists(
+                    cells, ours, [cells.of[n - 1] for n in others], low, high
+                )
+            return cells.exists(ours, sum(1 << (n - 1) for n in others), low, high)
+
+        if (
+            len(mine) == len(others) == 1
+            and not low
+            and mine[0] in self.above[others[0]]
+        ):
+            return True
+        return self.refined(question, is_sure=self.rules.is_product)
+
+    def tie(self, one: int, other: int, rivals: Iterable[int]) -> bool:
+        """Return whether two rules tie on an open set, no rival above them."""
+        others = [n for n in rivals if n not in (one, other)]
+
+        def question(cells: Cells) -> bool:
+            if self.rules.is_product:
+                return boxes.tie(cells, one - 1, other - 1, [n - 1 for n in others])
+            return cells.tie(
+                one - 1, other - 1, rivals=sum(1 << (n - 1) for n in others)
+            )
+
+        return self.refined(question, is_sure=self.rules.is_product)
+
+    def fires(self, number: int) -> bool:
+        """Return whether a rule is above 0 somewhere."""
+        return bool(self.fired >> (number - 1) & 1) or self.beats([number], ())
+
+    @cached_property
+    def fired(self) -> int:
+        """The rules that are above 0 at a known point, as bits."""
+        return sum(
+            1 << (n - 1)
+            for n in self.numbers
+            if any(one[n - 1][0] > 0 for one in self.known)
+        )
+
+    @cached_property
+    def known(self) -> list[list[Between]]:
+        """The strengths of all rules at witnesses and other points of the domain."""
+        points = [
+            {c.input: fraction(c.exact) for c in one.state.point}
+            for one in self.audit.answers
+            if isinstance(one.state, Witness)
+        ]
+        points = [p for p in points if p.keys() == {*self.inputs} and self.is_within(p)]
+        chance = random.Random(0)
+        for _ in range(MOST_POINTS):
+            point = {}
+            for name in self.inputs:
+                low, high = self.ends(self.model.variables[name])
+                point[name] = low + (high - low) * Fraction(
+                    chance.randrange(1025), 1024
+                )
+            points += [point] if self.is_within(point) else []
+        return [strengths(self.rules, point, CLOSE) for point in points]
+
+    @cached_property
+    def above(self) -> dict[int, set[int]]:
+        """For each rule, and shorter one, those known to be above it somewhere."""
+        result: dict[int, set[int]] = {
+            n: set() for n in range(1, len(self.numbers) + len(self.shorter) + 1)
+        }
+        for one in self.known:
+            for n in self.numbers:
+                result[n] |= {m for m in self.numbers if one[m - 1][0] > one[n - 1][1]}
+        return result
+
+    # --- points
+
+    @property
+    def inputs(self) -> list[str]:
+        """The names of the inputs."""
+        return [v.name for v in self.model.variables.values() if not v.parts]
+
+    def is_within(self, point: Point) -> bool:
+        """Return whether a point is in the domain."""
+        values = {n: self.model.variables[n].at(point) for n in self.sides}
+        return all(side.low <= values[n] <= side.high for n, side in self.sides.items())
+
+    def point_of(self, coordinates: Sequence[Coordinate]) -> dict[str, Fraction]:
+        """Return a point of the domain whose digits are one number each."""
+        point: dict[str, Fraction] = {}
+        for one in coordinates:
+            value = fraction(one.exact)
+            near = float(value)
+            hexed = near.hex() if Fraction(near) == value else None
+            text = (
+                f"{one.input!r}: the decimal or hexadecimal digits are not {one.exact}"
+            )
+            require((repr(near), hexed) == (one.decimal, one.hex), text)
+            require(one.input not in point, f"{one.input!r} stands twice in the point")
+            point[one.input] = value
+        is_whole = point.keys() == {*self.inputs}
+        require(is_whole, "the point does not have a value of every input")
+        require(self.is_within(point), "the point lies outside the domain")
+        return point
+
+    def check_point(
+        self, report: Report, coordinates: Sequence[Coordinate], claims: Sequence[Claim]
+    ) -> Point:
+        """Return a point of the domain at which the claims hold."""
+        point = self.point_of(coordinates)
+        for claim in claims:
+            entries = zip(claim._fields, claim, strict=True)
+            text = ", ".join(f"{name} {value}" for name, value in entries if value)
+            require(self.holds(claim, point), f"not so: {text}")
+            report.counts["claims evaluated again"] += 1
+        return point
+
+    def corners(self, region: Sequence[Span], point: Point) -> Iterator[Point]:
+        """Yield corners and the middle of a region, other inputs at three values.
+
+        A corner lies just above the lower ends, for these may belong to a neighbour.
+        """
+        spans = {span.variable: span for span in region}
+        if not spans or not self.is_free:
+            return
+        ends: dict[str, tuple[Fraction, Fraction, Fraction]] = {}
+        for name, side in self.sides.items():
+            span = spans.get(name, Span(name, None, None))
+            low = Fraction(side.low if span.low is None else span.low)
+            high = Fraction(side.high if span.high is None else span.high)
+            middle = (low + high) / 2 if name in spans else point[name]
+            ends[name] = low + (high - low) / 2**30, high, middle
+        ways = itertools.product((0, 1), repeat=len(spans))
+        chosen = [*itertools.islice(ways, 16), (2,) * len(spans)]
+        for way, other in itertools.product(chosen, range(3)):
+            places = dict.fromkeys(ends, other) | dict(zip(spans, way, strict=True))
+            result = {name: ends[name][place] for name, place in places.items()}
+            if self.is_within(result):
+                yield result
+
+    def holds(self, claim: Claim, point: Point, off: Fraction = ZERO) -> bool:
+        """Return whether a claim holds at a point, evaluated in fractions.
+
+        Raises:
+            DoesNotHoldError: If it is no claim about this model.
+            UndecidedError: If two numbers are too near to distinguish.
+        """
+        used = {n for n, one in zip(claim._fields, claim, strict=True) if one}
+        alien = used - {"kind", "of", *FIELDS[claim.kind].split(" ")}
+        require(not alien, f"a claim of kind {claim.kind} has no {', '.join(alien)}")
+        rules = self.model.raw if claim.of == "raw rules" else self.rules
+        is_known = claim.of in ("rules", "raw rules") or self.model.form == claim.of
+        if rules is None or not is_known:
+            raise DoesNotHoldError(f"there are no {claim.of} to claim something of")
+        if claim.kind == "decides":
+            if claim.of == "tree":
+                return self.model.leaves[self.model.leaf_at(point) - 1] == claim.label
+            return class_at(rules, point) == claim.label
+        require(claim.of != "tree", "a tree has no strengths")
+        level = None if claim.level is None else fraction(claim.level)
+        if claim.kind == "degree":
+            known = rules.variables.get(claim.variable or "")
+            if known is None or claim.term not in known.curves or level is None:
+                raise DoesNotHoldError("a claim of an unknown term")
+            x = known.at(point)
+            low, high = bounds(known.curves[claim.term], x, x)
+            return low <= level <= high
+        key = claim.of, *point.values()
+        if key not in self._strengths:
+            self._strengths[key] = strengths(rules, point, off)
+        every = self._strengths[key]
+        is_known = all(1 <= n <= len(every) for n in (*claim.rules, *claim.rivals))
+        require(is_known, "a claim of an unknown rule")
+        ours = [every[n - 1] for n in claim.rules or range(1, len(every) + 1)]
+        rivals = [every[n - 1] for n in claim.rivals]
+        require(bool(claim.rules) or claim.kind == "covered", "a claim of no rule")
+        least, most = (
+            tuple(choose(one[end] for one in ours) for end in (0, 1))
+            for choose in (min, max)
+        )
+        top = tuple(max((one[end] for one in rivals), default=ZERO) for end in (0, 1))
+        if claim.kind == "covered":
+            return less((ZERO, ZERO), most)
+        if claim.kind == "beats":
+            return less(top, least)  # alone: it fires
+        if claim.kind == "ties":
+            is_one = least == most and least[0] == least[1]
+            return is_one and (not rivals or less(top, least))
+        if level is None:
+            raise DoesNotHoldError("a claim without its level")
+        if claim.kind == "strength":
+            return ours[0][0] <= level <= ours[0][1]
+        if claim.kind == "below":
+            return most[1] == level == 0 or less(most, (level, level))
+        return least[0] >= level or not less(least, (level, level))
+
+
+FIELDS = {
+    "strength": "rules level",
+    "beats": "rules rivals",
+    "ties": "rules rivals",
+    "below": "rules level",
+    "reaches": "rules level",
+    "decides": "label",
+    "degree": "level variable term",
+    "covered": "",
+}
+"""What each kind of claim is about."""
+
+
+def less(one: tuple[Fraction, ...], other: tuple[Fraction, ...]) -> bool:
+    """Return whether a number is below another one, each between two ends."""
+    if one[1] < other[0]:
+        return True
+    if one[0] < other[1]:
+        raise UndecidedError("two strengths are too near to distinguish")
+    return False
+
+
+def strengths(rules: Rules, point: Point, off: Fraction = ZERO) -> list[Between]:
+    """Return between which numbers the strength of each rule at a point lies.
+
+    With `off`, those of curves that are no lines also so far beside it.
+    """
+    values = {name: variable.at(point) for name, variable in rules.variables.items()}
+    known: dict[Proposition, Between] = {}
+    result: list[Between] = []
+    for rule in rules.rules:
+        low = high = ONE
+        for proposition in rule.when:
+            if proposition not in known:
+                curves = rules.variables[proposition.variable].curves
+                x = values[proposition.variable]
+                every = [
+                    bounds(curve, x, x if is_straight(curve) else x + off)
+                    for curve in (curves[term] for term in proposition.terms)
+                ]
+                a, b = (max(one[end] for one in every) for end in (0, 1))
+                a, b = (1 - b, 1 - a) if proposition.negated else (a, b)
+                known[proposition] = proposition.weight * a, proposition.weight * b
+            a, b = known[proposition]
+            if rules.is_product:
+                low, high = low * a, high * b
+            else:
+                low, high = min(low, a), min(high, b)
+        result.append((low, high))
+    return result
+
+
+def class_at(rules: Rules, point: Point) -> str | None:
+    """Return the class of the first of the strongest rules; None is no class."""
+    result = strengths(rules, point)
+    best = max(result)
+    if best[1] == 0:
+        return rules.uncovered
+    first = result.index(best)
+    for place, one in enumerate(result):
+        is_exact = one == best and one[0] == one[1]
+        is_other = rules.rules[place].then != rules.rules[first].then
+        if is_other and not is_exact:
+            less(one, best)
+    return rules.rules[first].then

@@ -1,0 +1,560 @@
+"""What an audit says of itself, and everything about one answer that can be checked."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from statistics import NormalDist
+from typing import Any, Literal
+
+from fuzzytree.auditing.recheck.case import CLOSE, Case, class_at, strengths
+from fuzzytree.auditing.recheck.deciding import (
+    PROOFS,
+    least_cover,
+    top,
+    ways_to,
+    without,
+)
+from fuzzytree.auditing.recheck.models import ZERO
+from fuzzytree.auditing.recheck.outcomes import (
+    DoesNotHoldError,
+    Report,
+    UndecidedError,
+    require,
+)
+from fuzzytree.auditing.recheck.records import (
+    Answer,
+    Bracket,
+    Computed,
+    Declined,
+    Policy,
+    Proved,
+    Sampled,
+    Span,
+    Witness,
+    fraction,
+)
+from fuzzytree.auditing.recheck.sentences import MESSAGES, sentence_of
+
+LIMITS = (
+    "that the rules are right: an audit finds what a rule base says, not whether it is "
+    "true of the world",
+    "anything outside the domain: every answer holds on the stated ranges and nowhere "
+    "else",
+    "that all of the domain can happen: inputs are combined in every way, also in "
+    "those that no row will ever have",
+    "more about a sampled share than its interval says, and that only with the stated "
+    "confidence",
+    "what a bracket leaves open: the number lies between the two ends, and nothing "
+    "more is known",
+    "anything about what was declined or not run; both are listed",
+    "that strengths which only touch are reported: ties and gaps without an interior "
+    "are left out",
+    "what rounding changes: answers are about real numbers at the doubles of the "
+    "model, and a runtime may differ where strengths nearly tie",
+    "that other files, runtimes or devices answer alike: only what was compared is "
+    "compared",
+    "that the given rows are right, or stand for those to come",
+    "who made this audit: the digest shows an edit, and is no signature",
+)
+"""What every audit says that it does not establish, word for word."""
+
+
+def digest_of(facts: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of an audit's canonical JSON, with an empty digest."""
+    whole = dict(facts) | {"digest": ""}
+    text = json.dumps(whole, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+# --- the audit as a whole
+
+
+def check_files(
+    case: Case, report: Report, facts: Mapping[str, Any], model: bytes, name: str
+) -> None:
+    """Check the digest of an audit's facts, and the SHA-256 of the model's file."""
+    digest = digest_of(facts)
+    report.expect(case.audit.digest == digest, f"the digest is {digest}")
+    sha = hashlib.sha256(model).hexdigest()
+    if case.audit.file is not None:
+        text = f"the SHA-256 of {name} is {sha}, and not that of the audited file"
+        report.expect(case.audit.file.sha256 == sha, text)
+
+
+def check_head(case: Case, report: Report) -> None:
+    """Check what stands before the answers, and what they are as a whole."""
+    audit, model, expect = case.audit, case.model, report.expect
+    expect(audit.form == model.form, f"the form of the model is {model.form!r}")
+    expect(audit.model == model.name, f"the model's name is {model.name!r}")
+    decides: Literal["strongest", "all"] = (
+        "all" if model.form == "system" else "strongest"
+    )
+    norm = "product" if model.is_product else "minimum"
+    policy = Policy(norm, decides, model.uncovered, model.missing)
+    expect(audit.policy == policy, "the policy is not the model's")
+    expect(audit.limits == LIMITS, "the panel of limits is not the fixed one")
+    settings = audit.settings
+    for name in ("epsilon", "margin", "lead", "level", "overlap"):
+        is_share = 0 < getattr(settings, name) <= 1
+        expect(is_share, f"the setting {name} is not in (0, 1]")
+    expect(1 <= settings.rows <= 10**7, "the setting rows is not in 1 to 10,000,000")
+    expect(0 <= settings.seed < 2**32, "the setting seed is not in 0 to 2**32 - 1")
+    expect(0 < settings.budget_s <= 1e9, "the budget is not in (0, 1e9] seconds")
+    _domain(case, report)
+    ids = {one.id for one in audit.answers if one.is_finding}
+    known = sorted(ids.intersection(audit.accepted))
+    expect([*audit.accepted] == known, "a finding is accepted that there is not")
+    is_plain = model.numbers == [*range(1, len(model.numbers) + 1)]
+    text = "the numbers of rules in the file are not those of the system"
+    expect(audit.numbers == (() if is_plain else tuple(model.numbers)), text)
+    expect(audit.rows > 0 or audit.data is None, "a table is named without rows")
+    _questions(case, report)
+    report.counts["facts about the audit"] += 12
+
+
+def _domain(case: Case, report: Report) -> None:
+    expect, variables = report.expect, case.model.variables
+    order = [name for name in variables if name in case.sides]
+    is_plain = [side.variable for side in case.audit.domain.sides] == order
+    expect(is_plain, "the domain's sides are not those of variables, in order")
+    for name, side in case.sides.items():
+        text = f"the side of {name!r}"
+        expect(side.low <= side.high, f"{text} has swapped ends")
+        expect(not side.is_open, f"{text} is open, as no audit's is")
+        one = variables.get(name)
+        if one is not None and side.origin == "model" and not one.is_clipped:
+            is_range = (side.low, side.high) == (one.low, one.high)
+            expect(is_range, f"{text} is not the model's range")
+        if one is not None and one.is_clipped and not one.parts:
+            is_in = (one.low is None or one.low <= side.low) and (
+                one.high is None or side.high <= one.high
+            )
+            expect(is_in, f"{text} goes beyond the range that values are moved into")
+    for name, one in variables.items():
+        require(bool(one.parts) or name in case.sides, f"{name!r} has no side")
+
+
+def _questions(case: Case, report: Report) -> None:
+    """Check that every code has all its answers or is listed as left out."""
+    audit, expect = case.audit, report.expect
+    codes = [one.code for one in audit.answers]
+    expect(codes == sorted(codes), "the answers are not in the order of their codes")
+    ends = [(one.repeat, f" --select {one.code}") for one in audit.answers]
+    starts = {text.removesuffix(end) for text, end in ends}
+    is_one = starts <= {""} or all(text.endswith(end) for text, end in ends)
+    expect(is_one and len(starts) < 2, "the commands that find it again differ")
+    left = [text.split(" ")[0] for text in audit.unasked]
+    expect(left == sorted({*left}), "the list of what was left out is not in order")
+    is_cut = any(
+        ": cut short: " in text or text.endswith(("is spent", "interrupted"))
+        for text in audit.unasked
+    )
+    text = "is_complete is not what was left out says"
+    expect(audit.is_complete == (not is_cut), text)
+    known = {name.partition(".")[0] for name in MESSAGES} - {"FTD", "FT801", "FT802"}
+    for code in sorted(known):
+        is_stated = code in codes or code in left
+        expect(is_stated, f"{code} is neither answered nor listed as left out")
+    for code, text in zip(left, audit.unasked, strict=True):
+        is_left = text.endswith(("left out by the user", "that it applies to"))
+        is_both = code in codes and (is_left or ": not run: " in text)
+        expect(not is_both, f"{code} is answered, and listed as left out")
+    every, is_tree = {*case.numbers}, case.model.form == "tree"
+    dead = {
+        one.rules[0] for one in case.coded("FT101.") if one.is_finding and one.rules
+    }
+    is_system = case.model.form == "system"
+    wanted = {"FT101": every, "FT102": every - dead, "FT103": every}
+    if is_tree:
+        wanted = {"FT101": dead, "FT103": every, "FT205": every - dead}
+    if is_system:
+        wanted = {"FT101": every}
+        silent = sorted(one.subject for one in case.coded("FT101.") if not one.rules)
+        is_all = silent == sorted(case.model.silent) or "FT101" in left
+        expect(is_all, "other rules never fire, as their text says")
+    for code, numbers in wanted.items():
+        result = {one.rules[0] for one in case.coded(f"{code}.") if one.rules}
+        is_open = code in left or any(
+            "declined" in o.message or "not-listed" in o.message
+            for o in case.coded(code)
+        )
+        is_open |= len(every) == 1 or (code == "FT102" and "FT101" in left)
+        text = f"{code} has not one answer for each rule"
+        expect(is_open or result == numbers or not case.coded(code), text)
+    lengths = [len(rule.when) for rule in case.rules.rules]
+    of = case.coded("FT107.")
+    count = sum(
+        o.measures[0].value
+        if o.measures
+        else lengths[o.rules[0] - 1]
+        if "silent" in o.message
+        else 1
+        for o in of
+        if o.rules or o.measures
+    )
+    is_all = "FT107" in left or not of or count == sum(lengths)
+    expect(is_all, "FT107 has not one answer for each proposition")
+
+
+# --- one answer
+
+
+def check_answer(case: Case, report: Report, answer: Answer, number: int) -> None:
+    """Check everything about an answer."""
+    where = f"answer {number} ({answer.code}, {answer.subject:.60})"
+    try:
+        _words(case, report, answer)
+        _names(case, report, answer)
+        check_spans(case, answer.region)
+        _state(case, report, answer)
+    except DoesNotHoldError as error:
+        report.wrong.append(f"{where}: {error}")
+    except (
+        LookupError,
+        ArithmeticError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        AssertionError,
+    ):
+        report.wrong.append(f"{where}: it names what there is not")
+    except UndecidedError as error:
+        state = type(answer.state).__name__.upper()
+        report.undecided[state, str(error)].append(number - 1)
+
+
+def _words(case: Case, report: Report, answer: Answer) -> None:
+    """Check the message of an answer, its severity, its facts and its sentence."""
+    require(answer.message in MESSAGES, "no answer has this message")
+    code, grade = answer.message.partition(".")[0], MESSAGES[answer.message].grade
+    if code == "FTD":
+        code = answer.state.code if isinstance(answer.state, Declined) else ""
+    require(answer.code == code, "its message is of another code")
+    is_note = grade == "note" or (grade.endswith("?") and not answer.is_finding)
+    wanted = (not is_note, "info" if is_note else grade.rstrip("?"))
+    require(
+        (answer.is_finding, answer.severity) == wanted, f"it is a finding of {grade}"
+    )
+    if isinstance(answer.state, Sampled) and answer.message != "FT701.rule":
+        is_hit = answer.state.hits > 0 and not answer.subject.endswith("points")
+        require(answer.is_finding is is_hit, "it is a finding, or none")
+    known = _known_facts(case, answer)
+    for name, fact in answer.facts.items():
+        is_known = name in known
+        require(
+            not is_known or known[name] == fact, f"{name}: it is {known.get(name)!r}"
+        )
+    require(answer.sentence == sentence_of(answer), "its sentence says something else")
+    report.counts["sentences written again"] += 1
+
+
+def _known_facts(case: Case, answer: Answer) -> dict[str, Any]:
+    """Return what the facts of an answer must be, by their names."""
+    settings, model = case.audit.settings, case.model
+    is_system = model.form == "system"
+    known: dict[str, Any] = {
+        **{
+            name: getattr(settings, name)
+            for name in ("epsilon", "margin", "lead", "overlap")
+        },
+        "noun": "conclusion" if is_system else "class",
+        "nouns": "conclusions" if is_system else "classes",
+    }
+    if answer.code not in ("FT201",) or not answer.rules:
+        known["level"] = settings.level
+    if answer.code == "FT701":
+        del known["noun"]
+    thens = [case.then(n) for n in answer.rules]
+    if thens and answer.code not in ("FT105", "FT104"):
+        known |= dict(zip(("then", "other"), thens, strict=False))
+    if len(thens) > 1 and answer.code in ("FT104", "FT105"):
+        known |= {"then": thens[1], "by": case.name(answer.rules[1])}
+    if answer.message == "FT103.superfluous":
+        later = [n for n in case.rivals(answer.rules[0]) if n > answer.rules[0]]
+        known["later"] = len(later)
+        require(
+            bool(later) == ("later" in answer.facts),
+            "whether later rules are of another class",
+        )
+    if answer.message in ("FT104.others", "FT105.others", "FT106.others"):
+        listed = len([o for o in case.coded(answer.code) if o.is_finding])
+        known["listed"] = listed
+        require(bool(listed) == ("listed" in answer.facts), "whether others are listed")
+    if answer.code == "FT203":
+        known.pop("other", None)
+    if answer.code == "FT301":
+        known["then"] = model.uncovered
+    if answer.code == "FT107" and answer.rules:
+        known["rule"] = case.name(answer.rules[0])
+    if len(answer.rules) == 2 and answer.code in ("FT106", "FT201", "FT202"):
+        subject = " and ".join(map(case.name, answer.rules))
+        require(answer.subject == subject, f"it is of {subject}")
+    elif (
+        answer.rules
+        and answer.code in ("FT101", "FT102", "FT103", "FT104", "FT105")
+        and model.form != "tree"
+    ):
+        own = case.name(answer.rules[0])
+        ways = own.partition(" of ")[2] if own.startswith("way ") else own
+        require(answer.subject in (own, ways), f"it is of {own}")
+    return known
+
+
+def _names(case: Case, report: Report, answer: Answer) -> None:
+    """Check the rules, terms, measures, units and places that an answer names."""
+    count, model = len(case.numbers), case.model
+    require(
+        all(1 <= n <= count for n in answer.rules), "it is of a rule that there is not"
+    )
+    raw = model.raw.variables.values() if model.raw else ()
+    variables = [*model.variables.values(), *case.rules.variables.values(), *raw]
+    terms = {(v.name, term) for v in variables for term in v.curves}
+    require(
+        {tuple(one) for one in answer.terms} <= terms,
+        "it is of a term that there is not",
+    )
+    units = {"", *(v.unit for v in variables)}
+    for measure in answer.measures:
+        require(measure.unit in units, f"no unit {measure.unit:.60}")
+        if measure.exact is not None:
+            text = f"{measure.name}: {measure.exact:.60} is not {measure.value!r}"
+            require(float(fraction(measure.exact)) == measure.value, text)
+            report.counts["exact measures"] += 1
+    if case.audit.file is None:
+        require(not answer.places, "a place in no file")
+        return
+    own = [model.numbers[n - 1] for n in answer.rules]
+    if not own and answer.subject in model.absent:
+        own = [model.absent[answer.subject]]
+    wanted = [model.places[n - 1] for n in own]
+    wanted += [model.term_places[label.variable, label.term] for label in answer.terms]
+    entries = [(place.line, place.column) for place in answer.places]
+    is_there = entries in ([*dict.fromkeys(wanted)], [])
+    require(is_there, "its rules and terms stand elsewhere")
+    is_file = all(place.file == case.audit.file.name for place in answer.places)
+    require(is_file, "a place that is not in the audited file")
+
+
+def _state(case: Case, report: Report, answer: Answer) -> None:
+    state = answer.state
+    name, kind = answer.message, type(state).__name__.upper()
+    if isinstance(state, Proved | Computed):
+        require(bool(state.how), f"it is {kind}, without how")
+        try:
+            if name not in PROOFS:
+                raise UndecidedError("there is no second way for it here")
+            PROOFS[name](case, answer)
+        except UndecidedError:
+            if isinstance(state, Proved):
+                raise
+            report.counts["answers COMPUTED, not decided again"] += 1
+            return
+        report.counts[f"answers {kind}, decided again"] += 1
+        return
+    if isinstance(state, Declined):
+        known = {f"FTD0{n}" for n in range(1, 9)}
+        is_reason = state.code in known and bool(state.reason)
+        require(is_reason, "declined, and not for a reason")
+        require(not answer.is_finding, "what is declined is no finding")
+        report.counts["answers DECLINED"] += 1
+        return
+    is_free = name not in PROOFS or name in (
+        "FT202.others",
+        "FT203.leaves",
+        "FT104.others",
+        "FT105.others",
+        "FT106.others",
+    )
+    is_free |= isinstance(state, Bracket) and answer.code == "FT403"
+    require(is_free, f"it must be PROVED, and is {kind}")
+    if isinstance(state, Witness):
+        _witness(case, report, answer, state)
+        report.counts["answers with a WITNESS, evaluated again"] += 1
+    elif isinstance(state, Bracket):
+        require(name not in SHOWS, "it needs a witness")
+        require(state.low <= state.high, "the ends of the bracket are swapped")
+        if state.point or state.claims:
+            case.check_point(report, state.point, state.claims)
+        raise UndecidedError("a bracket is not computed again here")
+    else:
+        _sample(state)
+        raise UndecidedError("a sample is not drawn again here")
+
+
+def _sample(state: Sampled) -> None:
+    require(0 <= state.hits <= state.rows and state.rows > 0, "no share of rows")
+    require(0.0 < state.confidence < 1.0, "a confidence outside (0, 1)")
+    # Wilson's interval
+    z = NormalDist().inv_cdf((1.0 + state.confidence) / 2.0)
+    share, bottom = state.hits / state.rows, 1.0 + z * z / state.rows
+    middle = (share + z * z / (2 * state.rows)) / bottom
+    spread = share * (1 - share) / state.rows + z * z / (4 * state.rows**2)
+    half = z * math.sqrt(spread) / bottom
+    low, high = max(middle - half, 0.0), min(middle + half, 1.0)
+    is_near = math.isclose(low, state.low, abs_tol=1e-9)
+    is_near &= math.isclose(high, state.high, abs_tol=1e-9)
+    require(is_near, f"Wilson's interval is {low!r} to {high!r}")
+
+
+# --- witnesses
+
+
+def check_spans(case: Case, region: tuple[Span, ...]) -> None:
+    """Refuse a region of unknown variables or with swapped ends."""
+    for span in region:
+        is_known = span.variable in case.model.variables
+        require(is_known, f"no variable {span.variable!r}")
+        is_ordered = span.low is None or span.high is None or span.low <= span.high
+        require(is_ordered, f"the region's ends in {span.variable!r} are swapped")
+
+
+def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None:
+    point = case.check_point(report, state.point, state.claims)
+    is_same = answer.region in ((), state.region)
+    require(is_same, "the answer's region is not that of its witness")
+    require(bool(state.claims), "a witness of which nothing is claimed")
+    check_spans(case, state.region)
+    for span in state.region:
+        x = case.model.variables[span.variable].at(point)
+        is_above = span.low is None or span.low <= x
+        is_in = is_above and (span.high is None or x <= span.high)
+        require(is_in, f"the witness lies outside its region in {span.variable!r}")
+    lasting = [
+        c for c in state.claims if c.kind not in ("strength", "degree", "reaches")
+    ]
+    for other in case.corners(state.region, point):
+        for claim in lasting:
+            off = ZERO if claim.kind in ("below", "covered") else CLOSE
+            is_so = case.holds(claim, other, off)
+            require(is_so, f"{claim.kind} fails within the region")
+        report.counts["points of regions"] += 1
+    if answer.message in SHOWS:
+        SHOWS[answer.message](case, answer, state)
+
+
+def _shows_win(case: Case, answer: Answer, state: Witness) -> None:
+    (number,) = answer.rules
+    rivals = {*case.rivals(number)}
+    if answer.code == "FT103":
+        rivals = {*case.numbers} - {number}
+    if answer.message == "FT101.fires":
+        rivals = set()
+    beats = [c for c in state.claims if (c.kind, c.rules) == ("beats", (number,))]
+    is_all = any(rivals <= {*claim.rivals} for claim in beats)
+    require(is_all, "it is not claimed that the rule beats all these others")
+
+
+def _shows_tie(case: Case, answer: Answer, state: Witness) -> None:
+    """Check that a claim compares rules that tie with all others."""
+    met = [c for c in state.claims if c.kind == "ties" and answer.rules[0] in c.rules]
+    require(bool(met), "it is not claimed that they tie")
+    if answer.code == "FT202":
+        is_all = any(
+            {*answer.rules} <= {*c.rules} and {*c.rules, *c.rivals} == {*case.numbers}
+            for c in met
+        )
+        require(is_all, "it is not claimed that the two tie above all others")
+        require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
+
+
+def _shows_lead(case: Case, answer: Answer, state: Witness) -> None:
+    every = strengths(case.rules, case.point_of(state.point))
+    number = answer.rules[0]
+    rivals = [every[n - 1][1] for n in case.rivals(number)]
+    lead = every[number - 1][1] - max(rivals, default=ZERO)
+    entry = answer.measure("largest lead, at least")
+    is_so = entry >= case.audit.settings.lead and lead >= Fraction(entry)
+    require(is_so, "the rule does not lead by so much there")
+
+
+def _shows_need(case: Case, answer: Answer, state: Witness) -> None:
+    rest, point = without(case, answer), case.point_of(state.point)
+    every, place = [*case.rules.rules], answer.rules[0] - 1
+    every[place] = rest
+    before, after = (
+        class_at(case.rules, point),
+        class_at(case.rules._replace(rules=tuple(every)), point),
+    )
+    require(before != after == case.then(place + 1), "it does not matter there")
+    require(answer.facts.get("before") == before, f"the class there is {before!r}")
+
+
+def _shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
+    level = Fraction(case.audit.settings.level)
+    met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
+    is_high = any(fraction(claim.level) >= level for claim in met)
+    require(is_high, "it is not claimed that both reach the level")
+    require(len({*map(case.then, answer.rules)}) == 2, "the rules are of one class")
+    require(
+        answer.facts["level"] == answer.measures[0].value, "the level is another one"
+    )
+    top(case, answer)
+
+
+def _shows_difference(case: Case, answer: Answer, state: Witness) -> None:
+    said = {claim.of: claim.label for claim in state.claims if claim.kind == "decides"}
+    require(said.keys() == {"tree", "raw rules"}, "it is not claimed what both answer")
+    require(said["tree"] != said["raw rules"], "the two answers are the same")
+    is_so = (
+        answer.facts["then"] == said["tree"]
+        and answer.facts["other"] == said["raw rules"]
+    )
+    require(is_so, "the two answer something else")
+
+
+def _shows_region(case: Case, answer: Answer, state: Witness) -> None:
+    """Compare the region of a leaf with the intervals on the path to it."""
+    (number,) = answer.rules
+    is_there = case.model.leaf_at(case.point_of(state.point)) == number
+    require(is_there, "the witness reaches another leaf")
+    require(
+        [c.label for c in state.claims] == [case.model.leaves[number - 1]],
+        "it is not the leaf's class",
+    )
+    used = {node["ask"] for node, _ in case.model.paths[number - 1]}
+    require({s.variable for s in state.region} == used, "not the variables of its path")
+    for span in state.region:
+        is_one = any(
+            math.isclose(span.low or 0.0, low, rel_tol=2.0**-50)
+            and math.isclose(span.high or 0.0, high, rel_tol=2.0**-50)
+            for low, high, _ in ways_to(
+                case, number, case.model.variables[span.variable]
+            )
+        )
+        require(is_one, f"the path leads elsewhere in {span.variable!r}")
+
+
+def _shows_gap(case: Case, answer: Answer, state: Witness) -> None:
+    """Check the claim that every rule is low enough."""
+    is_weak = answer.message == "FT301.weak"
+    level = Fraction(case.audit.settings.epsilon) if is_weak else ZERO
+    below = [c for c in state.claims if c.kind == "below"]
+    met = [c for c in below if {*c.rules} == {*case.numbers}]
+    is_low = any(fraction(claim.level) <= level for claim in met)
+    require(is_low, "it is not claimed that all rules are below")
+    if is_weak:
+        least_cover(case, answer)
+
+
+SHOWS: dict[str, Callable[[Case, Answer, Witness], None]] = {
+    "FT101.wins": _shows_win,
+    "FT101.fires": _shows_win,
+    "FT101.decides-by-place": _shows_tie,
+    "FT102.leads": _shows_lead,
+    "FT103.alone": _shows_win,
+    "FT103.by-place": _shows_tie,
+    "FT107.needed": _shows_need,
+    "FT201.conflict": _shows_conflict,
+    "FT202.tie": _shows_tie,
+    "FT203.differs": _shows_difference,
+    "FT205.region": _shows_region,
+    "FT301.weak": _shows_gap,
+    "FT301.gap": _shows_gap,
+    "FT301.gap-with-class": _shows_gap,
+    "FT301.gap-of-system": _shows_gap,
+}
+"""What the claims of a witness must say, by message."""

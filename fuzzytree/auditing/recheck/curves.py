@@ -1,0 +1,348 @@
+"""Degrees of membership functions: between which fractions they lie on an interval.
+
+Straight pieces are exact. Everything else is enclosed; both ends are rounded outwards,
+to 40 decimal digits, so they are certain.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from bisect import bisect_left
+from collections.abc import Callable
+from decimal import Context, Decimal
+from fractions import Fraction
+from typing import Any
+
+from fuzzytree.auditing.recheck.models import ONE, ZERO, Curve
+from fuzzytree.auditing.recheck.outcomes import UndecidedError
+
+Between = tuple[Fraction, Fraction]
+STRAIGHT = ("band", "points", "trapezoid")
+CAP = 1 - Fraction(1, 2**53)  # the largest degree off a plateau
+_DIGITS = Context(prec=40)
+_PI = Fraction(31415926535897932384626433832795028841971693993751, 10**49)
+_FAR = 1000  # e**-1000 and less is enclosed by 0 and that
+
+
+def is_straight(curve: Curve) -> bool:
+    """Return whether a curve consists of lines between its knots."""
+    return curve.kind in STRAIGHT and not curve.hedges
+
+
+def knots(curve: Curve) -> list[Fraction]:
+    """Return where a curve jumps or bends; of others where their formula changes."""
+    n = curve.numbers
+    if curve.kind == "points":
+        return sorted({*map(Fraction, n[0])})
+    if curve.kind == "lr":
+        sides = [Fraction(s) * k for s, _, r in n[1:] for k in (ONE, Fraction(r))]
+        signs = zip((-1, -1, 1, 1), sides, strict=True)
+        mean = Fraction(n[0])
+        return sorted([mean, *(mean + sign * far for sign, far in signs)])
+    ends = [Fraction(end) for end in n if isinstance(end, float)]
+    if curve.kind == "band":
+        pairs = [(n[0], n[2]), (n[1], n[3])]
+        ends += [
+            Fraction(end) + CAP * (Fraction(top) - Fraction(end))
+            for top, end in pairs
+            if top is not None and end is not None
+        ]
+    if curve.kind == "trapezoid" and n[0] is not None and n[0] == n[1]:
+        ends.append(Fraction(math.nextafter(n[1], -math.inf)))  # 1 from there on
+    if curve.kind == "pi" or curve.kind == "s":
+        ends += [(a + b) / 2 for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    return sorted({*ends})
+
+
+def bounds(curve: Curve, low: Fraction, high: Fraction) -> Between:
+    """Return between which numbers the degrees of the values of an interval lie.
+
+    Of a straight curve the interval must be a point.
+
+    Raises:
+        UndecidedError: If the curve is not known here.
+    """
+    if is_straight(curve) and low == high:
+        degree = curve.height * _straight(curve, low)
+        return degree, degree
+    if curve.kind in STRAIGHT:
+        inner = [x for x in knots(curve) if low < x < high]
+        ends = [low, *inner, high]
+        degrees = [_straight(curve, x) for x in ends]
+        for a, b in itertools.pairwise(ends):  # the limits at the ends of each line
+            p, q = (_straight(curve, (k * a + (3 - k) * b) / 3) for k in (2, 1))
+            degrees += [2 * p - q, 2 * q - p]
+        one = max(min(degrees), ZERO), min(max(degrees), ONE)
+    else:
+        one = _enclosed(curve, low, high)
+    one = max(one[0], ZERO) * curve.height, min(one[1], ONE) * curve.height
+    for hedge in reversed(curve.hedges):
+        one = _hedged(hedge, one)
+    return one
+
+
+def _straight(curve: Curve, x: Fraction) -> Fraction:
+    """Return a straight curve's degree; a line beside a plateau is below 1."""
+    n = curve.numbers
+    if curve.kind == "points":
+        values, degrees = n
+        place = bisect_left(values, x)
+        if place in (0, len(values)):
+            return Fraction(degrees[min(place, len(values) - 1)])
+        return _line(x, values[place - 1 : place + 1], degrees[place - 1 : place + 1])
+    low, high, left, right = n
+    if curve.kind == "trapezoid":
+        left, low, high, right = n
+        if left is not None and x < low:
+            is_step = left == low and x > Fraction(math.nextafter(low, -math.inf))
+            return (
+                ONE if is_step else ZERO if x <= left else _line(x, (left, low), (0, 1))
+            )
+        if right is not None and x > high:
+            return ZERO if x >= right else _line(x, (high, right), (1, 0))
+        return ONE
+    end, top = (left, low) if low is not None and x <= low else (right, high)
+    if (low is None or x > low) and (high is None or x <= high):
+        return ONE
+    return ZERO if end is None else min(max(_line(x, (end, top), (0, 1)), ZERO), CAP)
+
+
+def _line(x: Fraction, ends: tuple[float, ...], degrees: tuple[float, ...]) -> Fraction:
+    a, b, p, q = map(Fraction, (*ends, *degrees))
+    return p + (q - p) * (x - a) / (b - a)
+
+
+def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
+    n: list[Any] = [Fraction(o) if isinstance(o, float) else o for o in curve.numbers]
+    match curve.kind:
+        case "lr":
+            return _both(
+                min,
+                _side(n[0] - high, n[0] - low, n[1]),
+                _side(low - n[0], high - n[0], n[2]),
+            )
+        case "gaussian":
+            return _bell(low - n[0], high - n[0], n[1])
+        case "two gaussians":
+            left = _bell(min(low - n[0], ZERO), min(high - n[0], ZERO), n[1])
+            right = _bell(max(low - n[2], ZERO), max(high - n[2], ZERO), n[3])
+            return left[0] * right[0], left[1] * right[1]
+        case "bell":
+            near, far = _sizes(low - n[0], high - n[0])
+            ends = [
+                _logistic(-2 * n[2] * _ln(x / n[1])[k])
+                if x
+                else ((ONE, ONE) if n[2] > 0 else (ZERO, ZERO))
+                for k, x in enumerate((near, far))
+            ]
+            more = [
+                _logistic(-2 * n[2] * _ln(x / n[1])[1 - k]) if x else ends[k]
+                for k, x in enumerate((near, far))
+            ]
+            every = [end for one in (*ends, *more) for end in one]
+            return min(every), max(every)
+        case "sigmoid":
+            ends = [_logistic(n[1] * (x - n[0])) for x in (low, high)]
+            return min(a for a, _ in ends), max(b for _, b in ends)
+        case "sigmoid product" | "sigmoid difference":
+            a, b = (
+                _enclosed(Curve("sigmoid", one), low, high) for one in curve.numbers
+            )
+            if curve.kind == "sigmoid product":
+                return a[0] * b[0], a[1] * b[1]
+            least, most = a[0] - b[1], a[1] - b[0]
+            return max(least, -most, ZERO), max(abs(least), abs(most))
+        case "cosine":
+            near, far = (
+                min(x / n[1], Fraction(1, 2)) for x in _sizes(low - n[0], high - n[0])
+            )
+            least, most = _cosine(far)[0], _cosine(near)[1]
+            return (1 + least) / 2 if far < Fraction(1, 2) else ZERO, (1 + most) / 2
+        case "spike":
+            near, far = _sizes(low - n[0], high - n[0])
+            return _falling(10 * far / n[1])[0], _falling(10 * near / n[1])[1]
+        case "concave":
+            wide = n[1] - n[0]
+            ends2 = [
+                abs(wide)
+                / (abs(wide) + max((n[1] - x) * (1 if wide >= 0 else -1), ZERO))
+                if wide or n[1] != x
+                else ONE
+                for x in (low, high)
+            ]
+            return min(ends2), max(ends2)
+        case "arc":
+            us = [min(max((x - n[0]) / (n[1] - n[0]), ZERO), ONE) for x in (low, high)]
+            return _root(min(us) * (2 - min(us)))[0], _root(max(us) * (2 - max(us)))[1]
+        case "semi ellipse":
+            middle, half = (n[0] + n[1]) / 2, (n[1] - n[0]) / 2
+            near, far = (
+                min(x / half, ONE) for x in _sizes(low - middle, high - middle)
+            )
+            return _root(1 - far * far)[0], _root(1 - near * near)[1]
+        case "s":
+            ends2 = [_s(x, n[0], n[1]) for x in (low, high)]
+            return min(ends2), max(ends2)
+        case "pi":
+            rise, fall = (
+                [_s(x, n[0], n[1]) for x in (low, high)],
+                [_s(x, n[3], n[2]) for x in (low, high)],
+            )
+            return min(rise) * min(fall), max(rise) * max(fall)
+        case _:
+            raise UndecidedError(f"a curve ({curve.kind}) is not evaluated here")
+
+
+def _both(choose: Callable[..., Fraction], one: Between, other: Between) -> Between:
+    return choose(one[0], other[0]), choose(one[1], other[1])
+
+
+def _sizes(low: Fraction, high: Fraction) -> Between:
+    """Return the least and the largest size of the numbers of an interval."""
+    ends = abs(low), abs(high)
+    return ZERO if low <= 0 <= high else min(ends), max(ends)
+
+
+def _side(
+    low: Fraction, high: Fraction, side: tuple[float, tuple[float, ...], float]
+) -> Between:
+    """Return the degrees of a side of an LR set at distances from its mean."""
+    if high <= 0:
+        return ONE, ONE
+    spread, reach = Fraction(side[0]), Fraction(side[2])
+    u, v = (min(max(x / spread, ZERO), reach) for x in (low, high))
+    a, b = min(u, ONE), min(v, ONE)
+    least = most = (
+        sum((c * a**k for k, c in enumerate(body(side[1]))), start=ZERO)
+        if a == b
+        else ZERO
+    )
+    if a < b:  # in doubles, of the distance from the middle
+        poly = [*map(float, body(side[1]))]
+        off = sum(map(abs, poly)) * 2.0**-36  # more than all rounding
+        middle, half = float(a + b) / 2, float(b - a) / 2 + 2.0**-50
+        for start in range(len(poly)):
+            for place in range(len(poly) - 2, start - 1, -1):
+                poly[place] += middle * poly[place + 1]
+        off += sum(abs(c) * half**k for k, c in enumerate(poly) if k)
+        least, most = Fraction(poly[0] - off), Fraction(poly[0] + off)
+    least, most = (min(max(y, ZERO), ONE) for y in (least, most))
+    if v <= 1:
+        return least, most
+    tails = [min((reach - x) / (reach - 1), ONE) ** 4 for x in (v, u)]
+    return least * tails[0], most * tails[1]
+
+
+@functools.lru_cache(maxsize=4096)
+def body(curve: tuple[float, ...]) -> tuple[Fraction, ...]:
+    """Return the polynomial `1 - t (c0 + (2 t - 1) (c1 + ...))`, the lowest first."""
+    poly: list[Fraction] = [ZERO]
+    for c in reversed(curve):
+        twice = [ZERO, *(2 * one for one in poly)]
+        poly = [a - b for a, b in zip(twice, [*poly, ZERO], strict=True)]
+        poly[0] += Fraction(c)
+    return (ONE, *(-c for c in poly))
+
+
+def _s(x: Fraction, start: Fraction, end: Fraction) -> Fraction:
+    if start == end:
+        return ONE if x > start else ZERO
+    t = min(max((x - start) / (end - start), ZERO), ONE)
+    return 2 * t * t if 2 * t <= 1 else 1 - 2 * (1 - t) ** 2
+
+
+# --- functions of the reals, enclosed
+
+
+def _rising(function: Callable[[Decimal], Decimal], x: Fraction) -> Between:
+    """Return between which numbers a rising function of x lies.
+
+    Decimals round its values to the nearest one, so its neighbours are beyond.
+    """
+    near = _DIGITS.divide(Decimal(x.numerator), Decimal(x.denominator))
+    ends = function(_DIGITS.next_minus(near)), function(_DIGITS.next_plus(near))
+    return Fraction(_DIGITS.next_minus(ends[0])), Fraction(_DIGITS.next_plus(ends[1]))
+
+
+def _falling(x: Fraction) -> Between:
+    """Return between which numbers e**-x lies, x >= 0."""
+    if not x:
+        return ONE, ONE
+    if x > _FAR:
+        return ZERO, Fraction(1, 2**_FAR)
+    return _rising(_DIGITS.exp, -x)
+
+
+def _ln(x: Fraction) -> Between:
+    return _rising(_DIGITS.ln, x)
+
+
+def _root(x: Fraction) -> Between:
+    """Return between which numbers the square root of x >= 0 lies."""
+    whole = math.isqrt((x.numerator << 256) // x.denominator)
+    low = Fraction(whole, 1 << 128)
+    return low, low if low * low == x else low + Fraction(1, 1 << 128)
+
+
+def _power(x: Fraction, power: Fraction) -> Between:
+    """Return between which numbers a power of x lies, 0 <= x <= 1."""
+    if x in (0, 1):
+        return x, x
+    low, high = _ln(x)
+    return _falling(-low * power)[0], min(_falling(-high * power)[1], ONE)
+
+
+def _bell(low: Fraction, high: Fraction, deviation: Fraction) -> Between:
+    near, far = _sizes(low, high)
+    ends = [(x / deviation) ** 2 / 2 for x in (far, near)]
+    return _falling(ends[0])[0], _falling(ends[1])[1]
+
+
+def _logistic(z: Fraction) -> Between:
+    """Return between which numbers 1 / (1 + e**-z) lies."""
+    low, high = _falling(abs(z))
+    return (
+        (low / (1 + low), high / (1 + high))
+        if z < 0
+        else (1 / (1 + high), 1 / (1 + low))
+    )
+
+
+def _cosine(turns: Fraction) -> Between:
+    """Return between which numbers cos(2 pi t) lies, 0 <= t <= 1/2."""
+    square, low, high = (2 * turns * _PI) ** 2, -ONE, ONE
+    for place in range(59, 0, -2):
+        step = square / (place * (place + 1))
+        ends = 1 - step * high, 1 - step * low
+        low, high = (Fraction(math.floor(end * 2**160), 2**160) for end in ends)
+        high += Fraction(1, 2**160)
+    off = Fraction(1, 10**40)  # of the digits of pi
+    return max(low - off, -ONE), min(high + off, ONE)
+
+
+_HEDGES: dict[str, Callable[[Fraction], Between]] = {
+    "any": lambda d: (ONE, ONE),
+    "very": lambda d: (d * d, d * d),
+    "cubed": lambda d: (d**3, d**3),
+    "very very": lambda d: (d**4, d**4),
+    "somewhat": _root,
+    "cube root": lambda d: _power(d, Fraction(1, 3)),
+    "plus": lambda d: _power(d, Fraction(5, 4)),
+    "minus": lambda d: _power(d, Fraction(3, 4)),
+    "extremely": lambda d: (_s(d, ZERO, ONE), _s(d, ZERO, ONE)),
+    "seldom": lambda d: (
+        _root(d / 2)
+        if 2 * d <= 1
+        else (1 - _root((1 - d) / 2)[1], 1 - _root((1 - d) / 2)[0])
+    ),
+}
+"""What a hedge makes of a degree; all rise with it."""
+
+
+def _hedged(hedge: str, one: Between) -> Between:
+    if hedge == "not":
+        return 1 - one[1], 1 - one[0]
+    low, high = (min(max(end, ZERO), ONE) for end in one)
+    return _HEDGES[hedge](low)[0], _HEDGES[hedge](high)[1]
