@@ -44,6 +44,7 @@ from fuzzytree.model import (
     SNorm,
     SystemRule,
     TNorm,
+    joints,
     name_choice,
     questions,
 )
@@ -240,12 +241,12 @@ def _norms(
     disjunction = norm_of(block, "OR", FCL_SNORMS, scope.notes)
     is_jfuzzylogic = scope.dialect == "jfuzzylogic"
     pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
-    if conjunction is None and any(_uses(rule.when, And) for rule in rules):
+    if conjunction is None and any(And in joints(rule.when) for rule in rules):
         partners: list[TNorm] = [t for t, one in pairs.items() if one == disjunction]
         conjunction = partners[0] if partners else "minimum"
         text = f"line {block.line}: AND is missing; {conjunction} is taken"
         scope.notes.remark(text)
-    if disjunction is None and any(_uses(rule.when, Or) for rule in rules):
+    if disjunction is None and any(Or in joints(rule.when) for rule in rules):
         disjunction = pairs.get(conjunction or "minimum", "maximum")
         text = f"line {block.line}: OR is missing; {disjunction} is taken"
         scope.notes.remark(text)
@@ -257,16 +258,6 @@ def _norms(
         )
         scope.notes.loss(f"line {block.line}", what)
     return conjunction, disjunction
-
-
-def _uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            return isinstance(condition, kind) or any(_uses(p, kind) for p in parts)
-        case Not(part=part):
-            return _uses(part, kind)
-        case _:
-            return False
 
 
 ALWAYS: Final = Points((0.0,), (1.0,))
