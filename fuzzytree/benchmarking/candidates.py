@@ -315,16 +315,10 @@ def _makers(rules: RuleBase) -> dict[str, Make]:
 
 
 def _largest_degree(rules: RuleBase) -> int:
-    largest = 0
-    for variable in rules.variables:
-        for term in variable.terms:
-            match term.shape:
-                case LR(left=left, right=right):
-                    curves = [left.curve, right.curve]
-                case _:
-                    curves = []
-            largest = max([largest, *map(len, curves)])
-    return largest
+    shapes = [term.shape for variable in rules.variables for term in variable.terms]
+    sets = [shape for shape in shapes if isinstance(shape, LR)]
+    sides = [side for shape in sets for side in (shape.left, shape.right)]
+    return max((len(side.curve) for side in sides), default=0)
 
 
 def _load(

@@ -246,8 +246,6 @@ def _labelled(label: Term) -> Curve:
     def degree(value: float) -> float:
         return min(max(label.height * curve_degree(curve, value), 0.0), 1.0)
 
-    if isinstance(curve, (Band, LR, Points)):
-        return Curve(label.name, degree, _corners(curve))
     return Curve(label.name, degree, _corners(curve))
 
 
