@@ -18,7 +18,8 @@ from fuzzytree.auditing import (
     point_of,
 )
 from fuzzytree.model import RuleBase
-from fuzzytree.report.drawing import Axis, Markup
+from fuzzytree.report.drawing import Axis
+from fuzzytree.report.markup import Markup
 from fuzzytree.report.parts import part
 from fuzzytree.report.svg_terms import span_text, terms_picture
 from fuzzytree.report.text import counted

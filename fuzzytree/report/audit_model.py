@@ -9,7 +9,8 @@ from fuzzytree.auditing import AuditAnswer, AuditView, Sampled
 from fuzzytree.model import FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
-from fuzzytree.report.drawing import Axis, Markup
+from fuzzytree.report.drawing import Axis
+from fuzzytree.report.markup import Markup
 from fuzzytree.report.parts import MOST_LINES, MOST_RULES, part
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, tree_picture

@@ -31,7 +31,8 @@ from fuzzytree.report.audit_states import (
     gravest_first,
     known_as,
 )
-from fuzzytree.report.drawing import Markup, axes_of, joined
+from fuzzytree.report.drawing import axes_of
+from fuzzytree.report.markup import Markup
 from fuzzytree.report.parts import part, whole_page
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def page(
         head=part("head", audit, classes),
         verdict=verdict(audit),
         sections=sections,
-        body=joined(part("section", *section) for section in sections),
+        body=[part("section", *section) for section in sections],
     )
 
 

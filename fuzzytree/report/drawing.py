@@ -1,15 +1,12 @@
-"""What the pictures of a page share: markup, scales, ticks, curves and words."""
+"""What the pictures of a page share: scales, ticks, curves and words."""
 
 from __future__ import annotations
 
-import html
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
-
-from markupsafe import Markup as Markup
 
 from fuzzytree.auditing import Domain
 from fuzzytree.model import (
@@ -29,85 +26,8 @@ from fuzzytree.model import (
 )
 from fuzzytree.model import Curve as SystemCurve
 from fuzzytree.numerics import exact_degree
+from fuzzytree.report.markup import Markup, mark, trimmed
 from fuzzytree.semantics import curve_degree
-
-MOST_LETTERS = 400
-"""Of one text on a page; a longer one is cut, and says how long it is."""
-
-_VOID = frozenset({"br", "meta"})
-_DRAWN = frozenset({"circle", "line", "path", "rect", "use"})
-
-
-Content = str | None
-"""A `Markup`, a text that will be escaped, or nothing."""
-
-Attribute = str | float | bool | None
-
-
-def text(words: str) -> Markup:
-    r"""Return words as markup: invisible characters escaped, long texts cut.
-
-    Example:
-        >>> print(text("soft <b>" + chr(27)))
-        soft &lt;b&gt;\x1b
-    """
-    if len(words) > MOST_LETTERS:
-        words = f"{words[:MOST_LETTERS]}… ({len(words)} characters)"
-    return Markup(html.escape(printable(words)))
-
-
-def text_lines(lines: Iterable[str]) -> Markup:
-    """Return lines as markup, each ended by a line break but the last."""
-    return Markup("\n".join(map(text, lines)))
-
-
-def joined(parts: Iterable[Content], between: str = "") -> Markup:
-    """Return parts one after another, with escaped words between them."""
-    kept = [part if isinstance(part, Markup) else text(part) for part in parts if part]
-    return Markup(text(between).join(kept))
-
-
-def tag(name: str, *children: Content, **attributes: Attribute) -> Markup:
-    """Return an element; texts in it are escaped.
-
-    In the names of attributes `_` stands for `-`, and a last `_` is left out. None and
-    False leave an attribute out, True gives it no value.
-
-    Example:
-        >>> print(tag("a", "R & D", href="#one", class_="link"))
-        <a href="#one" class="link">R &amp; D</a>
-    """
-    shown = "".join(_attribute(key, value) for key, value in attributes.items())
-    if name in _VOID:
-        return Markup(f"<{name}{shown}>")
-    inner = joined(children)
-    if name in _DRAWN and not inner:
-        return Markup(f"<{name}{shown}/>")
-    return Markup(f"<{name}{shown}>{inner}</{name}>")
-
-
-def _attribute(key: str, value: Attribute) -> str:
-    if value is None or value is False:
-        return ""
-    name = key.rstrip("_").replace("_", "-")
-    if value is True:
-        return f" {name}"
-    if not isinstance(value, str):
-        return f' {name}="{trimmed(value)}"'
-    shown = value if isinstance(value, Markup) else text(value)
-    return f' {name}="{shown}"'
-
-
-def trimmed(value: float) -> str:
-    """Return a number of points of a picture, with one decimal at most.
-
-    Example:
-        >>> trimmed(12.0), trimmed(-0.04), trimmed(3.25)
-        ('12', '0', '3.2')
-    """
-    shown = f"{value:.1f}".removesuffix(".0")
-    return "0" if shown == "-0" else shown
-
 
 LETTER = 0.58
 """How wide a letter of a picture is on average, in sizes of its font."""
@@ -349,52 +269,6 @@ def cut(words: str, letters: float) -> str:
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
 
-def svg(
-    width: float,
-    height: float,
-    title: str,
-    desc: str,
-    *children: Content,
-    name: str,
-    **attributes: Attribute,
-) -> Markup:
-    """Return a picture with its title and description; sizes are in points."""
-    return tag(
-        "svg",
-        tag("title", title, id=f"{name}-t"),
-        tag("desc", desc, id=f"{name}-d"),
-        *children,
-        viewBox=f"0 0 {trimmed(width)} {trimmed(height)}",
-        width=width,
-        height=height,
-        role="img",
-        aria_labelledby=f"{name}-t {name}-d",
-        **attributes,
-    )
-
-
-def rect(x: float, y: float, width: float, height: float, class_: str) -> Markup:
-    """Return a rectangle."""
-    return tag("rect", x=x, y=y, width=width, height=height, class_=class_)
-
-
-def line(x1: float, x2: float, y1: float, y2: float, class_: str) -> Markup:
-    """Return a line."""
-    return tag("line", x1=x1, x2=x2, y1=y1, y2=y2, class_=class_)
-
-
-def words(
-    x: float,
-    y: float,
-    said: str,
-    class_: str | None = None,
-    anchor: str | None = None,
-    **attributes: Attribute,
-) -> Markup:
-    """Return words in a picture."""
-    return tag("text", said, x=x, y=y, class_=class_, text_anchor=anchor, **attributes)
-
-
 def axis_marks(x: Scale, base: float, *, most: int = 4) -> Iterator[Markup]:
     """Yield the ticks of an axis with their numbers."""
     values = ticks(x.low, x.high, most)
@@ -402,11 +276,11 @@ def axis_marks(x: Scale, base: float, *, most: int = 4) -> Iterator[Markup]:
     for value, word in zip(values, tick_words(values), strict=True):
         at = x.at(value)
         half = 0.5 * LETTER * 10 * len(word)
-        yield line(at, at, base, base + 4, "tick")
+        yield mark("line", at, at, base, base + 4, "tick")
         left = min(max(at, x.start - 6 + half), x.end + 6 - half)
         if left - half > previous + 4:
             previous = left + half
-            yield words(left, base + 15, word, "small", "middle")
+            yield mark("words", left, base + 15, word, "small", "middle")
 
 
 def spread(values: Sequence[float], share: float = 0.03) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from fuzzytree.auditing import Audit
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import audit_lines
-from fuzzytree.report.drawing import Markup, joined, tag, text_lines
+from fuzzytree.report.markup import Markup
 from fuzzytree.report.parts import part
 from fuzzytree.report.systems import system_lines
 from fuzzytree.report.text import head_lines, model_lines, term_lines
@@ -39,8 +39,8 @@ def agreement_html(agreement: Agreement) -> Markup:
 def audit_html(audit: Audit) -> Markup:
     """Return an audit: its verdict, and all else as it is printed."""
     verdict, *rest = audit_lines(audit)
-    return joined([tag("p", verdict), _lines(rest)])
+    return part("printed", rest, verdict)
 
 
 def _lines(lines: Iterable[str]) -> Markup:
-    return tag("pre", text_lines(lines))
+    return part("printed", [*lines])

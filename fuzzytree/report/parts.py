@@ -7,10 +7,6 @@ import functools
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Sequence
-from importlib import resources
-from typing import cast
-
-from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from fuzzytree.auditing import CODES, Coordinate, Measure, State, Witness
 from fuzzytree.report.audit import ORIGINS
@@ -23,7 +19,7 @@ from fuzzytree.report.audit_states import (
     state_text,
     state_word,
 )
-from fuzzytree.report.drawing import Markup, text, text_lines
+from fuzzytree.report.markup import Markup, macros, source, template, text_lines
 from fuzzytree.report.stability import (
     CRITERION,
     advice,
@@ -58,16 +54,15 @@ def part(name: str, *values: object, **options: object) -> Markup:
 
 def whole_page(**parts: object) -> str:
     """Return the page with its parts."""
-    source = _source("page.html")
-    template = _environment().from_string(source)
-    return template.render(policy=_policy(source), **parts)
+    page = source("page.html")
+    return template(page).render(policy=_policy(page), **parts)
 
 
-def _policy(source: str) -> str:
+def _policy(page: str) -> str:
     """Return what the page may do: run its own style and script."""
     allowed: list[str] = []
     for kind in ("script", "style"):
-        match = re.search(f"<{kind}>(.*?)</{kind}>", source, re.DOTALL)
+        match = re.search(f"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
         content = match[1] if match else ""
         digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
         allowed.append(f"{kind}-src 'sha256-{digest}'")
@@ -93,34 +88,8 @@ def _macros() -> object:
     known |= {"MOST_INPUTS": _MOST_INPUTS, "MOST_LISTED": _MOST_LISTED}
     known |= {"MOST_LINES": MOST_LINES, "MOST_RULES": MOST_RULES}
     known |= {"SEVERITIES": SEVERITIES, "STATES": STATES}
-    return _environment().get_template("parts.html", globals=known).module
-
-
-@functools.cache
-def _environment() -> Environment:
-    environment = Environment(
-        loader=FunctionLoader(lambda name: re.sub(r"\n *", "", _source(name))),
-        autoescape=True,
-        finalize=_content,
-        keep_trailing_newline=True,
-        undefined=StrictUndefined,
-    )
-    filters = cast("dict[str, object]", environment.filters)
     rows = comparison_row, certified_row, criterion_row
-    filters.update({one.__name__: one for one in rows})
-    return environment
-
-
-def _source(name: str) -> str:
-    folder = resources.files("fuzzytree.report").joinpath("templates")
-    return folder.joinpath(name).read_text("utf-8")
-
-
-def _content(value: object) -> Markup:
-    """Return a value of a template as markup."""
-    if isinstance(value, Markup):
-        return value
-    return Markup("") if value is None else text(str(value))
+    return macros("parts.html", known, {one.__name__: one for one in rows})
 
 
 def how_known(state: State) -> str | None:

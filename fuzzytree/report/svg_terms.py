@@ -13,19 +13,14 @@ from fuzzytree.report.drawing import (
     LETTER,
     Axis,
     Curve,
-    Markup,
     Scale,
     axis_marks,
     between,
     cut,
-    line,
     polyline,
-    rect,
     spread,
-    svg,
-    tag,
-    words,
 )
+from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import number
 
@@ -85,23 +80,25 @@ def terms_picture(
     parts += outside(axis, x, top - 4, y.start)
     if span is not None:
         start, end = _ends(span, x)
-        parts.append(rect(start, top - 4, end - start, y.start - top + 4, "region"))
-    parts.append(line(_LEFT, _RIGHT, y.start, y.start, "axis"))
+        parts.append(
+            mark("rect", start, top - 4, end - start, y.start - top + 4, "region")
+        )
+    parts.append(mark("line", _LEFT, _RIGHT, y.start, y.start, "axis"))
     parts += _curves(drawn, x, y, named)
     parts += _names(names, top)
     if value is not None:
         at = x.at(value)
-        parts.append(line(at, at, top - 4, y.start, "pin"))
-        parts.append(tag("path", d=_diamond(at, y.start), class_="witness"))
+        parts.append(mark("line", at, at, top - 4, y.start, "pin"))
+        parts.append(mark("path", _diamond(at, y.start), "witness"))
     if len(names) < len(axis.curves):
         said = f"+ {len(drawn) - len(names)} unnamed"
         if len(drawn) < len(axis.curves):
             said += f", {len(axis.curves) - len(drawn)} not drawn"
-        parts.append(words(x.end, top + 10.0, said, "small", "end"))
+        parts.append(mark("words", x.end, top + 10.0, said, "small", "end"))
     parts += axis_marks(x, y.start)
     high = y.start + 22.0
     title = f"The terms of {axis.title}"
-    return svg(WIDE, high, title, _description(axis), *parts, name=name)
+    return mark("svg", WIDE, high, name, title, _description(axis), parts)
 
 
 def _curves(
@@ -110,13 +107,9 @@ def _curves(
     """Yield the curves of terms; all but those that are named, if any, are faint."""
     for place, curve in enumerate(curves):
         is_faint = bool(named) and curve.name not in (named or ())
-        yield tag(
-            "path",
-            tag("title", curve.name),
-            d=polyline(curve, x, y),
-            class_="curve faint" if is_faint else "curve",
-            stroke_dasharray=DASHES[place % len(DASHES)],
-        )
+        look = "curve faint" if is_faint else "curve"
+        dashes = DASHES[place % len(DASHES)]
+        yield mark("curve", curve.name, polyline(curve, x, y), look, dashes)
 
 
 def _description(axis: Axis) -> str:
@@ -134,9 +127,9 @@ def outside(axis: Axis, x: Scale, top: float, base: float) -> Iterator[Markup]:
     left, right = x.at(axis.low), x.at(axis.high)
     for start, end in ((x.start, left), (right, x.end)):
         if end - start > 0.3:
-            yield rect(start, top, end - start, base - top, "outside")
+            yield mark("rect", start, top, end - start, base - top, "outside")
     for at in (left, right):
-        yield line(at, at, top, base, "domain")
+        yield mark("line", at, at, top, base, "domain")
 
 
 def _bins(axis: Axis, data: Data | None, x: Scale, y: Scale) -> Iterator[Markup]:
@@ -152,10 +145,10 @@ def _bins(axis: Axis, data: Data | None, x: Scale, y: Scale) -> Iterator[Markup]
             if not count:
                 continue
             high = _PLOT * 0.86 * count / tallest
-            mark = class_mark(code) if code < len(data.classes) else "none"
+            own = class_mark(code) if code < len(data.classes) else "none"
             base -= high
             left = x.start + place * wide + 0.4
-            yield rect(left, base, wide - 0.8, high, f"bin {mark}")
+            yield mark("rect", left, base, wide - 0.8, high, f"bin {own}")
 
 
 class _Name(NamedTuple):
@@ -186,8 +179,8 @@ def _names(names: Sequence[_Name], top: float) -> Iterator[Markup]:
     for said, middle, row in names:
         base = top - 9.0 - _ROW * row
         if row:
-            yield line(middle, middle, base + 3, top - 4, "lead")
-        yield words(middle, base, said, "term", "middle")
+            yield mark("line", middle, middle, base + 3, top - 4, "lead")
+        yield mark("words", middle, base, said, "term", "middle")
 
 
 def _top(curve: Curve, x: Scale) -> float:

@@ -12,7 +12,8 @@ import msgspec
 from fuzzytree.files import PathLike, write_atomically
 from fuzzytree.model import FuzzyTree, Node
 from fuzzytree.report.audit_rows import Counts, Passing
-from fuzzytree.report.drawing import LETTER, Markup, cut, rect, svg, tag, words
+from fuzzytree.report.drawing import LETTER, cut
+from fuzzytree.report.markup import Markup, mark
 from fuzzytree.report.systems import sum_text
 from fuzzytree.report.text import counted, number, taken
 
@@ -70,15 +71,11 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
     more of them take it.
     """
     drawn, wide, high = _laid(boxes_of(tree, rows))
-    return svg(
-        wide,
-        high,
-        f"The tree {_size_text(tree)}",
+    desc = (
         "From left to right: each box tests one variable, each branch takes a part of "
-        "its values, and each rounded box is a class; the same as an outline follows",
-        *drawn,
-        name="tree",
+        "its values, and each rounded box is a class; the same as an outline follows"
     )
+    return mark("svg", wide, high, "tree", f"The tree {_size_text(tree)}", desc, drawn)
 
 
 class TreePicture(NamedTuple):
@@ -133,25 +130,23 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> TreePicture:
         if one.parts and one.name in used
     ]
     wide = max([wide, *(LETTER * 14 * min(len(one), 400) for one in (said, *notes))])
-    ends = range(len(notes))
     colours = "".join(
         f".box.k{k} {{ stroke: {colour}; }}\n"
         f".bar.k{k}, .strong.k{k} {{ fill: {colour}; }}\n"
         for k, colour in enumerate(_PALETTE)
     )
-    picture = svg(
-        wide,
-        high + _LINE * (len(notes) + 1),
-        said,
-        "",
-        tag("style", Markup(_STYLE + colours)),
-        tag("rect", width="100%", height="100%", fill="#ffffff"),
-        words(_EDGE, _LINE, said, "strong"),
-        tag("g", *drawn, transform=f"translate(0 {_LINE:.0f})"),
-        *(words(_EDGE, high + _LINE * (k + 1.5), notes[k], "small") for k in ends),
-        name="tree",
-        xmlns="http://www.w3.org/2000/svg",
-    )
+    marks = [
+        mark("style", Markup(_STYLE + colours)),
+        mark("words", _EDGE, _LINE, said, "strong"),
+        mark("group", drawn, move=f"translate(0 {_LINE:.0f})"),
+        *(
+            mark("words", _EDGE, high + _LINE * (k + 1.5), note, "small")
+            for k, note in enumerate(notes)
+        ),
+    ]
+    high += _LINE * (len(notes) + 1)
+    space = "http://www.w3.org/2000/svg"
+    picture = mark("svg", wide, high, "tree", said, "", marks, space)
     return TreePicture(f"{picture}\n")
 
 
@@ -246,32 +241,24 @@ def _branch(box: Box, whole: int) -> Markup:
     way = f"M{start:.1f} {above.middle:.1f}C{bend:.1f} {above.middle:.1f} "
     way += f"{bend:.1f} {box.middle:.1f} {end:.1f} {box.middle:.1f}"
     thick = _LEAST + (_MOST - _LEAST) * share
-    return tag("path", d=way, class_="branch", stroke_width=thick)
+    return mark("branch", way, thick)
 
 
 def _drawn(box: Box) -> Markup:
     left, top = box.left, box.middle - _HIGH / 2.0
     is_leaf = box.code is not None
-    mark = class_mark(box.code or 0) if is_leaf else ""
+    own = f" {class_mark(box.code or 0)}" if is_leaf else ""
+    rx = 14.0 if is_leaf else 4.0
     room = (_WIDE - 20.0) / (LETTER * 13.0)
     said = [box.branch, box.title, box.note, _counts_text(box.counts)]
-    return tag(
-        "g",
-        tag("title", "; ".join(filter(None, said))),
-        tag(
-            "rect",
-            x=left,
-            y=top,
-            width=_WIDE,
-            height=_HIGH,
-            rx=14.0 if is_leaf else 4.0,
-            class_=f"box {mark}".rstrip(),
-        ),
-        words(left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
-        words(left + 10, top + 18, cut(box.title, room), f"strong {mark}".rstrip()),
-        words(left + 10, top + 33, cut(box.note, _WIDE / 6.4), "small"),
+    marks = [
+        mark("rect", left, top, _WIDE, _HIGH, f"box{own}", rx),
+        mark("words", left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
+        mark("words", left + 10, top + 18, cut(box.title, room), f"strong{own}"),
+        mark("words", left + 10, top + 33, cut(box.note, _WIDE / 6.4), "small"),
         *_bar(box.counts, left + 10, top + 40, _WIDE - 20),
-    )
+    ]
+    return mark("group", marks, "; ".join(filter(None, said)))
 
 
 def _counts_text(counts: Counts) -> str:
@@ -281,10 +268,10 @@ def _counts_text(counts: Counts) -> str:
 def _bar(counts: Counts, left: float, top: float, wide: float) -> Iterator[Markup]:
     """Yield the parts of a bar, the rows of each class."""
     whole = sum(counts)
-    yield rect(left, top, wide, 6.0, "track")
+    yield mark("rect", left, top, wide, 6.0, "track")
     for code, count in enumerate(counts):
         if count:
             part = wide * count / whole
-            mark = class_mark(code)
-            yield rect(left, top, max(part - 0.6, 0.6), 6.0, f"bar {mark}")
+            look = f"bar {class_mark(code)}"
+            yield mark("rect", left, top, max(part - 0.6, 0.6), 6.0, look)
             left += part
