@@ -111,8 +111,9 @@ def draw_frames(
         FigureCanvasAgg(figure)
         panels = figure.subplots(down, across, squeeze=False).ravel().tolist()
         shapes = cells or [frame.shape for frame in drawn]
+        full = end if end > 0.0 else 1.0
+        images = [_draw(*pair, full) for pair in zip(panels, drawn, strict=False)]
         for number, frame in enumerate(drawn):
-            image = _draw(panels[number], frame, end if end > 0.0 else 1.0)
             if titles:
                 words = short(titles[number], _LONGEST)
                 panels[number].set_title(words, fontsize=SIZE, pad=4, parse_math=False)
@@ -120,7 +121,7 @@ def draw_frames(
                 _mark(panels[number], axis, frame.shape, shapes[number])
         for panel in panels[len(drawn) :]:
             panel.remove()
-        bar = figure.colorbar(image, ax=panels[: len(drawn)], shrink=0.9)
+        bar = figure.colorbar(images[-1], ax=panels[: len(drawn)], shrink=0.9)
         bar.set_label(unit, fontsize=SIZE)
         bar.outline.set(color=_EDGE, linewidth=0.6)
         bar.ax.tick_params(labelsize=SIZE - 1, length=2.5, color=_EDGE)

@@ -194,11 +194,11 @@ def _csv(parts: Sequence[Presses], found: Sequence[Features]) -> str:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(heads)
     for part, features in zip(parts, found, strict=True):
-        for number in features.is_pressed.nonzero()[0].tolist():
-            cells: list[object] = [*features.values[:, number].tolist()]
-            if has_class:
-                cells.append(part.label_names[int(part.label[number])])
-            if has_subject:
-                cells.append(int(part.subject[number]))
-            table.writerow(cells)
+        rows = features.is_pressed.nonzero()[0]
+        columns: list[list[object]] = features.values[:, rows].tolist()
+        if has_class:
+            columns.append([part.label_names[code] for code in part.label[rows]])
+        if has_subject:
+            columns.append(part.subject[rows].tolist())
+        table.writerows(zip(*columns, strict=True))
     return text.getvalue()

@@ -36,6 +36,7 @@ class Decoder(ABC):
         self._buffer = bytearray()
         self._need = 1  # the fewest bytes in the buffer that can decide anything
         self._board = board
+        self._banner = board.banner  # lines of it that may still come
 
     @property
     def pending(self) -> int:
@@ -91,6 +92,12 @@ class Decoder(ABC):
     @abstractmethod
     def _take_last(self) -> list[Cells]:
         """Return the frames that only waited for more, and begin again."""
+
+    def _pass_banner(self) -> int:
+        """Skip what there is of the banner; return how many bytes that was."""
+        taken, self._banner = banner_bytes(bytes(self._buffer), self._banner)
+        self._skip(taken)
+        return taken
 
     def _skip(self, count: int) -> None:
         """Drop bytes that belong to no frame."""

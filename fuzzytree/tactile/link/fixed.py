@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.tactile.boards import Board, Checksum, Marker, Request
-from fuzzytree.tactile.link.decoder import Decoder, banner_bytes, largest_cell
+from fuzzytree.tactile.link.decoder import Decoder, largest_cell
 from fuzzytree.tactile.sensor import Cells
 
 Blocks = npt.NDArray[np.uint8]
@@ -206,7 +206,6 @@ class RequestDecoder(Decoder):
         super().__init__(board)
         self.ask = bytes.fromhex(protocol.ask)
         self._layout = layout_of(board, protocol)
-        self._banner = board.banner
         self._is_given = False  # the last bytes were an answer, and it is not proven
 
     def requested(self) -> None:
@@ -229,8 +228,7 @@ class RequestDecoder(Decoder):
 
     def _take(self) -> list[Cells]:
         if self._banner:
-            taken, self._banner = banner_bytes(bytes(self._buffer), self._banner)
-            self._skip(taken)
+            self._pass_banner()
             if self._banner:
                 return []
         blocks, good = whole_blocks(self._layout, bytes(self._buffer))

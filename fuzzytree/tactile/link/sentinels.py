@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.tactile.boards import Board, Sentinel
-from fuzzytree.tactile.link.decoder import Decoder, banner_bytes, largest_cell
+from fuzzytree.tactile.link.decoder import Decoder, largest_cell
 from fuzzytree.tactile.link.fixed import Truths
 from fuzzytree.tactile.sensor import Cells
 
@@ -25,15 +25,12 @@ class SentinelDecoder(Decoder):
         self._protocol = protocol
         self._end = bytes([protocol.end])
         self._cells = board.sensor.rows * board.sensor.columns
-        self._banner = board.banner
         self._is_joined = is_joined
         self._is_astray = False  # inside a frame that is longer than any
 
     def _take(self) -> list[Cells]:
         if self._banner:
-            taken, self._banner = banner_bytes(bytes(self._buffer), self._banner)
-            self._skip(taken)
-            self._is_joined &= not taken
+            self._is_joined &= not self._pass_banner()
             if self._banner:
                 return []
         stop = self._buffer.rfind(self._end) + 1
