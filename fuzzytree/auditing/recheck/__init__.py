@@ -16,7 +16,9 @@ and how they end (`outcomes`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from fuzzytree.auditing.recheck.case import Case
 from fuzzytree.auditing.recheck.checks import check_answer, check_files, check_head
@@ -28,10 +30,16 @@ from fuzzytree.auditing.recheck.outcomes import (
     Report,
     UndecidedError,
 )
-from fuzzytree.auditing.recheck.records import Audit, Declined, built, read_json
+from fuzzytree.auditing.recheck.records import (
+    Audit,
+    Declined,
+    Proved,
+    built,
+    read_json,
+)
 from fuzzytree.auditing.recheck.yaml import MOST_BYTES
 
-__all__ = ["CannotRunError", "Report", "recheck", "recheck_files"]
+__all__ = ["CannotRunError", "Report", "recheck", "recheck_files", "undecided"]
 
 
 def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
@@ -42,6 +50,54 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     Raises:
         CannotRunError: If one of them cannot be read.
     """
+    facts, case = _read(audit, model, names)
+    report = Report()
+    report.codes = [one.code for one in case.audit.answers]
+    try:
+        check_files(case, report, facts, model, names[1])
+        check_head(case, report)
+        _name_shorter(case)
+        for number, answer in enumerate(case.audit.answers, 1):
+            check_answer(case, report, answer, number)
+    except (DoesNotHoldError, UndecidedError) as error:
+        report.wrong.append(str(error))
+    except (LookupError, TypeError, ValueError):
+        report.wrong.append("an answer names what there is not")
+    return report
+
+
+def undecided(audit: bytes, model: bytes, is_late: Callable[[], bool]) -> set[int]:
+    """Return the positions of the PROVED answers that are not decided again here.
+
+    Nothing is tried of small rules of straight lines under the minimum, whose inputs
+    are free of each other: there everything is decided.
+
+    Args:
+        audit: An audit that was made here, and is not yet done.
+        model: Its model, as YAML.
+        is_late: Whether nothing more shall be begun.
+
+    Raises:
+        CannotRunError: If the model cannot be read.
+    """
+    _, case = _read(audit, model, ("the audit", "model.yaml"))
+    result: set[int] = set()
+    if case.is_easy:
+        return result
+    _name_shorter(case)
+    for place, answer in enumerate(case.audit.answers):
+        if isinstance(answer.state, Proved):
+            report = Report()
+            if not is_late():
+                check_answer(case, report, answer, place + 1)
+            if not report.counts["answers PROVED, decided again"]:
+                result.add(place)
+    return result
+
+
+def _read(
+    audit: bytes, model: bytes, names: tuple[str, str]
+) -> tuple[dict[str, Any], Case]:
     facts = read_json(audit, names[0])
     result: Audit = built(Audit, facts, names[0])
     left_out = [
@@ -51,21 +107,14 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     if whole.form == "system" and result.policy.decision == "strongest":
         text = "a system that stands for rules is not checked again; audit these"
         raise CannotRunError(f"{names[0]}: {text}")
-    report, case = Report(), Case(result, whole)
-    report.codes = [one.code for one in result.answers]
-    try:
-        check_files(case, report, facts, model, names[1])
-        check_head(case, report)
-        for position, answer in enumerate(result.answers):
-            if answer.message == "FT107.irrelevant":
-                case.shorter[position] = without(case, answer)
-        for number, answer in enumerate(result.answers, 1):
-            check_answer(case, report, answer, number)
-    except (DoesNotHoldError, UndecidedError) as error:
-        report.wrong.append(str(error))
-    except (LookupError, TypeError, ValueError):
-        report.wrong.append("an answer names what there is not")
-    return report
+    return facts, Case(result, whole)
+
+
+def _name_shorter(case: Case) -> None:
+    """Name the rules without a proposition that answers are about."""
+    for position, answer in enumerate(case.audit.answers):
+        if answer.message == "FT107.irrelevant":
+            case.shorter[position] = without(case, answer)
 
 
 def recheck_files(audit: str, model: str) -> Report:

@@ -10,7 +10,7 @@ from functools import cached_property
 
 from fuzzytree.auditing.recheck import boxes
 from fuzzytree.auditing.recheck.cells import Cells, Interval
-from fuzzytree.auditing.recheck.curves import Between, bounds, is_straight
+from fuzzytree.auditing.recheck.curves import Between, bounds, is_straight, knots
 from fuzzytree.auditing.recheck.models import (
     ONE,
     ZERO,
@@ -40,6 +40,8 @@ from fuzzytree.auditing.recheck.records import (
 STEPS = (8, 32)
 """Into so many steps from 0 to 1 a curve that is no line is cut, coarsely first."""
 MOST_POINTS = 200
+MOST_EASY = 1_000
+"""Up to so many knots times rules nothing is too large."""
 CLOSE = Fraction(1, 2**70)
 """How far beside a point curves that are no lines are evaluated, where many are."""
 
@@ -64,6 +66,14 @@ class Case:
         self.shorter: dict[int, Rule] = {}
         self._strengths: dict[tuple[object, ...], list[Between]] = {}
         self._cells: dict[int, Cells | UndecidedError] = {}
+
+    @property
+    def is_easy(self) -> bool:
+        """Whether all questions are surely decided, and with few cells."""
+        curves = [c for v in self.rules.variables.values() for c in v.curves.values()]
+        is_straight_ = all(map(is_straight, curves)) and not self.rules.is_product
+        size = sum(len(knots(c)) for c in curves) * len(self.numbers)
+        return is_straight_ and self.is_free and size <= MOST_EASY
 
     def ends(self, variable: Variable) -> Interval:
         """Return the values of a variable in the domain; of a combination, at most."""

@@ -9,14 +9,20 @@ from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
+from fuzzytree import learn, load
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.locations import model_file
+from fuzzytree.auditing.findings.records import AuditSelection
+from fuzzytree.auditing.findings.subject import AuditRows, Material
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.checks import LIMITS, digest_of
+from fuzzytree.exporters import yaml
 from fuzzytree.model import FuzzySystem
 from fuzzytree.model.rulebase import Conjunction, RuleBase
 from fuzzytree.model.tree import FuzzyTree
@@ -93,15 +99,15 @@ def edit(facts: Facts, way: Way, chance: random.Random) -> None:
         holder[way[-1]] = chance.choice([one for one in words if one != value])
 
 
-def missed(audit: bytes, content: bytes, seed: int, many: int) -> list[str]:
+def missed(text: bytes, content: bytes, seed: int, many: int) -> list[str]:
     """Edit some fields of an audit, each with a new digest; return what is missed."""
-    facts, chance = json.loads(audit), random.Random(seed)
+    facts, chance = json.loads(text), random.Random(seed)
     every = defaultdict[str, list[Way]](list)
     for way in ways(facts):
         every[name_of(way)].append(way)
     result: list[str] = []
     for name in chance.sample(sorted(every.keys() - {"digest"}), many):
-        way, edited = chance.choice(every[name]), json.loads(audit)
+        way, edited = chance.choice(every[name]), json.loads(text)
         edit(edited, way, chance)
         edited["digest"] = digest_of(edited)
         is_free = any(re.fullmatch(pattern, name) for pattern in FREE)
@@ -160,19 +166,19 @@ def test_each_field_of_many_audits_that_is_edited_is_reported_or_free(
 
 
 def test_the_digest_shows_any_edit() -> None:
-    audit, content = small()
+    text, content = small()
     chance = random.Random(1)
-    every = [way for way in ways(json.loads(audit)) if way != ("digest",)]
+    every = [way for way in ways(json.loads(text)) if way != ("digest",)]
     for way in chance.sample(every, 6):
-        facts = json.loads(audit)
+        facts = json.loads(text)
         edit(facts, way, chance)
         assert wrong_with(facts, content), way
 
 
 def changed(**changes: Any) -> list[str]:
     """Return what does not hold once some facts are replaced, with a new digest."""
-    audit, content = small()
-    facts = json.loads(audit) | changes
+    text, content = small()
+    facts = json.loads(text) | changes
     facts["digest"] = digest_of(facts)
     return wrong_with(facts, content)
 
@@ -223,12 +229,12 @@ def test_a_proof_that_is_turned_into_a_witness_is_reported() -> None:
 
 
 def test_another_model_is_reported() -> None:
-    audit, content = small()
+    text, content = small()
     other = content.replace(
         b"range: {from: 0.0, to: 4.0}", b"range: {from: 0.0, to: 5}"
     )
-    wrong = recheck(audit, other, ("a.json", "m.yaml")).wrong
-    assert any(text.startswith("the SHA-256 of m.yaml is ") for text in wrong)
+    wrong = recheck(text, other, ("a.json", "m.yaml")).wrong
+    assert any(one.startswith("the SHA-256 of m.yaml is ") for one in wrong)
     assert "the side of 'force' is not the model's range" in wrong
 
 
@@ -259,3 +265,26 @@ def test_a_planted_defect_holds(planted: Planted) -> None:
         options["rows"] = AuditRows("rows.csv", ROWS.T)
     report = recheck(*audited(model, ignore=["FT6"], **options), ("a.json", "m.yaml"))
     assert report.wrong == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_proved_is_always_decided_again(seed: int) -> None:
+    kinds: tuple[Kind, ...] = ("points", "band", "lr")
+    norm: Conjunction = "product" if seed % 2 else "minimum"
+    model = random_base(seed, 3, 2, norm, kinds[seed % 3], shared=0.5)
+    report = recheck(*audited(model, ignore=["FT6", "FT7"]), ("a.json", "m.yaml"))
+    assert report.wrong == []
+    assert "PROVED" not in {state for state, _ in report.undecided}
+
+
+@pytest.mark.heavy
+def test_what_is_proved_of_the_tipper_and_the_wines_is_decided_again() -> None:
+    tipper = load("examples/tipper.fll")
+    assert isinstance(tipper, FuzzySystem)
+    for model in (learn("examples/wine/wine.csv", target="cultivar"), tipper):
+        content = yaml.write(model).content
+        material = Material(model, model_file("m.yaml", content))
+        found = audit(material, selection=AuditSelection(ignore=["FT6", "FT7"]))
+        report = recheck(msgspec.json.encode(found), content, ("a.json", "m.yaml"))
+        assert report.wrong == []
+        assert "PROVED" not in {state for state, _ in report.undecided}
