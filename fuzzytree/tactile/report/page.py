@@ -109,8 +109,7 @@ class _Server(ThreadingHTTPServer):
     def __init__(self, live: Live, port: int, times: int) -> None:
         self.live, self.times = live, times
         self.is_closing = threading.Event()
-        self._busy = 0
-        self._lock = threading.Condition()
+        self._room = threading.BoundedSemaphore(MOST_BROWSERS)
         content = resources.files("fuzzytree.tactile.report").joinpath("live.html")
         self.content = content.read_bytes()
         self.policy = _policy(self.content.decode())
@@ -122,10 +121,7 @@ class _Server(ThreadingHTTPServer):
         self, request: socket.socket | tuple[bytes, socket.socket], client_address: Any
     ) -> None:
         """Serve a connection in a thread, if there are not too many."""
-        with self._lock:
-            has_room = self._busy < MOST_BROWSERS
-            self._busy += has_room
-        if has_room:
+        if self._room.acquire(blocking=False):
             super().process_request(request, client_address)
             return
         assert isinstance(request, socket.socket)  # of a server of streams
@@ -140,14 +136,13 @@ class _Server(ThreadingHTTPServer):
         try:
             super().process_request_thread(request, client_address)
         finally:
-            with self._lock:
-                self._busy -= 1
-                self._lock.notify_all()
+            self._room.release()
 
     def wait_for_browsers(self, seconds: float) -> None:
         """Wait until no connection is served any more."""
-        with self._lock:
-            self._lock.wait_for(lambda: not self._busy, seconds)
+        end = time.monotonic() + seconds
+        for _ in range(MOST_BROWSERS):
+            self._room.acquire(timeout=max(end - time.monotonic(), 0.0))
 
 
 class _Handler(BaseHTTPRequestHandler):
