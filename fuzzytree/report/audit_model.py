@@ -15,7 +15,7 @@ from fuzzytree.report.parts import MOST_LINES, MOST_RULES, part
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, tree_picture
 from fuzzytree.report.systems import curve_text, rule_text, sum_text
-from fuzzytree.report.text import counted, number, shape_text, tree_lines
+from fuzzytree.report.text import counted, number, tree_lines
 
 Audited = FuzzyTree | RuleBase | FuzzySystem
 
@@ -88,16 +88,11 @@ def _cards(
 
 def _in_words(model: Audited, name: str) -> list[str]:
     """Return the terms of a variable in words."""
-    if isinstance(model, FuzzySystem):
-        own = next(one for one in model.inputs if one.name == name)
-        return [
-            f"{label.name}: {curve_text(label.function, model.columns)}"
-            for label in own.terms[:_MOST_TERMS]
-        ]
-    variable = next(one for one in model.variables if one.name == name)
+    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
+    own = next(one for one in variables if one.name == name)
     return [
-        f"{term.name}: {shape_text(term.shape)}"
-        for term in variable.terms[:_MOST_TERMS]
+        f"{term.name}: {curve_text(term.function, model.columns)}"
+        for term in own.terms[:_MOST_TERMS]
     ]
 
 

@@ -50,7 +50,7 @@ def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: AuditRows) -> Data:
     count = rows.values.shape[1]
     variables: tuple[Variable, ...]
     if isinstance(model, FuzzySystem):
-        variables = tuple(Variable(v.name, parts=v.parts) for v in model.inputs)
+        variables = model.inputs
         classes: tuple[str, ...] = ()
     else:
         variables, classes = model.variables, model.classes

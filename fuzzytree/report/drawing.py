@@ -92,12 +92,9 @@ def axes_of(
     model: FuzzyTree | RuleBase | FuzzySystem, domain: Domain
 ) -> dict[str, Axis]:
     """Return every input and combination of a model as it is drawn, by name."""
-    if isinstance(model, FuzzySystem):
-        variables = (_system_axis(one) for one in model.inputs)
-    else:
-        variables = (_axis(one) for one in model.variables)
+    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
     axes: dict[str, Axis] = {}
-    for axis in variables:
+    for axis in map(_axis, variables):
         side = domain.side(axis.name)
         if side is not None:
             axes[axis.name] = axis._replace(low=side.low, high=side.high)
@@ -123,19 +120,15 @@ def _reached(
 
 
 def _axis(variable: Variable) -> Axis:
-    curves = tuple(curve_of(term.name, term.shape) for term in variable.terms)
-    return Axis(variable.name, variable.unit, curves, (), None, None, variable.parts)
-
-
-def _system_axis(one: Variable) -> Axis:
-    drawn = [label for label in one.terms if not _is_undrawn(label.function)]
-    others = tuple(label.name for label in one.terms if _is_undrawn(label.function))
-    curves = tuple(map(_labelled, drawn))
-    return Axis(one.name, one.unit, curves, others, None, None, one.parts)
-
-
-def _is_undrawn(curve: SystemCurve) -> bool:
-    return isinstance(curve, (Linear, Formula))
+    is_undrawn = {
+        term.name: isinstance(term.function, (Linear, Formula))
+        for term in variable.terms
+    }
+    curves = tuple(_labelled(t) for t in variable.terms if not is_undrawn[t.name])
+    others = tuple(name for name, is_left in is_undrawn.items() if is_left)
+    return Axis(
+        variable.name, variable.unit, curves, others, None, None, variable.parts
+    )
 
 
 def curve_of(name: str, shape: Shape) -> Curve:

@@ -34,7 +34,14 @@ from fuzzytree.model import (
     Trapezoid,
     Variable,
 )
-from fuzzytree.report.text import aligned, counted, kind_text, number, shape_text
+from fuzzytree.report.text import (
+    aligned,
+    counted,
+    kind_text,
+    number,
+    shape_text,
+    span_text,
+)
 from fuzzytree.runtimes import Outputs
 from fuzzytree.semantics import Status
 
@@ -203,7 +210,7 @@ def condition_text(condition: Condition, *, level: int = 0) -> str:
 
 
 def _input_lines(one: Variable, columns: Sequence[str]) -> Iterator[str]:
-    yield one.name + _span(one)
+    yield one.name + span_text(one)
     if one.parts:
         yield f"  = {sum_text(one.parts)}"
     yield from _label_lines(one.terms, columns)
@@ -226,7 +233,7 @@ def _output_lines(one: SystemOutput, columns: Sequence[str]) -> Iterator[str]:
         facts.append(f"joined by {one.aggregation}")
     default = "nan" if one.default is None else number(one.default)
     facts.append(f"no rule: {default}")
-    yield one.name + _span(one)
+    yield one.name + span_text(one)
     yield f"  {'; '.join(facts)}"
     yield from _label_lines(one.terms, columns)
 
@@ -238,14 +245,6 @@ def _samples_text(one: SystemOutput) -> str:
         return "of its singletons"
     text = f"at {how.samples} values {_GRIDS[how.grid]}"
     return f"{text} and at its singletons" if single else text
-
-
-def _span(one: Variable | SystemOutput) -> str:
-    unit = f", in {one.unit}" if one.unit else ""
-    if one.low is None or one.high is None:
-        return unit
-    clipped = ", clipped" if one.clips else ""
-    return f"{unit}, {number(one.low)} to {number(one.high)}{clipped}"
 
 
 _MOST_PARTS = 12  # of a combination that are written

@@ -26,6 +26,7 @@ from fuzzytree.model import (
     Semantics,
     Shape,
     Side,
+    SystemOutput,
     Variable,
     intervals,
     printable,
@@ -257,15 +258,20 @@ def term_lines(variables: Sequence[Variable]) -> Iterator[str]:
     for variable in variables:
         if not variable.terms and not variable.parts:
             continue
-        unit = f", in {variable.unit}" if variable.unit else ""
-        span = ""
-        if variable.low is not None and variable.high is not None:
-            span = f", {number(variable.low)} to {number(variable.high)}"
-        yield f"{variable.name}{unit}{span}"
+        yield variable.name + span_text(variable)
         if variable.parts:
             yield from _sum_lines(variable)
         rows = [(f"  {t.name}", shape_text(t.shape)) for t in variable.terms]
         yield from aligned(rows)
+
+
+def span_text(one: Variable | SystemOutput) -> str:
+    """Return the unit and the range of a variable, to stand behind its name."""
+    unit = f", in {one.unit}" if one.unit else ""
+    if one.low is None or one.high is None:
+        return unit
+    clipped = ", clipped" if one.clips else ""
+    return f"{unit}, {number(one.low)} to {number(one.high)}{clipped}"
 
 
 def _sum_lines(variable: Variable) -> Iterator[str]:
