@@ -41,8 +41,8 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Is,
     Or,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -161,7 +161,9 @@ def seven_rules() -> FuzzySystem:
     )
     written = tuple(
         SystemRule(
-            And(tuple(Is(c.variable, _word(c.terms[0])) for c in rule.when)),
+            And(
+                tuple(Proposition(c.variable, (_word(c.terms[0]),)) for c in rule.when)
+            ),
             (Conclusion("answer", f"rule{number}"),),
         )
         for number, rule in enumerate(rules.rules, 1)
@@ -508,7 +510,7 @@ def _skfuzzy(system: FuzzySystem, _: Path) -> Engine:
     rules = []
     for rule in system.rules:
         asked = _skfuzzy_condition(rule.when, inputs)
-        rules.append(control.Rule(asked, made[rule.then[0].label]))
+        rules.append(control.Rule(asked, made[rule.then[0].term]))
     simulation = control.ControlSystemSimulation(control.ControlSystem(rules))
 
     def many(values: Floats) -> Floats:
@@ -528,7 +530,7 @@ def _skfuzzy(system: FuzzySystem, _: Path) -> Engine:
 
 def _skfuzzy_condition(condition: Condition | None, inputs: Mapping[str, Any]) -> Any:
     match condition:
-        case Is(variable=variable, label=label):
+        case Proposition(variable=variable, term=label):
             return inputs[variable][label]
         case And(parts=parts):
             found = [_skfuzzy_condition(part, inputs) for part in parts]
@@ -572,7 +574,7 @@ def _sentence(
 ) -> str:
     def told(condition: Condition | None) -> str:
         match condition:
-            case Is(variable=variable, label=label):
+            case Proposition(variable=variable, term=label):
                 return question.format(variable, label)
             case And(parts=parts):
                 text = both.join(map(told, parts))
@@ -583,7 +585,7 @@ def _sentence(
         return f"({text})" if is_grouped and len(parts) > 1 else text
 
     then = rule.then[0]
-    return f"IF {told(rule.when)} THEN {question.format(then.output, then.label)}"
+    return f"IF {told(rule.when)} THEN {question.format(then.output, then.term)}"
 
 
 OURS = ("native", "onnxruntime", "C, generated")

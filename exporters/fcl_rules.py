@@ -20,11 +20,11 @@ from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
-    Is,
     Loss,
     Not,
     Or,
     Points,
+    Proposition,
     RuleBase,
     RuleBlock,
     SNorm,
@@ -50,7 +50,7 @@ def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
     first = system.inputs[0]
     name = unlike("always", [label.name for label in first.terms])
     label = Term(name, ALWAYS)
-    always = Is(first.name, name)
+    always = Proposition(first.name, (name,))
     return replace(
         system,
         inputs=(replace(first, terms=(*first.terms, label)), *system.inputs[1:]),
@@ -113,7 +113,8 @@ def _text(rule: SystemRule, words: FclWords, words_of: WordsOf, always: str) -> 
     says = str.lower if words.is_lower else str.upper
     when = always if rule.when is None else _condition(rule.when, words_of, says)
     then = words.joiner.join(
-        _proposition(Is(one.output, one.label), words_of, says) for one in rule.then
+        _proposition(Proposition(one.output, (one.term,)), words_of, says)
+        for one in rule.then
     )
     weight = "" if rule.weight == 1.0 else f"{says(' with ')}{float(rule.weight)!r}"
     return f"{says('if ')}{when}{says(' then ')}{then}{weight};"
@@ -127,7 +128,7 @@ def _condition(
     So it does not matter that jFuzzyLogic reads AND and OR from left to right.
     """
     match condition:
-        case Is():
+        case Proposition():
             return _proposition(condition, words_of, says)
         case Not(part=part):
             return f"{says('not ')}({_condition(part, words_of, says)})"
@@ -138,8 +139,10 @@ def _condition(
             return f"({text})" if level and len(parts) > 1 else text
 
 
-def _proposition(one: Is, words_of: WordsOf, says: Callable[[str], str]) -> str:
-    name, term = words_of(one.variable, one.label)
+def _proposition(
+    one: Proposition, words_of: WordsOf, says: Callable[[str], str]
+) -> str:
+    name, term = words_of(one.variable, one.term)
     nots = one.hedges.count("not")
     text = f"{name}{says(' is not ' if nots else ' is ')}{term}"
     for _ in range(nots - 1):
@@ -191,7 +194,7 @@ def norm_losses(block: RuleBlock, number: int, words: FclWords) -> Iterator[str]
     if uses_or and block.disjunction not in words.ors:
         yield f"{where}: the dialect {words.name} has no OR {block.disjunction!r}"
     propositions = [one for rule in block.rules for one in questions(rule.when)]
-    if not words.has_hedges and any(one.label is None for one in propositions):
+    if not words.has_hedges and any(one.term is None for one in propositions):
         yield f"{where}: the dialect {words.name} has no 'any'"
     if words.name == "portable" and any(
         one.hedges.count("not") > 1 for one in propositions
@@ -259,10 +262,10 @@ def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
             continue
         propositions = list(questions(rule.when))
         if all(
-            (one.variable, one.label) in constants or one.hedges == ("any",)
+            (one.variable, one.term) in constants or one.hedges == ("any",)
             for one in propositions
         ):
-            return not any(one.hedges and one.label for one in propositions)
+            return not any(one.hedges and one.term for one in propositions)
     return False
 
 
@@ -286,7 +289,7 @@ def _accu_losses(
         file_norm = None
     curves = {one.name: one.function for one in output.terms}
     counts = Counter(
-        curves[one.label]
+        curves[one.term]
         for rule in system.rules
         for one in rule.then
         if one.output == output.name

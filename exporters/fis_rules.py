@@ -21,11 +21,11 @@ from fuzzytree.model import (
     Condition,
     FuzzySystem,
     Hedge,
-    Is,
     Loss,
     Not,
     Or,
     Points,
+    Proposition,
     RuleBlock,
     SystemOutput,
     SystemRule,
@@ -83,7 +83,7 @@ class FisTerms:
         labels.append(Term(unlike(name, [one.name for one in labels]), curve))
         return len(labels)
 
-    def code(self, proposition: Is) -> str | None:
+    def code(self, proposition: Proposition) -> str | None:
         """Return the number of a proposition with its hedges; None if it has none."""
         hedges = _merged(proposition.hedges)
         is_negated = hedges[:1] == ("not",)
@@ -91,11 +91,9 @@ class FisTerms:
         if hundredths is None:
             return None
         # Fuzzylite loads no rule with `any` before a term.
-        has_label = proposition.label is not None and hedges[-1:] != ("any",)
+        has_label = proposition.term is not None and hedges[-1:] != ("any",)
         place = (
-            self.place(proposition.variable, proposition.label or "")
-            if has_label
-            else 0
+            self.place(proposition.variable, proposition.term or "") if has_label else 0
         )
         return _code(place, hundredths, is_negated=is_negated)
 
@@ -124,7 +122,7 @@ class FisTerms:
     def _lines(self, condition: Condition) -> tuple[Lines, float]:
         """Return the degree of a condition on one input as lines, and their error."""
         match condition:
-            case Is():
+            case Proposition():
                 return self._lines_of(condition), 0.0
             case Not(part=part):
                 lines, bound = self._lines(part)
@@ -139,20 +137,20 @@ class FisTerms:
                     bound = bound + error + more
                 return total, bound
 
-    def _lines_of(self, proposition: Is) -> Lines:
+    def _lines_of(self, proposition: Proposition) -> Lines:
         hedges = _merged(proposition.hedges)
         if hedges == ("any",):
             return numerics.lines_of(EVERYWHERE)
-        if proposition.label is None or hedges not in ((), ("not",)):
+        if proposition.term is None or hedges not in ((), ("not",)):
             raise LossError(
                 f"{proposition.variable!r} has several conditions with hedges"
             )
         label = self.labels[proposition.variable][
-            self.place(proposition.variable, proposition.label) - 1
+            self.place(proposition.variable, proposition.term) - 1
         ]
         shape = shape_of(label.function)
         if not isinstance(shape, Points):
-            text = f"the term {proposition.label!r} of {proposition.variable!r}"
+            text = f"the term {proposition.term!r} of {proposition.variable!r}"
             raise LossError(f"{text} has several conditions and is no list of points")
         lines = numerics.scaled(numerics.lines_of(shape), label.height)
         return numerics.negated(lines) if hedges else lines
@@ -214,7 +212,11 @@ def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
     groups: dict[str, list[Condition]] = {}
     parts = [_simple(one) for one in operands(condition, terms.system.blocks[0])]
     if terms.dialect != "fuzzylite":
-        plain = [p for p in parts if not (isinstance(p, Is) and p.hedges == ("any",))]
+        plain = [
+            p
+            for p in parts
+            if not (isinstance(p, Proposition) and p.hedges == ("any",))
+        ]
         if not plain or (is_or and len(plain) < len(parts)):
             return _codes(None, terms)
         parts = plain
@@ -229,7 +231,7 @@ def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
     codes: dict[str, str] = {}
     for name, parts in groups.items():
         code = None
-        if len(parts) == 1 and isinstance(parts[0], Is):
+        if len(parts) == 1 and isinstance(parts[0], Proposition):
             code = terms.code(parts[0])
             if code is None:
                 hedges = " ".join(parts[0].hedges)
@@ -240,8 +242,8 @@ def _codes(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
 
 def _simple(condition: Condition) -> Condition:
     match condition:
-        case Not(part=Is(variable=variable, label=label, hedges=hedges)):
-            return Is(variable, label, ("not", *hedges))
+        case Not(part=Proposition(hedges=hedges) as part):
+            return msgspec.structs.replace(part, hedges=("not", *hedges))
         case And(parts=(part,)) | Or(parts=(part,)):
             return _simple(part)
         case _:
@@ -260,7 +262,7 @@ def _conclusions(rule: SystemRule, terms: FisTerms) -> list[tuple[str, str]]:
     result: list[tuple[str, str]] = []
     for one in rule.then:
         output = outputs[one.output]
-        place = [label.name for label in output.terms].index(one.label) + 1
+        place = [label.name for label in output.terms].index(one.term) + 1
         # Hedges act on the conclusions behind them too; in Octave on each alone.
         so_far = (*one.hedges, *so_far)
         is_shared = terms.dialect == "fuzzylite"
@@ -272,7 +274,7 @@ def _conclusions(rule: SystemRule, terms: FisTerms) -> list[tuple[str, str]]:
             is_plain or is_shared or output.defuzzifier.is_weighted
         ):
             text = " ".join(hedges)
-            raise LossError(f"{terms.dialect} cannot conclude {text!r} {one.label!r}")
+            raise LossError(f"{terms.dialect} cannot conclude {text!r} {one.term!r}")
         result.append((one.output, _code(place, hundredths, is_negated=is_negated)))
     return result
 
@@ -299,7 +301,7 @@ def _hundredths(
 
 def _text_of(condition: Condition) -> str:
     match condition:
-        case Is(label=label, hedges=hedges):
+        case Proposition(term=label, hedges=hedges):
             return " ".join((*hedges, label or ""))
         case Not(part=part):
             return f"not {_text_of(part)}"

@@ -23,13 +23,13 @@ from fuzzytree.model import (
     Condition,
     Expression,
     Hedge,
-    Is,
     Loss,
     Name,
     Not,
     Number,
     Or,
     Points,
+    Proposition,
     RuleBlock,
     SystemOutput,
     SystemRule,
@@ -95,7 +95,7 @@ def has_not(
 def _pushed(condition: Condition, nots: int) -> Condition:
     """Return a condition behind some NOTs, which move to its propositions."""
     match condition:
-        case Is(hedges=hedges):
+        case Proposition(hedges=hedges):
             return replace(condition, hedges=(*("not",) * nots, *hedges))
         case Not(part=part):
             return _pushed(part, nots + 1)
@@ -111,7 +111,7 @@ def rule_text(rule: SystemRule, words_of: WordsOf, always: str) -> str:
     """Return a rule as fuzzylite reads it."""
     when = always if rule.when is None else _condition_text(rule.when, words_of, 0)
     then = " and ".join(
-        _statement(one.output, one.label, one.hedges, words_of) for one in rule.then
+        _statement(one.output, one.term, one.hedges, words_of) for one in rule.then
     )
     weight = "" if rule.weight == 1.0 else f" with {float(rule.weight)!r}"
     return f"if {when} then {then}{weight}"
@@ -120,11 +120,11 @@ def rule_text(rule: SystemRule, words_of: WordsOf, always: str) -> str:
 def _condition_text(condition: Condition, words_of: WordsOf, level: int) -> str:
     """Return a condition; at level 1 an OR needs parentheses, at level 2 an AND too."""
     match condition:
-        case Is(variable=variable, label=label, hedges=hedges):
+        case Proposition(variable=variable, term=label, hedges=hedges):
             if "any" in hedges:  # whatever stands behind it makes no difference
                 label, hedges = None, hedges[: hedges.index("any") + 1]
             return _statement(variable, label, hedges, words_of)
-        case Not(part=Is() as part):
+        case Not(part=Proposition() as part):
             return _condition_text(_pushed(part, 1), words_of, level)
         case Not():
             raise TypeError(

@@ -20,12 +20,12 @@ from fuzzytree.model import (
     Condition,
     FuzzySystem,
     Hedge,
-    Is,
     Linear,
     Loss,
     Not,
     Or,
     Points,
+    Proposition,
     RuleBlock,
     SCurve,
     Singleton,
@@ -159,16 +159,16 @@ class FmlRules:
         clauses = [self._clause(part, block) for part in operands(rule.when, block)]
         for kind in dict.fromkeys(kinds[one.output] for one in rule.then):
             then = [one for one in rule.then if kinds[one.output] == kind]
-            concluded = tuple((one.output, one.label) for one in then)
+            concluded = tuple((one.output, one.term) for one in then)
             yield kind, FmlRule(tuple(clauses), concluded, rule.weight, is_or)
 
     def _clause(self, condition: Condition, block: RuleBlock) -> Clause:
         match condition:
-            case Is(variable=variable) if variable in self._kinds:
+            case Proposition(variable=variable) if variable in self._kinds:
                 raise LossError(f"it tests the output {variable!r}")
-            case Is(variable=variable, label=label, hedges=hedges):
+            case Proposition(variable=variable, term=label, hedges=hedges):
                 return self._question(variable, label, hedges)
-            case Not(part=Is(variable=variable, label=label, hedges=hedges)):
+            case Not(part=Proposition(variable=variable, term=label, hedges=hedges)):
                 return self._question(variable, label, ("not", *hedges))
             case Not(part=And() | Or() as part):
                 variable, label, _ = self._circular(part, block)
@@ -200,11 +200,11 @@ class FmlRules:
         parts: list[tuple[str, bool]] = []
         for part in condition.parts:
             match part:
-                case Is(label=str(label), hedges=()):
+                case Proposition(term=str(label), hedges=()):
                     parts.append((label, False))
                 case (
-                    Is(label=str(label), hedges=("not",))
-                    | Not(part=Is(label=str(label), hedges=()))
+                    Proposition(term=str(label), hedges=("not",))
+                    | Not(part=Proposition(term=str(label), hedges=()))
                 ):
                     parts.append((label, True))
                 case _:

@@ -30,7 +30,6 @@ from fuzzytree.model import (
     Format,
     FuzzySystem,
     FuzzyTree,
-    Is,
     Leaf,
     Node,
     Part,
@@ -166,7 +165,9 @@ def _named_system(names: Sequence[str]) -> FuzzySystem:
         f"{names[0]} 2", numbers, 0.0, 9.0, Defuzzifier("weighted average")
     )
     rules = tuple(
-        SystemRule(Is(one, other), (Conclusion(output.name, other),), name=one)
+        SystemRule(
+            Proposition(one, (other,)), (Conclusion(output.name, other),), name=one
+        )
         for one, other in zip(names, names[::-1], strict=True)
     )
     inputs = tuple(
@@ -189,7 +190,7 @@ def _extreme_rules() -> RuleBase:
     inputs = (Variable("a", terms, low=-1e308, high=1e308), Variable("b", terms))
     rules = (
         Rule((Proposition("a", ("wide",)), Proposition("mix", ("all",))), "one", 2**53),
-        Rule((Proposition("b", ("wide", "all"), negated=True),), "two", 0),
+        Rule((Proposition("b", ("wide", "all"), hedges=("not",)),), "two", 0),
         Rule((), "one"),
     )
     return RuleBase("extreme", ("one", "two"), (*inputs, mix), rules)
@@ -203,7 +204,7 @@ def _extreme_system() -> FuzzySystem:
     how = Defuzzifier("weighted average")
     output = SystemOutput("y", numbers, -1e308, 1e308, how, default=-0.0)
     rules = tuple(
-        SystemRule(Is("a", "wide"), (Conclusion("y", one.name),), weight)
+        SystemRule(Proposition("a", ("wide",)), (Conclusion("y", one.name),), weight)
         for one, weight in zip(numbers, degrees, strict=True)
     )
     inputs = (Variable("a", (label,), low=-1e308, high=1e308),)
@@ -223,10 +224,10 @@ def _system_by_lines() -> FuzzySystem:
     rules = tuple(
         SystemRule(when, (Conclusion("y", name),), weight)
         for name, weight, when in (
-            ("low", 1.0, Is("a", "ramp", ("not",))),
-            ("high", 0.5, Is("a", "ramp")),
+            ("low", 1.0, Proposition("a", ("ramp",), ("not",))),
+            ("high", 0.5, Proposition("a", ("ramp",))),
             ("all", 1.0, None),
-            ("high", 1.0, Is("a", "ramp", ("very",))),
+            ("high", 1.0, Proposition("a", ("ramp",), ("very",))),
         )
     )
     inputs = (Variable("a", (ramp,), low=0.0, high=1.0),)

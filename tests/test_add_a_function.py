@@ -74,9 +74,10 @@ system = FuzzySystem(
      Variable("load", (low,), "", 0.0, 9.0)),
     (SystemOutput("y", (small, far), 0.0, 5.0, Defuzzifier("centroid"), "maximum"),),
     (RuleBlock(
-        (SystemRule(And((Is("dirt", near.name), Is("load", "low"))),
+        (SystemRule(And((Proposition("dirt", (near.name,)),
+                         Proposition("load", ("low",)))),
                     (Conclusion("y", "small"),)),
-         SystemRule(Is("dirt", "far"), (Conclusion("y", "far"),))),
+         SystemRule(Proposition("dirt", ("far",)), (Conclusion("y", "far"),))),
         norm, "maximum", "minimum",
     ),),
 )

@@ -17,9 +17,9 @@ from fuzzytree.model import (
     Condition,
     Defuzzifier,
     FuzzySystem,
-    Is,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -61,11 +61,23 @@ def system_of(*conditions: Condition) -> FuzzySystem:
 
 
 CONDITIONS: list[Condition] = [
-    And((Is("a", "thin"), Is("b", "thin"))),
-    And((Is("a", "low"), Is("b", "never"))),
-    And((Not(Is("a", "low")), Not(Or((Is("b", "low"), Is("b", "thin")))))),
-    Or((And((Is("a", "thin"), Is("b", "low"))), Is("a", "never"))),
-    And((Is("a", "low", ("very",)), Is("b", "never", ("not",)))),
+    And((Proposition("a", ("thin",)), Proposition("b", ("thin",)))),
+    And((Proposition("a", ("low",)), Proposition("b", ("never",)))),
+    And(
+        (
+            Not(Proposition("a", ("low",))),
+            Not(Or((Proposition("b", ("low",)), Proposition("b", ("thin",))))),
+        )
+    ),
+    Or(
+        (
+            And((Proposition("a", ("thin",)), Proposition("b", ("low",)))),
+            Proposition("a", ("never",)),
+        )
+    ),
+    And(
+        (Proposition("a", ("low",), ("very",)), Proposition("b", ("never",), ("not",)))
+    ),
 ]
 
 
@@ -80,7 +92,7 @@ def test_a_row_aimed_at_a_rule_fires_it(condition: Condition) -> None:
 
 def test_a_row_is_aimed_at_a_rule_on_a_combination() -> None:
     mix = Variable("mix", (NEVER,), parts=(Part("a", 2.0, 0.5), Part("b", -3.0)))
-    rule = SystemRule(Is("mix", "never"), THEN)
+    rule = SystemRule(Proposition("mix", ("never",)), THEN)
     system = FuzzySystem("s", (*INPUTS, mix), (OUTPUT,), (RuleBlock((rule,)),))
     assert infer(system, Aim(system).row(rule)).activations[0] > 0.0
 
@@ -93,7 +105,7 @@ def test_every_rule_that_can_fire_fires_in_a_probe_of_a_check() -> None:
     assert found.probes > 10
 
 
-IMPOSSIBLE = And((Is("a", "low"), Is("a", "never")))
+IMPOSSIBLE = And((Proposition("a", ("low",)), Proposition("a", ("never",))))
 
 
 def test_a_rule_that_cannot_fire_is_named() -> None:
@@ -129,7 +141,7 @@ def test_many_rules_that_do_not_fire_are_named_in_a_line() -> None:
 
 def test_rows_are_drawn_from_the_ranges_themselves() -> None:
     wide = replace(LOW, function=Trapezoid(-100.0, 0.0, 1.0, 100.0))
-    system = system_of(Is("a", "low"))
+    system = system_of(Proposition("a", ("low",)))
     inputs = tuple(replace(one, terms=(wide, THIN, NEVER)) for one in INPUTS)
     rows = range_rows(replace(system, inputs=inputs), 50)
     assert all(0.0 <= value <= 1.0 for row in rows for value in row.values())
@@ -141,7 +153,10 @@ def test_probing_thousands_of_rules_runs_fewer_rows_than_rules(
     labels = tuple(Term(f"t{k}", Trapezoid(k - 1.0, k, k, k + 1.0)) for k in range(7))
     inputs = tuple(Variable(f"x{k}", labels, low=0.0, high=6.0) for k in range(4))
     rules = tuple(
-        SystemRule(And(tuple(Is(f"x{k}", f"t{t}") for k, t in enumerate(terms))), THEN)
+        SystemRule(
+            And(tuple(Proposition(f"x{k}", (f"t{t}",)) for k, t in enumerate(terms))),
+            THEN,
+        )
         for terms in itertools.product(range(7), repeat=4)
     )
     block = RuleBlock(rules, "minimum")

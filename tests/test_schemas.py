@@ -47,7 +47,8 @@ def models() -> list[Document]:
         found += [tree, rules_from_tree(tree), rules_from_tree(tree, "raw")]
     terms = (Term("b", Band()), Term("not b", Band(low=1.0)))
     trap = Rule(
-        (Proposition("a", ("b",), negated=True), Proposition("a", ("b", "not b"))), "no"
+        (Proposition("a", ("b",), hedges=("not",)), Proposition("a", ("b", "not b"))),
+        "no",
     )
     found.append(RuleBase("12:30", ("no",), (Variable("a", terms),), (trap,)))
     return found

@@ -277,7 +277,7 @@ COMBINATIONS = "combinations"
 _FEATURES: Mapping[str, Callable[[RuleBase], RuleBase]] = MappingProxyType(
     {
         "negation": lambda rules: _with_rules(
-            rules, lambda proposition: replace(proposition, negated=False)
+            rules, lambda proposition: replace(proposition, hedges=())
         ),
         "OR of terms": lambda rules: _with_rules(
             rules, lambda proposition: replace(proposition, terms=proposition.terms[:1])

@@ -21,7 +21,6 @@ from fuzzytree.model import (
     FuzzySystem,
     FuzzyTree,
     Hedge,
-    Is,
     Leaf,
     Name,
     Node,
@@ -112,11 +111,11 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
 
     def reduced(when: Condition | None) -> Condition | None:
         match when:
-            case Is(variable=name, label=label, hedges=()) if (
+            case Proposition(variable=name, term=label, hedges=()) if (
                 label is not None and (name, label) in everywhere
             ):
                 return None
-            case Is(label=None, hedges=("any",)):
+            case Proposition(term=None, hedges=("any",)):
                 return None
             case _:
                 return when
@@ -131,7 +130,7 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
     if blocks == system.blocks:
         return system
     used = {
-        (one.variable, one.label)
+        (one.variable, one.term)
         for block in blocks
         for rule in block.rules
         for one in questions(rule.when)
@@ -314,7 +313,8 @@ def _renamed(part: Any, names: _NewNames) -> Any:
         case Proposition(variable=name):
             known = names.terms[name]
             alternatives = tuple(known[term] for term in part.terms)
-            return Proposition(names.variables[name], alternatives, part.negated)
+            hedges = _hedges(part.hedges)
+            return Proposition(names.variables[name], alternatives, hedges)
         case Node(variable=name):
             known, sets = names.terms[name], names.sets.get(name)
             branches = tuple(
@@ -374,16 +374,13 @@ def _renamed_system(part: Any, names: _NewNames) -> Any:
             return Name(name if name == "x" else names.variables.get(name, name))
         case Call(function=function, arguments=arguments):
             return Call(function, new(arguments))
-        case Is(variable=variable, label=label):
-            label = None if label is None else names.terms[variable][label]
-            return Is(names.variables[variable], label, _hedges(part.hedges))
         case And(parts=parts) | Or(parts=parts):
             return type(part)(new(parts))
-        case Not(part=Is() as inner):
+        case Not(part=Proposition() as inner):
             return new(replace(inner, hedges=("not", *inner.hedges)))
         case Not(part=inner):
             return Not(new(inner))
-        case Conclusion(output=output, label=label):
+        case Conclusion(output=output, term=label):
             label = names.terms[output][label]
             return Conclusion(names.variables[output], label, _hedges(part.hedges))
         case _:
@@ -405,7 +402,7 @@ def _terms(
 def _block(block: RuleBlock, system: FuzzySystem, names: _NewNames) -> RuleBlock:
     rules = tuple(
         SystemRule(
-            rule.when and _ordered(_renamed_system(rule.when, names), block),
+            rule.when and _ordered(_renamed(rule.when, names), block),
             _renamed(rule.then, names),
             rule.weight,
         )

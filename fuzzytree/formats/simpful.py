@@ -25,11 +25,11 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Linear,
     Not,
     Or,
     Points,
+    Proposition,
     Sigmoid,
     Singleton,
     SNorm,
@@ -132,7 +132,7 @@ def _condition(
     if _is_of_simpful(part, "Clause"):
         if part._variable not in source._lvs:
             raise _refusal(f"{where} uses {part._variable!r}, which is no variable")
-        return Is(part._variable, part._term)
+        return Proposition(part._variable, (part._term,))
     if not _is_of_simpful(part, "Functional"):
         raise _refusal(f"{where} has an empty condition")
     sign = part._fun

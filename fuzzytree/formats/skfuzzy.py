@@ -21,10 +21,10 @@ from fuzzytree.model import (
     Condition,
     Defuzzifier,
     FuzzySystem,
-    Is,
     Not,
     Or,
     Points,
+    Proposition,
     SNorm,
     SystemOutput,
     SystemRule,
@@ -98,7 +98,7 @@ def from_skfuzzy(system: object, *, name: str = "scikit-fuzzy system") -> FuzzyS
 def _condition(part: Any, kinds: set[str]) -> Condition:
     """Return a condition, and note which kinds of joints it has."""
     if _is_of_skfuzzy(part, "Term"):
-        return Is(part.parent.label, part.label)
+        return Proposition(part.parent.label, (part.label,))
     kinds.add(part.kind)
     left = _condition(part.term1, kinds)
     if part.kind == "not":

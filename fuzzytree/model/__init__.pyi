@@ -114,7 +114,6 @@ from .rulebase import Conjunction as Conjunction
 from .rulebase import Kind as Kind
 from .rulebase import Label as Label
 from .rulebase import LabelType as LabelType
-from .rulebase import Proposition as Proposition
 from .rulebase import Rule as Rule
 from .rulebase import RuleBase as RuleBase
 from .rulebase import Semantics as Semantics
@@ -131,9 +130,9 @@ from .rules import ActivationMethod as ActivationMethod
 from .rules import And as And
 from .rules import Conclusion as Conclusion
 from .rules import Condition as Condition
-from .rules import Is as Is
 from .rules import Not as Not
 from .rules import Or as Or
+from .rules import Proposition as Proposition
 from .rules import Relation as Relation
 from .rules import RuleBlock as RuleBlock
 from .rules import SystemRule as SystemRule

@@ -26,6 +26,7 @@ from fuzzytree.model.mistakes import name_choice as name_choice
 from fuzzytree.model.mistakes import name_mistakes as name_mistakes
 from fuzzytree.model.mistakes import refuse as refuse
 from fuzzytree.model.mistakes import text_fault as text_fault
+from fuzzytree.model.rules import Proposition as Proposition
 from fuzzytree.model.values import Value as Value
 from fuzzytree.model.variables import Part as Part
 from fuzzytree.model.variables import Term as Term
@@ -49,14 +50,6 @@ def summary(name: str, **counts: int) -> str:
         for noun, count in counts.items()
     )
     return f"{name}({', '.join(shown)})"
-
-
-class Proposition(Value, frozen=True):
-    """`variable is term`, `variable is term or term`, or the negation of either."""
-
-    variable: str
-    terms: tuple[str, ...]
-    negated: bool = False
 
 
 class Rule(Value, frozen=True):
@@ -286,6 +279,9 @@ def proposition_mistakes(
             (*path, "terms"),
             f"{where}: the proposition on {proposition.variable!r} names no term",
         )
+    if proposition.hedges not in ((), ("not",)):
+        hedges = ", ".join(proposition.hedges)
+        yield (*path, "hedges"), f"{where}: only a fuzzy system has hedges: {hedges}"
     known = terms[proposition.variable]
     for index, term in enumerate(proposition.terms):
         if term not in known:

@@ -14,18 +14,31 @@ from fuzzytree.model.norms import Hedge, SNorm, TNorm
 from fuzzytree.model.values import Value
 
 
-class Is(Value, frozen=True, tag="is"):
-    """`variable is hedge ... label`; of an output, how far it was concluded so far.
+class Proposition(Value, frozen=True, tag="is"):
+    """`variable is term`, with hedges before the term; or one of several terms.
 
     Attributes:
-        variable: An input or an output.
-        label: One of its labels; None only behind the hedge `any`.
-        hedges: As they are read, from left to right; the last is applied first.
+        variable: An input; in a fuzzy system also an output, where it says how far a
+            term of it was concluded so far.
+        terms: Its terms; of several the largest degree counts, in class rules alone.
+            None only behind the hedge `any`.
+        hedges: As they are read, from left to right; the last is applied first. Class
+            rules have none, or `not`.
     """
 
     variable: str
-    label: str | None
+    terms: tuple[str, ...]
     hedges: tuple[Hedge, ...] = ()
+
+    @property
+    def term(self) -> str | None:
+        """The term, where it is one; None without a term."""
+        return self.terms[0] if self.terms else None
+
+    @property
+    def negated(self) -> bool:
+        """Whether it is the negation of `variable is term or term`."""
+        return self.hedges == ("not",)
 
 
 class And(Value, frozen=True, tag="and"):
@@ -46,18 +59,18 @@ class Not(Value, frozen=True, tag="not"):
     part: Condition
 
 
-Condition = Is | And | Or | Not
+Condition = Proposition | And | Or | Not
 
 
 class Conclusion(Value, frozen=True):
-    """`output is hedge ... label`; hedges change the degree of activation.
+    """`output is hedge ... term`; hedges change the degree of activation.
 
     They act on the conclusions of the rule that stand behind it too, as in fuzzylite:
     of `a is very high and b is low` both get the square of the rule's degree.
     """
 
     output: str
-    label: str
+    term: str
     hedges: tuple[Hedge, ...] = ()
 
 
@@ -129,10 +142,10 @@ class RuleBlock(Value, frozen=True):
     name: str = ""
 
 
-def questions(condition: Condition | None) -> Iterator[Is]:
+def questions(condition: Condition | None) -> Iterator[Proposition]:
     """Yield the propositions of a condition, from left to right."""
     match condition:
-        case Is():
+        case Proposition():
             yield condition
         case And(parts=parts) | Or(parts=parts):
             for part in parts:
@@ -177,8 +190,10 @@ def condition_mistakes(
     if _is_empty(condition):
         yield "it joins no conditions at all"
     for one in questions(condition):
-        if one.label is not None or one.variable not in terms:
-            yield from reference_mistakes(one.variable, one.label, terms)
+        if len(one.terms) > 1:
+            yield f"{one.variable!r} is used with several terms; join them by 'or'"
+        if one.terms or one.variable not in terms:
+            yield from reference_mistakes(one.variable, one.term, terms)
         elif not one.hedges or one.hedges[-1] != "any":
             yield f"{one.variable!r} is used without a term"
     if block.conjunction is None and _uses(condition, And):

@@ -382,7 +382,7 @@ def _width_mistakes(
         return
     samples = sampled_values(output)
     then = [one for rule in system.rules for one in rule.then]
-    concluded = {one.label for one in then if one.output == output.name}
+    concluded = {one.term for one in then if one.output == output.name}
     for name, (index, value) in thin.items():
         if name in concluded and value not in samples:
             yield (
@@ -429,7 +429,7 @@ def _conclusion_mistakes(
     if not then:
         yield "it concludes nothing"
     for one in then:
-        yield from reference_mistakes(one.output, one.label, terms)
+        yield from reference_mistakes(one.output, one.term, terms)
         output = outputs.get(one.output)
         is_curve = output is not None and not output.defuzzifier.is_weighted
         if is_curve and block.implication is None:

@@ -18,12 +18,12 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     FuzzyTree,
-    Is,
     Linear,
     Not,
     Or,
     Part,
     Points,
+    Proposition,
     RuleBlock,
     SigmoidDifference,
     SigmoidProduct,
@@ -172,7 +172,7 @@ def rule_text(rule: SystemRule) -> str:
     """Return a rule as people read it.
 
     Example:
-        >>> hot = Is("water", "hot", ("very",))
+        >>> hot = Proposition("water", ("hot",), ("very",))
         >>> rule_text(SystemRule(Not(hot), (Conclusion("power", "low"),), weight=0.5))
         'IF not (water is very hot) THEN power is low  (weight 0.5)'
     """
@@ -185,7 +185,7 @@ def rule_text(rule: SystemRule) -> str:
 
 
 def _conclusion_text(one: Conclusion) -> str:
-    return f"{one.output} is {' '.join((*one.hedges, one.label))}"
+    return f"{one.output} is {' '.join((*one.hedges, one.term))}"
 
 
 def condition_text(condition: Condition, *, level: int = 0) -> str:
@@ -196,7 +196,7 @@ def condition_text(condition: Condition, *, level: int = 0) -> str:
         level: 0 outside of all brackets, 1 within `or`, 2 within `and`.
     """
     match condition:
-        case Is(variable=variable, label=label, hedges=hedges):
+        case Proposition(variable=variable, term=label, hedges=hedges):
             words = [*hedges, *([] if label is None else [label])]
             return f"{variable} is {' '.join(words)}"
         case And(parts=parts):

@@ -29,7 +29,6 @@ from fuzzytree.model import (
     FuzzyTree,
     Gaussian,
     Hedge,
-    Is,
     Linear,
     Not,
     Or,
@@ -304,7 +303,7 @@ def _wishes(
 ) -> Iterator[tuple[str, _Wish]]:
     """Yield propositions that make a condition true, or untrue, as far as they are."""
     match condition:
-        case Is(variable=variable, label=str(label), hedges=hedges):
+        case Proposition(variable=variable, term=str(label), hedges=hedges):
             yield variable, (label, hedges, is_true)
         case Not(part=part):
             yield from _wishes(part, is_true=not is_true)

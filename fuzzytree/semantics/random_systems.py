@@ -23,13 +23,13 @@ from fuzzytree.model import (
     FuzzySystem,
     Grid,
     Hedge,
-    Is,
     Name,
     Not,
     Number,
     Or,
     Part,
     Points,
+    Proposition,
     Relation,
     RuleBlock,
     Side,
@@ -292,8 +292,10 @@ class _Maker:
                     return Not(parts[0])
         one = chance.choice(variables)
         if chance.random() < 0.05:
-            return Is(one.name, None, (*self._hedges(0.5), "any"))
-        return Is(one.name, chance.choice(one.terms).name, self._hedges(0.3))
+            return Proposition(one.name, (), (*self._hedges(0.5), "any"))
+        return Proposition(
+            one.name, (chance.choice(one.terms).name,), self._hedges(0.3)
+        )
 
     def _hedges(self, share: float) -> tuple[Hedge, ...]:
         chance = self.chance

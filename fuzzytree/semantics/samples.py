@@ -26,7 +26,6 @@ from fuzzytree.model import (
     FuzzySystem,
     FuzzyTree,
     Gaussian,
-    Is,
     Leaf,
     Linear,
     Name,
@@ -160,9 +159,9 @@ def _stepped() -> RuleBase:
 # --- systems
 
 
-_LOW: Condition = Is("heat", "low")
-_HIGH: Condition = Is("heat", "high")
-_DRY: Condition = Is("damp", "dry")
+_LOW: Condition = Proposition("heat", ("low",))
+_HIGH: Condition = Proposition("heat", ("high",))
+_DRY: Condition = Proposition("damp", ("dry",))
 
 
 def _input(name: str, low: str, high: str) -> Variable:
@@ -274,7 +273,7 @@ SAMPLES: Mapping[str, Callable[[], Document]] = {
         Rule((Proposition("force", ("low", "high")),), "soft"), _PLAIN[1]
     ),
     "negated propositions": lambda: _rules(
-        Rule((Proposition("force", ("low",), negated=True),), "soft"), _PLAIN[0]
+        Rule((Proposition("force", ("low",), hedges=("not",)),), "soft"), _PLAIN[0]
     ),
     "a rule that always holds": lambda: _rules(_PLAIN[0], Rule((), "firm")),
     "answers where no rule fires": lambda: _rules(
@@ -298,7 +297,9 @@ SAMPLES: Mapping[str, Callable[[], Document]] = {
     "weights of rules": lambda: _sugeno(*_two(0.75)),
     "hedges": lambda: _sugeno(
         _two()[0],
-        SystemRule(Is("heat", "high", ("very",)), (Conclusion("fan", "fast"),)),
+        SystemRule(
+            Proposition("heat", ("high",), ("very",)), (Conclusion("fan", "fast"),)
+        ),
     ),
     "OR": lambda: _sugeno(
         SystemRule(Or((And((_LOW, _DRY)), _HIGH)), (Conclusion("fan", "fast"),))

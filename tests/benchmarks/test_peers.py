@@ -345,15 +345,17 @@ def negated(semantics: Semantics, *terms: str) -> RuleBase:
     several = terms or ("low", "middle")
     rules = (
         Rule(
-            (Proposition("x", ("low",), negated=True), Proposition("y", ("low",))), "a"
+            (Proposition("x", ("low",), hedges=("not",)), Proposition("y", ("low",))),
+            "a",
         ),
         Rule(
-            (Proposition("y", ("high",)), Proposition("x", several, negated=True)), "b"
+            (Proposition("y", ("high",)), Proposition("x", several, hedges=("not",))),
+            "b",
         ),
         Rule(
             (
-                Proposition("x", ("high",), negated=True),
-                Proposition("y", ("high",), negated=True),
+                Proposition("x", ("high",), hedges=("not",)),
+                Proposition("y", ("high",), hedges=("not",)),
             ),
             "c",
         ),

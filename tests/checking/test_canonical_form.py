@@ -12,7 +12,6 @@ from fuzzytree.model import (
     Document,
     FuzzySystem,
     Hedge,
-    Is,
     Points,
     Proposition,
     Rule,
@@ -61,9 +60,7 @@ def test_a_rule_base_with_other_names_is_equal_to_it() -> None:
         rules=tuple(
             Rule(
                 tuple(
-                    Proposition(
-                        other(c.variable), tuple(map(other, c.terms)), c.negated
-                    )
+                    Proposition(other(c.variable), tuple(map(other, c.terms)), c.hedges)
                     for c in rule.when
                 ),
                 other(rule.then),
@@ -126,7 +123,7 @@ def test_the_range_of_an_output_that_is_clipped_stays() -> None:
 def test_very_very_is_very_twice() -> None:
     def asking(*hedges: Hedge) -> FuzzySystem:
         ramp = Term("low", Points((0.0, 1.0), (0.0, 1.0)))
-        rule = SystemRule(Is("x", "low", hedges), (Conclusion("y", "one"),))
+        rule = SystemRule(Proposition("x", ("low",), hedges), (Conclusion("y", "one"),))
         return replace(
             _system(), inputs=(Variable("x", (ramp,)),), blocks=(RuleBlock((rule,)),)
         )

@@ -114,7 +114,7 @@ def swapped_rules(rules: RuleBase) -> RuleBase:
 
 def negated_proposition(rules: RuleBase) -> RuleBase:
     first, *rest = rules.rules[0].when
-    return _with_rule(rules, 0, when=(replace(first, negated=True), *rest))
+    return _with_rule(rules, 0, when=(replace(first, hedges=("not",)), *rest))
 
 
 def other_conjunction(rules: RuleBase) -> RuleBase:

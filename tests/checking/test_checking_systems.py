@@ -15,7 +15,7 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Is,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -33,7 +33,7 @@ def washer(time: float = 60.0, output: str = "time") -> FuzzySystem:
     dirty = Term("dirty", Points((0.0, 10.0), (0.0, 1.0)))
     how = Defuzzifier("weighted sum")
     one = SystemOutput(output, (Term("long", Singleton(time)),), None, None, how)
-    rule = SystemRule(Is("dirt", "dirty"), (Conclusion(output, "long"),))
+    rule = SystemRule(Proposition("dirt", ("dirty",)), (Conclusion(output, "long"),))
     inputs = (Variable("dirt", (dirty,)),)
     return FuzzySystem("washer", inputs, (one,), (RuleBlock((rule,)),))
 
@@ -112,7 +112,10 @@ def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
     (dirt,) = system.inputs
     key = Term("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
     (block,) = system.blocks
-    rules = (*block.rules, SystemRule(Is("dirt", "key"), block.rules[0].then))
+    rules = (
+        *block.rules,
+        SystemRule(Proposition("dirt", ("key",)), block.rules[0].then),
+    )
     other = replace(
         system,
         inputs=(replace(dirt, terms=(*dirt.terms, key)),),

@@ -13,7 +13,6 @@ from fuzzytree.model import (
     Band,
     Document,
     FuzzySystem,
-    Is,
     Points,
     Proposition,
     Reading,
@@ -74,7 +73,8 @@ def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> N
 
     def asking(label: Term) -> FuzzySystem:
         rules = tuple(
-            replace(one, when=one.when or Is("heat", label.name)) for one in block.rules
+            replace(one, when=one.when or Proposition("heat", (label.name,)))
+            for one in block.rules
         )
         return replace(
             always,

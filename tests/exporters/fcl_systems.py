@@ -20,9 +20,9 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Is,
     Not,
     Or,
+    Proposition,
     SCurve,
     SemiEllipse,
     Sigmoid,
@@ -109,7 +109,7 @@ def _tamed_output(output: SystemOutput, dialect: Dialect) -> SystemOutput:
 def _spoken(condition: Condition) -> Condition:
     """Return a condition whose hedges fuzzylite knows."""
     match condition:
-        case Is(hedges=hedges):
+        case Proposition(hedges=hedges):
             kept = tuple(one for one in hedges if one in SPOKEN)
             return replace(condition, hedges=kept)
         case And(parts=parts):

@@ -10,10 +10,10 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Hedge,
-    Is,
     Linear,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     Term,
     Trapezoid,
@@ -89,9 +89,9 @@ def _known(
 
 def _said(condition: Condition) -> Condition:
     match condition:
-        case Is(hedges=hedges):
+        case Proposition(hedges=hedges):
             return replace(condition, hedges=_known(hedges))
-        case Not(part=Is() as part):
+        case Not(part=Proposition() as part):
             return Not(_said(part))
         case Not(part=part):
             return _said(part)

@@ -22,9 +22,9 @@ from fuzzytree.model import (
     Condition,
     Defuzzifier,
     FuzzySystem,
-    Is,
     Not,
     Or,
+    Proposition,
     RuleBlock,
 )
 from fuzzytree.model.rulebase import Points, RuleBase
@@ -286,7 +286,9 @@ def test_an_and_within_an_or_has_parentheses_for_those_who_read_from_the_left(
 def test_a_question_for_any_has_no_place_but_in_fuzzylite() -> None:
     system = _with_default(_sample("Sugeno, numbers"))
     (block,) = system.blocks
-    rules = tuple(replace(one, when=Is("heat", None, ("any",))) for one in block.rules)
+    rules = tuple(
+        replace(one, when=Proposition("heat", (), ("any",))) for one in block.rules
+    )
     made = replace(system, blocks=(replace(block, rules=rules),))
     assert "if heat is any then" in _text(made, "fuzzylite")
     with pytest.raises(LossError, match="the dialect jfuzzylogic has no 'any'"):
@@ -349,7 +351,7 @@ def test_names_avoid_the_words_of_every_dialect() -> None:
     def changed(condition: Condition | None) -> Condition | None:
         names = {first.name: "sum", second.name: "Größe (mm)"}
         match condition:
-            case Is(variable=variable):
+            case Proposition(variable=variable):
                 return replace(condition, variable=names[variable])
             case And(parts=parts):
                 found = [changed(part) for part in parts]

@@ -33,11 +33,11 @@ from fuzzytree.model import (
     FuzzySystem,
     Gaussian,
     Hedge,
-    Is,
     Linear,
     Not,
     Or,
     PiCurve,
+    Proposition,
     RuleBlock,
     SCurve,
     Sigmoid,
@@ -146,13 +146,13 @@ def _random_rule(
 
     known = [*FIS_HEDGES[dialect].values()]
 
-    def question(name: str) -> Is:
+    def question(name: str) -> Proposition:
         found = hedges(known)
         is_any = found[-1:] == ("any",)  # which tests no term
-        return Is(name, None if is_any else f"t{chance.randrange(3)}", found)
+        return Proposition(name, () if is_any else (f"t{chance.randrange(3)}",), found)
 
     parts = [question(f"x{k}") for k in range(3) if chance.random() < 0.7]
-    parts = parts or [Is("x0", "t0")]
+    parts = parts or [Proposition("x0", ("t0",))]
     kind = chance.choice((And, Or))
     when: Condition = kind(tuple(parts)) if len(parts) > 1 else parts[0]
     concluded: Sequence[tuple[Hedge, ...]] = [()]
@@ -172,7 +172,7 @@ def _random_rule(
 
 def test_any_tests_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
     system = random_fis(2, "fuzzylite")
-    question = Is("x0", "t1", ("not", "any"))
+    question = Proposition("x0", ("t1",), ("not", "any"))
     then = (Conclusion("y0", "t0"),)
     block = replace(system.blocks[0], rules=(SystemRule(question, then),))
     text = write(replace(system, blocks=(block,)), dialect="fuzzylite").content.decode()
@@ -258,7 +258,11 @@ def test_every_line_of_a_small_file() -> None:
         ),
         (
             RuleBlock(
-                (SystemRule(Is("food", "low", ("not", "very")), (_small(),), 0.5),)
+                (
+                    SystemRule(
+                        Proposition("food", ("low",), ("not", "very")), (_small(),), 0.5
+                    ),
+                )
             ),
         ),
     )
@@ -331,11 +335,20 @@ def rows(written: Written) -> list[str]:
 @pytest.mark.parametrize(
     ("when", "line"),
     [
-        (Is("b", "high"), "0 2, 1 (1.0) : 1"),
-        (Not(Is("b", "high")), "0 -2, 1 (1.0) : 1"),
-        (Or((Is("b", "low"), Is("a", "high"))), "2 1, 1 (1.0) : 2"),
-        (And((And((Is("a", "low"), Is("b", "low"))),)), "1 1, 1 (1.0) : 1"),
-        (And((Is("a", None, ("any",)), Is("b", "low"))), "0 1, 1 (1.0) : 1"),
+        (Proposition("b", ("high",)), "0 2, 1 (1.0) : 1"),
+        (Not(Proposition("b", ("high",))), "0 -2, 1 (1.0) : 1"),
+        (
+            Or((Proposition("b", ("low",)), Proposition("a", ("high",)))),
+            "2 1, 1 (1.0) : 2",
+        ),
+        (
+            And((And((Proposition("a", ("low",)), Proposition("b", ("low",)))),)),
+            "1 1, 1 (1.0) : 1",
+        ),
+        (
+            And((Proposition("a", (), ("any",)), Proposition("b", ("low",)))),
+            "0 1, 1 (1.0) : 1",
+        ),
     ],
 )
 def test_a_condition_is_a_number_for_each_input(when: Condition, line: str) -> None:
@@ -354,7 +367,13 @@ def test_a_rule_without_a_condition_tests_a_term_that_always_holds() -> None:
 
 
 def test_an_input_that_is_tested_twice_becomes_a_term_with_a_bound() -> None:
-    both = And((Is("a", "low"), Is("b", "low"), Is("a", "high")))
+    both = And(
+        (
+            Proposition("a", ("low",)),
+            Proposition("b", ("low",)),
+            Proposition("a", ("high",)),
+        )
+    )
     system = _sugeno(SystemRule(both, (_small(),)))
     with pytest.raises(LossError, match="low and high of 'a': the rules test it"):
         write(system)
@@ -373,17 +392,22 @@ def test_an_input_that_is_tested_twice_becomes_a_term_with_a_bound() -> None:
     [
         (
             SystemRule(
-                Or((And((Is("a", "low"), Is("b", "low"))), Is("a", "high"))),
+                Or(
+                    (
+                        And((Proposition("a", ("low",)), Proposition("b", ("low",)))),
+                        Proposition("a", ("high",)),
+                    )
+                ),
                 (_small(),),
             ),
             "rule 1: it mixes and, or and not over several inputs",
         ),
         (
-            SystemRule(Is("tip", "small"), (_small(),)),
+            SystemRule(Proposition("tip", ("small",)), (_small(),)),
             "rule 1: it tests the output 'tip'",
         ),
         (
-            SystemRule(Is("a", "low", ("seldom",)), (_small(),)),
+            SystemRule(Proposition("a", ("low",), ("seldom",)), (_small(),)),
             "rule 1: octave has no way to say 'seldom'",
         ),
     ],
@@ -401,7 +425,7 @@ def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
         "y", (Term("t", Gaussian(0.0, 1.0)),), 0.0, 1.0,
         Defuzzifier("centroid", 200, "middle"), "maximum", default=0.25, clips=True,
     )  # fmt: skip
-    rule = SystemRule(Is("x", "t"), (Conclusion("y", "t"),))
+    rule = SystemRule(Proposition("x", ("t",)), (Conclusion("y", "t"),))
     system = FuzzySystem(
         "s",
         (Variable("x", (Term("t", Gaussian(0.0, 1.0)),), low=0.0, high=1.0),),
@@ -427,7 +451,7 @@ def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
 def test_what_matlab_answers_where_no_rule_fires_is_a_loss_if_the_model_differs() -> (
     None
 ):
-    rule = SystemRule(Is("a", "low"), (Conclusion("tip", "small"),))
+    rule = SystemRule(Proposition("a", ("low",)), (Conclusion("tip", "small"),))
     system = _sugeno(rule)
     with pytest.raises(LossError) as caught:
         write(system, dialect="matlab")
@@ -456,11 +480,11 @@ def test_terms_of_one_number_are_a_loss_where_octave_joins_their_rules() -> None
         "maximum",
     )
     rules = [
-        SystemRule(Is("a", term), (Conclusion("tip", then),))
+        SystemRule(Proposition("a", (term,)), (Conclusion("tip", then),))
         for term, then in (("low", "small"), ("high", "tiny"))
     ]
     system = replace(
-        _sugeno(SystemRule(Is("a", "low"), (_small(),))),
+        _sugeno(SystemRule(Proposition("a", ("low",)), (_small(),))),
         outputs=(output,),
         blocks=(RuleBlock(tuple(rules), "minimum"),),
     )
@@ -493,7 +517,7 @@ def test_points_are_a_loss_where_standard_curves_are_required() -> None:
         "s",
         (Variable("x", (Term("t", curve),), low=0.0, high=2.0),),
         (SystemOutput("y", (Term("t", Singleton(1.0)),), 0.0, 1.0, _AVERAGE),),
-        (RuleBlock((SystemRule(Is("x", "t"), (Conclusion("y", "t"),)),)),),
+        (RuleBlock((SystemRule(Proposition("x", ("t",)), (Conclusion("y", "t"),)),)),),
     )
     assert write(system).losses == ()
     with pytest.raises(LossError, match="it is a discretemf, which MATLAB and Octave"):
@@ -528,7 +552,12 @@ def test_a_dialect_that_is_none_is_refused() -> None:
 
 
 def test_a_rule_that_mixes_and_and_or_becomes_several_under_maximum() -> None:
-    mixed = And((Or((Is("a", "low"), Is("b", "low"))), Is("a", "high")))
+    mixed = And(
+        (
+            Or((Proposition("a", ("low",)), Proposition("b", ("low",)))),
+            Proposition("a", ("high",)),
+        )
+    )
     system = _sugeno(SystemRule(mixed, (_small(),)))
     (output,) = system.outputs
     system = replace(system, outputs=(replace(output, aggregation="maximum"),))

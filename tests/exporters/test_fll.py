@@ -26,12 +26,12 @@ from fuzzytree.model import (
     Defuzzifier,
     Formula,
     FuzzySystem,
-    Is,
     Linear,
     Name,
     Not,
     Number,
     Or,
+    Proposition,
     RuleBlock,
     SCurve,
     Sigmoid,
@@ -98,8 +98,13 @@ TANK = FuzzySystem(
                 SystemRule(
                     And(
                         (
-                            Or((Is("water level", "low"), Is("is", "big", ("very",)))),
-                            Not(Is("water level", "high")),
+                            Or(
+                                (
+                                    Proposition("water level", ("low",)),
+                                    Proposition("is", ("big",), ("very",)),
+                                )
+                            ),
+                            Not(Proposition("water level", ("high",))),
                         )
                     ),
                     (Conclusion("valve", "shut"), Conclusion("rate", "some", ("not",))),
@@ -247,7 +252,11 @@ def test_what_is_lost_is_listed_and_refused() -> None:
         ),
         blocks=(
             RuleBlock(
-                (SystemRule(Is("a", "low", ("cubed",)), (Conclusion("y", "t"),)),),
+                (
+                    SystemRule(
+                        Proposition("a", ("low",), ("cubed",)), (Conclusion("y", "t"),)
+                    ),
+                ),
                 implication="minimum",
             ),
         ),
@@ -282,14 +291,28 @@ def test_words_are_reserved_in_small_letters_only() -> None:
 
 
 NEVER: list[tuple[Condition, TNorm, SNorm]] = [
-    (Not(And((Is("is", "big"), Is("is", "big")))), "product", "maximum"),
     (
-        And((Not(Or((Is("is", "big"), Is("is", "big")))), Is("is", "big"))),
+        Not(And((Proposition("is", ("big",)), Proposition("is", ("big",))))),
         "product",
         "maximum",
     ),
     (
-        Or((Not(And((Is("is", "big"), Is("is", "big")))), Is("is", "big"))),
+        And(
+            (
+                Not(Or((Proposition("is", ("big",)), Proposition("is", ("big",))))),
+                Proposition("is", ("big",)),
+            )
+        ),
+        "product",
+        "maximum",
+    ),
+    (
+        Or(
+            (
+                Not(And((Proposition("is", ("big",)), Proposition("is", ("big",))))),
+                Proposition("is", ("big",)),
+            )
+        ),
         "minimum",
         "sum",
     ),
@@ -308,11 +331,13 @@ def test_a_not_that_has_no_words_is_refused_for_good(
 
 def test_a_not_of_several_conditions_moves_to_each_under_minimum_and_maximum() -> None:
     low, big, high = (
-        Is("water level", "low"),
-        Is("is", "big"),
-        Is("water level", "high"),
+        Proposition("water level", ("low",)),
+        Proposition("is", ("big",)),
+        Proposition("water level", ("high",)),
     )
-    when = Not(Or((And((low, big)), Not(Not(And((high, Is("is", None, ("any",)))))))))
+    when = Not(
+        Or((And((low, big)), Not(Not(And((high, Proposition("is", (), ("any",))))))))
+    )
     rule = SystemRule(when, (Conclusion("rate", "none"),))
     system = replace(TANK, blocks=(RuleBlock((rule,), implication="minimum"),))
     model = read_fll(write(system).content, "t.fll").model
@@ -328,7 +353,9 @@ STEPS = Points((0.0, 1.0, 1.0, 2.0, 2.0), (0.0, 0.5, 1.0, 1.0, 0.0))
 
 
 def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
-    rule = SystemRule(Is("water level", "low"), (Conclusion("rate", "none"),))
+    rule = SystemRule(
+        Proposition("water level", ("low",)), (Conclusion("rate", "none"),)
+    )
     system = replace(
         TANK,
         inputs=(
@@ -368,7 +395,7 @@ def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
     labels = (Term("t", curve, height), Term("n", Singleton(1.0)))
     output = replace(TANK.outputs[1], terms=labels if is_mixed else labels[:1])
     ramp = Term("up", Points((0.0, 4.0), (0.0, 1.0)))
-    rule = SystemRule(Is("a", "up"), (Conclusion("rate", "t"),))
+    rule = SystemRule(Proposition("a", ("up",)), (Conclusion("rate", "t"),))
     system = FuzzySystem(
         "s", (Variable("a", (ramp,)),), (output,), (RuleBlock((rule,)),)
     )
@@ -387,7 +414,7 @@ def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
 def test_bands_and_lr_sets_as_numbers_become_points_of_their_own() -> None:
     shape = LR(0.5, Side(0.25, (1.0,)), Side(0.25, (1.0,)))
     output = replace(TANK.outputs[1], terms=(Term("t", shape),))
-    rule = SystemRule(Is("is", "big"), (Conclusion("rate", "t"),))
+    rule = SystemRule(Proposition("is", ("big",)), (Conclusion("rate", "t"),))
     system = replace(TANK, outputs=(output,), blocks=(RuleBlock((rule,)),))
     written = write(system, allow_loss=True)
     assert [loss.where for loss in written.losses] == ["term 't' of 'rate'"]

@@ -23,10 +23,13 @@ from fuzzytree.model import (
     FuzzySystem,
     Gaussian,
     Hedge,
-    Is,
+    Kind,
     Linear,
     Not,
     Or,
+    Points,
+    Proposition,
+    Rule,
     RuleBlock,
     SCurve,
     Singleton,
@@ -38,7 +41,6 @@ from fuzzytree.model import (
     TwoGaussians,
     Variable,
 )
-from fuzzytree.model.rulebase import Kind, Points, Proposition, Rule
 from fuzzytree.semantics import pointed
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
@@ -117,12 +119,12 @@ def _random_rule(chance: random.Random) -> SystemRule:
     def part(variable: str) -> Condition:
         if chance.random() < 0.3:
             kind = chance.choice((And, Or))
-            several = kind(tuple(Is(variable, f"t{n}") for n in range(3)))
+            several = kind(tuple(Proposition(variable, (f"t{n}",)) for n in range(3)))
             return several if chance.random() < 0.5 else Not(several)
-        return Is(variable, f"t{chance.randrange(3)}", chance.choice(known))
+        return Proposition(variable, (f"t{chance.randrange(3)}",), chance.choice(known))
 
     parts = [part(f"x{k}") for k in range(3) if chance.random() < 0.7]
-    parts = parts or [Is("x0", None, ("any",))]
+    parts = parts or [Proposition("x0", (), ("any",))]
     when = parts[0] if len(parts) == 1 else chance.choice((And, Or))(tuple(parts))
     then = (Conclusion("y", f"t{chance.randrange(3)}"),)
     return SystemRule(when, then, chance.choice((1.0, 0.3)))
@@ -153,7 +155,7 @@ def test_rules_of_points_are_read_back_equal(seed: int, kind: Kind) -> None:
 def test_product_and_negated_clauses_are_read_back_equal() -> None:
     rules, _ = pointed(rules_from_tree(random_tree(3, combinations=0.0)), 1e-2)
     terms = tuple(term.name for term in rules.variables[0].terms)
-    clause = Proposition(rules.variables[0].name, terms, negated=True)
+    clause = Proposition(rules.variables[0].name, terms, hedges=("not",))
     other = replace(
         rules,
         semantics=replace(rules.semantics, conjunction="product"),
@@ -180,7 +182,8 @@ def test_every_line_of_a_small_file() -> None:
             RuleBlock(
                 (
                     SystemRule(
-                        Is("food", "low", ("very",)), (Conclusion("tip %", "small"),)
+                        Proposition("food", ("low",), ("very",)),
+                        (Conclusion("tip %", "small"),),
                     ),
                 )
             ),
@@ -239,18 +242,25 @@ def test_every_line_of_a_small_file() -> None:
             "rule 1: it has no condition, and a rule of FML must have one",
         ),
         (
-            SystemRule(Is("x0", "t0", ("very", "very")), (Conclusion("y", "t0"),)),
+            SystemRule(
+                Proposition("x0", ("t0",), ("very", "very")), (Conclusion("y", "t0"),)
+            ),
             "rule 1: FML has no way to say 'very very'",
         ),
         (
             SystemRule(
-                Or((And((Is("x0", "t0"), Is("x1", "t0"))), Is("x2", "t0"))),
+                Or(
+                    (
+                        And((Proposition("x0", ("t0",)), Proposition("x1", ("t0",)))),
+                        Proposition("x2", ("t0",)),
+                    )
+                ),
                 (Conclusion("y", "t0"),),
             ),
             "rule 1: it mixes and, or and not over several inputs",
         ),
         (
-            SystemRule(Is("x0", "t0"), (Conclusion("y", "t0", ("very",)),)),
+            SystemRule(Proposition("x0", ("t0",)), (Conclusion("y", "t0", ("very",)),)),
             "rule 1: FML has no hedges of conclusions",
         ),
     ],
@@ -299,7 +309,12 @@ def test_a_rule_that_mixes_and_and_or_becomes_several_under_maximum() -> None:
         for one in map(random_fml, range(20))
         if one.blocks[0].implication and one.blocks[0].conjunction == "minimum"
     )
-    mixed = And((Or((Is("x0", "t0"), Is("x1", "t0"))), Is("x2", "t0")))
+    mixed = And(
+        (
+            Or((Proposition("x0", ("t0",)), Proposition("x1", ("t0",)))),
+            Proposition("x2", ("t0",)),
+        )
+    )
     rule = SystemRule(mixed, (Conclusion("y", "t0"),))
     system = replace(system, blocks=(replace(system.blocks[0], rules=(rule,)),))
     with pytest.raises(LossError, match="rule 1: it is 2 rules, joined by maximum"):
@@ -307,6 +322,6 @@ def test_a_rule_that_mixes_and_and_or_becomes_several_under_maximum() -> None:
     again = read_fml(write(system, allow_loss=True).content, "s.fml").model
     assert isinstance(again, FuzzySystem)
     assert [one.when for one in again.rules] == [
-        And((Is("x0", "t0"), Is("x2", "t0"))),
-        And((Is("x1", "t0"), Is("x2", "t0"))),
+        And((Proposition("x0", ("t0",)), Proposition("x2", ("t0",)))),
+        And((Proposition("x1", ("t0",)), Proposition("x2", ("t0",)))),
     ]

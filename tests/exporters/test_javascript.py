@@ -40,7 +40,7 @@ def grip() -> RuleBase:
     low = Term("low", Band(high=1.0, right=3.0))
     some = Term("some", Points((0.0, 0.1), (0.0, 1.0)))
     rules = (
-        Rule((Proposition("force", ("low", "some"), True),), "soft"),
+        Rule((Proposition("force", ("low", "some"), ("not",)),), "soft"),
         Rule((), "hard"),
     )
     inputs = (Variable("force", (low, some), unit="N"),)

@@ -87,7 +87,7 @@ def lr_rules() -> RuleBase:
     rules = (
         Rule((Proposition("slip", ("low", "high")),), "hold"),
         Rule(
-            (Proposition("slip", ("high",)), Proposition("slip", ("low",), True)),
+            (Proposition("slip", ("high",)), Proposition("slip", ("low",), ("not",))),
             "drop",
         ),
     )

@@ -24,8 +24,8 @@ from fuzzytree.model import (
     DefuzzifierMethod,
     Formula,
     FuzzySystem,
-    Is,
     Points,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -79,7 +79,10 @@ def test_a_degree_of_one_by_something_is_rounded_before_it_is_multiplied() -> No
     )
     one = Term("o", Singleton(1.0))
     output = SystemOutput("y", (one,), None, None, Defuzzifier("weighted sum"))
-    rule = SystemRule(And((Is("a", "t"), Is("b", "t"))), (Conclusion("y", "o"),))
+    rule = SystemRule(
+        And((Proposition("a", ("t",)), Proposition("b", ("t",)))),
+        (Conclusion("y", "o"),),
+    )
     system = FuzzySystem("s", inputs, (output,), (RuleBlock((rule,), "product"),))
     columns = np.random.default_rng(0).uniform(0.0, 9.0, (2, 500))
     content = write_onnx(system, outputs=("outputs", "activations")).content
@@ -95,7 +98,7 @@ def test_hostile_names_become_short_unique_identifiers() -> None:
     hostile = ["outputs", "a; b", "a  b", "\u5ea6" * 40, "x" * 400, "1[2J"]
     half = Term("x; DROP", Points((0.0, 1.0), (0.0, 1.0)))
     rules = [
-        SystemRule(Is(name, half.name), (Conclusion("status", "o"),))
+        SystemRule(Proposition(name, (half.name,)), (Conclusion("status", "o"),))
         for name in hostile
     ]
     one = Term("o", Singleton(1.0))
@@ -240,7 +243,7 @@ def grid_system(
     )
     rules = tuple(
         SystemRule(
-            And((Is("a", one.name), Is("b", two.name))),
+            And((Proposition("a", (one.name,)), Proposition("b", (two.name,)))),
             (Conclusion("y", number.name),),
         )
         for (one, two), number in zip(pairs, numbers, strict=True)

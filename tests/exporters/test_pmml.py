@@ -22,7 +22,6 @@ from fuzzytree.model import (
     FuzzySystem,
     FuzzyTree,
     Gaussian,
-    Is,
     Kind,
     Name,
     Number,
@@ -301,7 +300,7 @@ def test_a_system_of_too_many_steps_is_refused() -> None:
     )
     rule = SystemRule(None, (Conclusion("y", "all"),))
     dirt = Variable("dirt", (Term("high", curve),))
-    rules = (replace(rule, when=Is("dirt", "high")),)
+    rules = (replace(rule, when=Proposition("dirt", ("high",))),)
     block = RuleBlock(rules, implication="minimum")
     with pytest.raises(
         LossError, match=r"fields, and engines handle no more than 20,000"
@@ -329,11 +328,11 @@ def odd(*names: str, **semantics: str) -> RuleBase:
         (label, "class 2"),
         (Variable(first, (low, high)), Variable(second, (low, high))),
         (
-            Rule((Proposition(first, ("low", "high"), negated=True),), "class 2"),
+            Rule((Proposition(first, ("low", "high"), hedges=("not",)),), "class 2"),
             Rule(
                 (Proposition(first, ("low",)), Proposition(second, ("high",))), label, 7
             ),
-            Rule((Proposition(second, ("high",), negated=True),), "class 2"),
+            Rule((Proposition(second, ("high",), hedges=("not",)),), "class 2"),
             Rule((), label),
         ),
         Semantics(**semantics),  # type: ignore[arg-type]

@@ -55,7 +55,8 @@ def hostile_rules() -> RuleBase:
     mix = Variable("mix #", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
         Rule(
-            (Proposition(name, (name,)), Proposition("mix #", HOSTILE[:2], True)), name
+            (Proposition(name, (name,)), Proposition("mix #", HOSTILE[:2], ("not",))),
+            name,
         )
         for name in HOSTILE
     )

@@ -90,7 +90,10 @@ def named(names: list[str], *, kind: str = "rules") -> Model:
     terms = tuple(Term(name, Band()) for name in names)
     inputs = [Variable(name, terms, unit=last) for name in names]
     rules = [
-        Rule((Proposition(name, tuple(names[:3]), bool(index % 2)),), name)
+        Rule(
+            (Proposition(name, tuple(names[:3]), ("not",) if bool(index % 2) else ()),),
+            name,
+        )
         for index, name in enumerate(names)
     ]
     every = Rule(tuple(Proposition(name, (last,)) for name in names), last)
@@ -221,10 +224,10 @@ def test_a_symmetric_set_is_written_once() -> None:
 def test_an_ambiguous_proposition_is_written_with_its_parts() -> None:
     terms = tuple(Term(name, Band()) for name in ("b", "not b", "c"))
     propositions = (
-        Proposition("a", ("b",), negated=True),
+        Proposition("a", ("b",), hedges=("not",)),
         Proposition("a", ("not b",)),
         Proposition("a", ("b", "c")),
-        Proposition("a", ("not b",), negated=True),
+        Proposition("a", ("not b",), hedges=("not",)),
     )
     rules = RuleBase("s", ("k",), (Variable("a", terms),), (Rule(propositions, "k"),))
     text = assert_kept(rules).decode()
@@ -242,7 +245,7 @@ def test_no_line_is_long_where_it_can_be_broken() -> None:
     tree = random_tree(4, leaves=40, inputs=60)
     many = tuple(f"a somewhat long name {n}" for n in range(30))
     terms = tuple(Term(name, Band()) for name in many)
-    propositions = (Proposition("x", many), Proposition("x", many, negated=True))
+    propositions = (Proposition("x", many), Proposition("x", many, hedges=("not",)))
     wide = RuleBase(
         "w",
         many,

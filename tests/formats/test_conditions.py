@@ -15,10 +15,18 @@ from fuzzytree.formats.yaml.conditions import (
     parse_conclusions,
     parse_condition,
 )
-from fuzzytree.model import MOST_LEVELS, And, Conclusion, Condition, Is, Not, Or
+from fuzzytree.model import (
+    MOST_LEVELS,
+    And,
+    Conclusion,
+    Condition,
+    Not,
+    Or,
+    Proposition,
+)
 from fuzzytree.testing import random_system
 
-A, B, C = Is("a", "b"), Is("c", "d"), Is("e", "f")
+A, B, C = Proposition("a", ("b",)), Proposition("c", ("d",)), Proposition("e", ("f",))
 
 
 @pytest.mark.parametrize(
@@ -38,17 +46,20 @@ A, B, C = Is("a", "b"), Is("c", "d"), Is("e", "f")
         ("((a is b))", A),
         ("(and a is b)", And((A,))),
         ("(or (a is b and c is d))", Or((And((A, B)),))),
-        ("a is not very b", Is("a", "b", ("not", "very"))),
-        ("a is very-very cube-root b", Is("a", "b", ("very very", "cube root"))),
-        ("a is any", Is("a", None, ("any",))),
-        ("a is not any and c is d", And((Is("a", None, ("not", "any")), B))),
-        ("a is any b", Is("a", "b", ("any",))),
-        ("wall distance is quite near", Is("wall distance", "quite near")),
-        ("'is' is \"very\"", Is("is", "very")),
-        ('\'it\'\'s\' is "a ""b"""', Is("it's", 'a "b"')),
-        ("it's is b's", Is("it's", "b's")),
-        ("'' is b", Is("", "b")),
-        ("a is 'any'", Is("a", "any")),
+        ("a is not very b", Proposition("a", ("b",), ("not", "very"))),
+        (
+            "a is very-very cube-root b",
+            Proposition("a", ("b",), ("very very", "cube root")),
+        ),
+        ("a is any", Proposition("a", (), ("any",))),
+        ("a is not any and c is d", And((Proposition("a", (), ("not", "any")), B))),
+        ("a is any b", Proposition("a", ("b",), ("any",))),
+        ("wall distance is quite near", Proposition("wall distance", ("quite near",))),
+        ("'is' is \"very\"", Proposition("is", ("very",))),
+        ('\'it\'\'s\' is "a ""b"""', Proposition("it's", ('a "b"',))),
+        ("it's is b's", Proposition("it's", ("b's",))),
+        ("'' is b", Proposition("", ("b",))),
+        ("a is 'any'", Proposition("a", ("any",))),
     ],
 )
 def test_a_sentence_has_one_reading(text: str, expected: Condition | None) -> None:
@@ -125,10 +136,10 @@ def test_the_deepest_condition_of_a_system_is_read_again() -> None:
 def test_words_of_the_language_stand_in_quotes() -> None:
     for word in ("is", "and", "or", "not", "always", *HEDGES):
         for name in (word, f"a {word}", f"{word} b"):
-            text = condition_text(Is(name, name))
+            text = condition_text(Proposition(name, (name,)))
             assert text == f'"{name}" is "{name}"'
-            assert parse_condition(text) == Is(name, name)
-    assert condition_text(Is("island", "android")) == "island is android"
+            assert parse_condition(text) == Proposition(name, (name,))
+    assert condition_text(Proposition("island", ("android",))) == "island is android"
 
 
 def test_any_text_is_read_or_refused() -> None:

@@ -18,11 +18,11 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Name,
     Not,
     Number,
     Or,
+    Proposition,
     SCurve,
     Sigmoid,
     SigmoidDifference,
@@ -213,7 +213,9 @@ def test_a_file_in_the_manner_of_the_standard_is_read_over_several_lines() -> No
     assert (minutes.low, minutes.high, minutes.default) == (0.0, 90.0, 5.0)
     assert minutes.aggregation == "maximum"
     second, third = system.rules[1:]
-    assert second.when == And((Is("dirt", "much"), Is("load", "full", ("not",))))
+    assert second.when == And(
+        (Proposition("dirt", ("much",)), Proposition("load", ("full",), ("not",)))
+    )
     assert third.weight == 0.5
     assert reading.losses == ()
     assert reading.remarks[0] == (
@@ -265,9 +267,12 @@ def test_a_file_of_fuzzylite_is_read_line_by_line() -> None:
     assert block.implication == "product"
     first, second = block.rules
     assert first.when == Or(
-        (Is("light", "dark", ("very",)), Is("light", "bright", ("not",)))
+        (
+            Proposition("light", ("dark",), ("very",)),
+            Proposition("light", ("bright",), ("not",)),
+        )
     )
-    assert second.when == Is("light", None, ("any",))
+    assert second.when == Proposition("light", (), ("any",))
     assert (second.weight, second.name) == (0.5, "x")
 
 
@@ -324,7 +329,9 @@ def test_a_file_of_jfuzzylogic_is_read_with_its_shapes_and_defaults() -> None:
     assert tip.defuzzifier.samples == 1000
     assert system.blocks[0].conjunction == "product"
     assert system.blocks[0].implication == "minimum"
-    assert system.rules[1].when == Not(Or((Is("food", "bad"), Is("food", "fair"))))
+    assert system.rules[1].when == Not(
+        Or((Proposition("food", ("bad",)), Proposition("food", ("fair",))))
+    )
     assert [loss.where for loss in reading.losses] == ["the other function blocks"]
 
 
@@ -336,7 +343,10 @@ def test_an_or_before_an_and_is_reported_in_a_file_of_jfuzzylogic() -> None:
     first = reading.model
     assert isinstance(first, FuzzySystem)
     assert first.rules[0].when == Or(
-        (Is("food", "bad"), And((Is("food", "fair"), Not(Is("food", "good")))))
+        (
+            Proposition("food", ("bad",)),
+            And((Proposition("food", ("fair",)), Not(Proposition("food", ("good",))))),
+        )
     )
 
 

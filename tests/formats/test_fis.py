@@ -21,11 +21,11 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Is,
     Linear,
     Or,
     PiCurve,
     Points,
+    Proposition,
     SCurve,
     Sigmoid,
     SigmoidDifference,
@@ -97,8 +97,12 @@ def test_a_sugeno_system_is_read_whole() -> None:
     (block,) = system.blocks
     assert (block.conjunction, block.disjunction) == ("product", "algebraic sum")
     first, second = block.rules
-    assert first.when == And((Is("food", "bad"), Is("service", "slow")))
-    assert second.when == Or((Is("food", "good"), Is("service", "slow", ("not",))))
+    assert first.when == And(
+        (Proposition("food", ("bad",)), Proposition("service", ("slow",)))
+    )
+    assert second.when == Or(
+        (Proposition("food", ("good",)), Proposition("service", ("slow",), ("not",)))
+    )
     assert second.weight == 0.5
     assert infer(system, {"food": 0.0, "service": 0.0}).outputs == (5.0,)
 
@@ -165,11 +169,17 @@ def test_hundredths_are_hedges_and_mean_other_things_in_octave_and_fuzzylite() -
     octave, fuzzylite = read(HEDGED), read(HEDGED, "fuzzylite")
     rules = octave.rules[0], fuzzylite.rules[0]
     assert rules[0].when == And(
-        (Is("food", "bad", ("cubed",)), Is("service", "slow", ("not", "very")))
+        (
+            Proposition("food", ("bad",), ("cubed",)),
+            Proposition("service", ("slow",), ("not", "very")),
+        )
     )
     assert rules[0].then == (Conclusion("tip %", "small", ("cube root",)),)
     assert rules[1].when == And(
-        (Is("food", "bad", ("extremely",)), Is("service", "slow", ("not", "very")))
+        (
+            Proposition("food", ("bad",), ("extremely",)),
+            Proposition("service", ("slow",), ("not", "very")),
+        )
     )
     assert rules[1].then == (Conclusion("tip %", "small", ("extremely",)),)
 

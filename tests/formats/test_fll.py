@@ -24,12 +24,12 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Linear,
     Name,
     Number,
     Or,
     PiCurve,
+    Proposition,
     SCurve,
     SemiEllipse,
     Sigmoid,
@@ -151,21 +151,24 @@ def test_rules_are_conditions_in_their_order_of_precedence() -> None:
     assert (block.conjunction, block.disjunction) == ("minimum", "algebraic sum")
     assert (block.implication, block.name) == ("product", "all")
     assert block.activation == Activation("highest", 2)
-    poor, fine = Is("service", "poor"), Is("food", "fine")
+    poor, fine = Proposition("service", ("poor",)), Proposition("food", ("fine",))
     assert block.rules == (
         SystemRule(
             Or(
                 (
                     poor,
                     And(
-                        (Is("service", "good", ("not",)), Is("food", "fine", ("very",)))
+                        (
+                            Proposition("service", ("good",), ("not",)),
+                            Proposition("food", ("fine",), ("very",)),
+                        )
                     ),
                 )
             ),
             (Conclusion("tip", "cheap"),),
         ),
         SystemRule(
-            And((Or((poor, Is("food", None, ("any",)))), fine)),
+            And((Or((poor, Proposition("food", (), ("any",)))), fine)),
             (
                 Conclusion("tip", "generous", ("extremely",)),
                 Conclusion("share", "fair"),
@@ -394,7 +397,7 @@ def test_names_are_cleaned_as_the_engines_do() -> None:
     reading = read_fll("\n".join(lines).encode(), "names.fll")
     assert isinstance(reading.model, FuzzySystem)
     assert reading.model.columns == ("forearm",)
-    assert reading.model.rules[0].when == Is("forearm", "1st.one")
+    assert reading.model.rules[0].when == Proposition("forearm", ("1st.one",))
     assert reading.remarks == (
         "the name 'fore arm' is read as 'forearm', as the engines do",
         "the name 'out put' is read as 'output', as the engines do",

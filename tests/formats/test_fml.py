@@ -19,12 +19,12 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Is,
     Linear,
     Not,
     Or,
     PiCurve,
     Points,
+    Proposition,
     SCurve,
     Singleton,
     Trapezoid,
@@ -97,11 +97,15 @@ def test_a_sugeno_system_is_read_whole() -> None:
     first, second = system.blocks
     assert (first.conjunction, second.conjunction) == ("product", "minimum")
     assert first.rules[0].when == And(
-        (Is("food", "bad", ("very",)), Is("service", "slow"))
+        (Proposition("food", ("bad",), ("very",)), Proposition("service", ("slow",)))
     )
     assert first.rules[0].weight == 0.5
-    either: Condition = Or((Is("food", "bad"), Is("food", "good", ("not", "not"))))
-    assert second.rules[0].when == Or((either, Is("food", "good", ("not", "not"))))
+    either: Condition = Or(
+        (Proposition("food", ("bad",)), Proposition("food", ("good",), ("not", "not")))
+    )
+    assert second.rules[0].when == Or(
+        (either, Proposition("food", ("good",), ("not", "not")))
+    )
     (tip,) = infer(system, {"food": 0.0, "service": 0.0}).outputs
     assert tip == pytest.approx((0.5 * 5.0 + 1.0 * 2.0) / 1.5)
 
@@ -159,7 +163,7 @@ def test_modifiers_have_their_meaning(modifier: str, hedges: tuple[str, ...]) ->
     system = read(TIPPER.replace('"very"', f'"{modifier}"'))
     when = system.blocks[0].rules[0].when
     assert isinstance(when, And)
-    assert when.parts[0] == Is("food", "bad", hedges)  # type: ignore[arg-type]
+    assert when.parts[0] == Proposition("food", ("bad",), hedges)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("modifier", ["above", "below", "norm", "slightly", "custom_a"])

@@ -172,8 +172,8 @@ def astray(content: bytes, name: str) -> Iterator[str]:
 
 def said(kind: str, rule: SystemRule, text: str, model: Document) -> bool:
     """Return whether a rule stands at the beginning of a text."""
-    references = [(one.variable, one.label or "any") for one in questions(rule.when)]
-    references += [(one.output, one.label) for one in rule.then]
+    references = [(one.variable, one.term or "any") for one in questions(rule.when)]
+    references += [(one.output, one.term) for one in rule.then]
     if kind == "fis":
         numbers = re.findall(r"-?[0-9.]+", text.partition("(")[0])
         assert isinstance(model, FuzzySystem)

@@ -24,7 +24,10 @@ TRAPS = {
     [
         ("size is low", Proposition("size", ("low",))),
         ("size is high or low", Proposition("size", ("high", "low"))),
-        ("size is not low or high", Proposition("size", ("low", "high"), negated=True)),
+        (
+            "size is not low or high",
+            Proposition("size", ("low", "high"), hedges=("not",)),
+        ),
         ("wet or dry is wet or dry", Proposition("wet or dry", ("wet", "dry"))),
     ],
 )
@@ -48,7 +51,7 @@ def test_what_names_nothing_has_no_reading(text: str) -> None:
         (
             "a is not b",
             Proposition("a", ("not b",)),
-            Proposition("a", ("b",), negated=True),
+            Proposition("a", ("b",), hedges=("not",)),
         ),
         ("a is b or c", Proposition("a", ("b", "c")), Proposition("a", ("b or c",))),
         ("a is b is c", Proposition("a", ("b is c",)), Proposition("a is b", ("c",))),
@@ -79,15 +82,18 @@ def test_readings_are_those_that_a_search_of_all_propositions_finds(
     variable = data.draw(st.sampled_from(sorted(terms)))
     size = data.draw(st.integers(1, min(3, len(terms[variable]))))
     chosen = tuple(data.draw(st.permutations(terms[variable]))[:size])
-    text = proposition_text(Proposition(variable, chosen, data.draw(st.booleans())))
+    text = proposition_text(
+        Proposition(variable, chosen, ("not",) if data.draw(st.booleans()) else ())
+    )
     longest = text.count(" or ") + 1
     expected = {
-        Proposition(name, several, negated)
+        Proposition(name, several, ("not",) if negated else ())
         for name in terms
         for count in range(1, longest + 1)
         for several in itertools.product(terms[name], repeat=count)
         for negated in (False, True)
-        if proposition_text(Proposition(name, several, negated)) == text
+        if proposition_text(Proposition(name, several, ("not",) if negated else ()))
+        == text
     }
     vocabulary = {name: words(labels) for name, labels in terms.items()}
     found = readings(text, vocabulary)
@@ -98,7 +104,7 @@ def test_readings_are_those_that_a_search_of_all_propositions_finds(
 def test_a_guess_prefers_a_variable_that_exists() -> None:
     assert guess("a is b is d", TRAPS) == Proposition("a is b", ("d",))
     assert guess("size is not lo or hi", PLAIN) == Proposition(
-        "size", ("lo", "hi"), True
+        "size", ("lo", "hi"), ("not",)
     )
     assert guess("sise is low", PLAIN) == Proposition("sise", ("low",))
     assert guess("size low", PLAIN) is None

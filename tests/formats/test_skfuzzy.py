@@ -15,7 +15,7 @@ from fuzzytree.model import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,
-    Is,
+    Proposition,
     RuleBlock,
     SystemOutput,
     SystemRule,
@@ -291,7 +291,7 @@ def test_lines_are_refused_where_they_mean_nothing(
     ramp = Term("ramp", Points((0.0, 1.0), (0.0, 1.0)))
     how = Defuzzifier(*defuzzifier)
     output = SystemOutput("y", (ramp,), 0.0, 1.0, how, aggregation)
-    rule = SystemRule(Is("a", "ramp"), (Conclusion("y", "ramp"),))
+    rule = SystemRule(Proposition("a", ("ramp",)), (Conclusion("y", "ramp"),))
     block = RuleBlock((rule,), implication=implication)
     with pytest.raises(InvalidModelError) as caught:
         FuzzySystem("s", (Variable("a", (ramp,)),), (output,), (block,))

@@ -21,10 +21,10 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Hedge,
-    Is,
     Name,
     Number,
     Or,
+    Proposition,
     RuleBlock,
     SystemOutput,
     SystemRule,
@@ -83,7 +83,10 @@ def test_the_example_typed_by_hand_means_what_it_says() -> None:
     assert [label.name for label in service.terms] == ["poor", "good", "excellent"]
     assert (food.name, food.unit, food.clips) == ("food quality", "points", True)
     assert system.rules[2].when == Or(
-        (Is("service", "excellent"), system_of(TIPPER).rules[2].when.parts[1])  # type: ignore[union-attr]
+        (
+            Proposition("service", ("excellent",)),
+            system_of(TIPPER).rules[2].when.parts[1],  # type: ignore[union-attr]
+        )
     )
     assert system.rules[3].when is None
     assert system.rules[3].name == "never less than nothing"
@@ -289,7 +292,7 @@ def test_a_hedge_of_two_words_is_written_with_a_hyphen() -> None:
     hedges: tuple[Hedge, ...] = ("very very", "cube root")
     system = random_system(0, rules=1)
     variable: Variable | SystemOutput = system.inputs[0]
-    when = Is(variable.name, variable.terms[0].name, hedges)
+    when = Proposition(variable.name, (variable.terms[0].name,), hedges)
     block = replace(system.blocks[0], rules=(replace(system.rules[0], when=when),))
     text = write(replace(system, blocks=(block,))).content.decode()
     assert "is very-very cube-root " in text

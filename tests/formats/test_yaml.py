@@ -60,7 +60,7 @@ def test_words_of_yaml_1_1_are_the_names_that_they_look_like() -> None:
     assert rules.name == "2026-11-21"
     assert rules.rules[0].when == (Proposition("switch", ("off",)),)
     assert rules.rules[1].when == (
-        Proposition("switch", ("off", "12:30"), negated=True),
+        Proposition("switch", ("off", "12:30"), hedges=("not",)),
         Proposition("load", ("heavy or so", "1_000")),
     )
     assert rules.semantics.uncovered == "no"

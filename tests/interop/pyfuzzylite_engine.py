@@ -26,13 +26,13 @@ from fuzzytree.model import (
     FuzzySystem,
     Gaussian,
     Hedge,
-    Is,
     Linear,
     Name,
     Not,
     Number,
     Or,
     PiCurve,
+    Proposition,
     RuleBlock,
     SCurve,
     SemiEllipse,
@@ -260,7 +260,7 @@ def _is_edge(curve: Curve) -> bool:
 def _block_alike(block: RuleBlock, first: str, known: set[str]) -> RuleBlock:
     rules: list[SystemRule] = []
     for rule in block.rules:
-        when = rule.when or Is(first, None, ("any",))
+        when = rule.when or Proposition(first, (), ("any",))
         then = tuple(
             replace(one, hedges=_hedges(one.hedges, ("any", "not")))
             for one in rule.then
@@ -277,13 +277,13 @@ def _hedges(hedges: Sequence[Hedge], but: Sequence[Hedge] = ()) -> tuple[Hedge, 
 
 def _condition(condition: Condition, first: str, known: set[str]) -> Condition:
     match condition:
-        case Is(variable=variable) if variable not in known:
-            return Is(first, None, ("any",))
-        case Is(hedges=hedges) if "any" in hedges:
+        case Proposition(variable=variable) if variable not in known:
+            return Proposition(first, (), ("any",))
+        case Proposition(hedges=hedges) if "any" in hedges:
             # Behind `any` it reads nothing more, and nothing more matters.
             kept = _hedges(hedges[: hedges.index("any") + 1])
-            return Is(condition.variable, None, kept)
-        case Is(hedges=hedges):
+            return Proposition(condition.variable, (), kept)
+        case Proposition(hedges=hedges):
             return replace(condition, hedges=_hedges(hedges))
         case And(parts=parts):
             return And(tuple(_condition(part, first, known) for part in parts))
@@ -291,7 +291,7 @@ def _condition(condition: Condition, first: str, known: set[str]) -> Condition:
             return Or(tuple(_condition(part, first, known) for part in parts))
         case Not(part=part):
             inner = _condition(part, first, known)
-            if isinstance(inner, Is):
+            if isinstance(inner, Proposition):
                 return replace(inner, hedges=("not", *inner.hedges))
             return inner
 
@@ -387,7 +387,7 @@ def _sentence(rule: SystemRule) -> str:
 
 def _words(condition: Condition) -> str:
     match condition:
-        case Is():
+        case Proposition():
             return _proposition(condition)
         case And(parts=parts) | Or(parts=parts):
             word = "and" if isinstance(condition, And) else "or"
@@ -399,6 +399,6 @@ def _words(condition: Condition) -> str:
             raise TypeError("NOT is a hedge")
 
 
-def _proposition(one: Is | Conclusion) -> str:
-    variable = one.variable if isinstance(one, Is) else one.output
-    return " ".join([variable, "is", *one.hedges, one.label or ""])
+def _proposition(one: Proposition | Conclusion) -> str:
+    variable = one.variable if isinstance(one, Proposition) else one.output
+    return " ".join([variable, "is", *one.hedges, one.term or ""])

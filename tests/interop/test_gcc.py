@@ -69,7 +69,10 @@ def hostile_rules() -> RuleBase:
     inputs = tuple(Variable(name, terms, unit=name) for name in names)
     mix = Variable("mix */\\", terms, parts=tuple(Part(n, 0.5) for n in names[:3]))
     rules = tuple(
-        Rule((Proposition(name, (name,)), Proposition(mix.name, names[:2], True)), name)
+        Rule(
+            (Proposition(name, (name,)), Proposition(mix.name, names[:2], ("not",))),
+            name,
+        )
         for name in names
     )
     semantics = Semantics("product", names[0], names[1])

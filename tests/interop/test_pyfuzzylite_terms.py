@@ -33,9 +33,9 @@ from fuzzytree.model import (
     FuzzySystem,
     Gaussian,
     Hedge,
-    Is,
     Name,
     PiCurve,
+    Proposition,
     RuleBlock,
     SCurve,
     SemiEllipse,
@@ -317,7 +317,9 @@ def test_random_systems_answer_as_pyfuzzylites_engines(part: int) -> None:
 def one_rule(output: SystemOutput, *then: Conclusion) -> FuzzySystem:
     """Return a system whose only rule holds as far as x lies in [0, 1]."""
     ramp = Term("up", Points((0.0, 1.0), (0.0, 1.0)))
-    rule = SystemRule(Is("a", "up"), then or (Conclusion("y", output.terms[0].name),))
+    rule = SystemRule(
+        Proposition("a", ("up",)), then or (Conclusion("y", output.terms[0].name),)
+    )
     block = RuleBlock((rule,), implication="minimum")
     return FuzzySystem("one rule", (Variable("a", (ramp,)),), (output,), (block,))
 

@@ -44,7 +44,10 @@ def rule_base(
 
 def test_a_rule_reads_as_a_sentence() -> None:
     rule = Rule(
-        (Proposition("force", ("low", "high")), Proposition("slip", ("some",), True)),
+        (
+            Proposition("force", ("low", "high")),
+            Proposition("slip", ("some",), ("not",)),
+        ),
         "a",
     )
     assert sentence(rule) == "IF force is low or high AND slip is not some THEN a"

@@ -26,13 +26,13 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Linear,
     Name,
     Not,
     Number,
     Or,
     PiCurve,
+    Proposition,
     RuleBlock,
     SCurve,
     SemiEllipse,
@@ -56,7 +56,7 @@ WEIGHTED = SystemOutput(
     "y", (Term("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
 )
 CENTROID = SystemOutput("y", (LOW,), 0.0, 1.0, Defuzzifier("centroid"), "maximum")
-RULE = SystemRule(Is("a", "low"), (Conclusion("y", "one"),))
+RULE = SystemRule(Proposition("a", ("low",)), (Conclusion("y", "one"),))
 WHOLE = FuzzySystem("whole", (INPUT,), (WEIGHTED,), (RuleBlock((RULE,)),))
 
 
@@ -123,19 +123,27 @@ def test_all_mistakes_of_a_system_are_reported_at_once() -> None:
     ("rule", "place", "text"),
     [
         (
-            replace(RULE, when=Is("a", "lo")),
+            replace(RULE, when=Proposition("a", ("lo",))),
             "when",
             "'a' has no term 'lo'; there is low (did you mean 'low'?)",
         ),
-        (replace(RULE, when=Is("b", "low")), "when", "no variable 'b'; there is a, y"),
-        (replace(RULE, when=Is("a", None)), "when", "'a' is used without a term"),
         (
-            replace(RULE, when=Is("a", None, ("any", "very"))),
+            replace(RULE, when=Proposition("b", ("low",))),
+            "when",
+            "no variable 'b'; there is a, y",
+        ),
+        (
+            replace(RULE, when=Proposition("a", ())),
             "when",
             "'a' is used without a term",
         ),
         (
-            replace(RULE, when=Is("b", None, ("any",))),
+            replace(RULE, when=Proposition("a", (), ("any", "very"))),
+            "when",
+            "'a' is used without a term",
+        ),
+        (
+            replace(RULE, when=Proposition("b", (), ("any",))),
             "when",
             "no variable 'b'; there is a, y",
         ),
@@ -183,7 +191,7 @@ def test_mistakes_name_the_block_of_a_rule() -> None:
 
 
 def test_an_operator_is_needed_where_it_is_used() -> None:
-    both = And((Is("a", "low"), Not(Or((Is("a", "low"),)))))
+    both = And((Proposition("a", ("low",)), Not(Or((Proposition("a", ("low",)),)))))
     block = RuleBlock((replace(RULE, when=both),), None, None)
     assert [text for _, text in mistakes(blocks=(block,))] == [
         "rule 1: it needs a conjunction, and its block has none",
@@ -199,7 +207,7 @@ def test_an_operator_is_needed_where_it_is_used() -> None:
 
 
 def test_conditions_are_nested_as_deeply_as_may_be_and_no_deeper() -> None:
-    condition: Condition = Is("a", "low")
+    condition: Condition = Proposition("a", ("low",))
     for _ in range(MOST_LEVELS - 1):
         condition = Not(condition)
     block = RuleBlock((replace(RULE, when=condition),))
@@ -372,7 +380,11 @@ def test_every_function_of_a_formula_has_its_operation() -> None:
 
 
 def test_questions_and_names_come_from_left_to_right() -> None:
-    first, second, third = Is("a", "b"), Is("c", "d"), Is("e", "f")
+    first, second, third = (
+        Proposition("a", ("b",)),
+        Proposition("c", ("d",)),
+        Proposition("e", ("f",)),
+    )
     condition = Or((first, Not(And((second, third)))))
     assert [*questions(condition)] == [first, second, third]
     assert [*questions(None)] == []

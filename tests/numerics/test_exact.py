@@ -169,7 +169,7 @@ def test_a_rule_without_a_proposition_always_holds() -> None:
 
 def test_is_not_is_one_minus_the_largest_of_the_terms() -> None:
     variable = Variable("x", (Term("low", RAMP), Term("flat", LESS)))
-    proposition = Proposition("x", ("low", "flat"), negated=True)
+    proposition = Proposition("x", ("low", "flat"), hedges=("not",))
     rules = RuleBase("not", ("a",), (variable,), (Rule((proposition,), "a"),))
     assert exact_answer(rules, {"x": 2.0}).strengths == (Fraction(1, 3),)
     assert exact_answer(rules, {"x": 4.0}).strengths == (Fraction(3, 4),)

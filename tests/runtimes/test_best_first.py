@@ -96,10 +96,10 @@ def rules_of(shapes: list[Shape], conjunction: Conjunction = "minimum") -> RuleB
     names = tuple(f"t{number}" for number in range(len(shapes)))
     propositions = [
         Proposition("x", names),
-        Proposition("x", names, negated=True),
+        Proposition("x", names, hedges=("not",)),
         *(Proposition("x", names[start::3]) for start in range(min(3, len(names)))),
         *(Proposition("x", (name,)) for name in names[:5]),
-        Proposition("x", names[:1], negated=True),
+        Proposition("x", names[:1], hedges=("not",)),
     ]
     terms = tuple(Term(name, shape) for name, shape in zip(names, shapes, strict=True))
     rules = [Rule((proposition,), "y") for proposition in propositions]

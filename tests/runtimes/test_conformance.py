@@ -83,7 +83,9 @@ def random_rules(seed: int) -> RuleBase:
             [f"t{n}" for n in range(1, 5)], chance.choice((1, 1, 2, 4))
         )
         where = chance.choice(variables).name
-        return Proposition(where, tuple(names), chance.random() < 0.3)
+        return Proposition(
+            where, tuple(names), ("not",) if chance.random() < 0.3 else ()
+        )
 
     pool = [proposition() for _ in range(12)]
     rules = [

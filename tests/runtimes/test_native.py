@@ -153,7 +153,11 @@ def overlapping(conjunction: str) -> RuleBase:
     rules = tuple(
         Rule(
             tuple(
-                Proposition(name, (chance.choice(names),), chance.random() < 0.2)
+                Proposition(
+                    name,
+                    (chance.choice(names),),
+                    ("not",) if chance.random() < 0.2 else (),
+                )
                 for name in "abc"[: chance.randint(0, 3)]
             ),
             chance.choice("xy"),

@@ -100,7 +100,9 @@ def random_rules(seed: int) -> RuleBase:
         variable = chance.choice(variables)
         names = [term.name for term in variable.terms]
         some = tuple(chance.sample(names, chance.randint(1, len(names))))
-        return Proposition(variable.name, some, chance.random() < 0.3)
+        return Proposition(
+            variable.name, some, ("not",) if chance.random() < 0.3 else ()
+        )
 
     classes = ("no", "ja", "élan ☂")
     sizes = range(5) if chance.random() < 0.5 else (1, 2, 3)

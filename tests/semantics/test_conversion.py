@@ -17,25 +17,22 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError
 from fuzzytree.model import (
     And,
+    Band,
     Binary,
     Condition,
     FuzzySystem,
-    Is,
+    Kind,
     Not,
     Or,
-    Singleton,
-    Trapezoid,
-)
-from fuzzytree.model.rulebase import (
-    Band,
-    Kind,
     Part,
     Points,
     Proposition,
     Rule,
     RuleBase,
     Semantics,
+    Singleton,
     Term,
+    Trapezoid,
     Variable,
 )
 from fuzzytree.semantics import (
@@ -82,15 +79,15 @@ def grip(*rules: Rule, **semantics: object) -> RuleBase:
 
 
 ODD_RULES = (
-    Rule((Proposition("force", ("low", "middle"), negated=True),), "firm", 12),
+    Rule((Proposition("force", ("low", "middle"), hedges=("not",)),), "firm", 12),
     Rule(
         (Proposition("force", ("low", "high")), Proposition("speed", ("low",))), "soft"
     ),
     Rule(
         (
-            Proposition("speed", ("low",), negated=True),
-            Proposition("sum", ("low", "high"), negated=True),
-            Proposition("speed", ("high",), negated=True),
+            Proposition("speed", ("low",), hedges=("not",)),
+            Proposition("sum", ("low", "high"), hedges=("not",)),
+            Proposition("speed", ("high",), hedges=("not",)),
         ),
         "firm",
         0,
@@ -206,8 +203,10 @@ def test_names_that_a_target_changed_come_back_by_their_places(
 
     def renamed(condition: Condition | None) -> Condition | None:
         match condition:
-            case Is(variable=variable, label=label):
-                return replace(condition, variable=names[variable], label=f"t {label}")
+            case Proposition(variable=variable, term=label):
+                return replace(
+                    condition, variable=names[variable], terms=(f"t {label}",)
+                )
             case Not(part=part):
                 return replace(condition, part=renamed(part))
             case And(parts=parts) | Or(parts=parts):
@@ -231,7 +230,7 @@ def test_names_that_a_target_changed_come_back_by_their_places(
                 rule,
                 when=renamed(rule.when),
                 then=tuple(
-                    replace(c, output=names[c.output], label=f"t {c.label}")
+                    replace(c, output=names[c.output], term=f"t {c.term}")
                     for c in rule.then
                 ),
             )
@@ -275,7 +274,7 @@ def changes(system: FuzzySystem) -> Iterator[FuzzySystem]:
     yield replace(system, blocks=(replace(block, disjunction="sum"),))
     yield replace(system, blocks=(block, block))
     last = block.rules[-1]
-    negated = replace(last, when=Not(last.when or Is("force", "low")))
+    negated = replace(last, when=Not(last.when or Proposition("force", ("low",))))
     yield replace(system, blocks=(replace(block, rules=(*block.rules[:-1], negated)),))
     one, *rest = system.inputs
     yield replace(system, inputs=(replace(one, clips=True, low=0.0, high=0.5), *rest))

@@ -22,10 +22,10 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Name,
     PiCurve,
     Points,
+    Proposition,
     RuleBlock,
     SCurve,
     SemiEllipse,
@@ -181,7 +181,7 @@ def test_extreme_curves_become_points_or_are_refused(curve: Curve) -> None:
 
 def washer(curve: Curve, output: Curve, method: str) -> FuzzySystem:
     how = Defuzzifier(method)  # type: ignore[arg-type]
-    rule = SystemRule(Is("dirt", "high"), (Conclusion("time", "long"),))
+    rule = SystemRule(Proposition("dirt", ("high",)), (Conclusion("time", "long"),))
     return FuzzySystem(
         "washer",
         (Variable("dirt", (Term("high", curve, 0.5),)),),

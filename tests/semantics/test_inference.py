@@ -32,12 +32,12 @@ from fuzzytree.model import (
     Gaussian,
     Grid,
     Hedge,
-    Is,
     Linear,
     Not,
     Number,
     Or,
     PiCurve,
+    Proposition,
     RuleBlock,
     SCurve,
     SemiEllipse,
@@ -354,7 +354,11 @@ def rule(when: Condition | None, label: str = "one", weight: float = 1.0) -> Sys
     return SystemRule(when, (Conclusion("y", label),), weight)
 
 
-A_UP, A_DOWN, B_UP = Is("a", "up"), Is("a", "down"), Is("b", "up")
+A_UP, A_DOWN, B_UP = (
+    Proposition("a", ("up",)),
+    Proposition("a", ("down",)),
+    Proposition("b", ("up",)),
+)
 
 
 @pytest.mark.parametrize(
@@ -362,12 +366,12 @@ A_UP, A_DOWN, B_UP = Is("a", "up"), Is("a", "down"), Is("b", "up")
     [
         (None, 1.0),
         (A_UP, 0.25),
-        (Is("a", "up", ("not",)), 0.75),
-        (Is("a", "up", ("very", "not")), 0.5625),
-        (Is("a", "up", ("not", "very")), 0.9375),
-        (Is("a", None, ("any",)), 1.0),
-        (Is("a", None, ("very", "any")), 1.0),
-        (Is("a", "up", ("any",)), 1.0),
+        (Proposition("a", ("up",), ("not",)), 0.75),
+        (Proposition("a", ("up",), ("very", "not")), 0.5625),
+        (Proposition("a", ("up",), ("not", "very")), 0.9375),
+        (Proposition("a", (), ("any",)), 1.0),
+        (Proposition("a", (), ("very", "any")), 1.0),
+        (Proposition("a", ("up",), ("any",)), 1.0),
         (And((A_UP, B_UP)), 0.25),
         (Or((A_UP, B_UP)), 0.5),
         (Not(And((A_UP, B_UP))), 0.75),
@@ -602,7 +606,7 @@ def test_an_activation_chooses_rules(
     assert found.outputs[0] == pytest.approx(sum(expected), rel=1e-15)
 
 
-ECHO = Is("y", "one")
+ECHO = Proposition("y", ("one",))
 
 
 @pytest.mark.parametrize(
@@ -617,7 +621,11 @@ ECHO = Is("y", "one")
 def test_a_rule_may_ask_what_earlier_rules_concluded(
     method: Any, expected: tuple[float, ...]
 ) -> None:
-    rules = [rule(A_UP), rule(ECHO, "three"), rule(Is("y", "line"), "three")]
+    rules = [
+        rule(A_UP),
+        rule(ECHO, "three"),
+        rule(Proposition("y", ("line",)), "three"),
+    ]
     block = RuleBlock((), activation=Activation(method, 9))
     found = infer(system(rules, LABELS, block=block), {"a": 0.25, "b": 0.0})
     assert found.activations == expected
@@ -807,7 +815,7 @@ def test_a_combination_is_of_values_within_their_ranges() -> None:
     mix = Variable("mix", (UP,), parts=(Part("a", 2.0, 0.25), Part("b", 1.0)))
     subject = system([rule(B_UP)])
     subject = replace(subject, inputs=(clamped, Variable("b", (UP,)), mix))
-    block = RuleBlock((rule(Is("mix", "up")),))
+    block = RuleBlock((rule(Proposition("mix", ("up",))),))
     subject = replace(subject, blocks=(block,))
     found = infer(subject, {"a": 9.0, "b": 0.125})
     assert found.activations == (2.0 * (0.5 - 0.25) + 0.125,)
@@ -823,6 +831,9 @@ def test_a_degree_of_an_input_is_computed_once_for_a_row(
         return curve_degree(curve, *rest)
 
     monkeypatch.setattr("fuzzytree.semantics.inference.curve_degree", counted)
-    rules = tuple(rule(And((Is("a", "up"), Is("b", "down")))) for _ in range(50))
+    rules = tuple(
+        rule(And((Proposition("a", ("up",)), Proposition("b", ("down",)))))
+        for _ in range(50)
+    )
     infer(system(rules), {"a": 0.25, "b": 0.5})
     assert calls == [UP.function, DOWN.function]

@@ -116,7 +116,7 @@ def test_and_is_the_minimum_or_the_product() -> None:
 
 def test_or_is_the_maximum_and_not_is_one_minus() -> None:
     either = Proposition("x", ("low", "ten"))
-    neither = Proposition("x", ("low", "ten"), negated=True)
+    neither = Proposition("x", ("low", "ten"), hedges=("not",))
     answer = evaluate(rules((either,), (neither,)), {"x": 11.0, "y": 0.0})
     assert answer.strengths == (0.8, 1.0 - 0.8)
 

@@ -14,9 +14,9 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Is,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     SystemOutput,
     SystemRule,
@@ -31,14 +31,14 @@ TERMS = (Term("low", Gaussian(0.0, 0.4)), Term("high", Gaussian(1.0, 0.3)))
 
 def condition(chance: random.Random, level: int = 0) -> Condition:
     if level > 2 or chance.random() < 0.3:
-        return Is(chance.choice("abc"), chance.choice(("low", "high")))
+        return Proposition(chance.choice("abc"), (chance.choice(("low", "high")),))
     parts = tuple(condition(chance, level + 1) for _ in range(2))
     return chance.choice((And(parts), Or(parts), Not(parts[0])))
 
 
 def system(when: Condition) -> FuzzySystem:
     rule = SystemRule(when, (Conclusion("y", "high"),), 0.7)
-    other = SystemRule(Is("a", "low"), (Conclusion("y", "low"),))
+    other = SystemRule(Proposition("a", ("low",)), (Conclusion("y", "low"),))
     output = SystemOutput("y", TERMS, 0.0, 1.0, Defuzzifier("centroid", 20), "maximum")
     block = RuleBlock((rule, other), "minimum", "maximum", "product")
     inputs = tuple(Variable(name, TERMS) for name in "abc")
@@ -68,14 +68,21 @@ def test_split_rules_give_the_same_bits(seed: int) -> None:
     ids=str,
 )
 def test_rules_under_other_norms_stay_whole(change: dict[str, str]) -> None:
-    whole = system(And((Or((Is("a", "low"), Is("b", "low"))), Is("c", "high"))))
+    whole = system(
+        And(
+            (
+                Or((Proposition("a", ("low",)), Proposition("b", ("low",)))),
+                Proposition("c", ("high",)),
+            )
+        )
+    )
     block = replace(whole.blocks[0], **change)
     assert split(block.rules[0], block, whole) == (block.rules[0],)
     assert len(split(whole.rules[0], whole.blocks[0], whole)) == 2
 
 
 def test_too_many_alternatives_are_not_made() -> None:
-    pair = Or((Is("a", "low"), Is("b", "low")))
+    pair = Or((Proposition("a", ("low",)), Proposition("b", ("low",))))
     many = And((pair,) * 40)
     assert len(alternatives(many)) == MOST_RULES + 1
     whole = system(many)

@@ -57,7 +57,7 @@ def base(
 
 
 def force(*terms: str, negated: bool = False) -> Proposition:
-    return Proposition("force", terms, negated)
+    return Proposition("force", terms, ("not",) if negated else ())
 
 
 ALL = ((force("soft", "hard"),), (force("firm"),))
@@ -232,7 +232,7 @@ def test_a_proposition_and_its_negation_never_hold_together_on_a_plateau_alone()
 
 def test_the_negation_of_what_never_holds_always_holds() -> None:
     shapes: dict[tuple[str, str], Shape] = {("x", "no"): Points((5.0,), (0.0,))}
-    assert always_holds(Proposition("x", ("no",), negated=True), shapes)
+    assert always_holds(Proposition("x", ("no",), hedges=("not",)), shapes)
     assert not always_holds(Proposition("x", ("no",)), shapes)
 
 

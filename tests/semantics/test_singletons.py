@@ -18,7 +18,7 @@ from fuzzytree.model import (
     Defuzzifier,
     DefuzzifierMethod,
     FuzzySystem,
-    Is,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -122,8 +122,8 @@ def mixed(method: DefuzzifierMethod) -> FuzzySystem:
     )
     output = SystemOutput("y", terms, 0.0, 1.0, Defuzzifier(method, 7), "maximum")
     rules = (
-        SystemRule(Is("x", "low"), (Conclusion("y", "one"),)),
-        SystemRule(Is("x", "high"), (Conclusion("y", "wide"),)),
+        SystemRule(Proposition("x", ("low",)), (Conclusion("y", "one"),)),
+        SystemRule(Proposition("x", ("high",)), (Conclusion("y", "wide"),)),
     )
     block = RuleBlock(rules, implication="minimum")
     return FuzzySystem("mixed", (Variable("x", ramps),), (output,), (block,))

@@ -20,10 +20,10 @@ from fuzzytree.model import (
     Condition,
     Formula,
     FuzzySystem,
-    Is,
     Linear,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -89,7 +89,7 @@ def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None
             for conclusion in rule.then if degree > 0 else ():
                 degree = _hedged(conclusion.hedges, degree)
                 if conclusion.output == output and degree > 0:
-                    label = _named(one.terms, conclusion.label)
+                    label = _named(one.terms, conclusion.term)
                     total += degree * _number(label, system, values)
                     weight += degree
                     is_number = True
@@ -169,7 +169,7 @@ def _at(
     when: Condition, block: RuleBlock, system: FuzzySystem, values: Point
 ) -> Fraction:
     match when:
-        case Is(variable=name, label=label, hedges=hedges):
+        case Proposition(variable=name, term=label, hedges=hedges):
             if label is None:
                 return _hedged(hedges, Fraction(0))  # the last, `any`, makes 1 of it
             term = _named(_named(system.inputs, name).terms, label)

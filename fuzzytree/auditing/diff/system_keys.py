@@ -18,10 +18,10 @@ from fuzzytree.model import (
     Condition,
     Formula,
     FuzzySystem,
-    Is,
     Linear,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     SystemOutput,
     SystemRule,
@@ -224,7 +224,7 @@ class _Read:
             (
                 one.output,
                 self._concluded(
-                    self.outputs[one.output], self.labels[one.output, one.label]
+                    self.outputs[one.output], self.labels[one.output, one.term]
                 ),
                 one.hedges,
             )
@@ -251,11 +251,11 @@ class _Read:
             hedges = (*one.hedges, *hedges)
             if one.output == output:
                 cut = (block.implication or "minimum") if is_curve else None
-                yield self.labels[output, one.label], (hedges, cut)
+                yield self.labels[output, one.term], (hedges, cut)
 
     def _condition(self, when: Condition, block: RuleBlock) -> Hashable:
         match when:
-            case Is(variable=variable, label=label, hedges=hedges):
+            case Proposition(variable=variable, term=label, hedges=hedges):
                 if label is None:
                     return "is", None, hedges
                 place = variable, label

@@ -463,7 +463,7 @@ def _enclosed(element: RuleCurve, x: FloatArray, slack: FloatArray | None) -> En
     checkpoint()
     result = degree_enclosure(element.shape, EnclosedValue(x, slack))
     return proposition_enclosure(
-        Proposition("", ("",), element.is_complement), [result]
+        Proposition("", ("",), ("not",) if element.is_complement else ()), [result]
     )
 
 

@@ -183,7 +183,7 @@ class _Builder:
             else name[1]
             for name in names
         ]
-        return Proposition(proposition.variable, tuple(terms), negated=True)
+        return Proposition(proposition.variable, tuple(terms), hedges=("not",))
 
     def _weighted(
         self, proposition: Proposition, weight: float

@@ -34,7 +34,6 @@ from fuzzytree.model import (
     Conjunction,
     FuzzySystem,
     Hedge,
-    Is,
     Not,
     Or,
     Points,
@@ -126,7 +125,7 @@ def terms_of(
     uses = Counter(
         key
         for rule in system.rules
-        for key in {(one.variable, one.label) for one in questions(rule.when)}
+        for key in {(one.variable, one.term) for one in questions(rule.when)}
     )
     for one in system.inputs:
         plain[one.name] = {}
@@ -236,7 +235,7 @@ class Conditions:
         match condition:
             case None:
                 return [*_ALWAYS]
-            case Is():
+            case Proposition():
                 return self._proposition(condition, negated=negated)
             case Not(part=part):
                 return self.ways(part, negated=not negated)
@@ -252,7 +251,7 @@ class Conditions:
                 self._check_joint("or", negated=negated)
                 return self._joined(parts, is_union=not negated, negated=negated)
 
-    def _proposition(self, one: Is, *, negated: bool) -> list[Way]:
+    def _proposition(self, one: Proposition, *, negated: bool) -> list[Way]:
         """Return the only way of a proposition: a proposition, or always, or never."""
         hedges = one.hedges
         while hedges and hedges[0] == "not":
@@ -263,15 +262,15 @@ class Conditions:
             decline("FTD07", f"the hedge {hedges[0]!r} of 'any' has no exact method")
         if one.variable not in self.terms.plain:
             decline("FTD07", f"it uses the output {one.variable!r}")
-        if one.label is None or not self.terms.knows(one.variable, one.label):
-            name = f"{one.label!r} of {one.variable!r}"
+        if one.term is None or not self.terms.knows(one.variable, one.term):
+            name = f"{one.term!r} of {one.variable!r}"
             decline("FTD02", f"the curve of {name} has no exact method")
         if hedges:
-            term = self.terms.hedged(one.variable, one.label, hedges)
+            term = self.terms.hedged(one.variable, one.term, hedges)
             if term is None:
                 decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
-            return [(Proposition(one.variable, (term,), negated),)]
-        return [(Proposition(one.variable, (one.label,), negated),)]
+            return [(Proposition(one.variable, (term,), ("not",) if negated else ()),)]
+        return [(Proposition(one.variable, (one.term,), ("not",) if negated else ()),)]
 
     def _one_proposition(
         self, parts: Sequence[Condition], *, negated: bool
@@ -289,7 +288,9 @@ class Conditions:
         terms = dict.fromkeys(
             term for proposition in propositions for term in proposition.terms
         )
-        return Proposition(propositions[0].variable, tuple(terms), negated)
+        return Proposition(
+            propositions[0].variable, tuple(terms), ("not",) if negated else ()
+        )
 
     def _check_joint(self, word: Literal["and", "or"], *, negated: bool) -> None:
         """Raise unless a joint is a minimum, maximum or product where that is exact."""
@@ -329,13 +330,13 @@ class Conditions:
         return tuple(dict.fromkeys(both)) if self.conjunction == "minimum" else both
 
 
-def _plain_questions(parts: Iterable[Condition]) -> Iterator[Is | None]:
+def _plain_questions(parts: Iterable[Condition]) -> Iterator[Proposition | None]:
     """Yield the questions that parts join by or alone; None for anything else."""
     for part in parts:
         match part:
             case Or(parts=inner):
                 yield from _plain_questions(inner)
-            case Is(hedges=(), label=str()):
+            case Proposition(hedges=(), term=str()):
                 yield part
             case _:
                 yield None

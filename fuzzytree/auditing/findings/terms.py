@@ -239,7 +239,7 @@ def _inventory(
             [(one.name, label.name) for one in system.inputs for label in one.terms],
             [one.name for one in system.inputs],
             [
-                (question.variable, question.label or "")
+                (question.variable, question.term or "")
                 for block in system.blocks
                 for rule in block.rules
                 for question in questions(rule.when)

@@ -253,5 +253,5 @@ class _Taken:
 def _text(then: Iterable[Conclusion]) -> str:
     """Return what a rule concludes, as people read it."""
     return " and ".join(
-        " ".join((one.output, "is", *one.hedges, one.label)) for one in then
+        " ".join((one.output, "is", *one.hedges, one.term)) for one in then
     )

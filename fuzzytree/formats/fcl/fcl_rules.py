@@ -35,11 +35,11 @@ from fuzzytree.model import (
     Condition,
     FuzzySystem,
     Hedge,
-    Is,
     Loss,
     Not,
     Or,
     Points,
+    Proposition,
     RuleBlock,
     SNorm,
     SystemRule,
@@ -95,7 +95,7 @@ def _condition(condition: FclCondition, scope: Scope) -> Condition:
             return And(result) if connective == "and" else Or(result)
 
 
-def _proposition(proposition: FclProposition, scope: Scope) -> Is:
+def _proposition(proposition: FclProposition, scope: Scope) -> Proposition:
     variable = str(proposition.variable)
     if variable in scope.outputs and scope.dialect not in ("fuzzylite", "portable"):
         what = (
@@ -109,9 +109,9 @@ def _proposition(proposition: FclProposition, scope: Scope) -> Is:
         variable, ()
     ):
         _known_variable(proposition.variable, scope.terms, scope.notes)
-        return Is(variable, None, _hedges(proposition.words, scope))
+        return Proposition(variable, (), _hedges(proposition.words, scope))
     label = _known(proposition, scope.terms, scope.notes)
-    return Is(variable, label, _hedges(proposition.words[:-1], scope))
+    return Proposition(variable, (label,), _hedges(proposition.words[:-1], scope))
 
 
 def _conclusion(proposition: FclProposition, scope: Scope) -> Conclusion:
@@ -273,9 +273,9 @@ def without_questions(system: FuzzySystem) -> FuzzySystem:
     if not system.inputs:
         return system
     first = system.inputs[0]
-    proposition: Condition = Is(first.name, None, ("any",))
+    proposition: Condition = Proposition(first.name, (), ("any",))
     if first.terms and first.terms[-1].function == ALWAYS:
-        proposition = Is(first.name, first.terms[-1].name)
+        proposition = Proposition(first.name, (first.terms[-1].name,))
         first = replace(first, terms=first.terms[:-1])
     others = [
         one

@@ -32,10 +32,10 @@ from fuzzytree.model import (
     Curve,
     Formula,
     Hedge,
-    Is,
     Linear,
     Number,
     Or,
+    Proposition,
     SigmoidDifference,
     Singleton,
     SystemOutput,
@@ -478,7 +478,7 @@ def _rules(
     if not conclusions:
         notes.loss(f"rule {number}", "it concludes nothing; left out")
         return
-    if any(one.label and one.hedges[-1:] == ("any",) for one in questions):
+    if any(one.term and one.hedges[-1:] == ("any",) for one in questions):
         what = (
             "it uses 'any' (.99) with a term, which fuzzylite does not load; left out"
         )
@@ -531,7 +531,7 @@ def _question(
     where: tuple[int, FisEntry],
     dialect: Dialect,
     notes: ReaderNotes,
-) -> Is | None:
+) -> Proposition | None:
     """Return the proposition on an input; None if there is none."""
     if code == 0.0:
         return None
@@ -541,11 +541,11 @@ def _question(
     hedges = _hedges(words.FIS_HEDGES[dialect], result, (variable.name, where), notes)
     if not result.place:
         if hedges[-1:] == ("any",):
-            return Is(variable.name, None, hedges)
+            return Proposition(variable.name, (), hedges)
         what = f"rule {where[0]}: a hedge of no term of {variable.name!r}"
         notes.mistake((where[1].line, 1), what)
         return None
-    return Is(variable.name, variable.terms[result.place - 1].name, hedges)
+    return Proposition(variable.name, (variable.terms[result.place - 1].name,), hedges)
 
 
 def _conclusion(

@@ -442,10 +442,7 @@ def _compare(
         return
     for output in outputs:
         concluded = [
-            one.label
-            for r in block.rules
-            for one in r.then
-            if one.output == output.name
+            one.term for r in block.rules for one in r.then if one.output == output.name
         ]
         if len(set(concluded)) < len(concluded):
             notes.remark(

@@ -31,7 +31,7 @@ from fuzzytree.semantics import value_at
 def differences(system: FuzzySystem) -> Iterator[str]:
     """Yield where fuzzylite 6 and pyfuzzylite 8 mean other things by a file."""
     counts = Counter(
-        (one.output, one.label) for rule in system.rules for one in rule.then
+        (one.output, one.term) for rule in system.rules for one in rule.then
     )
     for output in system.outputs:
         yield from constant_degrees(output)

@@ -43,10 +43,10 @@ from fuzzytree.model import (
     Condition,
     Defuzzifier,
     FuzzySystem,
-    Is,
     Not,
     Or,
     Points,
+    Proposition,
     Reading,
     RuleBlock,
     Singleton,
@@ -470,7 +470,7 @@ def _without_disabled(
     outputs = [one.name for one in kept if one.is_output]
     if not off or not outputs:
         return kept, kept_blocks
-    never = Is(outputs[0], None, ("not", "any"))
+    never = Proposition(outputs[0], (), ("not", "any"))
     return kept, [_without(one, off, never, notes) for one in kept_blocks]
 
 
@@ -497,7 +497,7 @@ def _condition_without(
     condition: Condition, off: Collection[str], never: Condition
 ) -> Condition:
     match condition:
-        case Is(variable=variable):
+        case Proposition(variable=variable):
             return never if variable in off else condition
         case And(parts=parts):
             return And(tuple(_condition_without(part, off, never) for part in parts))

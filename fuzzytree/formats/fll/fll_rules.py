@@ -21,8 +21,8 @@ from fuzzytree.model import (
     Conclusion,
     Condition,
     Hedge,
-    Is,
     Or,
+    Proposition,
     SystemRule,
     name_choice,
 )
@@ -93,9 +93,7 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
     while not then or rule.words[place].text == "and":
         proposition, place = _statement(rule, place + 1, concludes=True)
         then.append(
-            Conclusion(
-                proposition.variable, proposition.label or "", proposition.hedges
-            )
+            Conclusion(proposition.variable, proposition.term or "", proposition.hedges)
         )
     weight = 1.0
     if rule.words[place].text == "with":
@@ -104,7 +102,9 @@ def read_rule(words: Sequence[Word], end: Word, vocabulary: Vocabulary) -> Syste
         raise rule.error(place, "'and', 'with' or the end")
     if rule.mistakes:
         raise PartError(*rule.mistakes)
-    always = isinstance(read.condition, Is) and read.condition.hedges == ("any",)
+    always = isinstance(read.condition, Proposition) and read.condition.hedges == (
+        "any",
+    )
     return SystemRule(None if always else read.condition, tuple(then), weight)
 
 
@@ -158,7 +158,9 @@ def _single(rule: _Rule, place: int, level: int) -> _Read:
     return _Read(inner.condition, inner.end + 1, inner.depth)
 
 
-def _statement(rule: _Rule, place: int, *, concludes: bool = False) -> tuple[Is, int]:
+def _statement(
+    rule: _Rule, place: int, *, concludes: bool = False
+) -> tuple[Proposition, int]:
     """Read `variable is hedge ... term`, without a term behind the hedge `any`."""
     variable = _variable(rule, place, concludes=concludes)
     place += 1
@@ -170,8 +172,10 @@ def _statement(rule: _Rule, place: int, *, concludes: bool = False) -> tuple[Is,
         hedges.append(FLL_HEDGES[rule.words[place].text])
         place += 1
         if hedges[-1] == "any" and not concludes:
-            return Is(variable.name, None, tuple(hedges)), place
-    return Is(variable.name, _term(rule, place, variable), tuple(hedges)), place + 1
+            return Proposition(variable.name, (), tuple(hedges)), place
+    return Proposition(
+        variable.name, (_term(rule, place, variable),), tuple(hedges)
+    ), place + 1
 
 
 def _variable(rule: _Rule, place: int, *, concludes: bool) -> FllVariable:

@@ -16,9 +16,9 @@ from fuzzytree.model import (
     Conclusion,
     Condition,
     Hedge,
-    Is,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     SNorm,
     SystemOutput,
@@ -275,10 +275,10 @@ def _question(
     hedges = _modifier(clause, notes)
     antecedent = _condition_of(named, about, notes, 0)
     if hedges == ("any",):
-        return Is(named[0], None, ("any",))
+        return Proposition(named[0], (), ("any",))
     match antecedent:
-        case Is(variable=variable, label=label, hedges=before):
-            return Is(variable, label, (*hedges, *before))
+        case Proposition(hedges=before):
+            return msgspec.structs.replace(antecedent, hedges=(*hedges, *before))
         case None:
             return None
         case _ if hedges == ("not",):
@@ -300,7 +300,7 @@ def _condition_of(
     if definition is None:
         label = variables.labels[named[0]][named[1]]
         hedges: tuple[Hedge, ...] = ("not",) if named in variables.negated else ()
-        return Is(named[0], label, hedges)
+        return Proposition(named[0], (label,), hedges)
     variables.spent.append(None)
     if level > _MOST_LEVELS or len(variables.spent) > _MOST_DEFINITIONS:
         what = f"the term {named[1]!r} is made of too many others, or of itself"
@@ -345,8 +345,8 @@ def _joined(
             return None
         result = _condition_of((variable, element.text), about, notes, level + 1)
         is_not = element.attributes.get("complement", "false").lower() == "true"
-        if is_not and isinstance(result, Is):
-            return Is(variable, result.label, ("not", *result.hedges))
+        if is_not and isinstance(result, Proposition):
+            return Proposition(variable, result.terms, ("not", *result.hedges))
         return Not(result) if is_not and result is not None else result
     if element.name not in ("and", "or"):
         notes.mistake(

@@ -16,7 +16,16 @@ from typing import Final, get_args
 
 import msgspec
 
-from fuzzytree.model import MOST_LEVELS, And, Conclusion, Condition, Hedge, Is, Not, Or
+from fuzzytree.model import (
+    MOST_LEVELS,
+    And,
+    Conclusion,
+    Condition,
+    Hedge,
+    Not,
+    Or,
+    Proposition,
+)
 
 ALWAYS: Final = "always"
 HEDGES: Final[Mapping[str, Hedge]] = {
@@ -63,7 +72,7 @@ def parse_condition(text: str) -> Condition | None:
 
     Example:
         >>> parse_condition("speed is not very high")
-        Is(variable='speed', label='high', hedges=('not', 'very'))
+        Proposition(variable='speed', terms=('high',), hedges=('not', 'very'))
     """
     sentence = _Sentence(text)
     if [token.text for token in sentence.tokens] == [ALWAYS, ""]:
@@ -81,7 +90,7 @@ def parse_conclusions(text: str) -> tuple[Conclusion, ...]:
 
     Example:
         >>> parse_conclusions("power is high and fan is off")[1]
-        Conclusion(output='fan', label='off', hedges=())
+        Conclusion(output='fan', term='off', hedges=())
     """
     sentence = _Sentence(text)
     results = [sentence.conclusion()]
@@ -95,13 +104,14 @@ def condition_text(condition: Condition | None) -> str:
     """Return the sentence of a condition; `parse_condition` gives back an equal one.
 
     Example:
-        >>> condition_text(And((Is("wall", "near"), Is("is it", "so", ("very",)))))
+        >>> condition_text(And((Proposition("wall", ("near",)),
+        ...     Proposition("is it", ("so",), ("very",)))))
         'wall is near and "is it" is very so'
     """
     match condition:
         case None:
             return ALWAYS
-        case Is(variable=variable, label=label, hedges=hedges):
+        case Proposition(variable=variable, term=label, hedges=hedges):
             return _proposition(variable, label, hedges)
         case Not(part=part):
             return f"not ({condition_text(part)})"
@@ -122,7 +132,7 @@ def condition_text(condition: Condition | None) -> str:
 def conclusions_text(conclusions: tuple[Conclusion, ...]) -> str:
     """Return the sentence of conclusions; `parse_conclusions` reads it."""
     return " and ".join(
-        _proposition(one.output, one.label, one.hedges) for one in conclusions
+        _proposition(one.output, one.term, one.hedges) for one in conclusions
     )
 
 
@@ -214,13 +224,13 @@ class _Sentence:
         self.place += 1
         return result if kind is None else kind((result,))
 
-    def question(self) -> Is:
+    def question(self) -> Proposition:
         """Read `variable is hedge ... term`."""
         variable, hedges = self.proposition()
         has_label = self.next.kind == "quoted" or self.next.is_of_a_name
         if hedges and hedges[-1] == "any" and not has_label:
-            return Is(variable, None, hedges)
-        return Is(variable, self.name("a term"), hedges)
+            return Proposition(variable, (), hedges)
+        return Proposition(variable, (self.name("a term"),), hedges)
 
     def conclusion(self) -> Conclusion:
         """Read `output is hedge ... term`."""

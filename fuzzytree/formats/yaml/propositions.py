@@ -60,7 +60,7 @@ def readings(text: str, vocabulary: Vocabulary) -> tuple[Proposition, ...]:
 
     Example:
         >>> readings("grip is not firm", {"grip": words(["soft", "firm"])})
-        (Proposition(variable='grip', terms=('firm',), negated=True),)
+        (Proposition(variable='grip', terms=('firm',), hedges=('not',)),)
     """
     results: list[Proposition] = []
     end = text.find(_IS)
@@ -73,7 +73,7 @@ def readings(text: str, vocabulary: Vocabulary) -> tuple[Proposition, ...]:
             if rest.startswith(_NOT):
                 lists = _lists(rest[len(_NOT) :], known)
                 results += [
-                    Proposition(variable, terms, negated=True) for terms in lists
+                    Proposition(variable, terms, hedges=("not",)) for terms in lists
                 ]
         end = text.find(_IS, end + 1)
     return tuple(results[:2])
@@ -92,7 +92,9 @@ def guess(text: str, vocabulary: Vocabulary) -> Proposition | None:
     rest = text[best + len(_IS) :]
     negated = rest.startswith(_NOT)
     terms = rest[len(_NOT) :] if negated else rest
-    return Proposition(text[:best], tuple(terms.split(_OR)), negated)
+    return Proposition(
+        text[:best], tuple(terms.split(_OR)), ("not",) if negated else ()
+    )
 
 
 def _lists(text: str, known: TermWords) -> list[tuple[str, ...]]:
@@ -157,7 +159,9 @@ def _proposition(
     """Return a proposition, or why the sentence cannot be one."""
     if isinstance(value, layout.WrittenOut):
         terms = value.is_ if value.is_ is not None else value.is_not or ()
-        return Proposition(value.variable, terms, negated=value.is_ is None)
+        return Proposition(
+            value.variable, terms, hedges=("not",) if value.is_ is None else ()
+        )
     result = readings(value, vocabulary)
     if len(result) == 1:
         return result[0]
@@ -184,8 +188,8 @@ def joined(join: type[And] | type[Or], left: Condition, right: Condition) -> Con
     """Return two conditions joined, without parentheses that change only rounding.
 
     Example:
-        >>> from fuzzytree.model import Is
-        >>> a, b, c = (Is("force", term) for term in "abc")
+        >>> from fuzzytree.model import Proposition
+        >>> a, b, c = (Proposition("force", (term,)) for term in "abc")
         >>> joined(Or, a, joined(Or, b, c)) == Or((a, b, c))
         True
     """

@@ -21,7 +21,6 @@ from fuzzytree.model import (
     And,
     Condition,
     FuzzySystem,
-    Is,
     Kind,
     Not,
     Or,
@@ -312,7 +311,7 @@ def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
         Proposition(
             variables[_place(place)].name,
             tuple(variables[place].terms[_place(k)].name for k in terms),
-            negated,
+            ("not",) if negated else (),
         )
         for place, terms, negated in facts.propositions
     ]
@@ -359,7 +358,7 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
     semantics = Semantics("product" if is_product else "minimum", uncovered)
     try:
         rules = tuple(
-            Rule(tuple(_propositions(rule.when)), rule.then[0].label)
+            Rule(tuple(_propositions(rule.when)), rule.then[0].term)
             for rule in block.rules
         )
         result = RuleBase(system.name, classes, variables, rules, semantics)
@@ -381,11 +380,13 @@ def _propositions(condition: Condition | None) -> Iterator[Proposition]:
         case And(parts=parts):
             for part in parts:
                 yield from _propositions(part)
-        case Is(variable=variable, label=str(label), hedges=() | ("not",) as hedges):
-            yield Proposition(variable, (label,), bool(hedges))
+        case Proposition(
+            variable=variable, term=str(label), hedges=() | ("not",) as hedges
+        ):
+            yield Proposition(variable, (label,), ("not",) if bool(hedges) else ())
         case Not(part=part):
             (whole,) = _propositions(part)
-            yield replace(whole, negated=not whole.negated)
+            yield replace(whole, hedges=() if whole.negated else ("not",))
         case Or(parts=parts):
             inner = [
                 proposition for part in parts for proposition in _propositions(part)
@@ -432,7 +433,7 @@ def _plain(system: FuzzySystem, *, has_default: bool) -> object:
             (
                 flat.condition(rule.when),
                 [
-                    (places[c.output], labels[c.output][c.label], c.hedges)
+                    (places[c.output], labels[c.output][c.term], c.hedges)
                     for c in rule.then
                 ],
                 rule.weight,
@@ -463,10 +464,10 @@ class _Flat:
         match one:
             case None:
                 return ()
-            case Is(variable=variable, label=label, hedges=hedges):
+            case Proposition(variable=variable, term=label, hedges=hedges):
                 place = None if label is None else self.labels[variable][label]
                 return ("is", self.places[variable], place, hedges)
-            case Not(part=Is() as part):
+            case Not(part=Proposition() as part):
                 return self.condition(replace(part, hedges=("not", *part.hedges)))
             case Not(part=part):
                 return ("not", self.condition(part))

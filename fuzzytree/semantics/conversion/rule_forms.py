@@ -21,10 +21,10 @@ from fuzzytree.model import (
     Curve,
     FuzzySystem,
     Hedge,
-    Is,
     Loss,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     SystemRule,
     questions,
@@ -44,7 +44,7 @@ def joined_outputs(system: FuzzySystem) -> frozenset[str]:
         >>> joined_outputs(as_system(rules_from_tree(random_tree(0))))
         frozenset()
     """
-    counts = Counter((one.output, one.label) for r in system.rules for one in r.then)
+    counts = Counter((one.output, one.term) for r in system.rules for one in r.then)
     several = {output for (output, _), count in counts.items() if count > 1}
     several |= {
         proposition.variable for r in system.rules for proposition in questions(r.when)
@@ -77,7 +77,7 @@ def joined_by_number(system: FuzzySystem) -> FuzzySystem:
             replace(
                 rule,
                 then=tuple(
-                    replace(one, label=first.get((one.output, one.label), one.label))
+                    replace(one, term=first.get((one.output, one.term), one.term))
                     for one in rule.then
                 ),
             )
@@ -93,7 +93,7 @@ def number_losses(system: FuzzySystem) -> Iterator[Loss]:
     joined = joined_by_number(system)
     for output in system.outputs:
         changed = {
-            one.label: other.label
+            one.term: other.term
             for rule, after in zip(system.rules, joined.rules, strict=True)
             for one, other in zip(rule.then, after.then, strict=True)
             if one.output == output.name and one != other
@@ -134,7 +134,8 @@ def split(
 
     Example:
         >>> from fuzzytree.model import Conclusion
-        >>> both = And((Is("a", "x"), Or((Is("b", "y"), Is("c", "z")))))
+        >>> a, b, c = (Proposition(name, ("x",)) for name in "abc")
+        >>> both = And((a, Or((b, c))))
         >>> [len(one.parts) for one in alternatives(both)]
         [2, 2]
     """
@@ -168,9 +169,9 @@ def alternatives(condition: Condition) -> list[And]:
 def _alternatives(condition: Condition, nots: int) -> list[tuple[Condition, ...]]:
     """Return the alternatives of a condition that stands in a number of nots."""
     match condition:
-        case Is(variable=variable, label=label, hedges=hedges):
+        case Proposition(hedges=hedges):
             outer: list[Hedge] = ["not" for _ in range(nots)]
-            return [(Is(variable, label, (*outer, *hedges)),)]
+            return [(replace(condition, hedges=(*outer, *hedges)),)]
         case Not(part=part):
             return _alternatives(part, nots + 1)
         case And(parts=parts) | Or(parts=parts):

@@ -46,7 +46,6 @@ from fuzzytree.model import (
     Defuzzifier,
     Formula,
     FuzzySystem,
-    Is,
     Linear,
     Loss,
     Not,
@@ -305,12 +304,12 @@ def _with_tautology(
     summed = {part.input for one in inputs for part in one.parts}
     first = next(one for one in inputs if one.terms or one.name not in summed)
     if always == "any":
-        return inputs, Is(first.name, None, ("any",))
+        return inputs, Proposition(first.name, (), ("any",))
     name = unlike("always", {label.name for label in first.terms})
     label = Term(name, _EVERYWHERE)
     changed = replace(first, terms=(*first.terms, label))
-    return tuple(changed if one is first else one for one in inputs), Is(
-        first.name, name
+    return tuple(changed if one is first else one for one in inputs), Proposition(
+        first.name, (name,)
     )
 
 
@@ -339,11 +338,11 @@ def _proposition(
     """Return what a proposition becomes: conditions that are joined by AND."""
     variable, terms = proposition.variable, proposition.terms
     if not proposition.negated:
-        propositions = tuple(Is(variable, term) for term in terms)
+        propositions = tuple(Proposition(variable, (term,)) for term in terms)
         return propositions if len(propositions) == 1 else (Or(propositions),)
     if len(terms) == 1 or not is_product:  # 1 - max = min of 1 - each, exactly
-        return tuple(Is(variable, term, ("not",)) for term in terms)
-    return (Not(Or(tuple(Is(variable, term) for term in terms))),)
+        return tuple(Proposition(variable, (term,), ("not",)) for term in terms)
+    return (Not(Or(tuple(Proposition(variable, (term,)) for term in terms))),)
 
 
 def _class_output(rules: RuleBase, taken: list[str]) -> SystemOutput:

@@ -27,10 +27,10 @@ from fuzzytree.model import (
     Condition,
     Formula,
     FuzzySystem,
-    Is,
     Linear,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     Singleton,
     SNorm,
@@ -100,7 +100,7 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
         ...     "washer", (Variable("dirt", (dirty,)),),
         ...     (SystemOutput("time", (long,), None, None,
         ...                   Defuzzifier("weighted sum")),),
-        ...     (RuleBlock((SystemRule(Is("dirt", "dirty"),
+        ...     (RuleBlock((SystemRule(Proposition("dirt", ("dirty",)),
         ...                            (Conclusion("time", "long"),)),)),),
         ... )
         >>> infer(system, {"dirt": 5.0}).outputs
@@ -223,7 +223,7 @@ class _Run:
 
     def _degree(self, condition: Condition, block: RuleBlock) -> float:
         match condition:
-            case Is():
+            case Proposition():
                 return self._proposition(condition)
             case And(parts=parts):
                 degrees = [self._degree(part, block) for part in parts]
@@ -234,13 +234,13 @@ class _Run:
             case Not(part=part):
                 return 1.0 - self._degree(part, block)
 
-    def _proposition(self, proposition: Is) -> float:
-        if proposition.label is None:
+    def _proposition(self, proposition: Proposition) -> float:
+        if proposition.term is None:
             degree = math.nan  # the hedge `any` makes 1 of it
         elif proposition.variable in self.outputs:
-            degree = self._so_far(self.outputs[proposition.variable], proposition.label)
+            degree = self._so_far(self.outputs[proposition.variable], proposition.term)
         else:
-            key = proposition.variable, proposition.label  # an input keeps its value
+            key = proposition.variable, proposition.term  # an input keeps its value
             if key not in self.degrees:
                 value = self.values[proposition.variable]
                 self.degrees[key] = self._label_degree(*key, value)
@@ -255,7 +255,7 @@ class _Run:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
         join = _or(output.aggregation or "sum")
         degrees = [
-            one.degree for one in self._of(output) if one.conclusion.label == label
+            one.degree for one in self._of(output) if one.conclusion.term == label
         ]
         return _folded(join, [0.0, *degrees])
 
@@ -299,7 +299,7 @@ class _Run:
         total = [0.0] * len(xs)
         for one in self._of(output):
             cut = _and(one.implication)
-            label = self.labels[output.name, one.conclusion.label]
+            label = self.labels[output.name, one.conclusion.term]
             if isinstance(label.function, Formula):
                 degrees = [self._label_degree(output.name, label.name, x) for x in xs]
             else:
@@ -314,7 +314,7 @@ class _Run:
         In a piece, `share` is 0 at its left end and 1 at its right end. Both sums are
         twice what they are called.
         """
-        known = {one.conclusion.label for one in self._of(output)}
+        known = {one.conclusion.term for one in self._of(output)}
         labels = [label for label in output.terms if label.name in known]
         cuts = [
             (self._so_far(output, label.name), line_tables(output, label))
@@ -359,9 +359,9 @@ class _Run:
         """Yield labels and degrees: each conclusion's, or each label's if joined."""
         if output.aggregation is None:
             for one in self._of(output):
-                yield self.labels[output.name, one.conclusion.label], one.degree
+                yield self.labels[output.name, one.conclusion.term], one.degree
             return
-        known = {one.conclusion.label for one in self._of(output)}
+        known = {one.conclusion.term for one in self._of(output)}
         for label in output.terms:
             if label.name in known:
                 yield label, self._so_far(output, label.name)
@@ -417,7 +417,7 @@ def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, Term]]:
     A rule that concludes such a term changes no answer. Terms with a formula are left
     out.
     """
-    concluded = {(one.output, one.label) for rule in system.rules for one in rule.then}
+    concluded = {(one.output, one.term) for rule in system.rules for one in rule.then}
     for output in system.outputs:
         if output.defuzzifier.is_weighted:
             continue

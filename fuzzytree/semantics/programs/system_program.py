@@ -24,11 +24,11 @@ from fuzzytree.model import (
     Condition,
     Formula,
     FuzzySystem,
-    Is,
     Linear,
     Norm,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -84,7 +84,7 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
         ...     "washer", (Variable("dirt", (dirty,)),),
         ...     (SystemOutput("time", (long,), None, None,
         ...                   Defuzzifier("weighted sum")),),
-        ...     (RuleBlock((SystemRule(Is("dirt", "dirty"),
+        ...     (RuleBlock((SystemRule(Proposition("dirt", ("dirty",)),
         ...                            (Conclusion("time", "long"),)),)),),
         ... )
         >>> evaluate_program(from_system(system), {"dirt": 5.0}).of("output")
@@ -193,7 +193,7 @@ class _Run:
             name: {} for name in self.outputs
         }
         self.units: set[Place] = {make.constant(0.0), make.constant(1.0)}
-        self.propositions: dict[Is, Place] = {}
+        self.propositions: dict[Proposition, Place] = {}
         self.degrees: dict[tuple[str, str, Place], Place] = {}
 
     def activate(self, block: RuleBlock) -> None:
@@ -272,7 +272,7 @@ class _Run:
 
     def _degree(self, condition: Condition, block: RuleBlock) -> Place:
         match condition:
-            case Is():
+            case Proposition():
                 return self._proposition(condition)
             case And(parts=parts):
                 both = block.conjunction or "minimum"
@@ -296,22 +296,22 @@ class _Run:
             total = joined
         return total
 
-    def _proposition(self, proposition: Is) -> Place:
+    def _proposition(self, proposition: Proposition) -> Place:
         if proposition in self.propositions:
             return self.propositions[proposition]
-        if proposition.label is None:
+        if proposition.term is None:
             degree = self.make.constant(math.nan)  # the hedge `any` makes 1 of it
         elif proposition.variable in self.outputs:
-            degree = self._so_far(self.outputs[proposition.variable], proposition.label)
+            degree = self._so_far(self.outputs[proposition.variable], proposition.term)
         else:
-            label = self.labels[proposition.variable, proposition.label]
+            label = self.labels[proposition.variable, proposition.term]
             value = self.values[proposition.variable]
             degree = self._label_degree(proposition.variable, label, value)
         words = (
             proposition.variable,
             "is",
             *proposition.hedges,
-            proposition.label or "",
+            proposition.term or "",
         )
         with self.make.topic(" ".join(words)):
             result = hedged(self.make, proposition.hedges, degree)
@@ -371,7 +371,7 @@ class _Run:
                 noted = make.where(is_active, self._positive(degree), zero)
                 self._unit(noted, if_all=[degree])
             how = block.implication or "minimum"
-            self.concluded[one.output][rule, offset] = _Concluded(one.label, noted, how)
+            self.concluded[one.output][rule, offset] = _Concluded(one.term, noted, how)
 
     def number(self, output: SystemOutput) -> Place:
         """Return what an output's conclusions amount to; NaN if to nothing."""

@@ -221,8 +221,8 @@ def test_a_class_that_is_called_otherwise_is_one_breaking_change() -> None:
 
 def test_rules_are_matched_by_what_they_say() -> None:
     old = grip()
-    extra = Rule((Proposition("slip", ("wet",), negated=True),), "hold")
-    proposition = Proposition("slip", ("wet",), negated=True)
+    extra = Rule((Proposition("slip", ("wet",), hedges=("not",)),), "hold")
+    proposition = Proposition("slip", ("wet",), hedges=("not",))
     changed = replace(old.rules[0], when=(old.rules[0].when[0], proposition))
     new = replace(old, rules=(extra, old.rules[1], changed))
     found = results(old, new)

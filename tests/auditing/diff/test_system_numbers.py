@@ -35,10 +35,10 @@ from fuzzytree.model import (
     FuzzySystem,
     Gaussian,
     Hedge,
-    Is,
     Linear,
     Not,
     Or,
+    Proposition,
     RuleBlock,
     Singleton,
     SNorm,
@@ -74,9 +74,12 @@ def tipper(
     values = {"low": 5.0, "middle": 12.5, "high": 25.0, **numbers}
     labels = tuple(Term(name, Singleton(value)) for name, value in values.items())
     rules = (
-        rule(Is("food", "bad"), "low"),
-        rule(And((Is("food", "good"), Is("service", "good"))), "high"),
-        rule(Is("service", "bad"), "middle"),
+        rule(Proposition("food", ("bad",)), "low"),
+        rule(
+            And((Proposition("food", ("good",)), Proposition("service", ("good",)))),
+            "high",
+        ),
+        rule(Proposition("service", ("bad",)), "middle"),
     )
     usual = [
         Variable(name, (bad, good), low=0.0, high=10.0) for name in ("food", "service")
@@ -108,7 +111,7 @@ ONE, TWO, THREE = tipper().blocks[0].rules
 def test_what_no_number_depends_on_leaves_the_operations_the_same() -> None:
     system = tipper()
     other = with_rules(system, ONE, replace(TWO, name="second"), THREE)
-    never = rule(Is("food", "bad"), "high", weight=0.0)
+    never = rule(Proposition("food", ("bad",)), "high", weight=0.0)
     other = with_rules(other, *other.blocks[0].rules, never)
     wide = replace(other.inputs[0], unit="points", high=11.0)
     service = replace(other.inputs[1], terms=other.inputs[1].terms[::-1])
@@ -232,7 +235,9 @@ def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
     sliver = Term("sliver", Trapezoid(5.0, 5.0 + 1e-12, 5.0 + 2e-12, 5.0 + 3e-12))
     food = replace(tipper().inputs[0], terms=(*tipper().inputs[0].terms, sliver))
     old = tipper(inputs=(food, tipper().inputs[1]), outputs=(output,))
-    new = with_rules(old, ONE, TWO, THREE, rule(Is("food", "sliver"), "top"))
+    new = with_rules(
+        old, ONE, TWO, THREE, rule(Proposition("food", ("sliver",)), "top")
+    )
     found = results(old, new)
     assert found.verdict in ("open", "changed")
     assert any(
@@ -328,9 +333,9 @@ def made(chance: random.Random) -> FuzzySystem:
         clips=chance.random() < 0.2,
     )
 
-    def queries() -> Is:
+    def queries() -> Proposition:
         hedges: tuple[Hedge, ...] = chance.choice([(), (), ("not",), ("very",)])
-        return Is(chance.choice("ab"), f"t{chance.randrange(3)}", hedges)
+        return Proposition(chance.choice("ab"), (f"t{chance.randrange(3)}",), hedges)
 
     def condition() -> Condition:
         kind = chance.randrange(4)

@@ -106,7 +106,7 @@ def _propositions(
 
     found = [Proposition(name, (term(),))]
     if chance.random() < odd:
-        found[0] = Proposition(name, (term(),), negated=True)
+        found[0] = Proposition(name, (term(),), hedges=("not",))
     if chance.random() < odd:
         found.append(Proposition(name, tuple({term(): None, term(): None})))
     return found

@@ -56,7 +56,9 @@ def pair(seed: int) -> tuple[RuleBase, RuleBase]:
     def rule() -> Rule:
         when = [
             Proposition(
-                name, tuple(chance.sample(["t0", "t1", "t2"], 2)), chance.random() < 0.2
+                name,
+                tuple(chance.sample(["t0", "t1", "t2"], 2)),
+                ("not",) if chance.random() < 0.2 else (),
             )
             for name in ("x", "y")
             if chance.random() < 0.8

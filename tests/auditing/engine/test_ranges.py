@@ -63,7 +63,7 @@ def test_a_cell_without_width_is_its_point() -> None:
 
 def test_a_negated_choice_is_enclosed() -> None:
     shapes = {("x", "a"): SHAPES[-1], ("x", "b"): SHAPES[-2]}
-    proposition = Proposition("x", ("a", "b"), negated=True)
+    proposition = Proposition("x", ("a", "b"), hedges=("not",))
     edges = np.linspace(0.0, 1.0, 9)
     _, cells = proposition_ranges(proposition, shapes, edges)
     for number, (a, b) in enumerate(itertools.pairwise(edges)):

@@ -271,7 +271,7 @@ def test_rivals_that_stay_at_a_level_are_seen_where_levels_are_near() -> None:
             Rule((on_x,), "b"),
             Rule((on_y,), "c"),
             Rule((Proposition("y", ("dip",)),), "c"),
-            Rule((Proposition("x", ("level",), negated=True),), "a"),
+            Rule((Proposition("x", ("level",), hedges=("not",)),), "a"),
         ),
     )
     box = Domain((DomainSide("x", 0.0, 2.0), DomainSide("y", 0.25, 3.75)))

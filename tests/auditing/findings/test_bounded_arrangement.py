@@ -36,7 +36,6 @@ from fuzzytree.model import (
     FuzzySystem,
     Gaussian,
     Hedge,
-    Is,
     Not,
     Or,
     Points,
@@ -59,8 +58,9 @@ from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.semantics.inference import infer
 from tests.auditing.findings.grids import check_on_grid
 
-A, B = Is("a", "low"), Is("b", "low")
-A_HIGH, B_HIGH = Is("a", "high"), Is("b", "high")
+A, B = Proposition("a", ("low",)), Proposition("b", ("low",))
+A_HIGH, B_HIGH = Proposition("a", ("high",)), Proposition("b", ("high",))
+FLAT_A, LATE_B = Proposition("a", ("flat",)), Proposition("b", ("late",))
 ROUNDING = 1e-12
 NORMS = ("minimum", pytest.param("product", marks=pytest.mark.heavy))
 LOW, HIGH = Gaussian(0.0, 1.0), Gaussian(4.0, 1.0)
@@ -191,7 +191,7 @@ def test_a_weight_on_a_curve_without_points_is_declined() -> None:
 
 def test_a_term_that_has_the_name_of_a_weighted_one_stays_itself() -> None:
     ramp, other = Points((0.0, 4.0), (0.0, 1.0)), Points((0.0, 4.0), (1.0, 0.0))
-    rules: Rules = ((A, "big", 0.5), (Is("a", "low x 0.5"), "big", 1.0))
+    rules: Rules = ((A, "big", 0.5), (Proposition("a", ("low x 0.5",)), "big", 1.0))
     others: dict[str, Curve] = {"low x 0.5": other}
     system = system_of(rules, norm="minimum", low=ramp, high=HIGH, **others)
     found = view(system, domain_of(system))
@@ -227,8 +227,11 @@ HEDGES: tuple[Hedge, ...] = (
     ],
 )
 def test_hedged_propositions_are_as_strong_as_those_of_the_system(curve: Curve) -> None:
-    queries = [Is("a", "low", (hedge,)) for hedge in HEDGES]
-    queries += [Is("a", "low", ("not", "very")), Is("a", "low", ("very", "not"))]
+    queries = [Proposition("a", ("low",), (hedge,)) for hedge in HEDGES]
+    queries += [
+        Proposition("a", ("low",), ("not", "very")),
+        Proposition("a", ("low",), ("very", "not")),
+    ]
     rules = tuple((one, "big", 0.5) for one in queries)
     system = system_of(rules, low=curve)
     found = view(system, domain_of(system))
@@ -247,7 +250,10 @@ def test_hedged_propositions_are_as_strong_as_those_of_the_system(curve: Curve) 
 
 
 def test_hedged_terms_are_named_and_used_but_are_no_terms_of_the_system() -> None:
-    rules: Rules = ((Is("a", "low", ("very",)), "soft", 1.0), (A, "soft", 1.0))
+    rules: Rules = (
+        (Proposition("a", ("low",), ("very",)), "soft", 1.0),
+        (A, "soft", 1.0),
+    )
     others: dict[str, Curve] = {"very low": FLAT}
     system = system_of(rules, norm="minimum", low=LOW, high=HIGH, **others)
     seen = view(system, domain_of(system))
@@ -268,11 +274,11 @@ LATE = SCurve(4.0, 6.0)  # 0 on all of the domain
 @pytest.mark.parametrize(
     ("code", "rule", "begins"),
     [
-        ("FT101", (And((A, Is("b", "late"))), "hard", 1.0), "rule 4 never fires"),
+        ("FT101", (And((A, LATE_B)), "hard", 1.0), "rule 4 never fires"),
         ("FT104", (And((A, B_HIGH)), "soft", 1.0), "rule 4 is subsumed by rule 1"),
         ("FT104", (And((A, Not(B))), "soft", 0.75), "rule 4 is subsumed by rule 1"),
         ("FT106", (A_HIGH, "hard", 1.0), "rule 2 and rule 4 have the same antecedent"),
-        ("FT201", (Is("a", "flat"), "hard", 1.0), "rule 1 and rule 4 conflict"),
+        ("FT201", (FLAT_A, "hard", 1.0), "rule 1 and rule 4 conflict"),
         ("FT401", None, "term 'late' of 'a' is empty"),
     ],
 )  # fmt: skip
@@ -346,7 +352,11 @@ def test_a_proposition_that_two_rules_share_is_one_degree_in_both() -> None:
         "rule 4 is subsumed by rule 1: wherever it fires, rule 1 of the same "
         "conclusion is at least as strong"
     ]
-    near = (And((Is("a", "near"), B)), "soft", 1.0)  # a little below, at most 1e-4
+    near = (
+        And((Proposition("a", ("near",)), B)),
+        "soft",
+        1.0,
+    )  # a little below, at most 1e-4
     system = system_of((*CLEAN[:2], near), near=Gaussian(0.0, 0.9999))
     (rest,) = results(system, "FT104")
     assert rest.sentence == (

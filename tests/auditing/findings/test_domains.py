@@ -23,7 +23,6 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Name,
     Part,
     PiCurve,
@@ -121,7 +120,7 @@ def test_a_system_is_audited_on_its_ranges_and_curves() -> None:
         Variable("dirt", (Term("much", Gaussian(5.0, 1.0)),)),
         Variable("load", (), low=0.0, high=3.0),
     )
-    rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
+    rule = SystemRule(Proposition("dirt", ("much",)), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     assert domain_of(system).sides == (
         DomainSide("dirt", 2.0, 8.0, "curves"),
@@ -228,7 +227,7 @@ def test_every_curve_of_a_system_has_a_span(
     curve: Curve, low: float, high: float
 ) -> None:
     inputs = (Variable("dirt", (Term("much", curve),)),)
-    rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
+    rule = SystemRule(Proposition("dirt", ("much",)), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     found = side(system)
     assert (found.low, found.high) == pytest.approx((low, high))
@@ -237,7 +236,7 @@ def test_every_curve_of_a_system_has_a_span(
 def test_an_input_that_a_formula_may_name_needs_limits() -> None:
     label = Term("much", Formula(Name("load")))
     inputs = (Variable("dirt", (label,), low=0.0, high=1.0), Variable("load", ()))
-    rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
+    rule = SystemRule(Proposition("dirt", ("much",)), (Conclusion("power", "on"),))
     system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     with pytest.raises(ValueError, match="input 'load' has neither a range nor"):
         domain_of(system)

@@ -26,7 +26,6 @@ from fuzzytree.model import (
     Document,
     FuzzySystem,
     FuzzyTree,
-    Is,
     Points,
     Proposition,
     Rule,
@@ -209,7 +208,7 @@ def system(
     high = Term("high", Trapezoid(1.5, 3.0, 4.0, None))
     entries = (("low", "weak", 1.0), ("high", "strong", 1.0), *others)
     rules = tuple(
-        SystemRule(Is("force", term), (Conclusion("grip", then),), weight)
+        SystemRule(Proposition("force", (term,)), (Conclusion("grip", then),), weight)
         for term, then, weight in entries
     )
     ends = Term("weak", Singleton(0.0)), Term("strong", Singleton(1.0))

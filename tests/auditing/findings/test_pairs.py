@@ -22,15 +22,18 @@ from fuzzytree.auditing.findings.records import (
     AuditSettings,
 )
 from fuzzytree.auditing.findings.subject import Material
-from fuzzytree.model import Conclusion, Is, Or, RuleBlock, SystemRule
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    Conclusion,
     Conjunction,
+    Or,
     Part,
     Points,
     Proposition,
     Rule,
     RuleBase,
+    RuleBlock,
     Semantics,
+    SystemRule,
     Term,
     Variable,
 )
@@ -305,7 +308,12 @@ def test_curves_that_agree_on_the_domain_only_are_the_same() -> None:
 
 
 def test_two_ways_of_one_rule_are_no_pair() -> None:
-    system = system_of(block_of(Or((Is("a", "low"), Is("b", "low"))), Is("a", "high")))
+    system = system_of(
+        block_of(
+            Or((Proposition("a", ("low",)), Proposition("b", ("low",)))),
+            Proposition("a", ("high",)),
+        )
+    )
     (answer,) = audit(
         Material(system), selection=AuditSelection(select=["FT106"])
     ).answers
@@ -448,7 +456,7 @@ def test_only_conclusions_about_one_output_conflict(
     labels = (*power.terms, replace(power.terms[0], name="small"))
     outputs = tuple(replace(power, name=n, terms=labels) for n in ("power", "fan"))
     rules = tuple(
-        SystemRule(Is(name, "high"), (Conclusion(output, label),))
+        SystemRule(Proposition(name, ("high",)), (Conclusion(output, label),))
         for name, (output, label) in zip("ab", conclusions, strict=True)
     )
     empty = system_of(block_of(A_LOW))

@@ -23,14 +23,14 @@ from fuzzytree.auditing.findings.support import (
     wilson,
 )
 from fuzzytree.auditing.findings.views import view
-from fuzzytree.model import Is, SCurve
-from fuzzytree.model.contracts import Document
-from fuzzytree.model.rulebase import (
+from fuzzytree.model import (
+    Document,
     Part,
     Points,
     Proposition,
     Rule,
     RuleBase,
+    SCurve,
     Term,
     Variable,
 )
@@ -275,7 +275,7 @@ def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> No
     assert whole["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
     assert whole["uncovered rows"].is_finding
     assert "tied rows" not in whole
-    part = system_of(block_of(A_LOW, Is("power", "big")))
+    part = system_of(block_of(A_LOW, Proposition("power", ("big",))))
     found = queries(subject_of(part, AuditRows("pump", values)))
     assert "uncovered rows" not in found
     assert found["covered rows"].sentence == (

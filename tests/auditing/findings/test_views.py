@@ -23,11 +23,11 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Name,
     Not,
     Or,
     Points,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -49,8 +49,8 @@ LOW: Curve = Trapezoid(None, 0.0, 1.0, 3.0)
 HIGH: Curve = Trapezoid(1.0, 3.0, 4.0, None)
 ROUNDING = Fraction(1, 2**48)  # of a few products and sums of degrees
 THEN = (Conclusion("power", "big"),)
-A_LOW, A_HIGH = Is("a", "low"), Is("a", "high")
-B_LOW, B_HIGH = Is("b", "low"), Is("b", "high")
+A_LOW, A_HIGH = Proposition("a", ("low",)), Proposition("a", ("high",))
+B_LOW, B_HIGH = Proposition("b", ("low",)), Proposition("b", ("high",))
 
 
 def block_of(*conditions: Condition | None, **others: object) -> RuleBlock:
@@ -102,8 +102,8 @@ CONDITIONS: tuple[Condition | None, ...] = (
     And((A_LOW, Or((B_LOW, A_HIGH)))),
     Or((A_LOW, A_HIGH)),
     Or((And((A_LOW, B_LOW)), And((A_HIGH, B_HIGH)))),
-    Is("a", "low", ("not",)),
-    And((Is("a", None, ("any",)), Is("b", "low", ("not", "not")))),
+    Proposition("a", ("low",), ("not",)),
+    And((Proposition("a", (), ("any",)), Proposition("b", ("low",), ("not", "not")))),
     Not(Or((A_LOW, A_HIGH))),
 )
 UNDER_MINIMUM = (
@@ -155,9 +155,11 @@ DECLINING = {
     "rule 1 is left out: its 'or' is the algebraic sum, which has no exact "
     "method": block_of(Or((A_LOW, B_LOW)), disjunction="algebraic sum"),
     "rule 1 is left out: the hedge 'very' of 'any' has no exact method": block_of(
-        Is("a", None, ("not", "very", "any"))
+        Proposition("a", (), ("not", "very", "any"))
     ),
-    "rule 1 is left out: it uses the output 'power'": block_of(Is("power", "big")),
+    "rule 1 is left out: it uses the output 'power'": block_of(
+        Proposition("power", ("big",))
+    ),
     "rule 1 is left out: it negates a product, which has no exact method": block_of(
         Not(And((A_LOW, B_LOW))), And((A_LOW, B_LOW)), conjunction="product"
     ),
@@ -248,7 +250,7 @@ def test_a_height_is_carried_where_no_degree_is_rounded() -> None:
 
 
 def test_a_rule_that_cannot_fire_is_a_finding_and_leaves_nothing_open() -> None:
-    never = block_of(Is("a", None, ("not", "any")), A_LOW)
+    never = block_of(Proposition("a", (), ("not", "any")), A_LOW)
     off = RuleBlock((SystemRule(A_LOW, THEN, 0.0), SystemRule(A_HIGH, THEN)))
     for block, why in (
         (never, "its condition is never true"),
@@ -282,7 +284,7 @@ def test_an_activation_of_only_some_rules_is_reported() -> None:
 
 
 def test_without_one_exact_rule_there_are_no_rules() -> None:
-    found = view(system_of(block_of(Is("power", "big"))), BOX)
+    found = view(system_of(block_of(Proposition("power", ("big",)))), BOX)
     assert found.rules is None
     assert found.numbers == ()
 

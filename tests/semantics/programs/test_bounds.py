@@ -14,8 +14,8 @@ from fuzzytree.model import (
     DefuzzifierMethod,
     FuzzySystem,
     Gaussian,
-    Is,
     Points,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -104,8 +104,8 @@ def tank(
         "valve", labels, 0.0, 30.0, Defuzzifier(method, 20), "maximum", default=7.0
     )
     rules = (
-        SystemRule(Is("level", "low"), (Conclusion("valve", "open"),)),
-        SystemRule(Is("level", "high"), (Conclusion("valve", "shut"),)),
+        SystemRule(Proposition("level", ("low",)), (Conclusion("valve", "open"),)),
+        SystemRule(Proposition("level", ("high",)), (Conclusion("valve", "shut"),)),
     )
     block = RuleBlock(rules, implication="minimum")
     return FuzzySystem("tank", (level,), (output,), (block,))

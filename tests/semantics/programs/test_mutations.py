@@ -12,8 +12,8 @@ from fuzzytree.model import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
-    Is,
     Or,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -64,12 +64,17 @@ FOOD = Variable(
 def tipper(output: SystemOutput) -> FuzzySystem:
     rules = (
         SystemRule(
-            Or((Is("service", "poor"), Is("food", "rancid"))),
+            Or((Proposition("service", ("poor",)), Proposition("food", ("rancid",)))),
             (Conclusion("tip", "cheap"),),
         ),
-        SystemRule(Is("service", "good"), (Conclusion("tip", "average"),)),
+        SystemRule(Proposition("service", ("good",)), (Conclusion("tip", "average"),)),
         SystemRule(
-            Or((Is("service", "excellent"), Is("food", "delicious"))),
+            Or(
+                (
+                    Proposition("service", ("excellent",)),
+                    Proposition("food", ("delicious",)),
+                )
+            ),
             (Conclusion("tip", "generous"),),
         ),
     )

@@ -12,8 +12,8 @@ from fuzzytree.model import (
     Formula,
     FuzzySystem,
     Gaussian,
-    Is,
     Number,
+    Proposition,
     RuleBlock,
     Singleton,
     SystemOutput,
@@ -52,7 +52,7 @@ def a_system(
 ) -> FuzzySystem:
     """Return a system that concludes labels if x is up."""
     then = [(Conclusion("y", name),) for name in conclusions]
-    rules = tuple(SystemRule(Is("x", "up"), one) for one in then)
+    rules = tuple(SystemRule(Proposition("x", ("up",)), one) for one in then)
     kept = replace(block or RuleBlock(()), rules=rules, implication="minimum")
     return FuzzySystem("test", (Variable("x", (RAMP,)),), (output,), (kept,))
 
@@ -77,8 +77,8 @@ def test_a_conclusion_that_is_not_activated_has_no_part_even_if_it_is_nan() -> N
     output = SystemOutput("y", labels, None, None, Defuzzifier("weighted average"))
     inputs = (Variable("x", (RAMP, Term("down", Points((0.0, 1.0), (1.0, 0.0))))),)
     rules = (
-        SystemRule(Is("x", "up"), (Conclusion("y", "nan"),)),
-        SystemRule(Is("x", "down"), (Conclusion("y", "one"),)),
+        SystemRule(Proposition("x", ("up",)), (Conclusion("y", "nan"),)),
+        SystemRule(Proposition("x", ("down",)), (Conclusion("y", "one"),)),
     )
     system = FuzzySystem("test", inputs, (output,), (RuleBlock(rules),))
     assert evaluate_program(from_system(system), {"x": -1.0}).of("output") == (1.0,)
@@ -146,7 +146,7 @@ def test_a_trapezoid_is_the_smaller_of_its_slopes(curve: Trapezoid) -> None:
     how = Defuzzifier("weighted sum")
     output = SystemOutput("y", (Term("one", Singleton(1.0)),), None, None, how)
     inputs = (Variable("x", (Term("in", curve),)),)
-    rule = SystemRule(Is("x", "in"), (Conclusion("y", "one"),))
+    rule = SystemRule(Proposition("x", ("in",)), (Conclusion("y", "one"),))
     system = FuzzySystem("test", inputs, (output,), (RuleBlock((rule,)),))
     assert_equal(system, [{"x": value} for value in values])
 
