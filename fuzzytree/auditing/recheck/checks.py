@@ -135,7 +135,7 @@ def _domain(case: Case, report: Report) -> None:
             )
             expect(is_in, f"{text} goes beyond the range that values are moved into")
     for name, one in variables.items():
-        require(bool(one.parts) or name in case.sides, f"{name!r} has no side")
+        require(bool(one.parts) or name in case.sides, f"the domain has no side {name!r}")
 
 
 def _questions(case: Case, report: Report) -> None:
@@ -266,8 +266,8 @@ def _known_facts(case: Case, answer: Answer) -> dict[str, Any]:
     }
     if answer.code not in ("FT201",) or not answer.rules:
         known["level"] = settings.level
-    if answer.code == "FT701":
-        del known["noun"]
+    if answer.code in ("FT601", "FT602", "FT701"):
+        del known["noun"]  # of rows
     thens = [case.then(n) for n in answer.rules]
     if thens and answer.code not in ("FT105", "FT104"):
         known |= dict(zip(("then", "other"), thens, strict=False))
