@@ -181,7 +181,7 @@ def test_too_little_memory_is_one_sentence(
     def fail(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("fuzzytree.api.verbs.read", fail)
+    monkeypatch.setattr("fuzzytree.api.read", fail)
     monkeypatch.setattr("fuzzytree.checking.converting.read_bounded", fail)
     assert call("show", "grip.yaml") == (
         2,
