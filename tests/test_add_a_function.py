@@ -182,7 +182,7 @@ fml points product
 {COMMON}rechecked: 2
 """
     )
-    assert "toy.yaml: a term: missing or unknown: cauchy\n" in errors
+    assert "toy.yaml: a curve (cauchy) is not known\n" in errors
 
 
 def test_a_t_norm_is_added_in_two_files(tmp_path: Path) -> None:

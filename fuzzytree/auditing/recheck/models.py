@@ -623,12 +623,12 @@ def _numbers(kind: str, data: Any) -> tuple[str, tuple[Any, ...]]:
     if kind == "pi":
         a, b, c, d = map(number_of, data)
         return kind, (a, b, c, d)
+    if kind not in ("singleton", "at least", "at most"):
+        raise CannotRunError(f"a curve ({kind:.60}) is not known")
     x = number_of(data)
     if kind == "singleton":
         return "trapezoid", (x, x, x, x)
-    if kind in ("at least", "at most"):
-        return "trapezoid", (x, x, x, None) if kind == "at least" else (None, x, x, x)
-    raise CannotRunError(f"a curve ({kind:.60}) is not known")
+    return "trapezoid", (x, x, x, None) if kind == "at least" else (None, x, x, x)
 
 
 def _rule(one: Facts, variables: Mapping[str, Variable]) -> Rule:
