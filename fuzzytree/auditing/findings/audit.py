@@ -133,10 +133,15 @@ def audit(
 
 
 def _proved_twice(result: Audit, model: Document, clock: Clock) -> Audit:
-    """Return an audit in which PROVED is only what the re-checker decides as well."""
+    """Return an audit in which PROVED is only what the re-checker decides as well.
+
+    The model is written anew, so nothing stands where it does in the user's file.
+    """
+    moved = (msgspec.structs.replace(one, places=()) for one in result.answers)
+    bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
     try:
         content = find_format("yaml").write(model).content
-        weak = undecided(msgspec.json.encode(result), content, lambda: clock.is_over)
+        weak = undecided(msgspec.json.encode(bare), content, lambda: clock.is_over)
     except (LossError, CannotRunError):
         every = enumerate(result.answers)
         weak = {place for place, one in every if isinstance(one.state, Proved)}

@@ -1,0 +1,81 @@
+"""Only what a second program decides again is called proved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.auditing.engine.states import Proved
+from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.locations import model_file
+from fuzzytree.auditing.findings.records import Audit, AuditSelection
+from fuzzytree.auditing.findings.subject import Material
+from fuzzytree.auditing.recheck import recheck
+from fuzzytree.exporters import yaml
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import Conjunction
+from fuzzytree.testing import random_system
+from tests.auditing.diff.test_system_numbers import tipper
+from tests.auditing.engine.bases import Kind, random_base
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+WITHOUT_RUNTIMES = AuditSelection(ignore=["FT6"])
+
+
+def audited(model: Document, content: bytes | None = None) -> Audit:
+    file = None if content is None else model_file("model.yaml", content)
+    return audit(Material(model, file), selection=WITHOUT_RUNTIMES)
+
+
+def check(model: Document) -> None:
+    """Check that the re-checker agrees with all that is called proved."""
+    content = yaml.write(model).content
+    result = audited(model, content)
+    report = recheck(msgspec.json.encode(result), content, ("audit", "model"))
+    assert report.wrong == []
+    assert not [why for state, why in report.undecided if state == "PROVED"]
+
+
+@pytest.mark.parametrize("name", ["grip.yaml", "tipper.fll"])
+def test_all_that_is_proved_of_an_example_is_decided_again(name: str) -> None:
+    check(ft.read(EXAMPLES / name).model)
+
+
+def test_all_that_is_proved_of_the_tipper_is_decided_again() -> None:
+    check(tipper())
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_all_that_is_proved_of_a_small_base_is_decided_again(seed: int) -> None:
+    check(random_base(seed, rules=4, features=2, kind="points"))
+
+
+@pytest.mark.heavy
+def test_all_that_is_proved_of_a_learned_tree_is_decided_again() -> None:
+    check(ft.learn(EXAMPLES / "wine" / "wine.csv", target="cultivar"))
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(50))
+def test_all_that_is_proved_of_many_bases_is_decided_again(seed: int) -> None:
+    norm: Conjunction = "product" if seed % 3 == 0 else "minimum"
+    kind: Kind = "lr" if seed % 10 == 0 else "points"
+    check(random_base(seed, 3 + seed % 4, 2 + seed % 2, norm, kind))
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 8])
+def test_all_that_is_proved_of_a_system_is_decided_again(seed: int) -> None:
+    check(random_system(seed, formulas="none"))
+
+
+def test_where_rules_stand_in_the_file_does_not_matter() -> None:
+    model = random_base(1, 4, 2, "product", "points")
+    content = b"# by hand\n" + yaml.write(model).content
+    both = audited(model), audited(model, content)
+    one, other = ([type(answer.state) for answer in of.answers] for of in both)
+    assert one == other
+    assert Proved in one
