@@ -244,6 +244,15 @@ def _words(case: Case, report: Report, answer: Answer) -> None:
     if is_share and isinstance(answer.state, Sampled):
         is_hit = answer.state.hits > 0 and not answer.subject.endswith("points")
         require(answer.is_finding is is_hit, "it is a finding, or none")
+    wanted_subject = SUBJECTS.get(answer.message, answer.subject)
+    if answer.code == "FT107" and "proposition" in answer.facts:
+        wanted_subject = "{rule}, {proposition!r}".format(**answer.facts)
+    if answer.message in ("FT301.weak", "FT301.reaches"):
+        wanted_subject = f"cover of {case.audit.settings.epsilon:g}"
+    if answer.message.startswith("FT301.gap"):
+        gaps = [one.id for one in case.coded("FT301.gap")]
+        wanted_subject = f"gap {gaps.index(answer.id) + 1}"
+    require(answer.subject == wanted_subject, f"it is of {wanted_subject}")
     known = _known_facts(case, answer)
     for name, fact in answer.facts.items():
         is_known = name in known
@@ -252,6 +261,22 @@ def _words(case: Case, report: Report, answer: Answer) -> None:
         )
     require(answer.sentence == sentence_of(answer), "its sentence says something else")
     report.counts["sentences written again"] += 1
+
+
+SUBJECTS = {
+    **dict.fromkeys(("FT104.others", "FT105.others", "FT106.others"), "pairs of rules"),
+    **dict.fromkeys(
+        ("FT201.never", "FT201.unlisted", "FT202.others"), "pairs of rules"
+    ),
+    **dict.fromkeys(("FT401.reached", "FT402.sound"), "terms"),
+    **dict.fromkeys(("FT403.others", "FT403.unlisted"), "pairs of terms"),
+    **dict.fromkeys(("FT101.leaves", "FT203.leaves"), "leaves"),
+    "FT404.used": "terms and variables",
+    "FT301.fires": "cover",
+    "FT501.size": "the rule base",
+    "FT501.size-of-view": "the rule base",
+}
+"""The subjects of messages that have one alone."""
 
 
 def _known_facts(case: Case, answer: Answer) -> dict[str, Any]:

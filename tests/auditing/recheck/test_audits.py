@@ -44,6 +44,8 @@ FREE = {
     r"answers\.state\.(how|of|why|reason)": "how it was made, in words",
     r"answers\.state\.(low|high|hits|rows|confidence)": "of samples and brackets",
     r"answers\.state\.claims|answers\.(state\.)?region(\..*)?": "it says less",
+    r"answers\.state\.claims\.(rules|rivals)": "true of other rules as well",
+    r"answers": "of several gaps, or what was declined",
     r"answers\.id": "it names a finding for baselines, and nothing else",
     r"answers\.places": "it says less",
     r"answers\.measures\.name": "of a bracket, or of the shape of a term",
