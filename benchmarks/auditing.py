@@ -34,7 +34,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # for tests.*
 from fuzzytree.auditing.engine import arrangement as arrangements
 from fuzzytree.auditing.engine.arrangement import arrange, rule_strengths
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.levels import levels_of
+from fuzzytree.auditing.engine.questions import wins
 from fuzzytree.auditing.engine.states import State
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import AuditSettings
@@ -81,9 +82,8 @@ def asked(base: RuleBase, budget_s: float) -> Asked:
     box = unit_domain(base)
     start = time.process_time()
     arrangement = arrange(base, box)
-    levels = (
-        len(arrangement.bands.low) if base.semantics.conjunction == "minimum" else 0
-    )
+    is_minimum = base.semantics.conjunction == "minimum"
+    levels = len(levels_of(arrangement).levels) if is_minimum else 0
     cut_s = time.process_time() - start
     states: list[State] = []
     each: list[float] = []

@@ -9,27 +9,24 @@ Terms
     - `domain`: the box, and the values of variables on it
     - `clock`: a budget of time, and how it is shared
 
-Curves, in fractions
-    - `polynomials`, `pieces`: roots, isolated in integers; membership functions as
-      polynomials on intervals, and bounds of degrees by doubles
-    - `axes`: an axis cut into cells; irrational levels that coincide
-    - `measures`: heights, areas, overlaps
+Degrees along an axis
+    - `lines`: as straight lines in fractions; other functions between two of them
+    - `measures`: heights, areas, overlaps, distances
+    - `polynomials`, `pieces`: membership functions as polynomials, and bounds of
+      degrees by doubles
 
 Points
-    - `linear`, `witnesses`: linear inequalities; from cells to points of the inputs
+    - `linear`, `witnesses`: linear inequalities; from values of axes to inputs
     - `probes`: random points and local search, by doubles
 
-Rules under the minimum: levels of cells
-    - `arrangement`: the axes on a box
-    - `duels`: the contribution of each axis; is a rule stronger
-    - `pivots`, `ties`: curves at which rules can tie; are rules equally strong
+Rules
+    - `arrangement`: what rules ask of each axis on a box
+    - `levels`: under the minimum, which rules reach a level that others do not
+    - `compared`: two rules, for the minimum and the product
+    - `space`, `bounding`: boxes of inputs; branch and bound, for any AND operator
 
-Rules under the product, and any other: boxes
-    - `space`, `bounding`: boxes of inputs; branch and bound
-    - `factors`, `product_ties`: degrees as products of polynomials; ties
-
-Questions, for each AND operator
-    - `cover`, `dominance`: does any rule fire; two rules compared
+Questions
+    - `questions`: does a rule win, by how much, does it tie; is every input covered
     - `decisions`, `nearest`, `regions`: does one class decide a box; the distance to
       another decision; the crisp regions of a tree
     - `contenders`, `equivalence`: do two models predict the same class everywhere

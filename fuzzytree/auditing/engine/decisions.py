@@ -1,10 +1,9 @@
 """Does one class decide everywhere on a box?
 
 A class decides where the first of the strongest rules is one of its rules. So another
-decision is made where some rule of another class is stronger than all of its rules
-(`fuzzytree.auditing.engine.duels`); where such a rule is as strong as some later ones,
-and stronger than the others (`fuzzytree.auditing.engine.ties`); or where no rule fires
-and the prediction for that differs (`fuzzytree.auditing.engine.cover`). Bounds of all
+decision is made where some rule of another class is stronger than all of its rules;
+where such a rule is as strong as some later ones, and stronger than the others; or
+where no rule fires and the prediction for that differs (`questions`). Bounds of all
 rules on many boxes at once, in doubles rounded outwards, exclude most rules first.
 """
 
@@ -20,11 +19,10 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.arrangement import Arrangement, arrange, prediction_at
 from fuzzytree.auditing.engine.bounding import simplified
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.cover import uncovered
 from fuzzytree.auditing.engine.domain import Domain, Point
-from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.pieces import proposition_ranges
 from fuzzytree.auditing.engine.probes import drawn_in, ends_of, near_strengths
+from fuzzytree.auditing.engine.questions import decides_by_order, uncovered, wins
 from fuzzytree.auditing.engine.states import (
     Claim,
     Proved,
@@ -34,7 +32,6 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
     point_of,
 )
-from fuzzytree.auditing.engine.ties import decides_by_order
 from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.model import (
     BoolArray,

@@ -1,38 +1,27 @@
-"""Heights, areas, overlaps, dips and distances of curves, between exact bounds.
+"""Measures of membership functions on a range: heights, areas, overlaps, dips.
 
-An axis is cut (`fuzzytree.auditing.engine.axes`) so that within a cell every curve is
-one polynomial, and each question becomes one about polynomials, in fractions. Only
-where a cell ends at an irrational place is the result a narrow interval.
+All are taken from straight lines (`lines`): exact for bands and points, between two
+bounds for functions that are enclosed.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.axes import Cells, cut
-from fuzzytree.auditing.engine.pieces import (
-    ONE,
-    ZERO,
-    RuleCurve,
-    piece_at,
-    pieces,
-    places,
-    shape_ranges,
+from fuzzytree.auditing.engine.lines import (
+    Between,
+    Lines,
+    at_knots,
+    combined,
+    lines_of,
+    together,
 )
-from fuzzytree.auditing.engine.polynomials import (
-    Polynomial,
-    derivative,
-    difference,
-    integral,
-    roots,
-    value_at,
-    values_near,
-)
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, pieces, shape_ranges
+from fuzzytree.auditing.engine.polynomials import value_at
 from fuzzytree.model import FloatArray, Shape, checkpoint
 
 
@@ -58,22 +47,22 @@ CurveValue = tuple[Bounds, Fraction]
 
 
 class CurveAxis(NamedTuple):
-    """Curves on an axis between two ends, cut into cells."""
+    """Membership functions on a range."""
 
-    elements: tuple[RuleCurve, ...]  # the curves
-    cells: Cells
+    curves: tuple[Between, ...]
+    ends: tuple[Fraction, Fraction]  # the lower and the upper end
     is_open: bool = False  # whether the lower end itself is left out
 
     @property
-    def ends(self) -> tuple[Fraction, Fraction]:
-        """The lower and the upper end."""
-        return self.cells.zones[0][0], self.cells.zones[-1][1]
+    def pieces(self) -> int:
+        """How many straight lines there are."""
+        return sum(max(len(one.lower.after), 1) for one in self.curves)
 
 
 def curve_axis(
     shapes: Sequence[Shape], low: Fraction, high: Fraction, *, is_open: bool = False
 ) -> CurveAxis:
-    """Return shapes on an axis, cut where something changes.
+    """Return membership functions on a range.
 
     Raises:
         ValueError: If `low` is above `high`.
@@ -87,91 +76,30 @@ def curve_axis(
     """
     if low > high:
         raise ValueError(f"no axis from {low} to {high}")
-    elements = tuple(RuleCurve(shape) for shape in shapes)
-    cells = cut(elements, places(elements), low, high)
-    return CurveAxis(elements, cells, is_open)
+    curves = tuple(lines_of(shape, low, high) for shape in shapes)
+    return CurveAxis(curves, (low, high), is_open and low < high)
 
 
-def separate_axis(shapes: Sequence[Shape], low: Fraction, high: Fraction) -> CurveAxis:
-    """Return shapes on an axis, cut where one of them changes; not where two cross.
-
-    In a cell each curve is one polynomial, but their order may change: enough for sums.
-    """
-    elements = tuple(RuleCurve(shape) for shape in shapes)
-    result = [place for element in elements for place in places([element])]
-    return CurveAxis(elements, cut(elements, result, low, high))
-
-
-def local_polynomial(element: RuleCurve, at: Fraction) -> Polynomial:
-    """Return the polynomial that a curve is in the cell of a point, clipped or not.
-
-    Example:
-        >>> from fuzzytree.model.rulebase import Points
-        >>> local_polynomial(RuleCurve(Points((0.0, 2.0), (0.0, 1.0)), True), ONE)
-        (Fraction(1, 1), Fraction(-1, 2))
-    """
-    checkpoint()
-    piece = piece_at(pieces(element.shape), at)
-    degree = piece.degree(at)
-    clipped = degree in (ZERO, piece.cap)
-    polynomial = (degree,) if clipped else piece.polynomial
-    return difference((ONE,), polynomial) if element.is_complement else polynomial
-
-
-def extremes(
-    polynomial: Polynomial, low: Fraction, high: Fraction
-) -> Iterator[tuple[Fraction, Bounds]]:
-    """Yield the ends and the turning points of a polynomial, with its values there.
-
-    The largest and the least value on `low <= x <= high` are among them.
-
-    Example:
-        >>> bump = (Fraction(0), Fraction(1), Fraction(-1))
-        >>> [float(b.high) for _, b in extremes(bump, Fraction(0), Fraction(1))]
-        [0.0, 0.25, 0.0]
-    """
-    yield low, Bounds(*values_near(polynomial, low, low))
-    if low < high:
-        if len(polynomial) > 2:
-            for root in roots(derivative(polynomial), low, high):
-                yield root.low, Bounds(*values_near(polynomial, root.low, root.high))
-        yield high, Bounds(*values_near(polynomial, high, high))
-
-
-def sizes(
-    polynomial: Polynomial, low: Fraction, high: Fraction
-) -> Iterator[tuple[Fraction, Bounds]]:
-    """Yield what `extremes` does, with how far the values are from 0."""
-    for at, value in extremes(polynomial, low, high):
-        near, far = sorted((abs(value.low), abs(value.high)))
-        yield at, Bounds(ZERO if value.low < 0 < value.high else near, far)
-
-
-def area(of: CurveAxis, chosen: Callable[[int, Fraction], Polynomial]) -> Bounds:
-    """Return the area under a curve with degrees in [0, 1] on a line.
-
-    `chosen`: given a cell's number and a point of it, the curve's polynomial there.
+def integral(lines: Lines) -> Fraction:
+    """Return the area under lines.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> ramp = curve_axis([Points((0.0, 2.0), (0.0, 1.0))], ZERO, Fraction(3))
-        >>> area(ramp, lambda cell, at: local_polynomial(ramp.elements[0], at)).exact
-        '2'
+        >>> integral(ramp.curves[0].lower)
+        Fraction(2, 1)
     """
-    total = sum(
-        (
-            integral(chosen(number, (low + high) / 2), low, high)
-            for number, (low, high) in enumerate(of.cells.between)
-        ),
-        start=ZERO,
-    )
-    # On the narrow places between cells a degree may be anything.
-    slack = sum((b - a for a, b in of.cells.zones), start=ZERO)
-    return Bounds(total, total + slack)
+    return sum(((b - a) * (p + q) / 2 for a, b, p, q in lines.pieces()), start=ZERO)
+
+
+def area(of: Between) -> Bounds:
+    """Return the area under a membership function on its range."""
+    low = integral(of.lower)
+    return Bounds(low, low if of.is_exact else integral(of.upper))
 
 
 def heights(of: CurveAxis) -> tuple[CurveValue, ...]:
-    """Return the supremum of each curve on a line, and a point where it is near.
+    """Return the supremum of each function on a range, and a point where it is near.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
@@ -179,62 +107,42 @@ def heights(of: CurveAxis) -> tuple[CurveValue, ...]:
         >>> heights(ramp)[0][0].exact
         '1/2'
     """
-    return tuple(_height(of, one) for one in range(len(of.elements)))
+    return tuple(_height(of, one) for one in range(len(of.curves)))
 
 
 def _height(of: CurveAxis, one: int) -> CurveValue:
-    result = [(bounds, at) for bounds, at in walk(of, one)]
-    most = max(bounds.high for bounds, _ in result)
-    low = max(bounds.low for bounds, _ in result)
-    at = next(at for bounds, at in result if bounds.low == low)
-    return Bounds(low, most), at
+    lower, upper = of.curves[one]
+    if of.curves[one].is_exact:
+        return max(walk(of, one), key=lambda value: value[0].low)
+    start = int(of.is_open)
+    low, at = max(zip(lower.at[start:], lower.x[start:], strict=True))
+    return Bounds(low, max(low, upper.highest)), at
 
 
 def walk(of: CurveAxis, one: int) -> Iterator[CurveValue]:
-    """Yield a curve's values from left to right; it is monotone between neighbours.
+    """Yield a function's values from left to right; at a step both, with its point.
 
-    At a step both its values are yielded, each with a point where it is reached or
-    approached.
+    Between neighbours it is one line, or close to one where it is enclosed.
     """
-    before: tuple[int, Bounds] | None = None
-    for zone, is_after in _sides(of):
-        value = value_at_place(of, one, zone, is_after=is_after)
-        if (zone, value) != before:
-            yield value, _middle(of, zone)
-        before = zone, value
+    lower, upper = of.curves[one]
+    last: CurveValue | None = None
+    for place, x in enumerate(lower.x):
+        values = [] if of.is_open and not place else [(lower.at, upper.at, place)]
+        if of.curves[one].is_exact:  # limits; those of an enclosure are no values
+            if place:
+                values.insert(0, (lower.before, lower.before, place - 1))
+            if place < len(lower.after):
+                values.append((lower.after, lower.after, place))
+        for low, high, number in values:
+            value = Bounds(low[number], high[number]), x
+            if value != last:
+                yield value
+            last = value
 
 
-def _sides(of: CurveAxis) -> Iterator[tuple[int, bool]]:
-    """Yield the places of a line, by number, each seen from below and from above."""
-    count = len(of.cells.zones)
-    for zone in range(count):
-        if zone > 0 or not of.is_open or count == 1:
-            yield zone, False
-        if zone + 1 < count:
-            yield zone, True
+# --- overlap of two membership functions
 
-
-def _middle(of: CurveAxis, zone: int) -> Fraction:
-    low, high = of.cells.zones[zone]
-    return (low + high) / 2
-
-
-def value_at_place(
-    of: CurveAxis, one: int, zone: int, *, is_after: bool = False
-) -> Bounds:
-    """Return a curve's value at a place, or its limit from above."""
-    low, high = of.cells.zones[zone]
-    if low == high:
-        element = of.elements[one]
-        value = element.degree_after(low) if is_after else element.degree(low)
-        return Bounds(value, value)
-    values = (of.cells.right if is_after else of.cells.left)[:, one, zone]
-    return Bounds(Fraction(values[0]), Fraction(values[1]))
-
-
-# --- overlap of two curves
-
-_CELLS = 256  # on which degrees are enclosed before areas are exact
+_CELLS: Final = 256  # on which degrees are enclosed before areas are worked out
 
 
 class Overlap(NamedTuple):
@@ -259,10 +167,10 @@ class Overlap(NamedTuple):
 
 
 def overlap(of: CurveAxis) -> Overlap:
-    """Return how much the two curves of a line share, exactly but for slivers.
+    """Return how much the two membership functions of a range share.
 
     Raises:
-        ValueError: If the line has not two curves.
+        ValueError: If there are not two.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
@@ -272,32 +180,35 @@ def overlap(of: CurveAxis) -> Overlap:
         >>> result.jaccard.exact, result.possibility.exact
         ('1/3', '1/2')
     """
-    if len(of.elements) != 2:
-        raise ValueError(f"two curves overlap, not {len(of.elements)}")
-    rank = of.cells.rank
-    lower = [int(a > b) for a, b in rank]
-    shared = area(of, lambda cell, at: local_polynomial(of.elements[lower[cell]], at))
-    joined = area(
-        of, lambda cell, at: local_polynomial(of.elements[1 - lower[cell]], at)
+    if len(of.curves) != 2:
+        raise ValueError(f"two curves overlap, not {len(of.curves)}")
+    one, other = of.curves
+    least, most = (
+        Between(*(combined([one[side], other[side]], pick) for side in (0, 1)))
+        for pick in (min, max)
     )
-    met: list[CurveValue] = []
-    for zone, is_after in _sides(of):
-        a, b = (value_at_place(of, n, zone, is_after=is_after) for n in (0, 1))
-        least = Bounds(min(a.low, b.low), min(a.high, b.high))
-        met.append((least, _middle(of, zone)))
-    low = max(bounds.low for bounds, _ in met)
-    high = max(bounds.high for bounds, _ in met)
-    start = of.cells.start_rank
-    orders = [] if of.is_open and len(rank) else [int(start[0]) - int(start[1])]
-    orders += [int(a) - int(b) for a, b in rank]
+    possibility, at = _height(CurveAxis((_same(least),), of.ends, of.is_open), 0)
     return Overlap(
-        shared,
-        joined,
-        Bounds(low, high),
-        next(at for bounds, at in met if bounds.low == low),
-        tuple(_crossings(of)),
-        all(order <= 0 for order in orders),
-        all(order >= 0 for order in orders),
+        area(least),
+        area(most),
+        possibility,
+        at,
+        tuple(_crossings(one.lower, other.lower)),
+        one == other or _is_within(one.upper, other.lower, of.is_open),
+        one == other or _is_within(other.upper, one.lower, of.is_open),
+    )
+
+
+def _same(of: Between) -> Between:
+    """Return bounds as one function where they are the same."""
+    return Between(of.lower, of.lower) if of.lower == of.upper else of
+
+
+def _is_within(one: Lines, other: Lines, is_open: bool) -> bool:
+    """Return whether a function is nowhere above another one."""
+    values = [(a, b) for _, a, b in at_knots(one, other)][is_open:]
+    return all(a <= b for a, b in values) and all(
+        p <= r and q <= s for _, _, p, q, r, s in together(one, other)
     )
 
 
@@ -326,16 +237,22 @@ def most_shared(shapes: Sequence[Shape], low: float, high: float) -> FloatArray:
     return np.minimum(result, 1.0)
 
 
-def _crossings(of: CurveAxis) -> Iterator[tuple[Fraction, Bounds]]:
-    before = 0
-    since = 0
-    for cell, (a, b) in enumerate(of.cells.rank):
-        order = int(a > b) - int(a < b)
-        if order and before and order != before:
-            low, high = of.cells.zones[since]
-            yield (low + high) / 2, value_at_place(of, 0, since)
-        if order:
-            before, since = order, cell + 1
+def _crossings(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Bounds]]:
+    """Yield where two functions change their order, with the degree there."""
+    before, since, value = 0, ZERO, ZERO
+    for a, b, p, q, r, s in together(one, other):
+        orders = [(p - r, a, p)]
+        if (p - r) * (q - s) < 0:
+            share = (p - r) / (p - r - q + s)
+            orders.append((ZERO, a + (b - a) * share, p + (q - p) * share))
+        for gap, x, degree in (*orders, (q - s, b, q)):
+            order = (gap > 0) - (gap < 0)
+            if order and before and order != before:
+                yield since, Bounds(value, value)
+            if order:
+                before, since, value = order, x, degree
+            else:
+                since, value = x, degree
 
 
 # --- dips and clipping
@@ -378,8 +295,13 @@ def dips(
         yield before, bottom, peak
 
 
+_SAMPLES: Final = 256  # of each piece
+
+
 def excesses(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
     """Yield where a shape's polynomials leave [0, 1] before they are clipped.
+
+    Each piece is evaluated in fractions at some values, evenly apart.
 
     Example:
         >>> from fuzzytree.model.rulebase import LR, Side
@@ -392,26 +314,35 @@ def excesses(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
         if piece.low is None or piece.high is None or len(piece.polynomial) < 2:
             continue
         a, b = max(piece.low, low), min(piece.high, high)
-        if a >= b or _is_inside(piece.polynomial, a, b):
-            continue
-        for goal, sign in ((ONE, 1), (ZERO, -1)):
-            over = difference(piece.polynomial, (goal,))
-            ends = [a, *((r.low + r.high) / 2 for r in roots(over, a, b)), b]
-            for start, end in itertools.pairwise(ends):
-                if sign * value_at(over, (start + end) / 2) <= 0:
-                    continue
-                result = [*extremes(over, start, end)]
-                at, depth = max(
-                    ((at, sign * (v.low + v.high) / 2) for at, v in result),
-                    key=lambda one: one[1],
-                )
-                yield Excess(start, end, at, depth, sign > 0)
+        if a < b:
+            places = [a + (b - a) * n / _SAMPLES for n in range(_SAMPLES + 1)]
+            if len(piece.polynomial) == 2:
+                places = [a, b]
+            checkpoint()
+            yield from _outside([(x, value_at(piece.polynomial, x)) for x in places])
 
 
-def _is_inside(polynomial: Polynomial, low: Fraction, high: Fraction) -> bool:
-    """Return whether a polynomial is a line within [0, 1]."""
-    ends = value_at(polynomial, low), value_at(polynomial, high)
-    return len(polynomial) == 2 and all(ZERO <= end <= ONE for end in ends)
+def _outside(values: Sequence[tuple[Fraction, Fraction]]) -> Iterator[Excess]:
+    """Yield where values leave [0, 1]; lines between them say from where to where."""
+    x, value = ([*of] for of in zip(*values, strict=True))
+    for goal, sign in ((ONE, 1), (ZERO, -1)):
+        depth = [sign * (one - goal) for one in value]
+        run: list[int] = []
+        for place in range(len(depth) + 1):
+            if place < len(depth) and depth[place] > 0:
+                run.append(place)
+            elif run:
+                first, last = max(run[0] - 1, 0), min(run[-1] + 1, len(depth) - 1)
+                low = _zero(x[first], x[run[0]], depth[first], depth[run[0]])
+                high = _zero(x[last], x[run[-1]], depth[last], depth[run[-1]])
+                deepest = max(run, key=depth.__getitem__)
+                yield Excess(low, high, x[deepest], depth[deepest], sign > 0)
+                run = []
+
+
+def _zero(a: Fraction, b: Fraction, p: Fraction, q: Fraction) -> Fraction:
+    """Return where a line is 0 between two places; the second where it is not."""
+    return a + (b - a) * p / (p - q) if p <= 0 < q else b
 
 
 class Excess(NamedTuple):
@@ -424,13 +355,13 @@ class Excess(NamedTuple):
     is_above: bool  # whether it is above 1, otherwise below 0
 
 
-# --- distance of two curves
+# --- distance of two membership functions
 
 
 class CurveDistance(NamedTuple):
-    """The largest difference of two curves on an interval."""
+    """The largest difference of two membership functions on an interval."""
 
-    low: Fraction  # it is at least this; reached, or approached from above, at `at`
+    low: Fraction  # it is at least this; reached, or approached, at `at`
     high: Fraction  # it is at most this
     at: Fraction  # where
 
@@ -438,10 +369,7 @@ class CurveDistance(NamedTuple):
 def curve_distance(
     one: Shape, other: Shape, low: Fraction, high: Fraction
 ) -> CurveDistance:
-    """Return how far two curves are apart at most on a closed interval.
-
-    The interval is cut where a curve changes; in each cell both are polynomials, whose
-    difference is largest at an end or where it turns.
+    """Return how far two membership functions are apart at most between two ends.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points
@@ -451,34 +379,26 @@ def curve_distance(
         >>> str(result.low), str(result.high), str(result.at)
         ('1/2', '1/2', '1')
     """
-    result = [*_gaps(one, other, low, high)]
-    least, at = max(((gap.low, at) for at, gap in result), key=lambda best: best[0])
-    return CurveDistance(least, max(gap.high for _, gap in result), at)
+    gap, at = largest_gap(lines_of(one, low, high), lines_of(other, low, high))
+    return CurveDistance(gap.low, min(gap.high, ONE), at)
 
 
-def _gaps(
-    one: Shape, other: Shape, low: Fraction, high: Fraction
-) -> Iterator[tuple[Fraction, Bounds]]:
-    """Yield places with how far two curves are apart there; the largest is among them.
+def largest_gap(one: Between, other: Between) -> tuple[Bounds, Fraction]:
+    """Return how far two functions are apart at most, and where."""
+    low = high = ZERO
+    place = one.lower.x[0]
+    for first, second in ((one, other), (other, one)):
+        low = max(low, *(gap for _, gap in _gaps(first.lower, second.upper)))
+        for x, gap in _gaps(first.upper, second.lower):
+            if gap > high:
+                high, place = gap, x
+    return Bounds(low, high), place
 
-    A limit from above is yielded with the place where it is approached.
-    """
-    axis = separate_axis([one, other], low, high)
-    first, second = axis.elements
-    start = abs(first.degree(low) - second.degree(low))
-    yield low, Bounds(start, start)
-    for a, b in axis.cells.between:
-        middle = (a + b) / 2
-        gap = difference(
-            local_polynomial(first, middle), local_polynomial(second, middle)
-        )
-        yield from sizes(gap, a, b)
-    # Where a curve changes at an irrational place, that is known as a narrow interval.
-    lows, highs = axis.cells.left
-    for number, (a, b) in enumerate(axis.cells.zones):
-        if a < b:
-            sides = (0, 1), (1, 0)
-            most = max(
-                Fraction(highs[p, number]) - Fraction(lows[q, number]) for p, q in sides
-            )
-            yield (a + b) / 2, Bounds(ZERO, max(most, ZERO))
+
+def _gaps(one: Lines, other: Lines) -> Iterator[tuple[Fraction, Fraction]]:
+    """Yield by how much a function is above another one, where that can be most."""
+    for x, value, rival in at_knots(one, other):
+        yield x, value - rival
+    for a, b, p, q, r, s in together(one, other):
+        yield a, p - r
+        yield b, q - s

@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import NamedTuple, assert_never
 
@@ -23,16 +22,10 @@ import numpy as np
 
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
-    Root,
-    common_factor,
     composed,
     derivative,
     difference,
-    division,
-    magnitude,
-    refined,
     roots,
-    squarefree,
     value_at,
 )
 from fuzzytree.model import (
@@ -220,169 +213,6 @@ class RuleCurve(NamedTuple):
             )
             for piece in pieces(self.shape)
         )
-
-
-class ChangePoint(NamedTuple):
-    """Where something can change on an axis: between `low` and `high`."""
-
-    low: Fraction  # at most the place; the place itself if `low == high`
-    high: Fraction  # at least the place
-    # what is zero there, and the root; None where the place is rational
-    of: tuple[Polynomial, Root] | None = None
-
-
-def places(
-    elements: Sequence[RuleCurve], most: float = math.inf
-) -> tuple[ChangePoint, ...]:
-    """Return all places where the order or direction of some curves can change.
-
-    `most`: beyond so many places the search ends, and more than that are returned.
-    """
-    result: set[Fraction] = set()
-    irrational: list[ChangePoint] = []
-    parts = [element.pieces() for element in elements]
-    levels = sorted(
-        {ZERO, ONE}
-        | {
-            level
-            for of in parts
-            for piece, polynomial in of
-            if piece.cap == CAP and len(polynomial) > 1
-            for level in (CAP, 1 - CAP)
-        }
-    )
-    for element, of in zip(elements, parts, strict=True):
-        is_kept = isinstance(element.shape, Points)  # lines that stay in [0, 1]
-        for piece, polynomial in of:
-            result.update(end for end in (piece.low, piece.high) if end is not None)
-            if len(polynomial) > 1:
-                ends = piece.low, piece.high
-                turning = derivative(polynomial)
-                if len(turning) > 1:
-                    _solve(turning, *ends, result, irrational)
-                for level in levels:
-                    if not is_kept or ZERO < level < ONE:
-                        met = difference(polynomial, (level,))
-                        _solve(met, *ends, result, irrational)
-    for one, other in itertools.combinations(parts, 2):
-        checkpoint()
-        if len(result) + len(irrational) > most:
-            return (*(ChangePoint(x, x) for x in result), *irrational)
-        for low, high, p, q in _overlaps(one, other):
-            is_asked = p in _ENDS or q in _ENDS  # where one meets 0 or 1 is known
-            if (len(p) > 1 or len(q) > 1) and not is_asked:
-                _solve(difference(p, q), low, high, result, irrational)
-    return tuple(_apart([*(ChangePoint(x, x) for x in result), *irrational]))
-
-
-def _apart(result: Iterable[ChangePoint]) -> list[ChangePoint]:
-    """Return places apart from each other: one place that was met twice stands once.
-
-    Two places that cannot be separated still touch.
-    """
-    kept: list[ChangePoint] = []
-    todo = sorted(result, key=lambda one: (one.low, one.high), reverse=True)
-    while todo:
-        after = todo.pop()
-        if not kept or after.low > kept[-1].high:
-            kept.append(after)
-            continue
-        before = kept.pop()
-        same = _same(before, after)
-        if same is not None:
-            todo.append(same)
-            continue
-        pair = sorted(_separated(before, after), key=lambda one: one.low)
-        if pair[1].low > pair[0].high:
-            todo += reversed(pair)  # the lower one may meet those before
-        else:
-            kept += pair
-    return kept
-
-
-def _same(one: ChangePoint, other: ChangePoint) -> ChangePoint | None:
-    """Return two places that touch as one, if they are the same for sure."""
-    if one.of is None or other.of is None:
-        exact, vague = (one, other) if one.of is None else (other, one)
-        if vague.of is None:
-            return exact if exact.low == vague.low else None
-        return exact if _is_only_root(vague.of[0], exact.low, vague) else None
-    low, high = max(one.low, other.low), min(one.high, other.high)
-    if not (one.of[1].is_sure and other.of[1].is_sure and low < high):
-        return None
-    # A root of what two polynomials have in common is a root of both, and each has
-    # only one in its place.
-    shared = common_factor(one.of[0], other.of[0])
-    if len(shared) > 1 and value_at(shared, low) * value_at(shared, high) < 0:
-        return ChangePoint(low, high, (shared, Root(low, high)))
-    return None
-
-
-def _is_only_root(of: Polynomial, at: Fraction, place: ChangePoint) -> bool:
-    """Return whether a polynomial is 0 at a value, and nowhere else in a place."""
-    if place.low == place.high:
-        return at == place.low
-    if value_at(of, at) != 0:
-        return False
-    while len(of) > 1 and value_at(of, at) == 0:
-        of, _ = division(of, (-at, ONE))
-    ends = place.low, place.high
-    return all(value_at(of, end) for end in ends) and not roots(of, *ends)
-
-
-def _separated(one: ChangePoint, other: ChangePoint) -> tuple[ChangePoint, ChangePoint]:
-    """Return two places that touch as narrow as it takes for them to be apart."""
-    for bits in (64, 128, 512):
-        one, other = (_narrowed(place, bits) for place in (one, other))
-        if one.high < other.low or other.high < one.low:
-            break
-    return one, other
-
-
-def _narrowed(place: ChangePoint, bits: int) -> ChangePoint:
-    if place.of is None:
-        return place
-    size = max(abs(place.low), abs(place.high)) or ONE
-    root = refined(*place.of, bits - magnitude(size))
-    return ChangePoint(root.low, root.high, (place.of[0], root))
-
-
-def _solve(
-    polynomial: Polynomial,
-    low: Fraction | None,
-    high: Fraction | None,
-    result: set[Fraction],
-    irrational: list[ChangePoint],
-) -> None:
-    if low is None or high is None:
-        return
-    met = roots(polynomial, low, high)
-    if not all(root.is_sure for root in met):  # it may be a double one
-        polynomial = squarefree(polynomial)
-        met = roots(polynomial, low, high)
-    for root in met:
-        if root.low == root.high:
-            result.add(root.low)
-        else:
-            place = ChangePoint(root.low, root.high, (polynomial, root))
-            irrational.append(place)
-
-
-def _overlaps(
-    one: Sequence[tuple[PolynomialPiece, Polynomial]],
-    other: Sequence[tuple[PolynomialPiece, Polynomial]],
-) -> Iterator[tuple[Fraction | None, Fraction | None, Polynomial, Polynomial]]:
-    """Yield where a piece of one curve and one of another both hold."""
-    i = j = 0
-    low: Fraction | None = None
-    while True:
-        (a, p), (b, q) = one[i], other[j]
-        high = min((x for x in (a.high, b.high) if x is not None), default=None)
-        if low is None or high is None or low < high:
-            yield low, high, p, q
-        if high is None:
-            return
-        i, j, low = i + (a.high == high), j + (b.high == high), high
 
 
 # --- bounds of degrees on whole intervals, by doubles

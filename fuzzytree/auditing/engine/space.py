@@ -19,9 +19,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.arrangement import Arrangement, AxisGrid
+from fuzzytree.auditing.engine.arrangement import Arrangement
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.levels import LevelAxis, levels_of
 from fuzzytree.auditing.engine.linear import feasible, row_of
+from fuzzytree.auditing.engine.lines import together
 from fuzzytree.auditing.engine.pieces import bends, proposition_ranges
 from fuzzytree.model import (
     Proposition,
@@ -541,50 +543,44 @@ def _ordered(
 
     Only where each of both is one curve: a product of several has no order there.
     """
-    if not pairs or base.is_empty or not base.is_kept:
+    if not pairs or base.is_empty:
         return {}
     is_product = base.rules.semantics.conjunction == "product"
     result: dict[str, list[Intervals]] = {}
-    for grid in base.grids:
+    for axis, levels in zip(base.axes, levels_of(base).axes, strict=True):
         of: list[Intervals] = []
         for pair in pairs:
-            propositions = (
-                grid.axis.propositions[pair.one],
-                grid.axis.propositions[pair.other],
-            )
+            propositions = (axis.propositions[pair.one], axis.propositions[pair.other])
             if is_product and max(map(len, propositions)) > 1:
                 of.append(Intervals(np.empty(0), np.empty(0)))
             else:
-                of.append(_spans(grid, grid.of[pair.one], grid.of[pair.other]))
-        result[grid.axis.variable.name] = of
+                of.append(_spans(levels, pair))
+        result[axis.variable.name] = of
     return result
 
 
-def _spans(grid: AxisGrid, one: IntArray, other: IntArray) -> Intervals:
-    """Return where one element is at most another, given both for each cell.
-
-    Cells are joined at a place that is known exactly, for curves are continuous from
-    the left; and at any other where bounds of both tell the order.
-    """
-    cells, rows = grid.cells, np.arange(len(one))
-    holds = cells.rank[rows, one] <= cells.rank[rows, other]
-    joins = [a == b for a, b in cells.zones]
-    inner = np.arange(1, len(one))  # the places between cells
-    is_known = np.ones(len(inner), dtype=bool)
-    for mine, theirs in ((one[:-1], other[:-1]), (one[1:], other[1:])):
-        for values in (cells.left, cells.right):
-            below = values[1, mine, inner] <= values[0, theirs, inner]
-            is_known &= below | (mine == theirs)
-    ends: list[list[Fraction]] = []
-    for cell in np.flatnonzero(holds).tolist():
-        low, high = cells.zones[cell][1], cells.zones[cell + 1][0]
-        is_next = bool(ends) and ends[-1][1] == cells.zones[cell][0]
-        if is_next and (joins[cell] or is_known[cell - 1]):
-            ends[-1][1] = high
-        else:
-            ends.append([low, high])
-    lows = [outwards(low)[1] for low, _ in ends]
-    highs = [outwards(high)[0] for _, high in ends]
+def _spans(axis: LevelAxis, pair: RivalPair) -> Intervals:
+    """Return where one rule's degree on an axis is surely at most another's."""
+    one, other = axis.function(pair.one).upper, axis.function(pair.other).lower
+    if set(axis.propositions[pair.other]) <= set(axis.propositions[pair.one]):
+        one = other
+    ends: list[tuple[Fraction, Fraction, bool]] = []  # and whether the upper one is in
+    for a, b, p, q, r, s in together(one, other):
+        low, high = a, b
+        if (p > r and q >= s) or (p >= r and q > s):
+            continue
+        if (p - r) * (q - s) < 0:
+            place = a + (b - a) * (p - r) / (p - r - q + s)
+            low, high = (a, place) if p < r else (place, b)
+        is_in = high < b or one.value(high) <= other.value(high)
+        if ends and ends[-1][1:] == (low, True):
+            low = ends.pop()[0]
+        ends.append((low, high, is_in))
+    lows = [outwards(low)[1] for low, _, _ in ends]
+    highs = [
+        outwards(high)[0] if is_in else math.nextafter(outwards(high)[0], -math.inf)
+        for _, high, is_in in ends
+    ]
     return Intervals(np.array(lows), np.array(highs))
 
 

@@ -23,18 +23,15 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, arrange
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
-from fuzzytree.auditing.engine.domain import Domain, span
-from fuzzytree.auditing.engine.dominance import (
+from fuzzytree.auditing.engine.compared import (
     Dominance,
     JointMaximum,
+    RuleDistance,
     RulePairs,
-    joint_bounds,
-    joint_maximum,
 )
-from fuzzytree.auditing.engine.duels import wins
-from fuzzytree.auditing.engine.factors import RuleDistance, rule_distance
+from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.measures import Bounds
+from fuzzytree.auditing.engine.questions import below, least_cover, uncovered, wins
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.auditing.findings.rule_bounds import BoundedRules
 from fuzzytree.auditing.findings.subject import Subject
@@ -161,7 +158,7 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
         """
         if self.is_inexact(one, other) and self._keys[one - 1] != self._keys[other - 1]:
             return None
-        return rule_distance(self.from_below.factored, one - 1, other - 1, most)
+        return self.from_below.distance(one, other, most)
 
     def is_near(self, one: int, other: int, most: Fraction) -> bool:
         """Return whether it is open whether degrees of two rules differ by more.
@@ -229,14 +226,14 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def highest(self, one: int) -> FloatArray:
         """Return bounds of the levels that a rule reaches with each other one."""
-        return joint_bounds(self.from_above, one)
+        return self.from_above.joint_bounds(one)
 
     def meet(self, one: int, other: int, level: Fraction, clock: Clock) -> JointMaximum:
         """Return the highest level that two rules reach at one point; see `meeting`."""
-        joint = joint_maximum(self.from_below, one, other, level, clock)
+        joint = self.from_below.joint_maximum(one, other, level, clock)
         if self.bounds is None or not self.is_inexact(one, other):
             return joint
-        above = joint_maximum(self.from_above, one, other, level, clock)
+        above = self.from_above.joint_maximum(one, other, level, clock)
         most = above.level.high
         if isinstance(joint.state, Witness):
             state = self.bounds.certified(joint.state)
@@ -247,10 +244,10 @@ class BoundedArrangement(msgspec.Struct, frozen=True, eq=False, dict=True):
             state = above.state
             if isinstance(state, Bracket):  # its point is one of the upper rules
                 state = replace(state, low=0.0, point=(), claims=())
-            return JointMaximum(Bounds(Fraction(0), most), state, above.is_touch)
+            return JointMaximum(Bounds(Fraction(0), most), state)
         # A level that is nearly reached is reported, with its point.
         easier = max(level - 4 * Fraction(self.bounds.gap), Fraction(0))
-        near = joint_maximum(self.from_below, one, other, easier, clock)
+        near = self.from_below.joint_maximum(one, other, easier, clock)
         low = near.level.low if isinstance(near.state, Witness) else Fraction(0)
         name = f"the highest level that rules {one} and {other} both reach"
         ends = outwards(low)[0], outwards(most)[1]

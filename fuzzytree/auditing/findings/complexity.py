@@ -5,20 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.measures import (
-    Bounds,
-    CurveAxis,
-    local_polynomial,
-    separate_axis,
-)
+from fuzzytree.auditing.engine.lines import combined, constant, lines_of
+from fuzzytree.auditing.engine.measures import Bounds, integral
 from fuzzytree.auditing.engine.pieces import ONE, ZERO
-from fuzzytree.auditing.engine.polynomials import (
-    Polynomial,
-    difference,
-    integral,
-    roots,
-    value_at,
-)
 from fuzzytree.auditing.engine.states import Computed
 from fuzzytree.auditing.findings.codes import audit_answer
 from fuzzytree.auditing.findings.records import AuditAnswer, Measure
@@ -130,32 +119,20 @@ def coverage(of: VariableRange) -> Bounds:
         >>> coverage(VariableRange(both, Fraction(0), Fraction(1), False)).exact
         '1'
     """
-    terms = of.variable.terms
-    axis = separate_axis([term.shape for term in terms], of.low, of.high)
-    total, slack = ZERO, sum((b - a for a, b in axis.cells.zones), ZERO)
-    for low, high in axis.cells.between:
-        summed = _sum(axis, (low + high) / 2)
-        over = difference(summed, (ONE,))
-        places = [*roots(over, low, high)]
-        slack += sum((root.high - root.low for root in places), ZERO)
-        starts = [low, *(root.high for root in places)]
-        ends = [*(root.low for root in places), high]
-        for a, b in zip(starts, ends, strict=True):
-            part = summed
-            if value_at(over, (a + b) / 2) > 0:
-                # More than 1 is summed up only by two terms or more.
-                count = len(terms)
-                part = tuple(
-                    c / (1 - count) for c in difference(summed, (Fraction(count),))
-                )
-            total += integral(part, a, b)
+    curves = [lines_of(term.shape, of.low, of.high) for term in of.variable.terms]
+    count = len(curves)
+    level = constant(ONE, of.low, of.high)
+    totals: list[Fraction] = []
+    for side in (0, 1):
+        summed = combined([one[side] for one in curves], lambda both: both[0] + both[1])
+        total = integral(combined([summed, level], min))
+        if count > 1:  # what is above 1 is taken off; two terms or more are needed
+            over = integral(combined([summed, level], max)) - (of.high - of.low)
+            total -= over / (count - 1)
+        totals.append(total)
+    # Where degrees are enclosed, h differs by no more than their sum does.
+    slack = sum((integral(c.upper) - integral(c.lower) for c in curves), ZERO) / 2
+    total = sum(totals, ZERO) / 2
     width = of.high - of.low
-    return Bounds(total / width, min((total + slack) / width, ONE))
-
-
-def _sum(axis: CurveAxis, at: Fraction) -> Polynomial:
-    total: Polynomial = (ZERO,)
-    for element in axis.elements:
-        negative = tuple(-c for c in local_polynomial(element, at))
-        total = difference(total, negative)
-    return total
+    low, high = max(total - slack, ZERO), min(total + slack, width)
+    return Bounds(low / width, high / width)

@@ -10,9 +10,14 @@ from typing import Final
 
 from fuzzytree.auditing.engine.arrangement import Arrangement
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.duels import largest_lead, wins
-from fuzzytree.auditing.engine.pivots import may_tie
 from fuzzytree.auditing.engine.probes import RandomProbes
+from fuzzytree.auditing.engine.questions import (
+    decides_by_order,
+    largest_lead,
+    may_tie,
+    tie,
+    wins,
+)
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -20,7 +25,6 @@ from fuzzytree.auditing.engine.states import (
     State,
     Witness,
 )
-from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,
     bounded_arrangement,
@@ -298,7 +302,9 @@ def _needed(
             continue
         tied = [one for one in known if one and not isinstance(one, Proved)]
         if tied:
-            yield audit_answer("FT103.by-place", name, tied[0], rules=(number,))
+            state = next((one for one in tied if isinstance(one, Witness)), tied[0])
+            message = "FT103.by-place" if isinstance(state, Witness) else "FT103.open"
+            yield audit_answer(message, name, state, rules=(number,))
             continue
         facts = {"later": len(later)} if later else {}
         yield audit_answer(

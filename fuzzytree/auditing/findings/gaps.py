@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import Arrangement, restricted
 from fuzzytree.auditing.engine.clock import OutOfTimeError
-from fuzzytree.auditing.engine.cover import uncovered
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, span
+from fuzzytree.auditing.engine.questions import uncovered
 from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
 from fuzzytree.auditing.findings.bounded_arrangement import (
     BoundedArrangement,

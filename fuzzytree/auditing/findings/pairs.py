@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.auditing.engine.dominance import Dominance, JointMaximum
-from fuzzytree.auditing.engine.factors import RuleDistance
+from fuzzytree.auditing.engine.compared import Dominance, JointMaximum, RuleDistance
 from fuzzytree.auditing.engine.states import (
     Declined,
     Proved,
@@ -121,10 +120,9 @@ def _hidden(
 
 
 def _how(compared: BoundedArrangement) -> str:
-    cells = sum(len(grid.cells.rank) for grid in compared.lower.grids)
     means = "ratios of degrees" if compared.is_product else "orders of degrees"
-    axes = len(compared.lower.axes)
-    return f"{means} in {cells} cells on {counted(axes, 'axis', 'axes')} were compared"
+    axes = counted(len(compared.lower.axes), "axis", "axes")
+    return f"{means} on {axes} were compared"
 
 
 def _rest_of_strengths(
@@ -229,7 +227,7 @@ def _facts(subject: Subject, pair: Pair) -> dict[str, FactValue]:
 def _conflicts(subject: Subject, compared: BoundedArrangement) -> Iterator[AuditAnswer]:
     level = subject.settings.level
     near: list[tuple[float, Pair]] = []
-    clean = touching = 0
+    clean = 0
     bounds: dict[int, FloatArray] = {}
     for one, other in _pairs(subject, is_alike=False):
         if not _may_conflict(subject, one, other):
@@ -253,14 +251,13 @@ def _conflicts(subject: Subject, compared: BoundedArrangement) -> Iterator[Audit
         is_shown = isinstance(joint.state, Witness)
         if joint.level.high < level or isinstance(joint.state, Proved):
             clean += 1
-            touching += joint.is_touch
         elif is_shown and listed == MOST_SHOWN:
             hidden += 1
         else:
             listed += is_shown
             yield _conflict(subject, pair, joint)
     if clean or hidden:
-        yield _rest_of_conflicts(subject, compared, (clean, touching), hidden)
+        yield _rest_of_conflicts(subject, compared, clean, hidden)
 
 
 def _may_conflict(subject: Subject, one: int, other: int) -> bool:
@@ -310,16 +307,13 @@ def _conflict(subject: Subject, pair: Pair, joint: JointMaximum) -> AuditAnswer:
 
 
 def _rest_of_conflicts(
-    subject: Subject, compared: BoundedArrangement, counts: tuple[int, int], hidden: int
+    subject: Subject, compared: BoundedArrangement, clean: int, hidden: int
 ) -> AuditAnswer:
-    clean, touching = counts
     is_one = _noun(subject) == "class"
     facts: dict[str, FactValue] = {
         "level": subject.settings.level,
         "nouns": "classes" if is_one else "conclusions",
     }
-    if touching:
-        facts["touching"] = touching
     means = "products" if compared.is_product else "minima"
     return audit_answer(
         "FT201.unlisted" if hidden else "FT201.never",

@@ -16,7 +16,7 @@ from fuzzytree.auditing.engine.arrangement import (
     prediction_at,
     rule_strengths,
 )
-from fuzzytree.auditing.engine.dominance import RulePairs
+from fuzzytree.auditing.engine.compared import RulePairs
 from fuzzytree.auditing.engine.equivalence import equivalence
 from fuzzytree.auditing.engine.states import (
     Claim,

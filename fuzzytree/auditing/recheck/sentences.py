@@ -138,11 +138,10 @@ FT201.may note
   at most:s} is reached by both
 FT201.never note
   {level:s} is never reached together by {pairs that never do:n pair} of rules of
-  different {nouns}[; {touching:d} of them at most touch it, at irrational values]
+  different {nouns}
 FT201.unlisted info
   {pairs not listed:n more pair} of rules may reach {level:s}, not listed; {pairs that
-  never do:n pair} never do[; {touching:d} of them at most touch it, at irrational
-  values]
+  never do:n pair} never do
 FT202.tie warning
   {subject} are equally strong, and the strongest, on more than a surface: the order of
   the rules alone decides there

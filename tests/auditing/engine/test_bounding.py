@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.bounding import (
 )
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.questions import wins
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Coordinate,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
-from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
+from fuzzytree.auditing.engine.questions import below, least_cover, uncovered
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
     LR,
@@ -115,7 +115,7 @@ def test_a_side_that_falls_as_a_line_covers_the_inputs_before_its_zero() -> None
     assert isinstance(uncovered(arrange(rules, _box(zero + 1e-9, 0.75))), Proved)
     found = uncovered(arrange(rules, _box(0.0, 0.75)))
     assert isinstance(found, Witness)
-    assert found.region[0].high == pytest.approx(zero)
+    assert zero - 0.01 < (found.region[0].high or 0.0) <= zero  # it is enclosed
 
 
 def test_a_gap_behind_a_step_begins_after_it() -> None:

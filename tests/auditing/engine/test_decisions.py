@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.arrangement import (
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.decisions import decision_at, other_decision
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.questions import decides_by_order, tie, wins
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -27,7 +27,6 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     point_of,
 )
-from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.model.rulebase import (
     Band,
     Points,

@@ -8,7 +8,7 @@ import pytest
 from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
 from fuzzytree.auditing.engine.bounding import wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.questions import wins
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.numerics.oracle import DECIDED, decide
 from tests.auditing.engine.bases import random_base, unit_domain

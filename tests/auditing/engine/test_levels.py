@@ -1,19 +1,14 @@
-"""Irrational levels that coincide are one level, and near ones are two."""
+"""Levels that coincide are one level, and near ones are two."""
 
 from __future__ import annotations
-
-from fractions import Fraction
 
 import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange
-from fuzzytree.auditing.engine.axes import AlgebraicLevel, equal_levels, relation
-from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.compared import RulePairs
 from fuzzytree.auditing.engine.domain import Domain, DomainSide
-from fuzzytree.auditing.engine.dominance import RulePairs
-from fuzzytree.auditing.engine.duels import LevelQuestion, search_level
-from fuzzytree.auditing.engine.pieces import ONE, ZERO
-from fuzzytree.auditing.engine.polynomials import roots, value_at
+from fuzzytree.auditing.engine.pieces import ONE
+from fuzzytree.auditing.engine.questions import wins
 from fuzzytree.auditing.engine.states import Proved, Witness
 from fuzzytree.model.rulebase import (
     Band,
@@ -54,9 +49,7 @@ def _rules(*, is_mirrored: bool, drop: float = 1.0) -> RuleBase:
 
 
 def _found(rules: RuleBase) -> object:
-    return search_level(
-        arrange(rules, SQUARE), LevelQuestion((1,), (2,), None, ""), Clock()
-    )
+    return wins(arrange(rules, SQUARE), 1, (2,))
 
 
 @pytest.mark.parametrize("is_mirrored", [False, True])
@@ -73,30 +66,3 @@ def test_it_wins_where_the_other_sinks_by_one_digit(is_mirrored: bool) -> None:
     rules = _rules(is_mirrored=is_mirrored, drop=1.0 - 2.0**-53)
     assert isinstance(_found(rules), Witness)
     assert RulePairs(arrange(rules, SQUARE)).never_weaker(2, 1) == "not"
-
-
-def test_values_of_two_polynomials_at_two_places_are_one_number() -> None:
-    place = roots(GOLDEN, ZERO, ONE)[0]
-    mirrored = (ONE, Fraction(-3), ONE)  # that of 1 - x
-    beside = roots(mirrored, ZERO, ONE)[0]
-    square = AlgebraicLevel((ZERO, ZERO, ONE), GOLDEN, place)
-    line = AlgebraicLevel((ZERO, ONE), mirrored, beside)
-    near = AlgebraicLevel((Fraction(1, 2**90), ONE), mirrored, beside)
-    groups = equal_levels([square, near, line])
-    assert groups is not None
-    assert list(groups.values()) == [[0, 2], [1]]
-    (_, high), (low, _) = groups
-    assert high < low
-
-
-def test_a_value_that_is_rational_at_an_irrational_place_is_that_number() -> None:
-    two = (Fraction(-2), ZERO, ONE)
-    place = roots(two, ONE, Fraction(2))[0]
-    half = Fraction(1, 2)
-    sides = AlgebraicLevel((ZERO, ZERO, Fraction(1, 4)), two, place), half
-    groups = equal_levels(sides)
-    assert groups is not None
-    assert list(groups.values()) == [[0, 1]]
-    fourth = relation((ZERO, ONE, ZERO, ONE), two)  # x**3 + x is 3 x there
-    assert [int(one) for one in fourth] == [-18, 0, 1]
-    assert value_at(fourth, Fraction(3)) < 0

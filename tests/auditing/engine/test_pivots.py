@@ -7,9 +7,8 @@ import itertools
 import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange
-from fuzzytree.auditing.engine.pivots import may_tie
+from fuzzytree.auditing.engine.questions import may_tie, tie
 from fuzzytree.auditing.engine.states import Witness
-from fuzzytree.auditing.engine.ties import tie
 from tests.auditing.engine.bases import Kind, random_base, unit_domain
 
 
@@ -35,4 +34,4 @@ def test_no_pair_that_ties_is_left_out(kind: Kind) -> None:
 def test_rules_with_curves_of_their_own_are_apart() -> None:
     base = random_base(1, 12, 3, kind="lr")
     found = may_tie(arrange(base, unit_domain(base)))
-    assert found.sum() == found.diagonal().sum() == 12
+    assert not found.any()

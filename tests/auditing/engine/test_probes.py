@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange, strength_above, strengths_at
-from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.probes import RandomProbes
+from fuzzytree.auditing.engine.questions import wins
 from fuzzytree.auditing.engine.states import Witness, point_of
 from fuzzytree.model.rulebase import Conjunction
 from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule

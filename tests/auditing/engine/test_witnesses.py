@@ -7,9 +7,8 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.engine.arrangement import arrange, strengths_at
-from fuzzytree.auditing.engine.cover import least_cover, uncovered
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, linear_form, span
-from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.questions import least_cover, uncovered, wins
 from fuzzytree.auditing.engine.states import Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
     Part,

@@ -89,7 +89,7 @@ def test_weak_cover_is_reported_with_the_least_strength() -> None:
     assert isinstance(weak.state, Witness)
     assert weak.is_finding
     assert weak.sentence == (
-        "no rule has a strength of 0.1 where 'x' is 0.92 to 0.98; where it is least, "
+        "no rule has a strength of 0.1 where 'x' is 0.9 to 1; where it is least, "
         "the strongest rule has 0.05"
     )
     assert 0.049 < weak.measures[0].value <= weak.measures[1].value < 0.051
