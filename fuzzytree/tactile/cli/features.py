@@ -26,11 +26,13 @@ from fuzzytree.cli import (
 from fuzzytree.errors import ReadError
 from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import FramesOptions, frames_of_options
-from fuzzytree.tactile.features.names import USUAL
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.presses import Presses
     from fuzzytree.tactile.runtimes.frames import Features
+
+USUAL = "log orientation / force"
+"""Features that hardly depend on the force of a press and on the gain of the sensor."""
 
 FEW_PLACEMENTS = 10
 CLASS = "class"

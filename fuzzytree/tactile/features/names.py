@@ -172,9 +172,6 @@ SETS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """The sets that have a name; `blocks:16x8` is all blocks of that division."""
 
-USUAL = "log orientation / force"
-"""Features that hardly depend on the force of a press and on the gain of the sensor."""
-
 MOST_FEATURES = 4096
 """The most features of a sentence of sets."""
 
