@@ -88,16 +88,16 @@ def in_units(tree: FuzzyTree, units: dict[str, Unit]) -> FuzzyTree:
             part["centre"] = own.value(part.get("centre", 0.0))
         _convert(variable, ("low", "high"), unit.value)
         for term in variable["terms"]:
-            _convert(term["shape"], ("low", "high", "left", "right"), unit.value)
+            _convert(term["function"], ("low", "high", "left", "right"), unit.value)
     for node in plain["nodes"]:
         unit = units.get(node["variable"], Unit())
         node["cuts"] = [unit.value(cut) for cut in node["cuts"]]
     for sets in plain["sets"]:
         unit = units.get(sets["variable"], Unit())
         for term in sets["terms"]:
-            _convert(term["shape"], ("mean",), unit.value)
+            _convert(term["function"], ("mean",), unit.value)
             for side in ("left", "right"):
-                _convert(term["shape"][side], ("spread",), unit.length)
+                _convert(term["function"][side], ("spread",), unit.length)
     return msgspec.convert(plain, FuzzyTree)
 
 
