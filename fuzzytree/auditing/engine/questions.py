@@ -7,6 +7,7 @@ that is claimed was evaluated in fractions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
@@ -58,6 +59,7 @@ from fuzzytree.model import BoolArray
 from fuzzytree.numerics import outwards
 
 _TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
+_BRIEF_S: Final = 5.0  # for boxes at first, where degrees are enclosed
 _MOST_BOXES: Final = 512  # on which two products are one function
 _STEPS: Final = 10  # halvings of the upper end of a lead
 _DEPENDENT: Final = "the inputs of its variables depend on each other"
@@ -220,17 +222,21 @@ def _first_known(
     by_boxes: Callable[[Clock], State],
     clock: Clock,
 ) -> State:
-    """Return what levels find, or else boxes; in turn where degrees are enclosed."""
-    ways = [by_levels, by_boxes]
-    if not levels_of(base).is_exact:
-        ways.reverse()
-    first = ways[0](clock.share(0.5))
-    if not isinstance(first, Bracket):
-        return first
-    second = ways[1](clock.share(0.9))
-    if not isinstance(second, Bracket):
-        return second
-    return min(first, second, key=lambda one: one.high - one.low)
+    """Return what levels or boxes find; boxes are first where degrees are enclosed."""
+    is_exact, left = levels_of(base).is_exact, clock.left_s
+    results: list[State] = []
+    if not is_exact:
+        is_short = left < 2.0 * _BRIEF_S
+        results.append(by_boxes(clock.share(0.5) if is_short else Clock(_BRIEF_S)))
+    if not results or isinstance(results[0], Bracket):
+        results.append(by_levels(clock.share(0.5)))
+    if isinstance(results[-1], Bracket) and (is_exact or math.isfinite(left)):
+        results.append(by_boxes(clock.share(0.9)))
+    known = [one for one in results if not isinstance(one, Bracket)]
+    if known:
+        return known[0]
+    brackets = [one for one in results if isinstance(one, Bracket)]
+    return min(brackets, key=lambda one: one.high - one.low)
 
 
 # --- by how much a rule leads

@@ -74,7 +74,8 @@ def test_areas_equal_dense_sums(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_curves_are_equal_where_they_cross(seed: int) -> None:
-    for one, other in itertools.combinations(shapes(seed, 4), 2):
+    exact = [shape for shape in shapes(seed, 6) if not isinstance(shape, LR)]
+    for one, other in itertools.combinations(exact, 2):
         for at, height in overlap(curve_axis([one, other], ZERO, ONE)).crossings:
             ends = [
                 sorted((exact_degree(one, x), exact_degree(other, x)))
