@@ -7,7 +7,6 @@ that is claimed was evaluated in fractions.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
@@ -230,7 +229,7 @@ def _first_known(
         results.append(by_boxes(clock.share(0.5) if is_short else Clock(_BRIEF_S)))
     if not results or isinstance(results[0], Bracket):
         results.append(by_levels(clock.share(0.5)))
-    if isinstance(results[-1], Bracket) and (is_exact or math.isfinite(left)):
+    if isinstance(results[-1], Bracket):
         results.append(by_boxes(clock.share(0.9)))
     known = [one for one in results if not isinstance(one, Bracket)]
     if known:

@@ -9,7 +9,8 @@ import pytest
 
 from fuzzytree import table
 from fuzzytree.api.verbs import learn
-from fuzzytree.tactile.features.names import USUAL, names_of
+from fuzzytree.tactile.cli.features import USUAL
+from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State, usual_floor
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.sensor import Cells
