@@ -90,7 +90,7 @@ def test_the_page_loads_from_a_file_asks_nobody_and_has_no_error(seen: Seen) -> 
     assert seen.run("return document.scripts.length") == 1
     assert seen.run("return document.images.length") == 0
     text = seen.run("return document.body.innerText")
-    assert "1 error, 1 warning and 2 notes were found" in text
+    assert "1 error, 1 warning, 2 notes" in text
     assert "<script>alert(1)</script>" in text
 
 

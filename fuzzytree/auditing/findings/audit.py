@@ -125,7 +125,7 @@ def audit(
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    late = Clock(max(clock.left_s if clock else 0.0, settings.budget_s / 4))
+    late = clock if clock and clock.is_over else Clock(settings.budget_s / 4)
     is_class = viewed.policy.decision == "strongest" and model is viewed.system
     whole = viewed.rules if is_class and viewed.rules is not None else model
     result = _proved_twice(result, whole, late)
@@ -140,6 +140,8 @@ def _proved_twice(result: Audit, model: Document, clock: Clock) -> Audit:
     moved = (msgspec.structs.replace(one, places=()) for one in result.answers)
     bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
     try:
+        if clock.is_over:
+            raise CannotRunError("the budget was spent")
         content = find_format("yaml").write(model).content
         weak = undecided(msgspec.json.encode(bare), content, lambda: clock.is_over)
     except (LossError, CannotRunError):

@@ -16,7 +16,14 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.auditing.engine.states import Bracket, Proved, Sampled, State, Witness
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Computed,
+    Proved,
+    Sampled,
+    State,
+    Witness,
+)
 from fuzzytree.auditing.findings.codes import AUDITED
 from fuzzytree.auditing.findings.records import AuditAnswer, Severity
 from fuzzytree.model import (
@@ -169,7 +176,7 @@ PLANTED = (
         "FT402",
         with_terms(Term("high", LR(3.5, OVER, OVER))),
         "warning",
-        Proved,
+        Computed,
         ("high",),
         says="is clipped",
     ),
