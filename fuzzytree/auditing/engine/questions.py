@@ -500,7 +500,7 @@ def _tied(question: _TieQuestion, clock: Clock) -> State:
         return _NO_POINT
     if _is_product(base):
         return _tied_products(question, clock)
-    levels = levels_of(base)
+    levels, is_open = levels_of(base), False
     try:
         if not levels.axes:
             return question.accept(_middle(base)) or Proved("no rule has a proposition")
@@ -509,9 +509,11 @@ def _tied(question: _TieQuestion, clock: Clock) -> State:
             state = wins(base, question.ours[0], rivals, clock.share(0.5))
             if isinstance(state, Witness):
                 return question.accept(point_of(state.point)) or state
+            is_open = isinstance(state, Bracket)
         if not levels.is_exact:
-            return _tied_enclosed(question, clock)
-        is_open = False
+            tied = _tied_enclosed(question, clock)
+            is_left = is_open and isinstance(tied, Proved)
+            return question.open(_ENCLOSED) if is_left else tied
         ours = [n - 1 for n in question.ours]
         strict, weak = bits(question.strict), bits(question.weak)
         for wanted in levels.tied(ours, strict, weak, clock):
@@ -608,7 +610,9 @@ def _tied_enclosed(question: _TieQuestion, clock: Clock) -> State:
         found = None if point is None else question.accept(point)
         if found is not None:
             return found
-    if not may_tie(base)[ours[0], ours[-1]]:
+    # A single rule ties with any that may be as strong; it was found not to win.
+    others = ours[1:] or [n - 1 for n in question.weak]
+    if not may_tie(base)[ours[0], others].any():
         return Proved("they share no curve, and no constant")
     return question.open(_ENCLOSED)
 
