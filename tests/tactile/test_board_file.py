@@ -60,9 +60,10 @@ def boards(draw: st.DrawFn) -> Board:
     order = st.sampled_from(["little", "big"])
     bits = st.just(16) if full > 255 else st.sampled_from([8, 16])
     prefix = st.text(st.sampled_from("Fr!~:#"), max_size=32)
+    sizes = st.sampled_from(("none", "rows and columns"))
     protocols: list[st.SearchStrategy[Protocol]] = [
         st.builds(
-            Marker, code, bits, order, st.booleans(), skip, checksum,
+            Marker, code, bits, order, sizes, skip, checksum,
             st.one_of(st.just(""), code.map(str.upper)),
         ),
         st.builds(Request, code, bits, order, skip, checksum, st.floats(0.001, 3600)),
