@@ -447,7 +447,7 @@ class RulePairs:
     def _by_levels(
         self, rules: tuple[int, int], level: Fraction, high: Fraction, clock: Clock
     ) -> JointMaximum:
-        goals = [high, high - (high - level) / 2**20, level]
+        goals = [high, high - (high - level) / 2**40, level]
         if self.levels.joined or not self.levels.is_exact:
             goals = [high, level]
         for goal in dict.fromkeys(goals):
