@@ -177,7 +177,7 @@ def test_a_number_that_was_changed_fails_the_self_test(
     tables, rest = text.split("#ifdef M_SELFTEST")
     source, failed = tmp_path / "model.c", 0
     places = [m.start(1) for m in re.finditer(r"0x1\.([0-9a-f])[0-9a-f]*p", tables)]
-    chosen = places[:: max(len(places) // 6, 1)]
+    chosen = places[:: max(len(places) // 24, 1)]
     for place in chosen:
         digit = "0" if tables[place] != "0" else "1"
         changed = tables[:place] + digit + tables[place + 1 :]
