@@ -30,6 +30,9 @@ from fuzzytree.model import FloatArray
 NEARLY: Final = Fraction(1, 10**6)
 """Two antecedents are nearly the same if no degree differs by more than this."""
 
+_ONE_LEVEL: Final = Fraction(1, 10**9)
+"""Bounds of a highest common level that are no further apart are shown as one."""
+
 MOST_SHOWN: Final = 20
 """The most conflicts that are listed one by one."""
 
@@ -293,7 +296,7 @@ def _conflict(subject: Subject, pair: Pair, joint: JointMaximum) -> AuditAnswer:
     exact = str(low) if low == high else None
     measures: tuple[Measure, ...]
     measures = (Measure("highest common level", float(low), exact),)
-    if high - low > NEARLY:
+    if high - low > _ONE_LEVEL:
         measures = (Measure("highest common level at least", float(low)), most)
     return audit_answer(
         "FT201.conflict",

@@ -49,7 +49,7 @@ def check_on_grid(
             one, other = answer.rules
             best = max(min(row[one - 1], row[other - 1]) for row in activations)
             most = max(one.value for one in answer.measures)
-            assert best <= most + 1e-6, answer
+            assert best <= most + 1e-9, answer
             checked += 1
         if answer.code == "FT301" and isinstance(answer.state, Proved):
             level = 0.1 if answer.measures else 0.0
