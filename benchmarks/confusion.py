@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from figures import SIZE, style
 
-from fuzzytree.report.plots.sheet import SIZE, short, style
+from fuzzytree.report import cut
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -125,8 +126,8 @@ def draw_confusion(
         MissingExtraError: If matplotlib is not installed.
     """
     counts = _checked(np.asarray(matrix), classes)
-    names = [short(name, _LONGEST) for name in classes]
-    heads = [*names, short(other, _LONGEST)][: counts.shape[1]]
+    names = [cut(name, _LONGEST) for name in classes]
+    heads = [*names, cut(other, _LONGEST)][: counts.shape[1]]
     with style():
         sheet = Sheet()
         left = MARGIN + _WORDS + max(map(sheet.width, names)) + _GAP

@@ -288,19 +288,13 @@ def _write(
 
 
 def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
-    """Return pictures of the tree, the table and frames; none without the extra."""
+    """Return pictures of the tree, the table and frames."""
     import importlib.util
 
-    if importlib.util.find_spec("matplotlib") is None:
-        say(
-            f"without pictures: they need {install_hint('plots')}",
-            quiet=quiet,
-        )
-        return {}
     import numpy as np
     from confusion import MOST_CLASSES, draw_confusion
+    from figures import drawn
 
-    from fuzzytree.report.plots.sheet import drawn
     from fuzzytree.report.svg_tree import MOST_LEAVES, draw_tree
     from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames
@@ -312,12 +306,14 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
         found["tree.svg"] = draw_tree(outcome.tree).svg.encode()
     else:
         say(f"no picture of a tree of {len(outcome.tree.leaves)} leaves", quiet=quiet)
-    if len(study.classes) <= MOST_CLASSES:
+    if importlib.util.find_spec("matplotlib") is None:
+        say("no picture of the table: it needs matplotlib", quiet=quiet)
+    elif len(study.classes) <= MOST_CLASSES:
         table = np.array(study.confusion, np.int64)
         count = len(study.classes)
         none = table[:, count:].sum(axis=1, keepdims=True)
         counts = np.hstack([table[:, :count], none]) if none.any() else table[:, :count]
-        found["confusion.svg"] = drawn(draw_confusion(counts, study.classes), ".svg")
+        found["confusion.svg"] = drawn(draw_confusion(counts, study.classes))
     first = [int(np.argmax(task.codes == code)) for code in range(len(study.classes))]
     cells = pressed(task.sensor, task.frames[first[:_FRAMES_SHOWN]])
     shown = [interpolated(one, times) for times in _TIMES for one in cells]
@@ -326,8 +322,8 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
         for times in _TIMES
         for name in study.classes[: len(cells)]
     ]
-    figure = draw_frames(shown, titles=titles, columns=len(cells))
-    found["frames.png"] = drawn(figure, ".png")
+    frames = draw_frames(shown, titles=titles, columns=len(cells))
+    found["frames.svg"] = frames.content(".svg")
     return found
 
 

@@ -18,17 +18,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from figures import SIZE, drawn, style
 
-from fuzzytree.report.plots import save
-from fuzzytree.report.plots.sheet import SIZE, style
 from fuzzytree.tactile.interpolation import interpolated
-from fuzzytree.tactile.plots import colours, draw_frames
+from fuzzytree.tactile.plots import COLOURS, draw_frames
 from fuzzytree.tactile.presses import read_frames
 from fuzzytree.tactile.sensor import pressed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from fuzzytree.report import Picture
 
 Floats = npt.NDArray[np.float64]
 
@@ -49,8 +50,8 @@ def main() -> None:
         parser.add_argument(f"--{name}", action="store_true")
     asked = {name for name, wanted in vars(parser.parse_args()).items() if wanted}
     if not asked or "draw" in asked:
-        save(picture_of_weights(), DOCS / "interpolation-weights.svg")
-        save(picture_of_a_hand(), DOCS / "interpolation-hand.svg")
+        (DOCS / "interpolation-weights.svg").write_bytes(drawn(picture_of_weights()))
+        picture_of_a_hand().save(DOCS / "interpolation-hand.svg")
     if not asked or "errors" in asked:
         print_errors()
     if not asked or "times" in asked:
@@ -81,6 +82,7 @@ def picture_of_weights() -> Figure:
     fuzzy, plain = interpolated(single, times), bilinear(single, times)
     with style():
         from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.colors import ListedColormap
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(8.0, 2.75))
@@ -91,7 +93,11 @@ def picture_of_weights() -> Figure:
             for left in (0.1, 2.0, 3.9, 6.12)
         )
         levels = np.linspace(0.1, 0.9, 9)
-        strong = {"vmin": 0.0, "vmax": 1.0, "cmap": colours()}
+        strong = {
+            "vmin": 0.0,
+            "vmax": 1.0,
+            "cmap": ListedColormap(np.divide(COLOURS, 255)),
+        }
         _show(first, fuzzy, "fuzzy", levels, strong)
         _show(second, plain, "bilinear", levels, strong)
         levels = np.delete(np.linspace(-MOST, MOST, 11), 5)  # 0 is no line but a plane
@@ -150,7 +156,7 @@ def _draw_profiles(axes: Axes, fuzzy: Floats, plain: Floats, times: int) -> None
     axes.legend(fontsize=SIZE - 1.5, frameon=False, handlelength=1.6)
 
 
-def picture_of_a_hand() -> Figure:
+def picture_of_a_hand() -> Picture:
     """Draw a press of a hand at each number of times (paper, Fig. 6)."""
     given = read_frames(HAND, threshold=6)
     cells = pressed(given.sensor, given.frames)[0]

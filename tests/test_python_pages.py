@@ -13,7 +13,7 @@ NEEDED = {
     "fuzzy-libraries.md": ("skfuzzy", "simpful"),
     "ibis.md": ("ibis",),
     "large-tables.md": ("pandas",),
-    "notebook.md": ("matplotlib", "pandas"),
+    "notebook.md": ("pandas",),
     "parts.md": ("pandas",),
     "polars.md": ("polars",),
 }

@@ -6,9 +6,9 @@ import itertools
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from figures import drawn, style
 from matplotlib.figure import Figure
 
-from fuzzytree.report.plots.sheet import drawn, style
 from paper.inference import wilson
 from paper.judging import PRIMARY, Line, Verdict, lines, verdicts
 from paper.records import Claims
@@ -59,7 +59,7 @@ def speed(claims: Claims) -> Figure:
 def svg(draw: Callable[[Claims], Figure], claims: Claims) -> bytes:
     """Return a picture as SVG: the same numbers give the same bytes."""
     with style():
-        return drawn(draw(claims), ".svg")
+        return drawn(draw(claims))
 
 
 def _growth(axis: Axes, chosen: Sequence[Line]) -> None:

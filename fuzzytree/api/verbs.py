@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.model import FloatArray, Use
-    from fuzzytree.report import TreePicture
+    from fuzzytree.report import Picture
 
 
 Frame = TypeVar("Frame")
@@ -839,7 +839,7 @@ def recheck(
         raise ReadError(str(error)) from error
 
 
-def draw(tree: ModelSource, *, title: str | None = None) -> TreePicture:
+def draw(tree: ModelSource, *, title: str | None = None) -> Picture:
     """Draw a tree: its nodes, the terms of its branches, its classes.
 
     Args:

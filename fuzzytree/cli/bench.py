@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,7 +27,6 @@ from fuzzytree.cli.console import (
     verbose_option,
     wrong_options,
 )
-from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import check_place, write_atomically
 
 if TYPE_CHECKING:
@@ -189,17 +187,17 @@ def _ending(found: Study, *, as_json: bool, quiet: bool) -> int:
 
 def _check_places(output: str | None, plots: Sequence[str]) -> None:
     """Refuse what cannot be written, before minutes of work."""
-    from fuzzytree.report import SUFFIXES
+    from fuzzytree.report import SUFFIXES, check_suffix
 
     for place in (output, *plots):
         if place:
             check_place(place)
     for place in plots:
-        if Path(place).suffix.lower() not in SUFFIXES:
+        suffix = Path(place).suffix.lower()
+        if suffix not in SUFFIXES:
             known = " or ".join(SUFFIXES)
             raise click.UsageError(f"--plot {place}: a picture ends in {known}")
-    if plots and importlib.util.find_spec("matplotlib") is None:
-        raise MissingExtraError(f"fuzzytree bench --plot needs {install_hint('plots')}")
+        check_suffix(suffix)
 
 
 def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
@@ -211,7 +209,7 @@ def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
     timings = [timing for point in found.points for timing in point.timings]
     rows = max(timing.rows for timing in timings)
     threads = min(timing.threads for timing in timings)
-    figure = report.work_precision(found, rows=rows, threads=threads)
+    picture = report.work_precision(found, rows=rows, threads=threads)
     for place in places:
-        report.save(figure, place)
+        picture.save(place)
     return places

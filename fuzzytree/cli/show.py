@@ -30,7 +30,7 @@ class ShowOptions:
     picture: str | None = option(
         "--picture",
         metavar="FILE",
-        help="Picture of the tree to write, as .svg.",
+        help="Picture of the tree to write, as .svg or .png.",
     )
     as_json: bool = json_option
     quiet: bool = quiet_option

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import NamedTuple
 
 import msgspec
 
-from fuzzytree.files import PathLike, write_atomically
 from fuzzytree.model import FuzzyTree, Node
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import LETTER, cut
 from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.pictures import Picture, picture
 from fuzzytree.report.systems import sum_text
 from fuzzytree.report.text import counted, number, taken
 
@@ -30,13 +27,10 @@ _PALETTE = (
     *("#5b4db2", "#b3261e", "#00788a", "#5f6b1f", "#57606a"),
 )  # of classes, in their order; more than ten classes share them
 _STYLE = """
-text { font: 12px system-ui, sans-serif; fill: #1b1c1e; }
-.small { font-size: 10.5px; fill: #595d66; }
-.strong { font-size: 13px; font-weight: 600; }
 .box { fill: #ffffff; stroke: #595d66; stroke-width: 1.5; }
 .branch { fill: none; stroke: #c8cacd; }
 .track { fill: #efefeb; }
-"""  # of a picture in a file of its own, in which no page says how it looks
+"""  # of a picture in a file of its own
 
 
 class Box(msgspec.Struct):
@@ -78,30 +72,7 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
     return mark("svg", wide, high, "tree", f"The tree {_size_text(tree)}", desc, drawn)
 
 
-class TreePicture(NamedTuple):
-    """A picture of a tree, which a notebook shows: the content of an SVG file."""
-
-    svg: str
-
-    def _repr_svg_(self) -> str:
-        """Return what a notebook shows."""
-        return self.svg
-
-    def save(self, path: PathLike) -> None:
-        """Write the picture to a file whose name ends in .svg.
-
-        Raises:
-            ValueError: If the name ends otherwise.
-            WriteError: If the file cannot be written.
-        """
-        if Path(path).suffix.lower() != ".svg":
-            raise ValueError(
-                f"{os.fspath(path)}: the name of a tree's picture ends in .svg"
-            )
-        write_atomically(path, self.svg.encode())
-
-
-def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> TreePicture:
+def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Picture:
     """Draw a tree: the variable of each node, the terms of its branches, the classes.
 
     A node shows its variable and its cuts. A leaf shows its class, the pattern if the
@@ -136,7 +107,6 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> TreePicture:
         for k, colour in enumerate(_PALETTE)
     )
     marks = [
-        mark("style", Markup(_STYLE + colours)),
         mark("words", _EDGE, _LINE, said, "strong"),
         mark("group", drawn, move=f"translate(0 {_LINE:.0f})"),
         *(
@@ -144,10 +114,7 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> TreePicture:
             for k, note in enumerate(notes)
         ),
     ]
-    high += _LINE * (len(notes) + 1)
-    space = "http://www.w3.org/2000/svg"
-    picture = mark("svg", wide, high, "tree", said, "", marks, space)
-    return TreePicture(f"{picture}\n")
+    return picture(marks, wide, high + _LINE * (len(notes) + 1), said, _STYLE + colours)
 
 
 def _size_text(tree: FuzzyTree) -> str:

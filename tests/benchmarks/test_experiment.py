@@ -127,7 +127,7 @@ def test_a_folder_holds_a_model_that_recognises_the_frames(
         "class,upright,flat,(nothing),(unknown)\nupright,12,0,0,0\nflat,0,12,0,0\n"
     )
     first = {path.name: path.read_bytes() for path in Path("found").iterdir()}
-    assert {"tree.svg", "confusion.svg", "frames.png", "report.json"} <= set(first)
+    assert {"tree.svg", "confusion.svg", "frames.svg", "report.json"} <= set(first)
     assert call(*words, "-o", "found", "--quiet") == (
         0,
         first["report.txt"].decode(),

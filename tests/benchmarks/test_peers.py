@@ -602,7 +602,7 @@ def test_the_list_of_peers_is_made_without_loading_any() -> None:
         "from fuzzytree.testing import random_tree; "
         "from fuzzytree.benchmarking.candidates import load_peers; import sys; "
         "load_peers(sys.argv[1])(random_tree(1), lambda rules, dtype: None); "
-        "import fuzzytree.report.plots; "
+        "import fuzzytree.report.svg_bench; "
         "names = 'sklearn skl2onnx treelite m2cgen fuzzylite simpful onnx onnxruntime "
         "matplotlib'; print([name for name in names.split() if name in sys.modules])"
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -12,6 +11,7 @@ from msgspec.structs import replace
 
 from fuzzytree import api
 from fuzzytree.benchmarking.records import Study
+from fuzzytree.errors import install_hint
 from fuzzytree.report.bench import study_lines
 from fuzzytree.report.text import duration
 from tests.benchmarking.studies import error, point, study, timing
@@ -227,13 +227,14 @@ def test_a_table_without_rows_is_one_sentence(call: Call) -> None:
 def test_pictures_are_drawn_for_most_rows(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("matplotlib")
+    pytest.importorskip("resvg_py")
+    pytest.importorskip("font_roboto")
     monkeypatch.setattr(api, "bench", lambda *_, **__: made())
     code, _, err = call("bench", "grip.yaml", "--plot", "a.svg", "--plot", "a.png")
     assert code == 0
     assert err.splitlines()[:2] == ["wrote    a.svg", "wrote    a.png"]
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
-    assert Path("a.svg").read_text("utf-8").startswith("<?xml")
+    assert Path("a.svg").read_text("utf-8").startswith("<svg")
 
 
 def test_a_study_of_nothing_leaves_files_as_they_were(
@@ -272,14 +273,9 @@ def test_a_place_that_cannot_be_written_is_reported_before_any_work(
 def test_a_missing_extra_for_pictures_is_named(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util,
-        "find_spec",
-        lambda name, *rest: None if name == "matplotlib" else real(name, *rest),
-    )
-    message = "fuzzytree bench --plot needs matplotlib: pip install 'matplotlib>=3.8'\n"
-    assert call("bench", "grip.yaml", "--plot", "a.svg") == (2, "", message)
+    monkeypatch.setitem(sys.modules, "resvg_py", None)
+    message = f"a PNG needs {install_hint('plots')}\n"
+    assert call("bench", "grip.yaml", "--plot", "a.png") == (2, "", message)
 
 
 def test_a_model_that_is_no_yaml_is_one_sentence(call: Call) -> None:

@@ -157,4 +157,4 @@ def test_what_has_no_tree_has_no_picture(call: Call) -> None:
 def test_a_picture_of_another_kind_is_refused(call: Call) -> None:
     code, _, err = call("show", "grip.yaml", "--picture", "grip.pdf")
     assert code == 2
-    assert "grip.pdf: the name of a tree's picture ends in .svg" in err
+    assert "grip.pdf: a picture's name ends in .svg or .png" in err

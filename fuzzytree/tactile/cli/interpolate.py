@@ -197,7 +197,6 @@ def _picture(
     cells: Pressed,
     times: Sequence[int],
 ) -> bytes:
-    from fuzzytree.report import drawn
     from fuzzytree.tactile.interpolation import interpolated
     from fuzzytree.tactile.plots import draw_frames
 
@@ -208,7 +207,7 @@ def _picture(
         title = f"{title}, {given.label_names[given.label[number]]}"
     axis = _axis(given, number) if options.is_marked else None
     names = [f"{n} times" if n > 1 else "once" for n in times]
-    figure = draw_frames(
+    picture = draw_frames(
         images,
         titles=[f"{sensor.rows} x {sensor.columns} cells", *names],
         title=title,
@@ -216,7 +215,7 @@ def _picture(
         cells=[(sensor.rows, sensor.columns)] * len(images),
         unit="reading",
     )
-    return drawn(figure, Path(options.output).suffix.lower())
+    return picture.content(Path(options.output).suffix.lower())
 
 
 def _axis(given: Presses, number: int) -> FrameAxis | None:
