@@ -30,14 +30,12 @@ from fuzzytree.formats import (
     LONGEST_NOTE,
     LONGEST_SENTENCE,
     FormulaError,
-    Vocabulary,
     conclusions_text,
     condition_text,
+    condition_texts,
     parse,
     read_yaml,
-    readings,
     text_of,
-    vocabulary_of,
 )
 from fuzzytree.model import (
     LR,
@@ -58,7 +56,6 @@ from fuzzytree.model import (
     Node,
     PiCurve,
     Points,
-    Proposition,
     RuleBase,
     RuleBlock,
     Semantics,
@@ -71,7 +68,6 @@ from fuzzytree.model import (
     Trapezoid,
     Variable,
     Written,
-    proposition_text,
 )
 
 _TITLES: Final = {
@@ -123,6 +119,10 @@ def _losses(model: Document) -> Iterator[Loss]:
             yield from _system_losses(model)
         case RuleBase():
             counts = [(f"rule {n}", r.support) for n, r in enumerate(model.rules, 1)]
+            shared = {id(one): one for rule in model.rules for one in rule.when}
+            texts = {key: condition_text(one) for key, one in shared.items()}
+            for number, rule in enumerate(model.rules, 1):
+                yield from _long(f"rule {number}", [texts[id(p)] for p in rule.when])
         case FuzzyTree():
             counts = [(f"leaf {n}", r.support) for n, r in enumerate(model.leaves, 1)]
     for where, count in counts:
@@ -153,15 +153,14 @@ def _rule_base(rules: RuleBase) -> dict[str, Entry]:
     if rules.kind:
         entries["terms"] = Noted(rules.kind, _ORIGINS[rules.kind])
     entries |= _body(rules)
-    vocabulary = vocabulary_of(rules.variables)
-    propositions: dict[int, Entry] = {}  # rules share propositions
+    texts: dict[int, Entry] = {}  # rules share propositions
     listed: list[Entry] = []
     for rule in rules.rules:
-        for proposition in rule.when:
-            if id(proposition) not in propositions:
-                propositions[id(proposition)] = _proposition(proposition, vocabulary)
+        for one in rule.when:
+            if id(one) not in texts:
+                texts[id(one)] = condition_text(one)
         whole: dict[str, Entry] = {
-            "if": Short([propositions[id(proposition)] for proposition in rule.when]),
+            "if": Short([texts[id(one)] for one in rule.when]),
             "then": rule.then,
         }
         if rule.support is not None:
@@ -230,16 +229,6 @@ def _variable(variable: Variable | SystemOutput) -> dict[str, Entry]:
     if variable.terms:
         entries["terms"] = [*map(_term, variable.terms)]
     return entries
-
-
-def _proposition(proposition: Proposition, vocabulary: Vocabulary) -> Entry:
-    """Return a sentence if it has one reading, otherwise the parts."""
-    text = proposition_text(proposition)
-    if len(text) <= LONGEST_SENTENCE and readings(text, vocabulary) == (proposition,):
-        return text
-    verb = "is not" if proposition.negated else "is"
-    terms = Short([*proposition.terms], is_run_on=True)
-    return Short({"variable": proposition.variable, verb: terms})
 
 
 def _node(number: int, node: Node) -> dict[str, Entry]:
@@ -312,8 +301,13 @@ def _system_losses(system: FuzzySystem) -> Iterator[Loss]:
         if block.activation.count > LARGEST_COUNT:
             yield Loss(f"block {number}", f"its count is above {LARGEST_COUNT}")
     for number, rule in enumerate(system.rules, 1):
-        if max(map(len, _sentences(rule))) > LONGEST_SENTENCE:
-            yield Loss(f"rule {number}", f"more than {LONGEST_SENTENCE} characters")
+        sentences = [*condition_texts(rule.when), conclusions_text(rule.then)]
+        yield from _long(f"rule {number}", sentences)
+
+
+def _long(where: str, sentences: list[str]) -> Iterator[Loss]:
+    if any(len(text) > LONGEST_SENTENCE for text in sentences):
+        yield Loss(where, f"a sentence of more than {LONGEST_SENTENCE} characters")
 
 
 def _is_readable(formula: Formula) -> bool:
@@ -417,13 +411,10 @@ def _activation(how: Activation) -> Short:
     return Short(entries)
 
 
-def _sentences(rule: SystemRule) -> tuple[str, str]:
-    return condition_text(rule.when), conclusions_text(rule.then)
-
-
 def _rule(rule: SystemRule) -> dict[str, Entry]:
     entries: dict[str, Entry] = {"name": rule.name} if rule.name else {}
-    entries["if"], entries["then"] = _sentences(rule)
+    entries["if"] = Short([*condition_texts(rule.when)])
+    entries["then"] = conclusions_text(rule.then)
     if rule.weight != 1.0:
         entries["weight"] = float(rule.weight)
     return entries

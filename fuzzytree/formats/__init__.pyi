@@ -67,6 +67,7 @@ from .yaml.binding import record as record
 from .yaml.binding import value_of as value_of
 from .yaml.conditions import conclusions_text as conclusions_text
 from .yaml.conditions import condition_text as condition_text
+from .yaml.conditions import condition_texts as condition_texts
 from .yaml.layout import LARGEST_COUNT as LARGEST_COUNT
 from .yaml.layout import LONGEST_NOTE as LONGEST_NOTE
 from .yaml.layout import LONGEST_SENTENCE as LONGEST_SENTENCE
@@ -79,8 +80,5 @@ from .yaml.nodes import MOST_NODES as MOST_NODES
 from .yaml.nodes import MappingNode as MappingNode
 from .yaml.nodes import Scalar as Scalar
 from .yaml.nodes import compose as compose
-from .yaml.propositions import Vocabulary as Vocabulary
-from .yaml.propositions import readings as readings
-from .yaml.propositions import vocabulary_of as vocabulary_of
 from .yaml.yaml_reader import mapping_of_format as mapping_of_format
 from .yaml.yaml_reader import read_yaml as read_yaml

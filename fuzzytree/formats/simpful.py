@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from fuzzytree.errors import LossError
 from fuzzytree.formats.formulas import parse
-from fuzzytree.formats.yaml.propositions import blocks_of, joined
+from fuzzytree.formats.yaml.conditions import blocks_of, joined
 from fuzzytree.model import (
     And,
     Conclusion,

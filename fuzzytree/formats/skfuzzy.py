@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.formats.yaml.propositions import blocks_of, joined
+from fuzzytree.formats.yaml.conditions import blocks_of, joined
 from fuzzytree.model import (
     And,
     Conclusion,

@@ -191,7 +191,8 @@ def condition_mistakes(
         yield "it joins no conditions at all"
     for one in questions(condition):
         if len(one.terms) > 1:
-            yield f"{one.variable!r} is used with several terms; join them by 'or'"
+            each = " or ".join(f"{one.variable} is {term}" for term in one.terms)
+            yield f"a proposition of a system has one term; write {each[:200]!r}"
         if one.terms or one.variable not in terms:
             yield from reference_mistakes(one.variable, one.term, terms)
         elif not one.hedges or one.hedges[-1] != "any":

@@ -221,29 +221,25 @@ def test_a_symmetric_set_is_written_once() -> None:
     )
 
 
-def test_an_ambiguous_proposition_is_written_with_its_parts() -> None:
-    terms = tuple(Term(name, Band()) for name in ("b", "not b", "c"))
+def test_a_name_with_a_word_of_the_language_stands_in_quotes() -> None:
+    terms = tuple(Term(name, Band()) for name in ("b", "not b", "c (cm)"))
     propositions = (
         Proposition("a", ("b",), hedges=("not",)),
         Proposition("a", ("not b",)),
-        Proposition("a", ("b", "c")),
+        Proposition("a", ("b", "c (cm)")),
         Proposition("a", ("not b",), hedges=("not",)),
     )
     rules = RuleBase("s", ("k",), (Variable("a", terms),), (Rule(propositions, "k"),))
     text = assert_kept(rules).decode()
     assert text[text.index("- if:") : text.index("  then:")] == (
-        "- if:\n"
-        "  - {variable: a, is not: [b]}\n"
-        "  - {variable: a, is: [not b]}\n"
-        "  - a is b or c\n"
-        "  - a is not not b\n"
+        "- if: [a is not b, 'a is \"not b\"', a is b or c (cm), 'a is not \"not b\"']\n"
     )
 
 
 @pytest.mark.heavy
 def test_no_line_is_long_where_it_can_be_broken() -> None:
     tree = random_tree(4, leaves=40, inputs=60)
-    many = tuple(f"a somewhat long name {n}" for n in range(30))
+    many = tuple(f"a rather long name {n}" for n in range(30))
     terms = tuple(Term(name, Band()) for name in many)
     propositions = (Proposition("x", many), Proposition("x", many, hedges=("not",)))
     wide = RuleBase(
@@ -299,6 +295,17 @@ def test_what_no_file_can_hold_is_refused() -> None:
             "rule 2: the support is above 9007199254740992"
         )
     assert text_files.LONGEST_NAME == 1000
+
+
+def test_a_sentence_that_would_not_be_read_again_is_refused() -> None:
+    names = tuple(f"{n:03}".ljust(1000, "x") for n in range(100))
+    variable = Variable("v", tuple(Term(name, Band()) for name in names))
+    rule = Rule((Proposition("v", names),), "a")
+    with pytest.raises(LossError) as caught:
+        write(RuleBase("r", ("a",), (variable,), (rule,)))
+    assert str(caught.value) == (
+        "cannot write r as yaml: rule 1: a sentence of more than 100000 characters"
+    )
 
 
 def test_a_file_that_would_not_be_read_again_is_refused(

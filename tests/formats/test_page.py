@@ -10,9 +10,10 @@ import msgspec
 from fuzzytree.formats import text_files
 from fuzzytree.formats.yaml import layout, nodes
 from fuzzytree.formats.yaml.binding import bind
+from fuzzytree.formats.yaml.conditions import parse_condition
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
 from fuzzytree.formats.yaml.yaml_reader import read_yaml
-from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.rulebase import Proposition, RuleBase
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "yaml-format.md"
 TEXT = PAGE.read_text("utf-8")
@@ -37,11 +38,10 @@ def test_the_first_example_is_a_whole_file() -> None:
 
 
 def test_every_other_example_fits_the_layout() -> None:
-    _, size, points, propositions, nodes_and_leaves, sets = BLOCKS
+    _, size, points, sentences, nodes_and_leaves, sets = BLOCKS
     bound: list[tuple[Node, type[layout.FileRecord]]] = [
         *((item, layout.VariableOfModel) for item in items(size)),
         *((item, layout.TermOfVariable) for item in items(points)),
-        *((item, layout.WrittenOut) for item in items(propositions)),
         *((item, layout.NodeOfTree) for item in items(nodes_and_leaves, "nodes")),
         *((item, layout.End) for item in items(nodes_and_leaves, "leaves")),
         *((item, layout.SetsOfVariable) for item in items(sets, "sets")),
@@ -50,6 +50,10 @@ def test_every_other_example_fits_the_layout() -> None:
     for item, kind in bound:
         assert bind(item, kind, found) is not None
     assert found == []
+    texts = [item.text for item in items(sentences) if isinstance(item, Scalar)]
+    assert [*map(parse_condition, texts)] == [
+        Proposition("black or white", ("not white", "grey"), ("not",))
+    ]
 
 
 def test_the_page_states_the_limits_of_the_code() -> None:

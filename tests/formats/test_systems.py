@@ -147,7 +147,7 @@ def test_mistakes_of_every_part_are_reported_at_once() -> None:
             "x.yaml:39:9: rule 2: 'service' has no term 'god'; there is poor, good, "
             "excellent (did you mean 'good'?)",
             "x.yaml:41:13: rule 2: the weight must lie in [0, 1], not 2.0",
-            "x.yaml:44:11: 'tip is': the end where a term must stand behind 'tip is'",
+            "x.yaml:45:11: 'tip is': the end where a term must stand behind 'tip is'",
         ]
     )
 
@@ -189,7 +189,7 @@ def hostile() -> dict[str, str]:
     block = "blocks:\n- activation: {method: general}\n  and: minimum\n  rules:\n"
 
     def rules(*sentences: str) -> str:
-        return "".join(f"  - if: '{one}'\n    then: y is one\n" for one in sentences)
+        return "".join(f"  - if: ['{one}']\n    then: y is one\n" for one in sentences)
 
     count = 4000
     inputs = "inputs:\n" + "".join(
@@ -215,12 +215,12 @@ def hostile() -> dict[str, str]:
         + block
         + rules(*(f"v{k} low" for k in range(count)))
         + tail,
-        "wrong formulas": head + formulas + output + block + rules("always") + tail,
+        "wrong formulas": head + formulas + output + block + rules("y is any") + tail,
         "unknown names of formulas": head
         + names
         + output
         + block
-        + rules("always")
+        + rules("y is any")
         + tail,
         "parentheses": head + output + block + rules("(" * 90_000 + "y is one") + tail,
         "a long sentence": head
@@ -234,13 +234,13 @@ def hostile() -> dict[str, str]:
         + "1'}\n"
         + output
         + block
-        + rules("always")
+        + rules("y is any")
         + tail,
         "many blocks": head
         + inputs
         + output
         + "blocks:\n"
-        + "- {activation: {method: general}, rules: [{if: v1 is lo, then: y is one}]}\n"
+        + "- {activation: {method: general}, rules: [{if: [a is b], then: y is one}]}\n"
         * count
         + tail,
     }

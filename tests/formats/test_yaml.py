@@ -182,7 +182,7 @@ def test_thousands_of_mistakes_are_listed_in_part_and_at_once() -> None:
     assert time.process_time() - start < 10
     assert len(message) == 101
     assert message[0].startswith("x.yaml:6033:8: rule 1: 'petal length' has no term")
-    assert message[-1] == "x.yaml: and at least 4100 more mistakes"
+    assert message[-1] == "x.yaml: and at least 200 more mistakes"
 
 
 @pytest.mark.heavy

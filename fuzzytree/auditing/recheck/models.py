@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -15,7 +14,6 @@ from fuzzytree.auditing.recheck.sentences_of_rules import (
     Joint,
     read_conclusions,
     read_condition,
-    readings,
 )
 from fuzzytree.auditing.recheck.yaml import Items, read_yaml
 
@@ -174,7 +172,7 @@ class Model:
         if kind == "tree":
             self._read_tree(top)
         else:
-            rules = [_rule(one, self.variables) for one in top["rules"]]
+            rules = [_rule(one) for one in top["rules"]]
             self.rules = self._rules(rules, self.variables)
         self.numbers = [*range(1, len(self.rules.rules) + 1)]
         self.names = [f"rule {number}" for number in self.numbers]
@@ -391,6 +389,8 @@ class Model:
         if hedges[:1] == ("any",):
             return [] if negated else [()]
         known = self.variables.get(one.variable)
+        if one.others:
+            raise CannotRunError("several terms in a proposition of a system")
         if known is None or one.term not in known.curves:
             raise UndecidedError("it uses an output")
         term = "\0".join((one.term, *hedges))
@@ -631,20 +631,14 @@ def _numbers(kind: str, data: Any) -> tuple[str, tuple[Any, ...]]:
     return "trapezoid", (x, x, x, None) if kind == "at least" else (None, x, x, x)
 
 
-def _rule(one: Facts, variables: Mapping[str, Variable]) -> Rule:
+def _rule(one: Facts) -> Rule:
     keys(one, "if, then", "support")
-    known = {name: variable.curves for name, variable in variables.items()}
-    when: list[Proposition] = []
-    for result in one["if"]:
-        if isinstance(result, dict):
-            verb = "is not" if "is not" in result else "is"
-            keys(result, f"variable, {verb}")
-            when.append(
-                Proposition(result["variable"], tuple(result[verb]), verb != "is")
-            )
-        else:
-            read = [*itertools.islice(readings(result, known), 2)]
-            if len(read) != 1:
-                raise CannotRunError(f"{len(read)} readings of {result!r:.200}")
-            when.append(Proposition(*read[0]))
-    return Rule(tuple(when), one["then"])
+    conditions = [read_condition([text]) for text in one["if"]]
+    when = [c for c in conditions if isinstance(c, Is) and c.term]
+    hedges = {c.hedges for c in when} - {(), ("not",)}
+    if len(when) < len(conditions) or hedges:
+        raise CannotRunError("a rule base has no such conditions")
+    every = [
+        Proposition(c.variable, (c.term or "", *c.others), bool(c.hedges)) for c in when
+    ]
+    return Rule(tuple(every), one["then"])

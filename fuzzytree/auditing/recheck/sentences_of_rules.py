@@ -1,14 +1,14 @@
-"""The sentences of a model's file: propositions, conditions and conclusions.
+"""The sentences of a model's file: conditions and conclusions.
 
-A condition of a fuzzy system is such as `dirt is very high and (load is small or not
-(load is big))`. AND binds closer than OR; a name of several words stands as it is, one
-with a word of the language in quotes.
+A condition is such as `dirt is very high and (load is small or big or not (load is
+big))`. AND binds closer than OR; a name of several words stands as it is, one with a
+word of the language in quotes. A rule has a list of conditions, which AND joins.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Sequence
 from typing import NamedTuple
 
 MOST_LEVELS = 100
@@ -17,20 +17,22 @@ HEDGES = (
     *("plus", "minus", "cube root"),
 )
 _HEDGES = {hedge.replace(" ", "-"): hedge for hedge in HEDGES}
-_WORDS = {"is", "and", "or", "not", "always", "(", ")", *_HEDGES}
+_WORDS = {"", "is", "and", "or", "not", "(", ")", *_HEDGES}
 _TOKEN = re.compile(
-    r"""\s*(?:('(?:[^']|'')*'|"(?:[^"]|"")*")|([()])|([^\s()'"][^\s()]*)|$)"""
+    r"""\s*(?:('(?:[^']|'')*'|"(?:[^"]|"")*")  # a name in quotes
+    |(\([^\s()'"]+\)|[^\s()'"][^\s()]*(?:\([^\s()]*\))*)  # a word, (cm) or f(x) too
+    |([()]))""",
+    re.VERBOSE,
 )
-Names = tuple[str, tuple[str, ...], bool]
-"""A variable, its terms, and whether the whole is negated."""
 
 
 class Is(NamedTuple):
-    """A proposition; `hedges` from left to right."""
+    """A proposition; `hedges` from left to right. Rule bases alone have `others`."""
 
     variable: str
     term: str | None
     hedges: tuple[str, ...]
+    others: tuple[str, ...] = ()
 
 
 class Joint(NamedTuple):
@@ -44,25 +46,37 @@ Condition = Is | Joint
 
 
 class _Words:
-    """The words of a sentence, from the last to the first one that is not yet read."""
+    """The words of a sentence, and how many are read."""
 
     def __init__(self, text: str) -> None:
-        self.rest: list[tuple[str, bool]] = []  # a name in quotes is marked
-        place = 0
-        while text[place:].strip():
+        self.all: list[tuple[str, bool]] = []  # a name in quotes is marked
+        self.count = place = 0
+        text = text.rstrip()
+        while place < len(text):
             token = _TOKEN.match(text, place)
             if token is None:
                 raise ValueError("a quote that is not closed")
             quoted, place = token[1], token.end()
             name = quoted[1:-1].replace(quoted[0] * 2, quoted[0]) if quoted else ""
-            self.rest.append((name, True) if quoted else (token[2] or token[3], False))
-        self.rest.reverse()
+            self.all.append((name, True) if quoted else (token[2] or token[3], False))
+        self.all.append(("", False))
+
+    @property
+    def next(self) -> tuple[str, bool]:
+        """The first word that is not read; at the end an empty one."""
+        return self.all[self.count]
+
+    @property
+    def is_over(self) -> bool:
+        return self.count == len(self.all) - 1
 
     def takes(self, *words: str) -> str:
         """Read a word if it is the next one, and return it."""
-        if self.rest and not self.rest[-1][1] and self.rest[-1][0] in words:
-            return self.rest.pop()[0]
-        return ""
+        word, is_quoted = self.next
+        if is_quoted or word not in words:
+            return ""
+        self.count += 1
+        return word
 
     def needs(self, *words: str) -> None:
         if not self.takes(*words):
@@ -70,15 +84,16 @@ class _Words:
 
     def name(self) -> str:
         """Read a name, in quotes or of several words; empty if there is none."""
-        if self.rest and self.rest[-1][1]:
-            return self.rest.pop()[0]
-        words: list[str] = []
-        while self.rest and not self.rest[-1][1] and self.rest[-1][0] not in _WORDS:
-            words.append(self.rest.pop()[0])
-        return " ".join(words)
+        start, (word, is_quoted) = self.count, self.next
+        if is_quoted:
+            self.count += 1
+            return word
+        while not self.next[1] and self.next[0] not in _WORDS:
+            self.count += 1
+        return " ".join(word for word, _ in self.all[start : self.count])
 
     def proposition(self) -> Is:
-        """Read `variable is hedge ... term`; behind `any` the term may be missing."""
+        """Read `variable is hedge ... term or term`; behind `any` it may be missing."""
         variable, hedges = self.name(), list[str]()
         self.needs("is")
         while hedge := self.takes(*_HEDGES):
@@ -86,7 +101,12 @@ class _Words:
         term = self.name() or None
         if not variable or (term is None and hedges[-1:] != ["any"]):
             raise ValueError("a variable or a term is missing")
-        return Is(variable, term, tuple(hedges))
+        others, count = list[str](), self.count
+        while self.takes("or") and (other := self.name()) and not self.takes("is"):
+            others.append(other)
+            count = self.count
+        self.count = count
+        return Is(variable, term, tuple(hedges), tuple(others))
 
     def joined(self, word: str, level: int) -> Condition:
         """Read parts that OR joins, each of parts that AND joins."""
@@ -102,7 +122,7 @@ class _Words:
     def _part(self, level: int) -> Condition:
         """Read a proposition, or a condition in parentheses."""
         if self.takes("not"):
-            if self.rest[-1:] != [("(", False)]:
+            if self.next != ("(", False):
                 raise ValueError("'(' is missing")
             return Joint("not", (self.joined("part", level + 1),))
         if not self.takes("("):
@@ -114,21 +134,25 @@ class _Words:
         return Joint(word, (result,)) if word else result
 
 
-def read_condition(text: str) -> Condition | None:
-    """Return the condition of a sentence; None for `always`.
+def read_condition(sentences: Sequence[str]) -> Condition | None:
+    """Return the condition of a rule's sentences; None if there are none.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If one is none.
 
     Example:
-        >>> read_condition("speed is not very high")
-        Is(variable='speed', term='high', hedges=('not', 'very'))
+        >>> read_condition(["speed is not very high"])
+        Is(variable='speed', term='high', hedges=('not', 'very'), others=())
     """
-    words = _Words(text)
-    result = None if words.takes("always") else words.joined("or", 1)
-    if words.rest:
-        raise ValueError("more behind the condition")
-    return result
+    results: list[Condition] = []
+    for text in sentences:
+        words = _Words(text)
+        results.append(words.joined("or", 1))
+        if not words.is_over:
+            raise ValueError("more behind the condition")
+    return (
+        Joint("and", tuple(results)) if len(results) > 1 else next(iter(results), None)
+    )
 
 
 def read_conclusions(text: str) -> tuple[Is, ...]:
@@ -140,34 +164,6 @@ def read_conclusions(text: str) -> tuple[Is, ...]:
     words, result = _Words(text), list[Is]()
     while not result or words.takes("and"):
         result.append(words.proposition())
-    if words.rest or any(one.term is None for one in result):
+    if not words.is_over or any(one.term is None or one.others for one in result):
         raise ValueError("no conclusions")
     return tuple(result)
-
-
-def readings(text: str, known: Mapping[str, Collection[str]]) -> Iterator[Names]:
-    """Yield everything that a proposition of a rule base can mean.
-
-    Example:
-        >>> list(readings("grip is not firm", {"grip": ["soft", "firm"]}))
-        [('grip', ('firm',), True)]
-    """
-    for place in re.finditer("(?= is )", text):
-        variable, rest = text[: place.start()], text[place.start() + 4 :]
-        terms = known.get(variable, ())
-        yield from ((variable, one, False) for one in _lists(rest, terms))
-        if rest.startswith("not "):
-            yield from ((variable, one, True) for one in _lists(rest[4:], terms))
-
-
-def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
-    """Yield every list of terms, joined by ` or `, that a text can mean."""
-    todo: list[tuple[int, tuple[str, ...]]] = [(0, ())]
-    while todo:
-        start, terms = todo.pop()
-        for name in known:
-            end = start + len(name)
-            if text.startswith(name, start) and end == len(text):
-                yield (*terms, name)
-            elif text.startswith(name, start) and text.startswith(" or ", end):
-                todo.append((end + 4, (*terms, name)))

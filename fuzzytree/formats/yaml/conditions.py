@@ -1,17 +1,20 @@
-"""Conditions and conclusions of systems as sentences, read and written.
+"""Conditions and conclusions as sentences, read, written and joined.
 
 `temperature is very hot and (pressure is not low or speed is fast)`. AND binds closer
-than OR. A name may have several words; one with a word of the language in it, such as
-`and` or `very`, or with signs that would end it, stands in quotes, where a quote is
-written twice. Between a variable and its term stand hedges, the words of a hedge joined
-by `-`. `not (...)` takes the opposite of a condition, `always` is no condition at all,
-and `(and a is b)` an AND of one part.
+than OR, and `speed is slow or fast` is one proposition. A name may have several words;
+one with a word of the language in it, such as `and` or `very`, or with signs that would
+end it, stands in quotes, where a quote is written twice. Between a variable and its
+term stand hedges, the words of a hedge joined by `-`. `not (...)` takes the opposite of
+a condition, and `(and a is b)` is an AND of one part. A rule has a list of conditions,
+all of which must hold.
 """
 
 from __future__ import annotations
 
+import itertools
+import operator
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final, get_args
 
 import msgspec
@@ -25,19 +28,22 @@ from fuzzytree.model import (
     Not,
     Or,
     Proposition,
+    RuleBlock,
+    SNorm,
+    SystemRule,
+    TNorm,
 )
 
-ALWAYS: Final = "always"
 HEDGES: Final[Mapping[str, Hedge]] = {
     hedge.replace(" ", "-"): hedge for hedge in get_args(Hedge)
 }
-_KEYWORDS: Final = frozenset(["is", "and", "or", "not", ALWAYS, *HEDGES])
+_KEYWORDS: Final = frozenset(["is", "and", "or", "not", *HEDGES])
 _TOKEN: Final = re.compile(
     r"""
     (?P<blank>\s+)
   | (?P<quoted>'(?:[^']|'')*'|"(?:[^"]|"")*")
+  | (?P<word>\([^\s()'"]+\)|[^\s()'"][^\s()]*(?:\([^\s()]*\))*)
   | (?P<sign>[()])
-  | (?P<word>[^\s()'"][^\s()]*)
     """,
     re.VERBOSE,
 )
@@ -60,23 +66,25 @@ class _Token(msgspec.Struct, frozen=True):
         return self.kind == "sign" and self.text == sign
 
     @property
+    def begins_a_name(self) -> bool:
+        return self.kind == "quoted" or self.is_of_a_name
+
+    @property
     def is_of_a_name(self) -> bool:
         return self.kind == "word" and bool(self.text) and self.text not in _KEYWORDS
 
 
-def parse_condition(text: str) -> Condition | None:
-    """Return the condition of a sentence, None for `always`.
+def parse_condition(text: str) -> Condition:
+    """Return the condition of a sentence.
 
     Raises:
         SentenceError: If it is none, or is nested too deeply.
 
     Example:
-        >>> parse_condition("speed is not very high")
-        Proposition(variable='speed', terms=('high',), hedges=('not', 'very'))
+        >>> parse_condition("speed is not very high or low")
+        Proposition(variable='speed', terms=('high', 'low'), hedges=('not', 'very'))
     """
     sentence = _Sentence(text)
-    if [token.text for token in sentence.tokens] == [ALWAYS, ""]:
-        return None
     result = sentence.condition(1)
     sentence.end("'and', 'or' or the end")
     return result
@@ -100,19 +108,24 @@ def parse_conclusions(text: str) -> tuple[Conclusion, ...]:
     return tuple(results)
 
 
-def condition_text(condition: Condition | None) -> str:
-    """Return the sentence of a condition; `parse_condition` gives back an equal one.
+def condition_texts(condition: Condition | None) -> list[str]:
+    """Return a sentence for each part of an outermost AND; none for None.
 
     Example:
-        >>> condition_text(And((Proposition("wall", ("near",)),
-        ...     Proposition("is it", ("so",), ("very",)))))
-        'wall is near and "is it" is very so'
+        >>> condition_texts(And((Proposition("wall", ("near",)),
+        ...     Proposition("is it", ("so", "so-so"), ("very",)))))
+        ['wall is near', '"is it" is very so or so-so']
     """
+    if isinstance(condition, And) and len(condition.parts) > 1:
+        return [*map(condition_text, condition.parts)]
+    return [] if condition is None else [condition_text(condition)]
+
+
+def condition_text(condition: Condition) -> str:
+    """Return the sentence of a condition; `parse_condition` gives back an equal one."""
     match condition:
-        case None:
-            return ALWAYS
-        case Proposition(variable=variable, term=label, hedges=hedges):
-            return _proposition(variable, label, hedges)
+        case Proposition(variable=variable, terms=terms, hedges=hedges):
+            return _proposition(variable, terms, hedges)
         case Not(part=part):
             return f"not ({condition_text(part)})"
         case And(parts=parts) | Or(parts=parts):
@@ -132,14 +145,15 @@ def condition_text(condition: Condition | None) -> str:
 def conclusions_text(conclusions: tuple[Conclusion, ...]) -> str:
     """Return the sentence of conclusions; `parse_conclusions` reads it."""
     return " and ".join(
-        _proposition(one.output, one.term, one.hedges) for one in conclusions
+        _proposition(one.output, (one.term,), one.hedges) for one in conclusions
     )
 
 
-def _proposition(variable: str, label: str | None, hedges: tuple[Hedge, ...]) -> str:
-    words = [hedge.replace(" ", "-") for hedge in hedges]
-    name = [] if label is None else [_quoted(label)]
-    return " ".join([_quoted(variable), "is", *words, *name])
+def _proposition(
+    variable: str, terms: tuple[str, ...], hedges: tuple[Hedge, ...]
+) -> str:
+    words = [_quoted(variable), "is", *(hedge.replace(" ", "-") for hedge in hedges)]
+    return " ".join([*words, " or ".join(map(_quoted, terms))]).rstrip()
 
 
 def _quoted(name: str) -> str:
@@ -225,12 +239,20 @@ class _Sentence:
         return result if kind is None else kind((result,))
 
     def question(self) -> Proposition:
-        """Read `variable is hedge ... term`."""
+        """Read `variable is hedge ... term or term`."""
         variable, hedges = self.proposition()
-        has_label = self.next.kind == "quoted" or self.next.is_of_a_name
-        if hedges and hedges[-1] == "any" and not has_label:
+        if hedges and hedges[-1] == "any" and not self.next.begins_a_name:
             return Proposition(variable, (), hedges)
-        return Proposition(variable, (self.name("a term"),), hedges)
+        terms = [self.name("a term")]
+        place = self.place
+        while self.takes("or") and self.next.begins_a_name:
+            term = self.name("a term")
+            if self.next.is_word("is"):  # it is the variable of another proposition
+                break
+            terms.append(term)
+            place = self.place
+        self.place = place
+        return Proposition(variable, tuple(terms), hedges)
 
     def conclusion(self) -> Conclusion:
         """Read `output is hedge ... term`."""
@@ -261,3 +283,30 @@ class _Sentence:
         if self.place == start:
             raise self.unexpected(what)
         return " ".join(token.text for token in self.tokens[start : self.place])
+
+
+def joined(join: type[And] | type[Or], left: Condition, right: Condition) -> Condition:
+    """Return two conditions joined, without parentheses that change only rounding.
+
+    Example:
+        >>> a, b, c = (Proposition("force", (term,)) for term in "abc")
+        >>> joined(Or, a, joined(Or, b, c)) == Or((a, b, c))
+        True
+    """
+    first, last = (
+        one.parts if isinstance(one, join) else (one,) for one in (left, right)
+    )
+    return join((*first, *last))
+
+
+def blocks_of(
+    rules: Iterable[tuple[SystemRule, TNorm, SNorm]], implication: TNorm | None
+) -> tuple[RuleBlock, ...]:
+    """Return blocks of rules in their order, a new one where the operators change."""
+    groups = itertools.groupby(rules, key=operator.itemgetter(1, 2))
+    return tuple(
+        RuleBlock(
+            tuple(rule for rule, *_ in some), conjunction, disjunction, implication
+        )
+        for (conjunction, disjunction), some in groups
+    )

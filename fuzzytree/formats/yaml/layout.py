@@ -69,14 +69,20 @@ GoTo = Annotated[
         examples=["node 2", "leaf 1"],
     ),
 ]
-Sentence = Annotated[
-    str,
-    Meta(
-        max_length=LONGEST_SENTENCE,
-        description="`VARIABLE is TERM`, `VARIABLE is TERM or TERM`, "
-        "or either with `is not`.",
-        examples=["petal length is high", "petal width is not low or medium"],
-    ),
+Antecedent = tuple[
+    Annotated[
+        str,
+        Meta(
+            max_length=LONGEST_SENTENCE,
+            description="`VARIABLE is HEDGE ... TERM or TERM`; in a fuzzy system also "
+            "such propositions with and, or, not (...) and parentheses.",
+            examples=[
+                "petal width is not low or medium",
+                "dirt is high or load is big",
+            ],
+        ),
+    ],
+    ...,
 ]
 
 
@@ -256,21 +262,11 @@ class VariableOfModel(FileRecord, frozen=True, kw_only=True):
     terms: tuple[TermOfVariable, ...] = ()
 
 
-class WrittenOut(FileRecord, frozen=True, kw_only=True):
-    """A proposition whose names would make a sentence ambiguous."""
-
-    noun: ClassVar[str] = "a proposition"
-    forms: ClassVar[tuple[KeyForm, ...]] = (KeyForm(("is",)), KeyForm(("is not",)))
-    variable: Name
-    is_: tuple[Name, ...] | None = field(name="is", default=None)
-    is_not: tuple[Name, ...] | None = field(name="is not", default=None)
-
-
 class RuleOfModel(FileRecord, frozen=True, kw_only=True):
     """If all propositions hold, then the class; support counts training rows."""
 
     noun: ClassVar[str] = "a rule"
-    if_: tuple[Sentence | WrittenOut, ...] = field(name="if")
+    if_: Antecedent = field(name="if")
     then: Name
     support: Count | None = None
 
@@ -389,15 +385,6 @@ LONGEST_NOTE = 100_000
 
 Note = Annotated[str, Meta(min_length=1, max_length=LONGEST_NOTE)]
 Samples = Annotated[int, Meta(ge=1, le=MOST_SAMPLES)]
-ConditionText = Annotated[
-    str,
-    Meta(
-        max_length=LONGEST_SENTENCE,
-        description="Propositions `VARIABLE is HEDGE ... TERM` with and, or, not (...) "
-        "and parentheses; `always` holds always.",
-        examples=["dirt is very high and (load is small or load is not big)"],
-    ),
-]
 ConclusionText = Annotated[
     str,
     Meta(
@@ -438,11 +425,11 @@ class ActivationOfBlock(FileRecord, frozen=True, kw_only=True):
 
 
 class RuleOfSystem(FileRecord, frozen=True, kw_only=True):
-    """If a condition holds, then some terms are concluded."""
+    """If all conditions hold, then some terms are concluded."""
 
     noun: ClassVar[str] = "a rule"
     name: Name | None = None
-    if_: ConditionText = field(name="if")
+    if_: Antecedent = field(name="if")
     then: ConclusionText
     weight: float = 1.0
 

@@ -19,14 +19,11 @@ from fuzzytree.formats.yaml.binding import (
     shortened,
     variables_at,
 )
-from fuzzytree.formats.yaml.conditions import (
-    SentenceError,
-    parse_conclusions,
-    parse_condition,
-)
+from fuzzytree.formats.yaml.conditions import SentenceError, parse_conclusions
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode
 from fuzzytree.model import (
     Activation,
+    And,
     Conclusion,
     Condition,
     Defuzzifier,
@@ -121,6 +118,7 @@ def _blocks(
             not_a_list(node, "blocks", file_mistakes)
         return None
     blocks: list[RuleBlock] = []
+    known: dict[str, Condition | None] = {}
     for position, item in enumerate(node.items):
         if not isinstance(item, MappingNode):
             bind(item, layout.BlockOfSystem, file_mistakes)
@@ -131,7 +129,7 @@ def _blocks(
         rules: list[SystemRule] = []
         for index, one in enumerate(bound or ()):
             path: Path = ("blocks", position, "rules", index)
-            rule = _rule(path, one, mistakes)
+            rule = _rule(path, one, known, mistakes)
             if rule is None:
                 broken.add(path)
                 rule = spare
@@ -157,22 +155,19 @@ def _block(head: layout.BlockHead | None, rules: tuple[SystemRule, ...]) -> Rule
 
 
 def _rule(
-    path: Path, one: layout.RuleOfSystem | None, mistakes: list[Mistake]
+    path: Path,
+    one: layout.RuleOfSystem | None,
+    known: dict[str, Condition | None],
+    mistakes: list[Mistake],
 ) -> SystemRule | None:
     """Return a rule, or None if it is broken."""
     if one is None or len(mistakes) >= MOST_SHOWN:
         return None
-    count = len(mistakes)
-    when: Condition | None = None
-    then: tuple[Conclusion, ...] = ()
-    try:
-        when = parse_condition(one.if_)
-    except SentenceError as error:
-        mistakes.append(((*path, "when"), f"{shortened(one.if_)}: {error}"))
+    parts = values.conditions(path, one.if_, known, mistakes)
+    when = And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else None
     try:
         then = parse_conclusions(one.then)
     except SentenceError as error:
         mistakes.append(((*path, "then"), f"{shortened(one.then)}: {error}"))
-    if len(mistakes) > count:
         return None
     return SystemRule(when, then, one.weight, one.name or "")

@@ -12,11 +12,14 @@ from msgspec.structs import astuple
 from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import MOST_SHOWN
 from fuzzytree.formats.yaml import layout
+from fuzzytree.formats.yaml.binding import shortened
+from fuzzytree.formats.yaml.conditions import SentenceError, parse_condition
 from fuzzytree.model import (
     LR,
     Band,
     Binary,
     Branch,
+    Condition,
     Curve,
     Formula,
     Leaf,
@@ -155,6 +158,27 @@ def semantics(value: layout.RuleSemantics | layout.TreeSemantics | None) -> Sema
 
 def _answer(text: str) -> str | None:
     return None if text == "no class" else text.removeprefix("class ")
+
+
+def conditions(
+    path: Path,
+    sentences: Sequence[str],
+    known: dict[str, Condition | None],
+    mistakes: list[Mistake],
+) -> list[Condition]:
+    """Return the conditions of a rule that can be read; equal sentences share theirs.
+
+    `known` has those of the rules before it, None for what is no condition.
+    """
+    for index, text in enumerate(sentences):
+        if text not in known and len(mistakes) < MOST_SHOWN:
+            try:
+                known[text] = parse_condition(text)
+            except SentenceError as error:
+                known[text] = None
+                where = (*path, "when", index)
+                mistakes.append((where, f"{shortened(text)}: {error}"))
+    return [one for text in sentences if (one := known.get(text)) is not None]
 
 
 def leaf(one: layout.End) -> Leaf:

@@ -23,17 +23,16 @@ from fuzzytree.formats.yaml.binding import (
 )
 from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
 from fuzzytree.formats.yaml.nodes import MappingNode, Node, Scalar, compose
-from fuzzytree.formats.yaml.propositions import (
-    read_rules,
-    vocabulary_of,
-)
 from fuzzytree.formats.yaml.system_reader import read_system
 from fuzzytree.model import (
+    Condition,
     Document,
     FuzzyTree,
     Mistake,
     Path,
+    Proposition,
     Reading,
+    Rule,
     RuleBase,
     Variable,
     naming_mistakes,
@@ -128,9 +127,8 @@ def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase 
     if head is None or bound is None or known is None:
         return None
     variables, broken = known
-    vocabulary = vocabulary_of(variables)
     mistakes: list[Mistake] = []
-    rules = read_rules(bound, head.classes[0], vocabulary, mistakes)
+    rules = _rules(bound, head.classes[0], mistakes)
     file_mistakes += located(root, mistakes)
     return _built(
         lambda: RuleBase(
@@ -144,6 +142,29 @@ def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase 
         ),
         root, file_mistakes, broken,
     )  # fmt: skip
+
+
+def _rules(
+    bound: list[layout.RuleOfModel | None], any_class: str, mistakes: list[Mistake]
+) -> tuple[Rule, ...]:
+    """Return the rules, with one that is always right in the place of a broken one."""
+    known: dict[str, Condition | None] = {}
+    rules: list[Rule] = []
+    for position, one in enumerate(bound):
+        if one is None:
+            rules.append(Rule((), any_class))
+            continue
+        path: Path = ("rules", position)
+        when = values.conditions(path, one.if_, known, mistakes)
+        propositions = tuple(part for part in when if isinstance(part, Proposition))
+        if len(propositions) < len(when):
+            text = (
+                "only a fuzzy system joins propositions; a rule base has 'VARIABLE is "
+                "TERM or TERM', or the same with 'is not'"
+            )
+            mistakes.append(((*path, "when"), f"rule {position + 1}: {text}"))
+        rules.append(Rule(propositions, one.then, one.support))
+    return tuple(rules)
 
 
 def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | None:

@@ -281,4 +281,4 @@ END_FUNCTION_BLOCK
         assert len(dead.places) == 1
         assert place is None or dead.places == (place,)
         if place is None:
-            assert text_at(file, dead.places[0]).startswith("if: speed is low")
+            assert text_at(file, dead.places[0]).startswith("if: [speed is low]")
