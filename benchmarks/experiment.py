@@ -59,69 +59,59 @@ _ONLY = {
 class ExperimentOptions:
     """The arguments and options of the verb."""
 
-    task: str = argument(metavar="[TASK]", default="paper")
+    task: str = argument("[TASK]", default="paper")
     features: str | None = option(
-        "--features", metavar="NAMES", help="Names and sets of features, with commas."
+        "--features NAMES", "Names and sets of features, with commas."
     )
     mode: Literal["default", "paper"] | None = option(
         "--mode",
-        type=click.Choice(["default", "paper"]),
-        help="`paper` is the paper's learner to the letter.",
+        "`paper` is the paper's learner to the letter.",
+        choices=["default", "paper"],
     )
     patterns: int | None = option(
-        "--patterns", type=click.IntRange(1), help="For each class."
+        "--patterns", "For each class.", type=click.IntRange(1)
     )
     shrinkage: float | None = option(
-        "--shrinkage", type=float, help="Of off-diagonal scatter, 0 to 1."
+        "--shrinkage", "Of off-diagonal scatter, 0 to 1.", type=float
     )
     entry: float | None = option(
-        "--entry", type=float, help="What a further feature must gain."
+        "--entry", "What a further feature must gain.", type=float
     )
     choose: bool = option(
         "--choose",
+        "Choose patterns, shrinkage and entry without those who are tested.",
         is_flag=True,
-        help="Choose patterns, shrinkage and entry without those who are tested.",
     )
     sensor: str = option(
         "--sensor",
-        type=click.Choice(["paper", "ideal"]),
+        "Of TASK paper: `ideal` is even and linear.",
+        choices=["paper", "ideal"],
         default="paper",
-        help="Of TASK paper: `ideal` is even and linear.",
     )
     seed: int = option(
-        "--seed", type=click.IntRange(0), default=0, help="Of presses and peers."
+        "--seed", "Of presses and peers.", type=click.IntRange(0), default=0
     )
     repeats: int = option(
         "--repeats",
+        "Of TASK paper, each pressed anew.",
         type=click.IntRange(1, 100),
         default=5,
-        show_default=True,
-        help="Of TASK paper, each pressed anew.",
     )
-    test: str | None = option(
-        "--test", metavar="FILE.npz", help="What FILE.npz is tested on."
-    )
+    test: str | None = option("--test FILE.npz", "What FILE.npz is tested on.")
     label: str = option(
-        "--label",
-        metavar="ARRAY",
-        default="label",
-        help="The classes in FILE.npz; `label`.",
+        "--label ARRAY", "The array of FILE.npz with the classes.", default="label"
     )
     full: int | None = option(
-        "--full", type=int, help="What a cell of FILE.npz reads at most."
+        "--full", "What a cell of FILE.npz reads at most.", type=int
     )
     threshold: int | None = option(
-        "--threshold", type=int, help="Above it a cell is pressed."
+        "--threshold", "Above it a cell is pressed.", type=int
     )
-    data: str | None = option(
-        "--data", metavar="FOLDER", help="Where the project's frames lie."
-    )
+    data: str | None = option("--data FOLDER", "Where the project's frames lie.")
     no_peers: bool = option(
-        "--no-peers", is_flag=True, help="Without learners of scikit-learn."
+        "--no-peers", "Without learners of scikit-learn.", is_flag=True
     )
-    output: str | None = option(
-        "-o", "--output", metavar="FOLDER", help="For models and pictures."
-    )
+    output: str | None = option("-o --output FOLDER", "For models and pictures.")
     as_json: bool = json_option
     quiet: bool = quiet_option
 

@@ -22,6 +22,7 @@ from fuzzytree.cli.console import (
     answer,
     answer_json,
     argument,
+    flag,
     json_option,
     option,
     quiet_option,
@@ -258,24 +259,19 @@ def discriminate(
 class TablesOptions:
     """The arguments and options of the verb."""
 
-    name: str = argument(metavar="OBJECT")
-    count: int = option(
-        "--count", metavar="NUMBER", type=int, default=50, show_default=True
+    name: str = argument("OBJECT")
+    count: int = option("--count NUMBER", "Presses of each class.", default=50)
+    seed: int = option(
+        "--seed NUMBER", "Random seed.", type=click.IntRange(0), default=0
     )
-    seed: int = option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
     changes: Sequence[str] = option(
-        "--set",
-        metavar="NAME=VALUE",
+        "--set NAME=VALUE",
+        "A number of the simulator (repeat); docs/explanation/simulator.md.",
         multiple=True,
-        help="A number of the simulator (repeat); docs/explanation/simulator.md.",
     )
-    means: bool = option(
-        "--means", is_flag=True, help="Print mean invariants beside Table 2."
-    )
-    is_each: bool = option(
-        "--effects",
-        is_flag=True,
-        help="Print the recognition rates without each effect of the sensor.",
+    means: bool = flag("--means", "Print mean invariants beside Table 2.")
+    is_each: bool = flag(
+        "--effects", "Print the recognition rates without each effect of the sensor."
     )
     as_json: bool = json_option
     quiet: bool = quiet_option

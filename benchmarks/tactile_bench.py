@@ -39,43 +39,34 @@ from fuzzytree.tactile.cli.sensors import (
 class TactileBenchOptions(SensorOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
-    data: str | None = option(
-        "--data", metavar="FRAMES", help="Frames of your own; made ones if none."
-    )
+    model: str = argument("MODEL")
+    data: str | None = option("--data FRAMES", "Frames of your own; made ones if none.")
     rows: Sequence[int] = option(
-        "--rows",
-        metavar="N",
+        "--rows N",
+        "Frames in a call.",
         type=click.IntRange(1, 1_000_000),
         multiple=True,
         default=(1, 10_000),
-        show_default=True,
-        help="Frames in a call.",
     )
     reject: float = option(
-        "--reject",
+        "--reject SHARE",
+        "What is weaker is none of the known objects; for raw rules.",
         type=click.FloatRange(0.0, 1.0),
         default=0.0,
-        metavar="SHARE",
-        help="What is weaker is none of the known objects; for raw rules.",
     )
     rounds: int = option(
-        "--rounds",
-        metavar="N",
+        "--rounds N",
+        "Samples of each; the interval needs 6.",
         type=click.IntRange(1, 1_000),
         default=15,
-        show_default=True,
-        help="Samples of each; the interval needs 6.",
     )
     budget: float = option(
-        "--budget",
-        metavar="SECONDS",
+        "--budget SECONDS",
+        "About how long it may take.",
         type=click.FloatRange(0.1),
         default=120.0,
-        show_default=True,
-        help="About how long it may take.",
     )
-    seed: int = option("--seed", type=click.IntRange(0), default=0, show_default=True)
+    seed: int = option("--seed", "Random seed.", type=click.IntRange(0), default=0)
     as_json: bool = json_option
     quiet: bool = quiet_option
 

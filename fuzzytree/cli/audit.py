@@ -56,100 +56,79 @@ For example:
 class AuditOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
+    model: str = argument("MODEL")
     data: str | None = option(
-        "--data",
-        metavar="TABLE",
-        help="Table of rows that the audit counts; `-` is standard input.",
+        "--data TABLE", "Table of rows that the audit counts; `-` is standard input."
     )
     target: str | None = option(
-        "--target",
-        metavar="COLUMN",
-        help="Column of TABLE that holds the class of each row.",
+        "--target COLUMN", "Column of TABLE that holds the class of each row."
     )
     within: Literal["model", "data"] = option(
         "--within",
-        type=click.Choice(["model", "data"]),
+        "Domain of the audit: the ranges of the model, or those of TABLE.",
+        choices=["model", "data"],
         default="model",
-        show_default=True,
-        help="Domain of the audit: the ranges of the model, or those of TABLE.",
     )
     spreads: float | None = option(
-        "--spreads",
+        "--spreads K",
+        "Extend the domain by K spreads around the fitted sets.",
         type=float,
-        metavar="K",
-        help="Extend the domain by K spreads around the fitted sets.",
     )
     limits: tuple[str, ...] = several(
-        "--limits",
-        "NAME=LOW:HIGH",
-        help="Range of values of a variable in the audit (repeat).",
+        "--limits NAME=LOW:HIGH", "Range of values of a variable in the audit (repeat)."
     )
     row: str | None = option(
-        "--row",
-        metavar="NAME=VALUE,...",
-        help="Row for which to find the nearest row of another class.",
+        "--row NAME=VALUE,...",
+        "Row for which to find the nearest row of another class.",
     )
     select: tuple[str, ...] = several(
-        "--select", "CODES", help="Codes to examine, such as FT1,FT301; all by default."
+        "--select CODES", "Codes to examine, such as FT1,FT301; all by default."
     )
     ignore: tuple[str, ...] = several(
-        "--ignore", "CODES", help="Codes to leave out, such as FT5."
+        "--ignore CODES", "Codes to leave out, such as FT5."
     )
     budget: float | None = option(
-        "--budget",
+        "--budget SECONDS",
+        "Time limit of the audit in seconds; 60 by default.",
         type=float,
-        metavar="SECONDS",
-        help="Time limit of the audit in seconds; 60 by default.",
     )
     settings: tuple[str, ...] = several(
-        "--set",
-        "NAME=VALUE",
-        help="Threshold (epsilon, margin, lead, level, overlap), or rows, seed.",
+        "--set NAME=VALUE",
+        "Threshold (epsilon, margin, lead, level, overlap), or rows, seed.",
     )
     config: str | None = option(
-        "--config",
-        metavar="FILE",
-        help="File with options; by default fuzzytree-audit.yaml of this folder.",
+        "--config FILE",
+        "File with options; by default fuzzytree-audit.yaml of this folder.",
     )
     baseline: str | None = option(
-        "--baseline",
-        metavar="FILE",
-        help="File of accepted findings, which do not fail the audit.",
+        "--baseline FILE", "File of accepted findings, which do not fail the audit."
     )
     write_baseline: str | None = option(
-        "--write-baseline",
-        metavar="FILE",
-        help="File to write all findings to, for --baseline.",
+        "--write-baseline FILE", "File to write all findings to, for --baseline."
     )
     fail_on: FailOn | None = option(
         "--fail-on",
-        type=click.Choice(["error", "warning", "info", "never"]),
-        help="Least severity that makes the exit code 1; warning by default.",
+        "Least severity that makes the exit code 1; warning by default.",
+        choices=["error", "warning", "info", "never"],
     )
     form: Form = option(
         "--output-format",
-        type=click.Choice(["text", "json", "sarif", "github"]),
+        "Format of the result: for people, programs or code hosts.",
+        choices=["text", "json", "sarif", "github"],
         default="text",
-        show_default=True,
-        help="Format of the result: for people, programs or code hosts.",
     )
     is_whole: bool = flag(
-        "--all", help="List every answer, also those that are no findings."
+        "--all", "List every answer, also those that are no findings."
     )
     output: str | None = option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="File to write the result to, in place of stdout.",
+        "-o --output FILE", "File to write the result to, in place of stdout."
     )
     page: str | None = option(
-        "--page", metavar="FILE", help="HTML file to write the audit to, in addition."
+        "--page FILE", "HTML file to write the audit to, in addition."
     )
     results: tuple[str, ...] = several(
-        "--results",
-        "FILE",
-        help="Result of `check --json` or `stability --json` to include (repeat).",
+        "--results FILE",
+        "Result of `check --json` or `stability --json` to include (repeat).",
     )
     delimiter: str | None = delimiter_option
     allow_loss: bool = allow_loss_option

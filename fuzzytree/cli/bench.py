@@ -38,74 +38,51 @@ INTERRUPTED = 130
 class BenchOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
+    model: str = argument("MODEL")
     data: str | None = option(
-        "--data",
-        metavar="TABLE",
-        help="Table of rows to measure on; rows from the model's ranges by default.",
+        "--data TABLE",
+        "Table of rows to measure on; rows from the model's ranges by default.",
     )
     rows: Sequence[int] = option(
-        "--rows",
-        metavar="N",
+        "--rows N",
+        "Rows in one call (repeat).",
         type=int,
         multiple=True,
         default=(1, 1_000, 1_000_000),
-        show_default=True,
-        help="Rows in one call (repeat).",
     )
     threads: Sequence[int] = option(
-        "--threads",
-        metavar="N",
+        "--threads N",
+        "Threads that a candidate may use (repeat).",
         type=int,
         multiple=True,
         default=(1, 2),
-        show_default=True,
-        help="Threads that a candidate may use (repeat).",
     )
     only: Sequence[str] = several(
-        "--only",
-        "NAME",
-        help="Candidates to measure, such as native, 'raw rules', variant (repeat).",
+        "--only NAME",
+        "Candidates to measure, such as native, 'raw rules', variant (repeat).",
     )
-    skip: Sequence[str] = several(
-        "--skip", "NAME", help="Candidates to leave out (repeat)."
-    )
+    skip: Sequence[str] = several("--skip NAME", "Candidates to leave out (repeat).")
     budget: float = option(
-        "--budget",
-        metavar="SECONDS",
-        type=float,
-        default=300.0,
-        show_default=True,
-        help="Approximate time limit in seconds.",
+        "--budget SECONDS", "Approximate time limit in seconds.", default=300.0
     )
     error: float | None = option(
-        "--error",
-        metavar="E",
+        "--error E",
+        "Largest error of a strength that the advice may accept.",
         type=float,
-        help="Largest error of a strength that the advice may accept.",
     )
     seed: int = option(
-        "--seed",
-        type=int,
-        default=0,
-        show_default=True,
-        help="Random seed for generated rows and the order of rounds.",
+        "--seed", "Random seed for generated rows and the order of rounds.", default=0
     )
     peers: str | None = option(
-        "--peers",
-        metavar="FOLDER",
-        help="Python module or package, which is run; its function "
+        "--peers FOLDER",
+        "Python module or package, which is run; its function "
         "peers(model, bounds) returns further candidates and omissions.",
     )
-    output: str | None = option(
-        "-o", "--output", metavar="FILE", help="JSON file to write the study to."
-    )
+    output: str | None = option("-o --output FILE", "JSON file to write the study to.")
     plots: Sequence[str] = several(
-        "--plot", "FILE", help="Picture of the study, as .svg or .png (repeat)."
+        "--plot FILE", "Picture of the study, as .svg or .png (repeat)."
     )
-    is_full: bool = flag(
-        "--full", help="List variants that are slower and less exact, too."
-    )
+    is_full: bool = flag("--full", "List variants that are slower and less exact, too.")
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option
     as_json: bool = json_option

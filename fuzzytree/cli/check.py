@@ -29,23 +29,20 @@ from fuzzytree.cli.console import (
 class CheckOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
-    files: Sequence[str] = argument(metavar="[FILES]...", nargs=-1)
+    model: str = argument("MODEL")
+    files: Sequence[str] = argument("[FILES]...", nargs=-1)
     data: str | None = data_option
     runtimes: Sequence[str] = runtimes_option
     limit: int | None = option(
         "--limit",
+        "Largest number of probes; 20000 by default, 2000 for a fuzzy system.",
         type=click.IntRange(min=1),
-        help="Largest number of probes; 20000 by default, 2000 for a fuzzy system.",
     )
-    is_full: bool = flag(
-        "--rows", help="List rows that differ by an allowed amount, too."
-    )
+    is_full: bool = flag("--rows", "List rows that differ by an allowed amount, too.")
     delimiter: str | None = delimiter_option
     rows_only: bool = rows_only_option
     run_code: bool = flag(
-        "--run-code",
-        help="Run a program file although its text differs from a new one.",
+        "--run-code", "Run a program file although its text differs from a new one."
     )
     allow_loss: bool = allow_loss_option
     verbose: bool = verbose_option

@@ -37,37 +37,28 @@ STATE = ".state"
 class CollectOptions:
     """The arguments and options of the verb."""
 
-    parts: Sequence[str] = argument(metavar="PART...", nargs=-1, required=True)
+    parts: Sequence[str] = argument("PART...", nargs=-1, required=True)
     target: str = option(
-        "--target",
-        required=True,
-        metavar="COLUMN",
-        help="Column that holds the class of each row.",
+        "--target COLUMN", "Column that holds the class of each row.", required=True
     )
-    output: str = option(
-        "-o", "--output", required=True, metavar="FILE.state", help="File to write."
-    )
+    output: str = option("-o --output FILE.state", "File to write.", required=True)
     model: str | None = option(
-        "--for",
-        metavar="MODEL",
-        help="Count the rows in each leaf of a tree: the second pass.",
+        "--for MODEL", "Count the rows in each leaf of a tree: the second pass."
     )
     columns: str | None = option(
-        "--columns",
-        metavar="NAMES",
-        help="Columns to learn from, separated by commas; all of the first PART by "
-        "default.",
+        "--columns NAMES",
+        "Columns to learn from, separated by commas; all of the first PART by default.",
     )
     ignore: Sequence[str] = ignore_option
     rows_per_class: int | None = option(
         "--rows-per-class",
+        "Largest number of rows per class that the learner keeps.",
         type=click.IntRange(min=1),
-        help="Largest number of rows per class that the learner keeps.",
     )
     missing: str | None = option(
         "--missing",
-        type=click.Choice(["drop", "refuse"]),
-        help="Rows with missing values: drop them, or refuse the part.",
+        "Rows with missing values: drop them, or refuse the part.",
+        choices=["drop", "refuse"],
     )
     delimiter: str | None = delimiter_option
     as_json: bool = json_option

@@ -26,24 +26,48 @@ _PATIENCE_S = 0.5  # before a bar appears
 _MOST_LINES = 8  # of a list on stderr, unless all are printed
 
 
-def option(*flags: str, **about: Any) -> Any:
-    """Return an option of a verb, to be the attribute of a class of options."""
-    return functools.partial(click.option, *flags, **about)
+def option(
+    words: str,
+    help: str,
+    choices: Sequence[str] = (),
+    *,
+    default: Any = None,
+    **about: Any,
+) -> Any:
+    """Return an option of a verb, to be the attribute of a class of options.
+
+    Args:
+        words: Its names and what stands for its value, such as `-o --output FILE`.
+        help: What it is.
+        choices: What its value can be, if not anything.
+        default: Its value where it is not named; the help shows it.
+        about: As `click.option` takes it.
+    """
+    *names, last = words.split()
+    if last.startswith("-"):
+        names.append(last)
+    else:
+        about["metavar"] = last
+    if choices:
+        about["type"] = click.Choice(choices)
+    if default is not None:
+        about |= {"default": default, "show_default": True}
+    return functools.partial(click.option, *names, help=help, **about)
 
 
-def flag(*flags: str, **about: Any) -> Any:
+def flag(words: str, help: str, **about: Any) -> Any:
     """Return an option of a verb that is on where it is named."""
-    return option(*flags, is_flag=True, **about)
+    return option(words, help, is_flag=True, **about)
 
 
-def several(name: str, metavar: str, **about: Any) -> Any:
+def several(words: str, help: str, **about: Any) -> Any:
     """Return an option of a verb that may be named more than once."""
-    return option(name, metavar=metavar, multiple=True, **about)
+    return option(words, help, multiple=True, **about)
 
 
-def argument(**about: Any) -> Any:
+def argument(metavar: str, **about: Any) -> Any:
     """Return an argument of a verb, to be the attribute of a class of options."""
-    return functools.partial(click.argument, **about)
+    return functools.partial(click.argument, metavar=metavar, **about)
 
 
 def takes(
@@ -55,8 +79,8 @@ def takes(
 
     Example:
         >>> class Words:
-        ...     text: str = argument()
-        ...     times: int = option("--times", type=int, default=1)
+        ...     text: str = argument("TEXT")
+        ...     times: int = option("--times NUMBER", "How often.", default=1)
         >>> @click.command()
         ... @takes(Words)
         ... def repeat(options: Words) -> None:
@@ -83,38 +107,30 @@ def takes(
     return decorate
 
 
-quiet_option = flag("--quiet", help="Print errors only.")
-json_option = flag("--json", help="Print the whole result as JSON to stdout.")
-verbose_option = flag(
-    "--verbose", help="Print every part of the result, not only counts."
-)
+quiet_option = flag("--quiet", "Print errors only.")
+json_option = flag("--json", "Print the whole result as JSON to stdout.")
+verbose_option = flag("--verbose", "Print every part of the result, not only counts.")
 delimiter_option = option(
-    "--delimiter",
-    metavar="CHARACTER",
-    help="Character between the cells of a CSV file; by default from its first line.",
+    "--delimiter CHARACTER",
+    "Character between the cells of a CSV file; by default from its first line.",
 )
 
-ignore_option = several("--ignore", "COLUMN", help="Column that is no input (repeat).")
+ignore_option = several("--ignore COLUMN", "Column that is no input (repeat).")
 
 allow_loss_option = flag(
     "--allow-loss",
-    help="Read a file that a model cannot represent exactly, with the nearest values.",
+    "Read a file that a model cannot represent exactly, with the nearest values.",
 )
 
 rows_only_option = flag(
-    "--rows-only",
-    help="Accept a file that predicts the same although its content differs.",
+    "--rows-only", "Accept a file that predicts the same although its content differs."
 )
 
 data_option = option(
-    "--data",
-    metavar="TABLE",
-    help="Table of rows to use in addition to the generated probes.",
+    "--data TABLE", "Table of rows to use in addition to the generated probes."
 )
 runtimes_option = several(
-    "--runtime",
-    "NAME",
-    help="Runtime to use (repeat); all installed runtimes by default.",
+    "--runtime NAME", "Runtime to use (repeat); all installed runtimes by default."
 )
 
 

@@ -58,33 +58,25 @@ if TYPE_CHECKING:
 class ConvertOptions:
     """The arguments and options of the verb."""
 
-    source: str = argument(metavar="IN")
-    output: str = argument(metavar="OUT")
+    source: str = argument("IN")
+    output: str = argument("OUT")
     read_as: str | None = option(
-        "--from", metavar="FORMAT", help="Format of IN; from its suffix by default."
+        "--from FORMAT", "Format of IN; from its suffix by default."
     )
-    to: str | None = option(
-        "--to", metavar="FORMAT", help="Format of OUT; from its suffix by default."
-    )
+    to: str | None = option("--to FORMAT", "Format of OUT; from its suffix by default.")
     representation: ModelKind | None = as_option
     kind: Kind | None = terms_option
     conjunction: Conjunction | None = conjunction_option
-    dialect: str | None = option(
-        "--dialect", metavar="NAME", help="Dialect of the format of OUT."
-    )
+    dialect: str | None = option("--dialect NAME", "Dialect of the format of OUT.")
     tolerance: str | None = option(
-        "--tolerance",
-        metavar="NUMBER",
-        help="Largest error of a degree where a curve becomes points.",
+        "--tolerance NUMBER", "Largest error of a degree where a curve becomes points."
     )
     settings: Sequence[str] = several(
-        "--set",
-        "NAME=VALUE",
-        help="Option of the writer (repeat); "
-        "`fuzzytree formats --format NAME` lists them.",
+        "--set NAME=VALUE",
+        "Option of the writer (repeat); `fuzzytree formats --format NAME` lists them.",
     )
     allow_loss: bool = flag(
-        "--allow-loss", help="Write the file although the conversion loses information."
+        "--allow-loss", "Write the file although the conversion loses information."
     )
     verbose: bool = verbose_option
     as_json: bool = json_option

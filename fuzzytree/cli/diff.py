@@ -27,22 +27,16 @@ from fuzzytree.cli.console import (
 class DiffOptions:
     """The arguments and options of the verb."""
 
-    old: str = argument(metavar="OLD")
-    new: str = argument(metavar="NEW")
+    old: str = argument("OLD")
+    new: str = argument("NEW")
     data: str | None = option(
-        "--data", metavar="TABLE", help="Table of rows that both models classify."
+        "--data TABLE", "Table of rows that both models classify."
     )
     limits: Sequence[str] = several(
-        "--limits",
-        "NAME=LOW:HIGH",
-        help="Range of values of an input to compare on (repeat).",
+        "--limits NAME=LOW:HIGH", "Range of values of an input to compare on (repeat)."
     )
     budget: float = option(
-        "--budget",
-        type=float,
-        default=60.0,
-        metavar="SECONDS",
-        help="Time limit of the proofs in seconds; 60 by default.",
+        "--budget SECONDS", "Time limit of the proofs in seconds.", default=60.0
     )
     delimiter: str | None = delimiter_option
     allow_loss: bool = allow_loss_option

@@ -17,7 +17,7 @@ from fuzzytree.cli.console import (
 class ExplainOptions:
     """The arguments and options of the verb."""
 
-    code: str | None = argument(metavar="[CODE]", required=False)
+    code: str | None = argument("[CODE]", required=False)
     verbose: bool = verbose_option
     as_json: bool = json_option
 

@@ -27,49 +27,41 @@ from fuzzytree.model import Conjunction, Kind, ModelKind
 class ExportOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
+    model: str = argument("MODEL")
     output: str = option(
-        "-o",
-        "--output",
-        required=True,
-        metavar="FILE",
-        help="File to write; `-` is stdout.",
+        "-o --output FILE", "File to write; `-` is stdout.", required=True
     )
     to: str | None = option(
-        "--to", metavar="FORMAT", help="Format of FILE; from its suffix by default."
+        "--to FORMAT", "Format of FILE; from its suffix by default."
     )
     representation: ModelKind | None = as_option
     kind: Kind | None = terms_option
     conjunction: Conjunction | None = conjunction_option
     dtype: str | None = option(
         "--dtype",
-        type=click.Choice(["float64", "mixed", "float32"]),
-        help="onnx: number type of the degrees.",
+        "onnx: number type of the degrees.",
+        choices=["float64", "mixed", "float32"],
     )
     opset: int | None = option(
-        "--opset", type=int, help="onnx: version of the operators, 12 to 26."
+        "--opset", "onnx: version of the operators, 12 to 26.", type=int
     )
     ir: int | None = option(
-        "--ir", type=int, help="onnx: version of the file format, 4 to 13."
+        "--ir", "onnx: version of the file format, 4 to 13.", type=int
     )
     signature: str | None = option(
         "--signature",
-        type=click.Choice(["needed", "all"]),
-        help="onnx: columns that are inputs of the graph.",
+        "onnx: columns that are inputs of the graph.",
+        choices=["needed", "all"],
     )
     outputs: str | None = option(
-        "--outputs",
-        metavar="NAMES",
-        help="onnx: outputs of the graph, of label,rule,status,strengths.",
+        "--outputs NAMES", "onnx: outputs of the graph, of label,rule,status,strengths."
     )
     readable: bool = flag(
-        "--readable", help="onnx: write a node with a name for each step of rules."
+        "--readable", "onnx: write a node with a name for each step of rules."
     )
-    plain: bool = flag(
-        "--plain", help="onnx: write a tree without operators of ai.onnx.ml."
-    )
+    plain: bool = flag("--plain", "onnx: write a tree without operators of ai.onnx.ml.")
     allow_loss: bool = flag(
-        "--allow-loss", help="Write the file although the format loses information."
+        "--allow-loss", "Write the file although the format loses information."
     )
     verbose: bool = verbose_option
     as_json: bool = json_option

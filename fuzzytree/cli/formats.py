@@ -28,9 +28,7 @@ class FormatsOptions:
     """The arguments and options of the verb."""
 
     name: str | None = option(
-        "--format",
-        metavar="NAME",
-        help="Format to describe with its options and limits.",
+        "--format NAME", "Format to describe with its options and limits."
     )
     verbose: bool = verbose_option
     as_json: bool = json_option

@@ -57,39 +57,31 @@ Progress = Callable[[str, float], None]
 class LearnOptions:
     """The arguments and options of the verb."""
 
-    tables: Sequence[str] = argument(metavar="TABLE", nargs=-1, required=True)
+    tables: Sequence[str] = argument("TABLE", nargs=-1, required=True)
     target: str | None = option(
-        "--target",
-        metavar="COLUMN",
-        help="Column that holds the class of each row; states know theirs.",
+        "--target COLUMN",
+        "Column that holds the class of each row; states know theirs.",
     )
     output: str = option(
-        "-o",
-        "--output",
-        required=True,
-        metavar="FILE",
-        help="File to write; `-` is stdout.",
+        "-o --output FILE", "File to write; `-` is stdout.", required=True
     )
     name: str | None = option(
-        "--name", metavar="TEXT", help="Name of the tree; the name of TABLE by default."
+        "--name TEXT", "Name of the tree; the name of TABLE by default."
     )
     ignore: Sequence[str] = ignore_option
-    units: Sequence[str] = several(
-        "--unit", "COLUMN=UNIT", help="Unit of a column (repeat)."
-    )
+    units: Sequence[str] = several("--unit COLUMN=UNIT", "Unit of a column (repeat).")
     representation: ModelKind | None = as_option
     kind: Kind | None = terms_option
     conjunction: Conjunction | None = conjunction_option
     no_test: bool = flag(
-        "--no-test", help="Learn without measuring the cross-validated accuracy."
+        "--no-test", "Learn without measuring the cross-validated accuracy."
     )
     model: str | None = option(
-        "--for",
-        metavar="MODEL",
-        help="Write this tree with the supports that states of `collect --for` count.",
+        "--for MODEL",
+        "Write this tree with the supports that states of `collect --for` count.",
     )
     repeated: bool = flag(
-        "--repeated", help="Count the rows of a state twice that is part of two others."
+        "--repeated", "Count the rows of a state twice that is part of two others."
     )
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option
@@ -97,70 +89,58 @@ class LearnOptions:
     quiet: bool = quiet_option
     mode: Any = option(
         "--mode",
-        type=click.Choice(["default", "paper"]),
+        "Learner: the default one, or that of the paper exactly.",
+        choices=["default", "paper"],
         default="default",
-        show_default=True,
-        help="Learner: the default one, or that of the paper exactly.",
     )
     alpha: Any = option(
         "--alpha",
+        "Weight of the means in the distance of patterns, 0 to 1.",
         type=float,
-        help="Weight of the means in the distance of patterns, 0 to 1.",
     )
     l_max: Any = option(
         "--l-max",
+        "Parameter L_MAX of the paper: largest ratio of distances.",
         type=float,
-        help="Parameter L_MAX of the paper: largest ratio of distances.",
     )
     points: Any = option(
-        "--points",
-        type=int,
-        help="Number n of the 2n + 1 points on a fitted set, 1 to 8.",
+        "--points", "Number n of the 2n + 1 points on a fitted set, 1 to 8.", type=int
     )
     separate_sides: Any = flag(
-        "--separate-sides", default=None, help="Fit the two sides of a set separately."
+        "--separate-sides", "Fit the two sides of a set separately."
     )
     patterns_per_class: str | None = option(
-        "--patterns",
-        metavar="NUMBER|auto",
-        help="Number of patterns of each class; auto chooses it per class.",
+        "--patterns NUMBER|auto",
+        "Number of patterns of each class; auto chooses it per class.",
     )
     shrinkage: Any = option(
-        "--shrinkage", type=float, help="Shrinkage of the off-diagonal scatter, 0 to 1."
+        "--shrinkage", "Shrinkage of the off-diagonal scatter, 0 to 1.", type=float
     )
-    entry: Any = option(
-        "--entry", type=float, help="Gain that a further input must bring."
-    )
+    entry: Any = option("--entry", "Gain that a further input must bring.", type=float)
     costs: Sequence[str] = several(
-        "--cost", "COLUMN=COST", help="Cost of computing a column (repeat)."
+        "--cost COLUMN=COST", "Cost of computing a column (repeat)."
     )
     choices: Any = option(
         "--validate",
-        type=click.Choice(["alpha", "l_max", "shrinkage", "entry"]),
+        "Setting to choose by inner cross-validation (repeat).",
+        choices=["alpha", "l_max", "shrinkage", "entry"],
         multiple=True,
-        help="Setting to choose by inner cross-validation (repeat).",
     )
     rows_per_class: Any = option(
         "--rows-per-class",
+        "Largest number of rows per class that the learner keeps.",
         type=int,
-        help="Largest number of rows per class that the learner keeps.",
     )
     seed: int = option(
-        "--seed",
-        type=int,
-        default=0,
-        show_default=True,
-        help="Random seed for the cross-validation folds.",
+        "--seed", "Random seed for the cross-validation folds.", default=0
     )
     keep_reversals: Any = flag(
-        "--keep-reversals",
-        default=None,
-        help="Let a wide set take back the far tails of others.",
+        "--keep-reversals", "Let a wide set take back the far tails of others."
     )
     missing: Any = option(
         "--missing",
-        type=click.Choice(["drop", "refuse"]),
-        help="Rows with missing values: drop them, or refuse the table.",
+        "Rows with missing values: drop them, or refuse the table.",
+        choices=["drop", "refuse"],
     )
 
 

@@ -33,32 +33,28 @@ if TYPE_CHECKING:
 class NeedsOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
+    model: str = argument("MODEL")
     data: str | None = data_option
     output: str | None = option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="File to write the simplified model to, if its equality is proved.",
+        "-o --output FILE",
+        "File to write the simplified model to, if its equality is proved.",
     )
     uses: Sequence[Use] = option(
         "--for",
-        type=click.Choice(["tree", "relative", "raw"]),
+        "Use of a tree (repeat); its path and its relative rules by default.",
+        choices=["tree", "relative", "raw"],
         multiple=True,
-        help="Use of a tree (repeat); its path and its relative rules by default.",
     )
     drop: Sequence[str] = option(
         "--drop",
-        type=click.Choice(["inputs", "rules"]),
+        "Also leave out inputs that nothing tests, or rules that never fire (repeat).",
+        choices=["inputs", "rules"],
         multiple=True,
-        help="Also leave out inputs that nothing tests, or rules that never fire "
-        "(repeat).",
     )
     seconds: float | None = option(
-        "--time",
+        "--time SECONDS",
+        "Time in seconds for measuring loading, prediction and reading.",
         type=click.FloatRange(min=0.0, min_open=True),
-        metavar="SECONDS",
-        help="Time in seconds for measuring loading, prediction and reading.",
     )
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option

@@ -13,18 +13,18 @@ from fuzzytree.model import Conjunction, Document, Format, Kind, ModelKind
 
 as_option = option(
     "--as",
-    type=click.Choice(["tree", "rules", "system"]),
-    help="Representation to write: the tree, its rules, or the equivalent system.",
+    "Representation to write: the tree, its rules, or the equivalent system.",
+    choices=["tree", "rules", "system"],
 )
 terms_option = option(
     "--terms",
-    type=click.Choice(["relative", "raw"]),
-    help="Rules that equal the tree (the default), or those of the paper.",
+    "Rules that equal the tree (the default), or those of the paper.",
+    choices=["relative", "raw"],
 )
 conjunction_option = option(
     "--conjunction",
-    type=click.Choice(["minimum", "product"]),
-    help="AND operator of the rules; minimum by default.",
+    "AND operator of the rules; minimum by default.",
+    choices=["minimum", "product"],
 )
 
 

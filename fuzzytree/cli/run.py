@@ -59,37 +59,31 @@ _GROUP = 1 << 26  # bytes of rows that a binary file gets at a time
 class RunOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
-    table: str = argument(metavar="TABLE")
+    model: str = argument("MODEL")
+    table: str = argument("TABLE")
     output: str = option(
-        "-o",
-        "--output",
+        "-o --output FILE",
+        "File to write: CSV, or Parquet or Arrow if its name ends in .parquet, "
+        ".arrow or .feather; `-` is CSV on stdout.",
         default="-",
-        metavar="FILE",
-        help="File to write: CSV, or Parquet or Arrow if its name ends in .parquet, "
-        ".arrow or .feather; CSV on stdout by default.",
     )
     strengths: By | None = option(
         "--strengths",
-        type=click.Choice(["class", "rule"]),
-        help="Add a column with the firing strength of each class or rule.",
+        "Add a column with the firing strength of each class or rule.",
+        choices=["class", "rule"],
     )
-    why: bool = flag(
-        "--why", help="Add the winning rule, with its degrees of membership."
-    )
-    keep: bool = flag("--keep", help="Add the columns of TABLE before the others.")
+    why: bool = flag("--why", "Add the winning rule, with its degrees of membership.")
+    keep: bool = flag("--keep", "Add the columns of TABLE before the others.")
     runtime: str | None = option(
-        "--runtime",
-        metavar="NAME",
-        help="Runtime that executes the model; native by default.",
+        "--runtime NAME", "Runtime that executes the model; native by default."
     )
     delimiter: str | None = delimiter_option
     as_json: bool = flag(
-        "--json", help="Write JSON lines in place of CSV; null for an empty cell."
+        "--json", "Write JSON lines in place of CSV; null for an empty cell."
     )
     safe_csv: bool = flag(
         "--safe-csv",
-        help="Put an apostrophe before text that a spreadsheet reads as a formula.",
+        "Put an apostrophe before text that a spreadsheet reads as a formula.",
     )
     allow_loss: bool = allow_loss_option
     quiet: bool = quiet_option

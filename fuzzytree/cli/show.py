@@ -26,11 +26,9 @@ if TYPE_CHECKING:
 class ShowOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
+    model: str = argument("MODEL")
     picture: str | None = option(
-        "--picture",
-        metavar="FILE",
-        help="Picture of the tree to write, as .svg or .png.",
+        "--picture FILE", "Picture of the tree to write, as .svg or .png."
     )
     as_json: bool = json_option
     quiet: bool = quiet_option

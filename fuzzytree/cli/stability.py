@@ -27,13 +27,13 @@ from fuzzytree.cli.console import (
 class StabilityOptions:
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
+    model: str = argument("MODEL")
     data: str | None = data_option
     only: Sequence[str] = several(
-        "--only", "CODE", help="Check to apply, such as N3 (repeat); all by default."
+        "--only CODE", "Check to apply, such as N3 (repeat); all by default."
     )
     runtimes: Sequence[str] = runtimes_option
-    is_full: bool = flag("--rows", help="The same as --verbose.")
+    is_full: bool = flag("--rows", "The same as --verbose.")
     delimiter: str | None = delimiter_option
     verbose: bool = verbose_option
     as_json: bool = json_option

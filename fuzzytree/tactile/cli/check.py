@@ -28,14 +28,14 @@ from fuzzytree.tactile.cli.sensors import (
 class TactileCheckOptions(SensorOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
-    files: Sequence[str] = argument(metavar="FILE.onnx...", nargs=-1, required=True)
+    model: str = argument("MODEL")
+    files: Sequence[str] = argument("FILE.onnx...", nargs=-1, required=True)
     data: str | None = data_option
     reject: float = option(
         "--reject",
+        "Value of `reject` that the files were exported with.",
         type=click.FloatRange(0.0, 1.0),
         default=0.0,
-        help="Value of `reject` that the files were exported with; default 0.",
     )
     rows_only: bool = rows_only_option
     as_json: bool = json_option

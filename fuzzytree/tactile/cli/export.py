@@ -44,18 +44,15 @@ _SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
 class TactileExportOptions(SensorOptions):
     """The arguments and options of the verb."""
 
-    model: str = argument(metavar="MODEL")
-    output: str = argument(metavar="OUT")
+    model: str = argument("MODEL")
+    output: str = argument("OUT")
     to: Form | None = option(
-        "--to",
-        type=click.Choice(["onnx", "c"]),
-        help="Format; default by the suffix of OUT.",
+        "--to", "Format; default by the suffix of OUT.", choices=["onnx", "c"]
     )
     data: str | None = data_option
     settings: Sequence[str] = several(
-        "--set",
-        "NAME=VALUE",
-        help="Option (repeat): outputs, reject, opset, ir, plain of graphs; "
+        "--set NAME=VALUE",
+        "Option (repeat): outputs, reject, opset, ir, plain of graphs; "
         "name, reject of C.",
     )
     as_json: bool = json_option

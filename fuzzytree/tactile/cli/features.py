@@ -42,23 +42,16 @@ CLASS = "class"
 class TactileFeaturesOptions(FramesOptions):
     """The arguments and options of the verb."""
 
-    frames: tuple[str, ...] = argument(nargs=-1, required=True, metavar="FRAMES...")
+    frames: tuple[str, ...] = argument("FRAMES...", nargs=-1, required=True)
     text: str = option(
-        "--features",
-        metavar="NAMES",
+        "--features NAMES",
+        "Names and sets of features, separated by commas.",
         default=USUAL,
-        show_default=True,
-        help="Names and sets of features, separated by commas.",
     )
     label: str = option(
-        "--label",
-        metavar="ARRAY",
-        default="label",
-        help="Array of FRAMES with the classes; default `label`.",
+        "--label ARRAY", "Array of FRAMES with the classes.", default="label"
     )
-    output: str | None = option(
-        "-o", "--output", metavar="FILE", help="CSV file to write; `-` is stdout."
-    )
+    output: str | None = option("-o --output FILE", "CSV file to write; `-` is stdout.")
     as_json: bool = json_option
     quiet: bool = quiet_option
 

@@ -40,30 +40,24 @@ MOST_BYTES = 2**30
 class TactileInterpolateOptions(FramesOptions):
     """The arguments and options of the verb."""
 
-    frames: str = argument(metavar="FRAMES")
+    frames: str = argument("FRAMES")
     text: str = option(
-        "--times",
-        metavar="NUMBERS",
+        "--times NUMBERS",
+        "Points for a cell on each side, separated by commas.",
         default="3,5,7",
-        show_default=True,
-        help="Points for a cell on each side, separated by commas.",
     )
     frame: int | None = option(
-        "--frame",
-        metavar="NUMBER",
+        "--frame NUMBER",
+        "Number of the frame, from 0; a picture shows the first pressed one if none.",
         type=int,
-        help="Number of the frame, from 0; "
-        "a picture shows the first pressed one if none.",
     )
     is_marked: bool = flag(
-        "--axis", help="Mark the centre of pressure and the principal axis."
+        "--axis", "Mark the centre of pressure and the principal axis."
     )
     output: str = option(
-        "-o",
-        "--output",
-        metavar="FILE",
+        "-o --output FILE",
+        "Picture of a frame (.svg, .png), or values of all frames (.npz).",
         required=True,
-        help="Picture of a frame (.svg, .png), or values of all frames (.npz).",
     )
     as_json: bool = json_option
     quiet: bool = quiet_option

@@ -41,71 +41,53 @@ SWITCH_S = 2e-4
 class TactileLiveOptions:
     """The arguments and options of the verb."""
 
-    source: str = argument(metavar="SOURCE")
+    source: str = argument("SOURCE")
     model: str = option(
-        "--model",
-        required=True,
-        metavar="MODEL",
-        help="Model to run: a tree or a rule base.",
+        "--model MODEL", "Model to run: a tree or a rule base.", required=True
     )
-    board: str | None = option(
-        "--board", metavar="BOARD.yaml", help="File of the board on the port."
-    )
+    board: str | None = option("--board BOARD.yaml", "File of the board on the port.")
     reject: float | None = option(
-        "--reject",
-        type=click.FloatRange(0.0, 1.0),
-        metavar="SHARE",
-        help="Firing strength below which an object is unknown; "
+        "--reject SHARE",
+        "Firing strength below which an object is unknown; "
         "default 0.001, or 0 for relative rules.",
+        type=click.FloatRange(0.0, 1.0),
     )
     hold: int = option(
-        "--hold",
+        "--hold N",
+        "Frames that a result must last before its line is printed.",
         type=click.IntRange(1),
         default=3,
-        show_default=True,
-        metavar="N",
-        help="Frames that a result must last before its line is printed.",
     )
-    lines: bool = flag("--lines", help="Print lines, also on a terminal.")
-    as_json: bool = flag("--json", help="Print each line as JSON.")
+    lines: bool = flag("--lines", "Print lines, also on a terminal.")
+    as_json: bool = flag("--json", "Print each line as JSON.")
     page: int | None = option(
-        "--page",
+        "--page [PORT]",
+        "Serve a page on this computer; a free port if none is named.",
         is_flag=False,
         flag_value=0,
         type=click.IntRange(0, 65535),
-        metavar="[PORT]",
-        help="Serve a page on this computer; a free port if none is named.",
     )
     times: int = option(
-        "--times",
+        "--times N",
+        "Largest number of picture points for a cell, on each side.",
         type=click.IntRange(1, 9),
         default=3,
-        show_default=True,
-        metavar="N",
-        help="Largest number of picture points for a cell, on each side.",
     )
-    record: str | None = option(
-        "--record", metavar="FILE", help="Recording to write the frames to."
-    )
+    record: str | None = option("--record FILE", "Recording to write the frames to.")
     speed: float = option(
-        "--speed",
+        "--speed X",
+        "Speed of a recording or the simulator; 0 for no pauses.",
         type=click.FloatRange(0.0),
         default=1.0,
-        show_default=True,
-        metavar="X",
-        help="Speed of a recording or the simulator; 0 for no pauses.",
     )
     seed: int = option(
         "--seed",
+        "Random seed of the simulator.",
         type=click.IntRange(0),
         default=0,
-        help="Random seed of the simulator; default 0.",
     )
     frames: int | None = option(
-        "--frames",
-        type=click.IntRange(1),
-        metavar="N",
-        help="Number of frames to recognise.",
+        "--frames N", "Number of frames to recognise.", type=click.IntRange(1)
     )
     quiet: bool = quiet_option
 

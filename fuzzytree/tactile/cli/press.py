@@ -33,33 +33,20 @@ if TYPE_CHECKING:
 class TactilePressOptions:
     """The arguments and options of the verb."""
 
-    name: str = argument(metavar="OBJECT")
-    count: int = option(
-        "--count",
-        metavar="NUMBER",
-        type=int,
-        default=50,
-        show_default=True,
-        help="Presses of each object.",
-    )
+    name: str = argument("OBJECT")
+    count: int = option("--count NUMBER", "Presses of each object.", default=50)
     seed: int = option(
-        "--seed",
-        metavar="NUMBER",
+        "--seed NUMBER",
+        "Random seed of the presses.",
         type=click.IntRange(0),
         default=0,
-        help="Random seed of the presses; default 0.",
     )
     output: str = option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        required=True,
-        help="Archive to write (.npz); `-` is stdout.",
+        "-o --output FILE", "Archive to write (.npz); `-` is stdout.", required=True
     )
     changes: Sequence[str] = several(
-        "--set",
-        "NAME=VALUE",
-        help="Number of the simulator (repeat); see docs/explanation/simulator.md.",
+        "--set NAME=VALUE",
+        "Number of the simulator (repeat); see docs/explanation/simulator.md.",
     )
     as_json: bool = json_option
     quiet: bool = quiet_option

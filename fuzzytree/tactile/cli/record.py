@@ -43,25 +43,17 @@ _LOOK_S = 0.1
 class TactileRecordOptions:
     """The arguments and options of the verb."""
 
-    board: str = argument(metavar="BOARD.yaml")
-    port: str = argument(metavar="PORT")
-    output: str = option(
-        "-o", "--output", metavar="FILE", required=True, help="Recording to write."
-    )
+    board: str = argument("BOARD.yaml")
+    port: str = argument("PORT")
+    output: str = option("-o --output FILE", "Recording to write.", required=True)
     frames: int | None = option(
-        "--frames",
-        type=click.IntRange(1),
-        metavar="N",
-        help="Number of frames to record.",
+        "--frames N", "Number of frames to record.", type=click.IntRange(1)
     )
     seconds: float | None = option(
-        "--seconds",
-        type=click.FloatRange(0.0, min_open=True),
-        metavar="S",
-        help="Seconds to record.",
+        "--seconds S", "Seconds to record.", type=click.FloatRange(0.0, min_open=True)
     )
-    force: bool = flag("--force", help="Replace FILE if it exists.")
-    no_wait: bool = flag("--no-wait", help="End when the port goes away.")
+    force: bool = flag("--force", "Replace FILE if it exists.")
+    no_wait: bool = flag("--no-wait", "End when the port goes away.")
     as_json: bool = json_option
     quiet: bool = quiet_option
 

@@ -36,21 +36,17 @@ _LAST_S = 0.2  # for the reader of a port to take the last bytes
 class TactileReplayOptions:
     """The arguments and options of the verb."""
 
-    recording: str = argument(metavar="FILE")
+    recording: str = argument("FILE")
     output: str | None = option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="File for the frames (.csv, .npz) or for the board (.yaml).",
+        "-o --output FILE", "File for the frames (.csv, .npz) or for the board (.yaml)."
     )
     to_port: bool = flag(
-        "--to-port", help="Send the frames through a new port, as the board did."
+        "--to-port", "Send the frames through a new port, as the board did."
     )
     speed: float | None = option(
-        "--speed",
+        "--speed X",
+        "Speed of --to-port as a multiple of the recorded one; default 1.",
         type=click.FloatRange(0.0, min_open=True),
-        metavar="X",
-        help="Speed of --to-port as a multiple of the recorded one; default 1.",
     )
     as_json: bool = json_option
     quiet: bool = quiet_option

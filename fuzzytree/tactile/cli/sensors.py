@@ -18,36 +18,30 @@ if TYPE_CHECKING:
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
 
 
-data_option = option(
-    "--data", metavar="FRAMES", help="Frames to check with, beside generated ones."
-)
+data_option = option("--data FRAMES", "Frames to check with, beside generated ones.")
 
 
 class FramesOptions:
     """The options that say whose frames a file holds."""
 
-    board: str | None = option("--board", metavar="FILE", help="File of the board.")
+    board: str | None = option("--board FILE", "File of the board.")
     full: int | None = option(
-        "--full",
-        metavar="N",
+        "--full N",
+        "Reading of a saturated cell; default that of a file of frames, or 255.",
         type=int,
-        help="Reading of a saturated cell; default that of a file of frames, or 255.",
     )
     threshold: int | None = option(
-        "--threshold",
-        metavar="N",
-        type=int,
-        help="Reading above which a cell is pressed; default that of a file of "
+        "--threshold N",
+        "Reading above which a cell is pressed; default that of a file of "
         "frames, or 0.",
+        type=int,
     )
 
 
 class SensorOptions(FramesOptions):
     """The options that say which sensor it is."""
 
-    size: str | None = option(
-        "--sensor", metavar="16x16", help="Rows and columns of the sensor."
-    )
+    size: str | None = option("--sensor 16x16", "Rows and columns of the sensor.")
 
 
 def sensor_of_options(options: SensorOptions) -> Sensor:

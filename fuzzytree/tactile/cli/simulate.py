@@ -35,37 +35,29 @@ _LOOK_S = 0.05
 class TactileSimulateOptions:
     """The arguments and options of the verb."""
 
-    board: str = argument(metavar="BOARD.yaml")
+    board: str = argument("BOARD.yaml")
     name: str | None = option(
-        "--object",
-        metavar="NAME",
-        help="Object of the paper to show, or `all` in turn.",
+        "--object NAME", "Object of the paper to show, or `all` in turn."
     )
     recording: str | None = option(
-        "--recording", metavar="FILE", help="Recording whose frames are repeated."
+        "--recording FILE", "Recording whose frames are repeated."
     )
     faults: Sequence[str] = several(
-        "--fault",
-        "NAME=VALUE",
-        help="Fault to simulate, `stall=SECONDS` or `unplug=SECONDS` (repeat).",
+        "--fault NAME=VALUE",
+        "Fault to simulate, `stall=SECONDS` or `unplug=SECONDS` (repeat).",
     )
     link: str | None = option(
-        "--link",
-        metavar="PATH",
-        help="Path of the port; a new one in a folder of its own if none.",
+        "--link PATH", "Path of the port; a new one in a folder of its own if none."
     )
     seed: int = option(
         "--seed",
+        "Random seed of the simulated object.",
         type=click.IntRange(0),
         default=0,
-        help="Random seed of the simulated object; default 0.",
     )
-    fast: bool = flag("--fast", help="Send as fast as the host reads.")
+    fast: bool = flag("--fast", "Send as fast as the host reads.")
     frames: int | None = option(
-        "--frames",
-        type=click.IntRange(1),
-        metavar="N",
-        help="Number of frames to send.",
+        "--frames N", "Number of frames to send.", type=click.IntRange(1)
     )
     as_json: bool = json_option
     quiet: bool = quiet_option
