@@ -15,7 +15,12 @@ import msgspec
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Computed, Declined, Proved, counted
-from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
+from fuzzytree.auditing.findings.codes import (
+    AUDITED,
+    CODES,
+    FAMILIES,
+    audit_answer,
+)
 from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.locations import (
@@ -53,6 +58,7 @@ FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
 
 _OF_A_ROW = "FT204"
 _LATE = "FTD03"
+_TWICE_S = 3.0  # for deciding proofs again
 _TOO_LARGE = "it needs more memory than there is"
 
 
@@ -125,7 +131,8 @@ def audit(
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    late = clock if clock and clock.is_over else Clock(settings.budget_s / 4)
+    left = min(_TWICE_S, settings.budget_s / 4)
+    late = clock if clock and clock.is_over else Clock(left)
     is_class = viewed.policy.decision == "strongest" and model is viewed.system
     whole = viewed.rules if is_class and viewed.rules is not None else model
     result = _proved_twice(result, whole, late)
@@ -135,7 +142,8 @@ def audit(
 def _proved_twice(result: Audit, model: Document, clock: Clock) -> Audit:
     """Return an audit in which PROVED is only what the re-checker decides as well.
 
-    The model is written anew, so nothing stands where it does in the user's file.
+    What it decides otherwise is reported as FT901. The model is written anew, so
+    nothing stands where it does in the user's file.
     """
     moved = (msgspec.structs.replace(one, places=()) for one in result.answers)
     bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
@@ -146,15 +154,34 @@ def _proved_twice(result: Audit, model: Document, clock: Clock) -> Audit:
         weak = undecided(msgspec.json.encode(bare), content, lambda: clock.is_over)
     except (LossError, CannotRunError):
         every = enumerate(result.answers)
-        weak = {place for place, one in every if isinstance(one.state, Proved)}
-    answers = [*result.answers]
-    for place in weak:
-        state = answers[place].state
-        assert isinstance(state, Proved)
-        answers[place] = msgspec.structs.replace(
-            answers[place], state=Computed(state.how)
-        )
+        weak = {place: "" for place, one in every if isinstance(one.state, Proved)}
+    answers, refuted = [*result.answers], list[AuditAnswer]()
+    for place, why in weak.items():
+        one = answers[place]
+        assert isinstance(one.state, Proved)
+        answers[place] = msgspec.structs.replace(one, state=Computed(one.state.how))
+        refuted += [_refuted(one, why)] if why else []
+    answers = sorted((*answers, *refuted), key=lambda one: one.code)
     return msgspec.structs.replace(result, answers=tuple(answers))
+
+
+def _refuted(answer: AuditAnswer, why: str) -> AuditAnswer:
+    """Return the finding that the re-checker decides an answer otherwise."""
+    result = audit_answer(
+        "FT901.refuted",
+        answer.subject,
+        Computed("each PROVED answer was decided again"),
+        rules=answer.rules,
+        terms=answer.terms,
+        facts={"code": answer.code, "detail": why},
+    )
+    name = answer.id.replace(answer.code, result.code, 1)
+    return msgspec.structs.replace(
+        result,
+        id=name,
+        places=answer.places,
+        repeat=answer.repeat,
+    )
 
 
 def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:

@@ -27,6 +27,7 @@ from fuzzytree.auditing.recheck.models import Model
 from fuzzytree.auditing.recheck.outcomes import (
     CannotRunError,
     DoesNotHoldError,
+    Limit,
     Report,
     UndecidedError,
 )
@@ -50,7 +51,7 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     Raises:
         CannotRunError: If one of them cannot be read.
     """
-    facts, case = _read(audit, model, names)
+    facts, case = _read(audit, model, names, Limit())
     report = Report()
     report.codes = [one.code for one in case.audit.answers]
     try:
@@ -66,37 +67,37 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     return report
 
 
-def undecided(audit: bytes, model: bytes, is_late: Callable[[], bool]) -> set[int]:
-    """Return the positions of the PROVED answers that are not decided again here.
-
-    Nothing is tried of small rules of straight lines under the minimum, whose inputs
-    are free of each other: there everything is decided.
+def undecided(
+    audit: bytes, model: bytes, is_late: Callable[[], bool]
+) -> dict[int, str]:
+    """Return the PROVED answers that are not decided again here.
 
     Args:
         audit: An audit that was made here, and is not yet done.
         model: Its model, as YAML.
         is_late: Whether nothing more shall be begun.
 
+    Returns:
+        By the position of each such answer what is wrong with it; nothing if it is
+        beyond the limits.
+
     Raises:
         CannotRunError: If the model cannot be read.
     """
-    _, case = _read(audit, model, ("the audit", "model.yaml"))
-    result: set[int] = set()
-    if case.is_easy:
-        return result
+    _, case = _read(audit, model, ("the audit", "model.yaml"), Limit(is_late))
+    result: dict[int, str] = {}
     _name_shorter(case)
     for place, answer in enumerate(case.audit.answers):
         if isinstance(answer.state, Proved):
             report = Report()
-            if not is_late():
-                check_answer(case, report, answer, place + 1)
+            check_answer(case, report, answer, place + 1)
             if not report.counts["answers PROVED, decided again"]:
-                result.add(place)
+                result[place] = "; ".join(report.wrong).partition("): ")[2]
     return result
 
 
 def _read(
-    audit: bytes, model: bytes, names: tuple[str, str]
+    audit: bytes, model: bytes, names: tuple[str, str], limit: Limit
 ) -> tuple[dict[str, Any], Case]:
     facts = read_json(audit, names[0])
     result: Audit = built(Audit, facts, names[0])
@@ -107,7 +108,7 @@ def _read(
     if whole.form == "system" and result.policy.decision == "strongest":
         text = "a system that stands for rules is not checked again; audit these"
         raise CannotRunError(f"{names[0]}: {text}")
-    return facts, Case(result, whole)
+    return facts, Case(result, whole, limit)
 
 
 def _name_shorter(case: Case) -> None:

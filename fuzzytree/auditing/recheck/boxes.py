@@ -10,15 +10,23 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.recheck.cells import Axis, Cell, Cells, Function, Needs
+from fuzzytree.auditing.recheck.cells import (
+    Axis,
+    Cell,
+    Cells,
+    Interval,
+    Needs,
+    numbers_in,
+)
 from fuzzytree.auditing.recheck.models import ONE, ZERO
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
 
-MOST_BOXES = 3_000
+BOX = 500  # steps that a box takes
+HALF = Fraction(1, 2)
 _NONE = Fraction(2**4096)  # a ratio of which nothing is known
 
 
@@ -45,59 +53,50 @@ def exists(
         UndecidedError: If it takes too many boxes.
     """
     todo: list[Box] = [tuple(_Stretch(axis, tuple(axis.cells)) for axis in cells.axes)]
-    for _ in range(MOST_BOXES):
-        if not todo:
-            return False
+    while todo:
         box = todo.pop()
-        if _is_settled(box, mine, rivals, low, high):
+        cells.limit.spend(BOX)
+        least, most = _between(box, mine, rivals)
+        if most[0] <= max(low, least[1]) or least[1] >= high:
             continue
-        if _is_shown(box, mine, rivals, low, high):
+        if any(ratio(box, a, b) <= 1 for a in mine for b in rivals):
+            continue
+        least, most = _between(_middle(box), mine, rivals)
+        if least[0] > max(low, most[1]) and most[1] < high:
             return True
         todo += _halves(box)
-    raise UndecidedError(f"more than {MOST_BOXES:,} boxes")
+    return False
 
 
-def _is_settled(
-    box: Box,
-    mine: Sequence[Needs],
-    rivals: Sequence[Needs],
-    low: Fraction,
-    high: Fraction,
-) -> bool:
-    most = min((strength(box, one)[1] for one in mine), default=ONE)
-    least = max((strength(box, one)[0] for one in rivals), default=ZERO)
-    if most <= max(low, least) or least >= high:
-        return True
-    return any(ratio(box, a, b) <= 1 for a in mine for b in rivals)
+def _between(
+    box: Box, mine: Sequence[Needs], rivals: Sequence[Needs]
+) -> tuple[Interval, Interval]:
+    """Return bounds of the weakest of some rules and of the strongest of others.
+
+    The lower bounds of both, and the upper bounds of both.
+    """
+    ours, theirs = ([strength(box, one) for one in of] for of in (mine, rivals))
+    lower, upper = (
+        (
+            min((one[side] for one in ours), default=ONE),
+            max((one[side] for one in theirs), default=ZERO),
+        )
+        for side in (0, 1)
+    )
+    return lower, upper
 
 
-def _is_shown(
-    box: Box,
-    mine: Sequence[Needs],
-    rivals: Sequence[Needs],
-    low: Fraction,
-    high: Fraction,
-) -> bool:
-    middle = tuple(
-        _Stretch(axis, (_part(cells[len(cells) // 2], Fraction(1, 2), Fraction(1, 2)),))
+def _middle(box: Box) -> Box:
+    return tuple(
+        _Stretch(axis, (cells[len(cells) // 2].part(HALF, HALF),))
         for axis, cells in box
     )
-    least = min((strength(middle, one)[0] for one in mine), default=ONE)
-    most = max((strength(middle, one)[1] for one in rivals), default=ZERO)
-    return least > max(low, most) and most < high
-
-
-def _part(cell: Cell, u: Fraction, v: Fraction) -> Cell:
-    """Return the part of a cell between two shares of its width."""
-    ends = cell.low, cell.high
-    low, high = (ends[0] + w * (ends[1] - ends[0]) for w in (u, v))
-    return Cell(low, high, [(p + u * (q - p), p + v * (q - p)) for p, q in cell.lines])
 
 
 def _halves(box: Box) -> list[Box]:
     """Return the two halves of a box: of its longest row of cells, or widest change."""
     sizes = [
-        (len(s.cells), max((abs(p - q) for p, q in s.cells[0].lines), default=ZERO))
+        (len(s.cells), max((abs(p - q) for p, q in s.cells[0].upper), default=ZERO))
         for s in box
     ]
     place = max(range(len(box)), key=sizes.__getitem__)
@@ -106,57 +105,49 @@ def _halves(box: Box) -> list[Box]:
     if half:
         halves = [cells[:half], cells[half:]]
     elif sizes[place][1]:
-        middle = Fraction(1, 2)
-        halves = [(_part(cells[0], a, b),) for a, b in ((ZERO, middle), (middle, ONE))]
+        halves = [(cells[0].part(a, b),) for a, b in ((ZERO, HALF), (HALF, ONE))]
     else:
         raise UndecidedError("degrees that are enclosed too widely")
     return [(*box[:place], _Stretch(axis, one), *box[place + 1 :]) for one in halves]
 
 
-def strength(box: Box, rule: Needs) -> tuple[Fraction, Fraction]:
+def strength(box: Box, rule: Needs) -> Interval:
     """Return between which numbers the strength of a rule lies on a box."""
     low = high = ONE
-    for (axis, cells), needs in zip(box, rule, strict=True):
-        own = [f for n, f in enumerate(axis.functions) if needs >> n & 1]
+    for (_, cells), needs in zip(box, rule, strict=True):
+        own = numbers_in(needs)
         if own:
-            ranges = [_product(own, cell) for cell in cells]
-            low, high = (
-                low * min(a for a, _ in ranges),
-                high * max(b for _, b in ranges),
-            )
+            low *= min(_product(cell.lower, own, min) for cell in cells)
+            high *= max(_product(cell.upper, own, max) for cell in cells)
     return low, high
 
 
-def _product(functions: Sequence[Function], cell: Cell) -> tuple[Fraction, Fraction]:
-    low = math.prod((min(f.ends(cell, is_upper=False)) for f in functions), start=ONE)
-    high = math.prod((max(f.ends(cell, is_upper=True)) for f in functions), start=ONE)
-    return low, high
+def _product(
+    lines: Sequence[Interval],
+    numbers: Sequence[int],
+    choose: Callable[[Interval], Fraction],
+) -> Fraction:
+    return math.prod((choose(lines[n]) for n in numbers), start=ONE)
 
 
 def ratio(box: Box, rule: Needs, rival: Needs) -> Fraction:
     """Return an upper bound of a rule's strength divided by a rival's, on a box."""
     result = ONE
-    for (axis, cells), one, other in zip(box, rule, rival, strict=True):
-        ours, theirs = (
-            [f for n, f in enumerate(axis.functions) if bits >> n & 1]
-            for bits in (one & ~other, other & ~one)
-        )
-        if ours or theirs:
+    for (_, cells), one, other in zip(box, rule, rival, strict=True):
+        if one != other:
+            ours, theirs = numbers_in(one & ~other), numbers_in(other & ~one)
             result *= max(_ratio(cell, ours, theirs) for cell in cells)
     return result
 
 
-def _ratio(
-    cell: Cell, ours: Sequence[Function], theirs: Sequence[Function]
-) -> Fraction:
+def _ratio(cell: Cell, ours: Sequence[int], theirs: Sequence[int]) -> Fraction:
     if len(ours) == len(theirs) == 1:
-        a, b = ours[0].ends(cell, is_upper=True), theirs[0].ends(cell, is_upper=False)
-        ends = [p / q for p, q in zip(a, b, strict=True) if q]
-        if len(ends) == 2 or (
-            ends and not any(p and not q for p, q in zip(a, b, strict=True))
-        ):
+        pairs = [*zip(cell.upper[ours[0]], cell.lower[theirs[0]], strict=True)]
+        ends = [p / q for p, q in pairs if q]
+        if ends and not any(p and not q for p, q in pairs):
             return max(ends)  # where both are 0, two lines have one ratio
-    most, least = _product(ours, cell)[1], _product(theirs, cell)[0]
+    most = _product(cell.upper, ours, max)
+    least = _product(cell.lower, theirs, min)
     return most / least if least else _NONE if most else ZERO
 
 
@@ -168,24 +159,18 @@ def tie(cells: Cells, one: int, other: int, rivals: Sequence[int]) -> bool:
     pair = cells.of[one], cells.of[other]
     choices: list[list[tuple[Fraction, _Stretch]]] = []
     for place, axis in enumerate(cells.axes):
-        own: list[tuple[Fraction, _Stretch]] = []
-        for cell in axis.cells:
-            if cell.low == cell.high and axis.ends[0] < axis.ends[1]:
-                continue
-            stretch = _Stretch(axis, (cell,))
-            ratios = [
-                _fixed(axis, cell, a[place], b[place]) for a, b in (pair, pair[::-1])
-            ]
-            if ratios[0] is not None:
-                own.append((ratios[0], stretch))
-        choices.append(own)
-    if math.prod(map(len, choices)) > MOST_BOXES:
-        raise UndecidedError(f"more than {MOST_BOXES:,} boxes")
+        open_cells = (
+            cell
+            for cell in axis.cells
+            if cell.low < cell.high or axis.ends[0] == axis.ends[1]
+        )
+        ratios = ((_fixed(c, pair[0][place], pair[1][place]), c) for c in open_cells)
+        choices.append([(r, _Stretch(axis, (c,))) for r, c in ratios if r is not None])
+    cells.limit.spend(BOX * math.prod(map(len, choices)))
     for chosen in itertools.product(*choices):
-        if math.prod((share for share, _ in chosen), start=ONE) != 1:
-            continue
         box = tuple(stretch for _, stretch in chosen)
-        if not strength(box, pair[0])[1]:
+        is_one = math.prod((share for share, _ in chosen), start=ONE) == 1
+        if not (is_one and strength(box, pair[0])[1]):
             continue
         if not any(_is_above(box, cells.of[r], pair[0]) for r in rivals):
             return True
@@ -194,40 +179,26 @@ def tie(cells: Cells, one: int, other: int, rivals: Sequence[int]) -> bool:
 
 def _is_above(box: Box, rival: Needs, rule: Needs) -> bool:
     """Return whether a rival is above a rule in all of the inside of a box."""
-    if ratio(box, rule, rival) > 1:
-        return False
-    middle = tuple(
-        _Stretch(a, (_part(c[0], Fraction(1, 2), Fraction(1, 2)),)) for a, c in box
-    )
-    return ratio(middle, rule, rival) < 1
+    return ratio(box, rule, rival) <= 1 and ratio(_middle(box), rule, rival) < 1
 
 
-def _fixed(axis: Axis, cell: Cell, one: int, other: int) -> Fraction | None:
+def _fixed(cell: Cell, one: int, other: int) -> Fraction | None:
     """Return the one ratio that two rules have in a cell; None if it changes.
 
     Raises:
         UndecidedError: If it may be one, and is not a ratio of lines.
     """
-    ours, theirs = (
-        [f for n, f in enumerate(axis.functions) if bits >> n & 1]
-        for bits in (one & ~other, other & ~one)
-    )
-    if len(ours) > 1 or len(theirs) > 1:
-        flat = [f for f in (*ours, *theirs) if len({*f.ends(cell, is_upper=False)}) > 1]
-        if flat:
-            raise UndecidedError("products of several degrees of one variable")
-    ends = [
-        [f.ends(cell, is_upper=up) for f in of]
-        for of in (ours, theirs)
-        for up in (False, True)
-    ]
-    if ends[0] != ends[1] or ends[2] != ends[3]:
+    both = [numbers_in(one & ~other), numbers_in(other & ~one)]
+    every = [*both[0], *both[1]]
+    has_change = any(len({*cell.lower[n]}) > 1 for n in every)
+    if has_change and max(map(len, both)) > 1:
+        raise UndecidedError("products of several degrees of one variable")
+    if any(cell.lower[n] != cell.upper[n] for n in every):
         raise UndecidedError("a tie of curves that are no lines")
-    products = [
-        [math.prod((e[k] for e in of), start=ONE) for k in (0, 1)]
-        for of in (ends[0], ends[2])
-    ]
-    (a, b), (c, d) = products
+    (a, b), (c, d) = (
+        [math.prod((cell.lower[n][k] for n in of), start=ONE) for k in (0, 1)]
+        for of in both
+    )
     if a * d != b * c or not (c or d):
         return None if c or d or a or b else ONE
     return a / c if c else b / d

@@ -10,7 +10,7 @@ from functools import cached_property
 
 from fuzzytree.auditing.recheck import boxes
 from fuzzytree.auditing.recheck.cells import Cells, Interval
-from fuzzytree.auditing.recheck.curves import Between, bounds, is_straight, knots
+from fuzzytree.auditing.recheck.curves import Between, bounds, is_straight
 from fuzzytree.auditing.recheck.models import (
     ONE,
     ZERO,
@@ -23,6 +23,7 @@ from fuzzytree.auditing.recheck.models import (
 )
 from fuzzytree.auditing.recheck.outcomes import (
     DoesNotHoldError,
+    Limit,
     Report,
     UndecidedError,
     require,
@@ -40,8 +41,6 @@ from fuzzytree.auditing.recheck.records import (
 STEPS = (8, 32)
 """Into so many steps from 0 to 1 a curve that is no line is cut, coarsely first."""
 MOST_POINTS = 200
-MOST_EASY = 1_000
-"""Up to so many knots times rules nothing is too large."""
 CLOSE = Fraction(1, 2**70)
 """How far beside a point curves that are no lines are evaluated, where many are."""
 
@@ -55,25 +54,19 @@ class Case:
         sides: The sides of the domain by name.
         is_free: Whether no variable is a combination of others.
         numbers: The numbers of the rules, from 1.
+        limit: How much work an answer may take.
         shorter: By the position of an answer of FT107, the rule that it is about.
     """
 
-    def __init__(self, audit: Audit, model: Model) -> None:
+    def __init__(self, audit: Audit, model: Model, limit: Limit) -> None:
         self.audit, self.model, self.rules = audit, model, model.rules
         self.sides = {side.variable: side for side in audit.domain.sides}
         self.is_free = not any(v.parts for v in model.variables.values())
         self.numbers = range(1, len(self.rules.rules) + 1)
         self.shorter: dict[int, Rule] = {}
+        self.limit = limit
         self._strengths: dict[tuple[object, ...], list[Between]] = {}
         self._cells: dict[int, Cells | UndecidedError] = {}
-
-    @property
-    def is_easy(self) -> bool:
-        """Whether all questions are surely decided, and with few cells."""
-        curves = [c for v in self.rules.variables.values() for c in v.curves.values()]
-        is_straight_ = all(map(is_straight, curves)) and not self.rules.is_product
-        size = sum(len(knots(c)) for c in curves) * len(self.numbers)
-        return is_straight_ and self.is_free and size <= MOST_EASY
 
     def ends(self, variable: Variable) -> Interval:
         """Return the values of a variable in the domain; of a combination, at most."""
@@ -144,7 +137,7 @@ class Case:
             ends = {v.name: self.ends(v) for v in self.rules.variables.values()}
             try:
                 self._cells[step] = Cells(
-                    rules, self.rules.variables, ends, levels, step
+                    rules, self.rules.variables, ends, levels, step, self.limit
                 )
             except UndecidedError as error:  # known once, for every question
                 self._cells[step] = error

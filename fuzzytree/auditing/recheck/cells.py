@@ -13,9 +13,10 @@ With lower and upper lines a `False` is certain and a `True` is not.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -28,38 +29,75 @@ from fuzzytree.auditing.recheck.models import (
     Rule,
     Variable,
 )
-from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.auditing.recheck.outcomes import Limit
 
-MOST_LINES, MOST_STEPS = 60_000, 1_000_000
 Interval = tuple[Fraction, Fraction]
 Needs = tuple[int, ...]
 """The propositions of a rule on each axis, as bits."""
 Pattern = tuple[int, int]
 """Which propositions can be at a level or above together; which are, for certain."""
+Group = tuple[int, int, int, int]
+"""Lines of a cell with the same ends: the numbers of their lower and of their higher
+level, and the propositions of which they are the upper and the lower line, as bits."""
+LINE = 20  # steps that a line of a cell takes
+_Line = tuple[Curve, bool, Fraction, bool]
+"""A curve, whether it is negated, its weight, and whether it is the upper line."""
 
 
 class Cell(NamedTuple):
-    """A point of an axis, or what lies between two: of each line its two ends."""
+    """A point of an axis, or what lies between two: lines of each proposition.
+
+    Attributes:
+        lower: The ends of a line that each proposition is nowhere below.
+        upper: The ends of one that it is nowhere above; the same if it is a line.
+    """
 
     low: Fraction
     high: Fraction
-    lines: list[Interval]
+    lower: list[Interval]
+    upper: list[Interval]
+
+    def part(self, u: Fraction, v: Fraction) -> Cell:
+        """Return the part between two shares of its width."""
+        low, high = ((1 - w) * self.low + w * self.high for w in (u, v))
+        return Cell(low, high, _part(self.lower, u, v), _part(self.upper, u, v))
 
 
-class Function(NamedTuple):
-    """A proposition on its axis: the numbers of its lower and of its upper lines."""
+class Stairs(NamedTuple):
+    """A curve that is no line: where each step begins, and what encloses it there."""
 
-    proposition: Proposition
-    lower: tuple[int, ...]
-    upper: tuple[int, ...]
+    starts: tuple[Fraction, ...]
+    degrees: tuple[Interval, ...]
 
-    def ends(self, cell: Cell, *, is_upper: bool) -> Interval:
-        """Return its degrees at both ends of a cell."""
-        numbers = self.upper if is_upper else self.lower
-        if len(numbers) == 1:
-            return cell.lines[numbers[0]]
-        lines = [cell.lines[n] for n in numbers]
-        return min(lines, key=sum) if self.proposition.negated else max(lines, key=sum)
+    def at(self, x: Fraction) -> Interval:
+        """Return what encloses the degrees of the step from a value on."""
+        return self.degrees[bisect_right(self.starts, x) - 1]
+
+
+@functools.lru_cache(maxsize=512)
+def stairs_of(curve: Curve, low: Fraction, high: Fraction, step: int) -> Stairs:
+    """Return a curve in steps of degrees no wider than 1 / step."""
+    inner = sorted({low, *(x for x in knots(curve) if low < x < high), high})
+    todo = [(a, b, 0) for a, b in itertools.pairwise(inner)][::-1] or [(low, low, 0)]
+    result: list[tuple[Fraction, Interval]] = []
+    while todo:
+        a, b, depth = todo.pop()
+        least, most = bounds(curve, a, b)
+        if (most - least) * step > 1 and depth < 30:
+            middle = (a + b) / 2
+            todo += [(middle, b, depth + 1), (a, middle, depth + 1)]
+        else:
+            result.append((a, _rounded(least, most, 2 * step)))
+    return Stairs(*zip(*result, strict=True))
+
+
+def _rounded(low: Fraction, high: Fraction, step: int) -> Interval:
+    """Return the ends of an interval on a grid: few levels are fast."""
+    whole = Fraction(low * step // 1, step)
+    if low and not whole:  # a little, but not nothing
+        bits = low.denominator.bit_length() - low.numerator.bit_length()
+        whole = Fraction(1, 2 ** (64 * (bits // 64 + 1)))
+    return (low, low) if low == high else (whole, -(-high * step // 1) / Fraction(step))
 
 
 class Axis:
@@ -71,96 +109,89 @@ class Axis:
         ends: Interval,
         propositions: Iterable[Proposition],
         step: int,
+        limit: Limit,
     ) -> None:
         self.variable, self.name, self.ends = variable, variable.name, ends
-        self.functions: list[Function] = []
+        self.limit = limit
         self.known: dict[tuple[object, ...], int] = {}
-        self.lines: dict[tuple[Curve, bool, Fraction, bool], int] = {}
-        self.is_exact = True
+        self.propositions: list[Proposition] = []
         for one in propositions:
-            curves = [variable.curves[term] for term in one.terms]
-            key = (frozenset(curves), one.negated, one.weight)
-            if key in self.known:
-                continue
-            self.known[key] = len(self.functions)
-            sides: list[tuple[int, ...]] = []
-            for is_upper in (False, True):
-                numbers: list[int] = []
-                for c in curves:
-                    line = c, *key[1:], is_upper and not is_straight(c)
-                    numbers.append(self.lines.setdefault(line, len(self.lines)))
-                sides.append(tuple(numbers))
-            self.is_exact &= all(map(is_straight, curves))
-            self.functions.append(Function(one, *sides))
+            if self.known.setdefault(self._key(one), len(self.known)) == len(
+                self.propositions
+            ):
+                self.propositions.append(one)
+        curves = [variable.curves[t] for p in self.propositions for t in p.terms]
+        self.is_exact = all(map(is_straight, curves))
         self.cells = [*self._cells(step)]
-        self.groups: list[list[tuple[int, int, int]]] = []
+        self.groups: list[list[Group]] = []
         self.marks: list[int] = []
         self.patterns: dict[int, list[Pattern]] = {}
 
-    def function(self, curve: Curve) -> Function:
-        """Return the proposition that is a curve alone."""
-        return self.functions[self.known[frozenset([curve]), False, ONE]]
+    def _key(self, one: Proposition) -> tuple[object, ...]:
+        curves = frozenset(self.variable.curves[term] for term in one.terms)
+        return curves, one.negated, one.weight
+
+    def number_of(self, one: Proposition) -> int:
+        """Return the number of a proposition."""
+        return self.known[self._key(one)]
 
     def _cells(self, step: int) -> Iterator[Cell]:
         low, high = self.ends
-        curves = [*dict.fromkeys(curve for curve, *_ in self.lines)]
-        cuts = {low, high}
-        steps: dict[Curve, list[tuple[Fraction, Interval]]] = {}
-        for curve in curves:
-            inner = sorted({low, *(x for x in knots(curve) if low < x < high), high})
-            cuts.update(inner)
-            if not is_straight(curve):
-                steps[curve] = [*_stairs(curve, inner, step)]
-                cuts.update(x for x, _ in steps[curve])
-            if len(cuts) * len(self.lines) > MOST_LINES:
-                raise UndecidedError(f"more than {MOST_LINES:,} lines in cells")
-        order, room = sorted(cuts), MOST_LINES
+        numbers: dict[_Line, int] = {}
+        sides: list[list[list[int]]] = []
+        for one in self.propositions:
+            curves = [self.variable.curves[term] for term in one.terms]
+            both: list[list[int]] = [[], []]
+            for c, up in itertools.product(curves, (False, True)):
+                line = c, one.negated, one.weight, up and not is_straight(c)
+                both[up].append(numbers.setdefault(line, len(numbers)))
+            sides.append(both)
+        cuts, stairs = {low, high}, dict[Curve, Stairs]()
+        for curve, *_ in numbers:
+            if is_straight(curve):
+                cuts.update(x for x in knots(curve) if low < x < high)
+            else:
+                stairs[curve] = stairs_of(curve, low, high, step)
+                cuts.update(stairs[curve].starts)
+        order = sorted(cuts)
         for place, x in enumerate(order):
-            yield Cell(x, x, [self._ends(line, x, x, steps) for line in self.lines])
-            if x < high:
-                end = order[place + 1]
-                whole = Cell(x, end, [self._ends(n, x, end, steps) for n in self.lines])
-                for cell in _uncrossed(whole):
-                    room -= len(cell.lines)
-                    if room < 0:
-                        raise UndecidedError(f"more than {MOST_LINES:,} lines in cells")
-                    yield cell
+            for end in order[place : place + 2]:
+                lines = [_ends(line, x, end, stairs) for line in numbers]
+                for a, b, ends in _uncrossed(x, end, lines):
+                    self.limit.spend(LINE * len(lines))
+                    yield Cell(a, b, *(self._chosen(ends, sides, k) for k in (0, 1)))
 
-    def _ends(
-        self,
-        line: tuple[Curve, bool, Fraction, bool],
-        low: Fraction,
-        high: Fraction,
-        steps: Mapping[Curve, list[tuple[Fraction, Interval]]],
-    ) -> Interval:
-        """Return the degrees at both ends of a line that does not bend between them."""
-        curve, negated, weight, is_upper = line
-        if curve in steps:
-            place = bisect_right(steps[curve], low, key=lambda pair: pair[0]) - 1
-            one = steps[curve][place][1][is_upper is not negated]
-            degrees = one, one
-        elif low == high:
-            degrees = bounds(curve, low, low)
-        else:
-            p, q = (
-                bounds(curve, x, x)[0]
-                for x in ((2 * low + high) / 3, (low + 2 * high) / 3)
-            )
-            degrees = 2 * p - q, 2 * q - p
-        if negated:
-            degrees = 1 - degrees[0], 1 - degrees[1]
-        return weight * degrees[0], weight * degrees[1]
+    def _chosen(
+        self, ends: Sequence[Interval], sides: Sequence[Sequence[list[int]]], side: int
+    ) -> list[Interval]:
+        """Return of each proposition the line of the term that is highest."""
+        result: list[Interval] = []
+        for one, numbers in zip(self.propositions, sides, strict=True):
+            choose = min if one.negated else max
+            result.append(choose((ends[n] for n in numbers[side]), key=sum))
+        return result
+
+    def always_differ(self, one: int, other: int) -> bool:
+        """Return whether two propositions are surely on no interval one function."""
+        a, b = self.propositions[one], self.propositions[other]
+        if a.negated != b.negated or not len(a.terms) == len(b.terms) == 1:
+            return False
+        p, q = (self.variable.curves[term] for term in (*a.terms, *b.terms))
+        is_known = p.kind == q.kind and p.kind in _ANALYTIC
+        is_known &= not (p.hedges or q.hedges)
+        return is_known and (p, a.weight) != (q, b.weight)
 
     def number(self, levels: Mapping[Fraction, int]) -> None:
         """Group the lines of each cell, the highest first, by the numbers of levels."""
         marks: set[int] = set()
         for cell in self.cells:
-            groups: dict[Interval, int] = {}
-            for bit, ends in enumerate(cell.lines):
-                groups[ends] = groups.get(ends, 0) | 1 << bit
-            order = sorted(groups, key=sum, reverse=True)
-            ranges = [
-                (levels[min(one)], levels[max(one)], groups[one]) for one in order
+            groups: dict[Interval, list[int]] = {}
+            for side, lines in enumerate((cell.upper, cell.lower)):
+                for number, ends in enumerate(lines):
+                    groups.setdefault(ends, [0, 0])[side] |= 1 << number
+            ranges: list[Group] = [
+                (levels[min(one)], levels[max(one)], groups[one][0], groups[one][1])
+                for one in sorted(groups, key=sum, reverse=True)
             ]
             marks.update(end for one in ranges for end in one[:2])
             self.groups.append(ranges)
@@ -170,75 +201,61 @@ class Axis:
         """Return which propositions can be above the gap behind a level together."""
         place = bisect_right(self.marks, gap)
         if place not in self.patterns:
-            sets = {one for groups in self.groups for one in _chain(groups, gap)}
-            self.patterns[place] = [*{self.pattern(one, one) for one in sets}]
+            every = (one for groups in self.groups for one in _chain(groups, gap))
+            self.patterns[place] = [*{*every}]
         return self.patterns[place]
 
-    def pattern(self, possible: int, certain: int) -> Pattern:
-        """Return the propositions whose lines are among some, given as bits."""
-        result = [0, 0]
-        for number, one in enumerate(self.functions):
-            choose = all if one.proposition.negated else any
-            for side, lines, bits in (
-                (0, one.upper, possible),
-                (1, one.lower, certain),
-            ):
-                if choose(bits >> line & 1 for line in lines):
-                    result[side] |= 1 << number
-        return result[0], result[1]
+
+def _part(lines: Iterable[Interval], u: Fraction, v: Fraction) -> list[Interval]:
+    return [((1 - u) * p + u * q, (1 - v) * p + v * q) for p, q in lines]
 
 
-def _chain(groups: Sequence[tuple[int, int, int]], gap: int) -> Iterator[int]:
-    """Yield which lines of a cell can be above a gap together."""
-    base, crossing = 0, [0]
-    for low, high, bits in groups:
+def _ends(
+    line: _Line, low: Fraction, high: Fraction, stairs: Mapping[Curve, Stairs]
+) -> Interval:
+    """Return the degrees at both ends of a line that does not bend between them."""
+    curve, negated, weight, is_upper = line
+    if curve in stairs:
+        degree = stairs[curve].at(low)[is_upper is not negated]
+        degrees = degree, degree
+    elif low == high:
+        degrees = bounds(curve, low, low)
+    else:
+        inner = (2 * low + high) / 3, (low + 2 * high) / 3
+        p, q = (bounds(curve, x, x)[0] for x in inner)
+        degrees = 2 * p - q, 2 * q - p
+    if negated:
+        degrees = 1 - degrees[0], 1 - degrees[1]
+    return weight * degrees[0], weight * degrees[1]
+
+
+def _chain(groups: Sequence[Group], gap: int) -> Iterator[Pattern]:
+    """Yield which propositions of a cell can be above a gap together."""
+    base, crossing = (0, 0), [(0, 0)]
+    for low, high, upper, lower in groups:
         if low > gap:
-            base |= bits
+            base = base[0] | upper, base[1] | lower
         elif high > gap:
-            crossing.append(crossing[-1] | bits)
-    yield from (base | one for one in crossing)
+            crossing.append((crossing[-1][0] | upper, crossing[-1][1] | lower))
+    yield from ((base[0] | one[0], base[1] | one[1]) for one in crossing)
 
 
-def _uncrossed(cell: Cell) -> Iterator[Cell]:
-    """Yield the parts of a cell in which no two lines cross."""
-    order = sorted(cell.lines)
+def _uncrossed(
+    low: Fraction, high: Fraction, lines: list[Interval]
+) -> Iterator[tuple[Fraction, Fraction, list[Interval]]]:
+    """Yield the parts of a cell in which no two lines cross, with their lines."""
+    order = sorted({*lines})
     places: set[Fraction] = set()
     if any(one[1] > other[1] for one, other in itertools.pairwise(order)):
-        for one, other in itertools.combinations({*order}, 2):
+        for one, other in itertools.combinations(order, 2):
             left, right = one[0] - other[0], one[1] - other[1]
             if left * right < 0:
                 places.add(left / (left - right))
     for u, v in itertools.pairwise(sorted({ZERO, *places, ONE})):
-        ends = [(p + u * (q - p), p + v * (q - p)) for p, q in cell.lines]
-        a, b = (cell.low + w * (cell.high - cell.low) for w in (u, v))
+        a, b = (low + w * (high - low) for w in (u, v))
         if u:
-            yield Cell(a, a, [(one, one) for one, _ in ends])
-        yield Cell(a, b, ends)
-
-
-def _stairs(
-    curve: Curve, inner: Sequence[Fraction], step: int
-) -> Iterator[tuple[Fraction, Interval]]:
-    """Yield where each step of a curve begins, and the degrees that enclose it."""
-    todo = [(a, b, 0) for a, b in itertools.pairwise(inner)][::-1]
-    while todo:
-        a, b, depth = todo.pop()
-        low, high = bounds(curve, a, b)
-        if (high - low) * step > 1 and depth < 30:
-            middle = (a + b) / 2
-            todo += [(middle, b, depth + 1), (a, middle, depth + 1)]
-            continue
-        whole = Fraction(low * step * 2 // 1, step * 2)
-        if low and not whole:  # a little, but not nothing
-            bits = low.denominator.bit_length() - low.numerator.bit_length()
-            whole = Fraction(1, 2 ** (64 * (bits // 64 + 1)))
-        yield (
-            a,
-            (
-                low if low == high else whole,
-                high if low == high else -(-high * step * 2 // 1) / Fraction(step * 2),
-            ),
-        )
+            yield a, a, _part(lines, u, u)
+        yield a, b, _part(lines, u, v) if places else lines
 
 
 class Cells:
@@ -254,17 +271,19 @@ class Cells:
         rules: Sequence[Rule],
         variables: Mapping[str, Variable],
         ends: Mapping[str, Interval],
-        levels: Iterable[Fraction] = (),
-        step: int = 16,
+        levels: Iterable[Fraction],
+        step: int,
+        limit: Limit,
     ) -> None:
         every = dict.fromkeys(one for rule in rules for one in rule.when)
-        self.variables = variables
+        self.limit = limit
         self.axes = [
-            Axis(v, ends[v.name], (p for p in every if p.variable == v.name), step)
+            Axis(v, ends[v.name], own, step, limit)
             for v in variables.values()
-            if any(p.variable == v.name for p in every)
+            if (own := [one for one in every if one.variable == v.name])
         ]
-        lines = (line for axis in self.axes for c in axis.cells for line in c.lines)
+        cells = [cell for axis in self.axes for cell in axis.cells]
+        lines = (line for cell in cells for line in (*cell.lower, *cell.upper))
         self.levels = sorted({ZERO, ONE, *levels, *itertools.chain(*lines)})
         numbers = {level: n for n, level in enumerate(self.levels)}
         for axis in self.axes:
@@ -272,21 +291,14 @@ class Cells:
         self.is_exact = all(axis.is_exact for axis in self.axes)
         self.of = [self.needs(rule.when) for rule in rules]
         self.all = (1 << len(rules)) - 1
-        self.left = MOST_STEPS
         self.masks: dict[tuple[int, int], int] = {}
 
-    def needs(self, when: Iterable[Proposition]) -> Needs:
+    def needs(self, when: Sequence[Proposition]) -> Needs:
         """Return the propositions of a rule on each axis."""
-        bits = dict.fromkeys((axis.name for axis in self.axes), 0)
-        for proposition in when:
-            axis = next(axis for axis in self.axes if axis.name == proposition.variable)
-            curves = frozenset(
-                self.variables[axis.name].curves[t] for t in proposition.terms
-            )
-            bits[axis.name] |= (
-                1 << axis.known[curves, proposition.negated, proposition.weight]
-            )
-        return tuple(bits.values())
+        return tuple(
+            sum({1 << axis.number_of(p) for p in when if p.variable == axis.name})
+            for axis in self.axes
+        )
 
     def exists(
         self,
@@ -325,21 +337,22 @@ class Cells:
             for one in mine:
                 own |= one[place]
             patterns = fixed[place] if fixed and place in fixed else axis.at(gap)
-            self.left -= len(patterns)
-            every.append(
-                least(
-                    self.on(place, certain | own) & rivals
-                    for possible, certain in patterns
-                    if not own & ~possible
-                )
+            self.limit.spend(len(patterns))
+            masks = (
+                self.on(place, certain | own) & rivals
+                for possible, certain in patterns
+                if not own & ~possible
             )
+            every.append(least(masks))
             if not every[-1]:
                 return False
-        live = [rivals]
+        return self._are_missed(rivals, every)
+
+    def _are_missed(self, whole: int, every: Sequence[Sequence[int]]) -> bool:
+        """Return whether one mask of each axis can be chosen that have no bit alike."""
+        live = [whole]
         for masks in sorted(every, key=len):
-            self.left -= len(live) * len(masks)
-            if self.left < 0:
-                raise UndecidedError(f"more than {MOST_STEPS:,} steps")
+            self.limit.spend(len(live) * len(masks))
             live = least(a & b for a in live for b in masks)
         return live == [0]
 
@@ -353,41 +366,27 @@ class Cells:
 
     def highest(self, *mine: Needs) -> Fraction:
         """Return the largest level that all of some rules reach together, at most."""
-        low, high = 0, len(self.levels) - 1
-        while low < high:  # the gap below `high` may be reached, that above is not
-            gap = (low + high) // 2
-            if self._at(mine, 0, gap):
-                low = gap + 1
-            else:
-                high = gap
-        return self.levels[low]
+        return self._first(lambda gap: not self._at(mine, 0, gap))
 
     def least_cover(self) -> Fraction:
         """Return a level that some rule reaches everywhere, the highest known."""
-        low, high = 0, len(self.levels) - 1
-        while low < high:
-            gap = (low + high) // 2
-            if self._at((), self.all, gap):
-                high = gap
-            else:
-                low = gap + 1
-        return self.levels[low]
+        return self._first(lambda gap: self._at((), self.all, gap))
+
+    def _first(self, is_so: Callable[[int], bool]) -> Fraction:
+        """Return the level before the first gap of which something is so."""
+        gaps = range(len(self.levels) - 1)
+        return self.levels[bisect_left(gaps, 1, key=is_so)]
 
     def is_bare(self) -> bool:
         """Return whether all rules can be exactly 0 together."""
         every: list[list[int]] = []
         for place, axis in enumerate(self.axes):
-            masks: set[int] = set()
-            straight = bits_of(is_straight(line[0]) for line in axis.lines)
-            for groups in axis.groups:
-                lines = sum(bits for _, high, bits in groups if high > 0) & straight
-                lines |= sum(bits for low, _, bits in groups if low > 0)
-                masks.add(self.on(place, axis.pattern(lines, lines)[1]))
-            every.append(least(masks))
-        live = [self.all]
-        for masks_ in every:
-            live = least(a & b for a in live for b in masks_)
-        return live == [0]
+            positive = (
+                sum(lower for _, high, _, lower in groups if high > 0)
+                for groups in axis.groups
+            )
+            every.append(least(self.on(place, one) for one in positive))
+        return self._are_missed(self.all, every)
 
     def tie(self, one: int, other: int, *, rivals: int) -> bool:
         """Return whether two rules can be equal on an open set, no rival above them.
@@ -402,82 +401,33 @@ class Cells:
         for place, axis in enumerate(self.axes):
             pairs = [
                 (f, g)
-                for f, g in itertools.product(
-                    *(
-                        [f for n, f in enumerate(axis.functions) if one[place] >> n & 1]
-                        for one in mine
-                    )
-                )
-                if f == g
-                or not _always_differ(f.proposition, g.proposition, axis.variable)
+                for f in numbers_in(mine[0][place])
+                for g in numbers_in(mine[1][place])
+                if f == g or not axis.always_differ(f, g)
             ]
             for cell, groups in zip(axis.cells, axis.groups, strict=True):
-                if cell.low == cell.high:
-                    continue
-                ranges = set()
-                for f, g in pairs:
-                    ends = [
-                        [one.ends(cell, is_upper=up) for up in (False, True)]
-                        for one in (f, g)
-                    ]
-                    is_line = all(low == high for low, high in ends)
-                    if is_line and ends[0] != ends[1]:
-                        continue
-                    low = max(min(lower) for lower, _ in ends)
-                    high = min(max(upper) for _, upper in ends)
-                    if low < high:
-                        ranges.add((low, high, ends[0][0] if is_line else None))
-                for low, high, line in ranges:
-                    for gap in range(
-                        bisect_left(self.levels, low), bisect_left(self.levels, high)
-                    ):
-                        fixed = {place: [self._pivot(axis, cell, groups, gap, line)]}
-                        if self._at(mine, rivals, gap, fixed):
+                for low, high, line in _pivots(cell, pairs):
+                    numbers = [bisect_left(self.levels, end) for end in (low, high)]
+                    for gap in range(*numbers):
+                        on = _pivot(groups, gap, numbers if line else [])
+                        if self._at(mine, rivals, gap, {place: [on]}):
                             return True
         return False
 
-    def _pivot(
-        self,
-        axis: Axis,
-        cell: Cell,
-        groups: Sequence[tuple[int, int, int]],
-        gap: int,
-        line: Interval | None,
-    ) -> Pattern:
-        """Return what can be at a level where a line crosses it, and what is above."""
-        possible = certain = 0
-        pivot = 0 if line is None else 1 << cell.lines.index(line)
-        is_above = line is not None
-        for low, high, bits in groups:
-            is_pivot = bool(bits & pivot)
-            is_above &= not is_pivot
-            is_on = high > gap and (is_above or line is None or low > gap or is_pivot)
-            possible |= bits if is_on else 0
-            certain |= bits if low > gap or (is_above and high > gap) else 0
-        return axis.pattern(possible, certain)
-
     def _stands(self, mine: tuple[Needs, Needs], rivals: int) -> bool:
         levels = [self._flat(one) for one in mine]
+        size = len(self.of)
         for level in sorted((levels[0] & levels[1]) - {0}):
             every: list[list[int]] = []
-            size = len(self.of)
             for place, axis in enumerate(self.axes):
-                masks: set[int] = set()
-                for possible, certain, equal in axis_flats(axis, level):
-                    if (mine[0][place] | mine[1][place]) & ~possible:
-                        continue
-                    mask = self.on(place, certain) & rivals
-                    for k in (0, 1):
-                        mask |= 0 if mine[k][place] & equal else 1 << (size + k)
-                    masks.add(mask)
+                own, masks = (mine[0][place], mine[1][place]), set[int]()
+                for possible, certain in axis_flats(axis, level):
+                    if not (own[0] | own[1]) & ~possible:
+                        open_ = [not bits & possible & ~certain for bits in own]
+                        mask = self.on(place, certain) & rivals
+                        masks.add(mask | open_[0] << size | open_[1] << size + 1)
                 every.append(least(masks))
-            live = [rivals | 3 << size]
-            for masks_ in every:
-                self.left -= len(live) * len(masks_)
-                live = least(a & b for a in live for b in masks_)
-            if self.left < 0:
-                raise UndecidedError(f"more than {MOST_STEPS:,} steps")
-            if live == [0]:
+            if self._are_missed(rivals | 3 << size, every):
                 return True
         return False
 
@@ -487,51 +437,62 @@ class Cells:
             level
             for place, axis in enumerate(self.axes)
             for cell, groups in zip(axis.cells, axis.groups, strict=True)
-            if cell.low < cell.high
-            for level, high, bits in groups
-            if level == high
-            and any(
-                mine[place] >> n & 1 and any(bits >> line & 1 for line in f.lower)
-                for n, f in enumerate(axis.functions)
-            )
+            for level, high, _, lower in groups
+            if cell.low < cell.high and level == high and lower & mine[place]
         }
 
 
-def axis_flats(axis: Axis, level: int) -> set[tuple[int, int, int]]:
-    """Return what can be at a level in open cells, what is above it, what stays."""
-    result: set[tuple[int, int, int]] = set()
-    for cell, groups in zip(axis.cells, axis.groups, strict=True):
-        if cell.low == cell.high and axis.ends[0] < axis.ends[1]:
-            continue
-        flat = sum(bits for low, high, bits in groups if low == high == level)
-        above = sum(bits for low, high, bits in groups if low >= level and high > level)
-        crossing = [0]
-        for low, high, bits in groups:
-            if low < level < high:
-                crossing.append(crossing[-1] | bits)
-        for one in crossing:
-            possible, certain = axis.pattern(above | one | flat, above | one)
-            result.add((possible, certain, possible & ~certain))
+def _pivots(
+    cell: Cell, pairs: Iterable[tuple[int, int]]
+) -> set[tuple[Fraction, Fraction, bool]]:
+    """Return between which levels two propositions can be one function in a cell.
+
+    True is a line, which both are.
+    """
+    result: set[tuple[Fraction, Fraction, bool]] = set()
+    for f, g in pairs if cell.low < cell.high else ():
+        is_line = all(cell.lower[n] == cell.upper[n] for n in (f, g))
+        low = max(min(cell.lower[n]) for n in (f, g))
+        high = min(max(cell.upper[n]) for n in (f, g))
+        if low < high and not (is_line and cell.lower[f] != cell.lower[g]):
+            result.add((low, high, is_line))
     return result
 
 
-_ANALYTIC = ("gaussian", "sigmoid", "bell", "two gaussians")
+def _pivot(groups: Sequence[Group], gap: int, ends: Sequence[int]) -> Pattern:
+    """Return what can be at a level in a gap, and what is above it, for certain.
+
+    `ends`: The levels of the line that crosses it there; none if it is not known.
+    """
+    possible = certain = 0
+    is_above = bool(ends)
+    for low, high, upper, lower in groups:
+        is_pivot = [low, high] == ends
+        is_above &= not is_pivot
+        if low > gap or (high > gap and (is_above or is_pivot or not ends)):
+            possible |= upper
+        if low > gap or (high > gap and is_above):
+            certain |= lower
+    return possible, certain
 
 
-def _always_differ(one: Proposition, other: Proposition, variable: Variable) -> bool:
-    """Return whether two propositions are surely on no interval the same function."""
-    if one.negated != other.negated or not len(one.terms) == len(other.terms) == 1:
-        return False
-    a, b = (variable.curves[term] for term in (*one.terms, *other.terms))
-    is_known = (
-        a.kind == b.kind and a.kind in _ANALYTIC[:3] and not (a.hedges or b.hedges)
-    )
-    return is_known and (a != b or one.weight != other.weight)
+def axis_flats(axis: Axis, level: int) -> set[Pattern]:
+    """Return what can be at a level or above in open cells, and what is above it."""
+    result: set[Pattern] = set()
+    for cell, groups in zip(axis.cells, axis.groups, strict=True):
+        if cell.low < cell.high or axis.ends[0] == axis.ends[1]:
+            flat = sum(upper for low, high, upper, _ in groups if low == high == level)
+            chained = _chain([one for one in groups if one[1] > level], level - 1)
+            result.update((a | flat, b) for a, b in chained)
+    return result
 
 
-def bits_of(flags: Iterable[bool]) -> int:
-    """Return a number whose n-th bit is the n-th flag."""
-    return sum(1 << place for place, flag in enumerate(flags) if flag)
+_ANALYTIC = ("gaussian", "sigmoid", "bell")
+
+
+def numbers_in(bits: int) -> list[int]:
+    """Return the places of the bits of a number that are 1."""
+    return [place for place in range(bits.bit_length()) if bits >> place & 1]
 
 
 def least(masks: Iterable[int]) -> list[int]:

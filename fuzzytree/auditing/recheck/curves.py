@@ -159,7 +159,12 @@ def _enclosed(curve: Curve, low: Fraction, high: Fraction) -> Between:
                 min(x / n[1], Fraction(1, 2)) for x in _sizes(low - n[0], high - n[0])
             )
             least, most = _cosine(far)[0], _cosine(near)[1]
-            return (1 + least) / 2 if far < Fraction(1, 2) else ZERO, (1 + most) / 2
+            is_out = [2 * x >= 1 for x in (far, near)]
+            least, most = (
+                ZERO if out else (1 + one) / 2
+                for out, one in zip(is_out, (least, most), strict=True)
+            )
+            return least, most
         case "spike":
             near, far = _sizes(low - n[0], high - n[0])
             return _falling(10 * far / n[1])[0], _falling(10 * near / n[1])[1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 
 class CannotRunError(ValueError):
@@ -26,6 +26,31 @@ def require(is_so: bool, otherwise: str) -> None:
     """
     if not is_so:
         raise DoesNotHoldError(otherwise)
+
+
+MOST_STEPS = 2_000_000
+
+
+class Limit:
+    """How much work an answer may take: so many steps, and some time.
+
+    `is_late`: Whether the time is over.
+    """
+
+    def __init__(self, is_late: Callable[[], bool] = lambda: False) -> None:
+        self.is_late, self.left = is_late, MOST_STEPS
+
+    def spend(self, steps: int) -> None:
+        """Count some steps.
+
+        Raises:
+            UndecidedError: If there are too many, or the time is over.
+        """
+        self.left -= steps
+        if self.left < 0:
+            raise UndecidedError(f"more than {MOST_STEPS:,} steps")
+        if self.is_late():
+            raise UndecidedError("the time is over")
 
 
 UNCHECKED = (

@@ -354,6 +354,8 @@ FT801.bound note
   {output:q} differs by at most {most:.6g} where both answer a number
 FT801.no-bound note
   how far {output:q} can differ at most is not known: {reason}
+FT901.refuted error
+  {subject}: the proof of {code} is refuted: {detail}
 FTD.left-out note
   {subject} is left out: {reason}
 FTD.bounded note

@@ -8,12 +8,16 @@ import msgspec
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.engine.states import Proved
+from fuzzytree.auditing.engine.states import Computed, Proved
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import Audit, AuditSelection
 from fuzzytree.auditing.findings.subject import Material
 from fuzzytree.auditing.recheck import recheck
+from fuzzytree.auditing.recheck.case import Case
+from fuzzytree.auditing.recheck.deciding import PROOFS
+from fuzzytree.auditing.recheck.outcomes import DoesNotHoldError
+from fuzzytree.auditing.recheck.records import Answer
 from fuzzytree.exporters import yaml
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Conjunction
@@ -70,6 +74,29 @@ def test_all_that_is_proved_of_many_bases_is_decided_again(seed: int) -> None:
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 6, 7, 8])
 def test_all_that_is_proved_of_a_system_is_decided_again(seed: int) -> None:
     check(random_system(seed, formulas="none"))
+
+
+def test_what_is_decided_otherwise_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuted(case: Case, answer: Answer) -> None:
+        raise DoesNotHoldError("it is otherwise")
+
+    monkeypatch.setitem(PROOFS, "FT404.used", refuted)
+    result = audited(random_base(1, 4, 2, "minimum", "points"))
+    (one,) = (a for a in result.answers if a.code == "FT901")
+    sentence = "terms and variables: the proof of FT404 is refuted: it is otherwise"
+    assert (one.sentence, one.severity, one.is_finding) == (sentence, "error", True)
+    (other,) = (a for a in result.answers if a.message == "FT404.used")
+    assert isinstance(other.state, Computed)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_nothing_that_is_said_of_a_system_is_refuted(seed: int) -> None:
+    model = random_system(seed, formulas="none")
+    content = yaml.write(model).content
+    result = audited(model, content)
+    assert not [one.sentence for one in result.answers if one.code == "FT901"]
+    encoded = msgspec.json.encode(result)
+    assert recheck(encoded, content, ("audit", "model")).wrong == []
 
 
 def test_where_rules_stand_in_the_file_does_not_matter() -> None:
