@@ -108,6 +108,8 @@ def _read(
     if whole.form == "system" and result.policy.decision == "strongest":
         text = "a system that stands for rules is not checked again; audit these"
         raise CannotRunError(f"{names[0]}: {text}")
+    if any(side.is_open for side in result.domain.sides):
+        raise CannotRunError(f"{names[0]}: a domain with an open side is not checked")
     return facts, Case(result, whole, limit)
 
 

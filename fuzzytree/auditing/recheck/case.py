@@ -126,6 +126,9 @@ class Case:
         """
         if step not in self._cells:
             rules = [*self.rules.rules, *self.shorter.values()]
+            has_twice = any(len({*rule.when}) < len(rule.when) for rule in rules)
+            if self.rules.is_product and has_twice:
+                raise UndecidedError("a product in which one degree stands twice")
             settings = self.audit.settings
             levels = {Fraction(settings.epsilon), Fraction(settings.level)}
             for one in self.audit.answers:

@@ -104,8 +104,8 @@ def test_mistakes_are_reported_with_their_places(content: bytes, message: str) -
 
 
 def test_an_unknown_code_is_reported_with_its_place() -> None:
-    with pytest.raises(ReadError, match=r"^x.yaml:1:15: no code begins with 'FT9'; "):
-        configuration(b"select: [FT1, FT9]", "x.yaml")
+    with pytest.raises(ReadError, match=r"^x.yaml:1:15: no code begins with 'FT99'; "):
+        configuration(b"select: [FT1, FT99]", "x.yaml")
 
 
 def test_a_configuration_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
