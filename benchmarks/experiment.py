@@ -23,13 +23,12 @@ from experiment_study import Outcome, experiment
 from experiment_tasks import KNOWN, Task, file_task, known_task
 
 from fuzzytree.cli.console import (
+    ResultOptions,
     answer,
     answer_json,
     argument,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say,
     say_rows,
     takes,
@@ -56,7 +55,7 @@ _ONLY = {
 """The kinds of task that an option is for."""
 
 
-class ExperimentOptions:
+class ExperimentOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     task: str = argument("[TASK]", default="paper")
@@ -112,8 +111,6 @@ class ExperimentOptions:
         "--no-peers", "Without learners of scikit-learn.", is_flag=True
     )
     output: str | None = option("-o --output FOLDER", "For models and pictures.")
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("experiment.py")

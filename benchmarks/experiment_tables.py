@@ -19,13 +19,12 @@ import numpy as np
 from commands import run
 
 from fuzzytree.cli.console import (
+    ResultOptions,
     answer,
     answer_json,
     argument,
     flag,
-    json_option,
     option,
-    quiet_option,
     say,
     takes,
     wrong_options,
@@ -256,7 +255,7 @@ def discriminate(
     return nearest
 
 
-class TablesOptions:
+class TablesOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     name: str = argument("OBJECT")
@@ -273,8 +272,6 @@ class TablesOptions:
     is_each: bool = flag(
         "--effects", "Print the recognition rates without each effect of the sensor."
     )
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("experiment_tables.py")

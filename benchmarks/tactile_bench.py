@@ -18,10 +18,8 @@ from fuzzytree.cli.console import (
     answer,
     answer_json,
     argument,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say,
     takes,
     wrong_options,
@@ -67,8 +65,6 @@ class TactileBenchOptions(SensorOptions):
         default=120.0,
     )
     seed: int = option("--seed", "Random seed.", type=click.IntRange(0), default=0)
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("tactile_bench.py")

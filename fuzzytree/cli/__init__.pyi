@@ -1,3 +1,4 @@
+from .console import ResultOptions as ResultOptions
 from .console import answer as answer
 from .console import answer_bytes as answer_bytes
 from .console import answer_json as answer_json

@@ -19,19 +19,17 @@ from fuzzytree.cli.audit_options import (
     table_of,
 )
 from fuzzytree.cli.console import (
+    FullResultOptions,
     allow_loss_option,
     answer_styled,
     argument,
     delimiter_option,
     flag,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say,
     several,
     takes,
-    verbose_option,
     wrong_options,
 )
 from fuzzytree.files import check_places, write_atomically
@@ -53,7 +51,7 @@ For example:
 """
 
 
-class AuditOptions:
+class AuditOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -132,9 +130,6 @@ class AuditOptions:
     )
     delimiter: str | None = delimiter_option
     allow_loss: bool = allow_loss_option
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command(

@@ -11,20 +11,18 @@ from typing import TYPE_CHECKING
 import click
 
 from fuzzytree.cli.console import (
+    FullResultOptions,
     answer,
     answer_json,
     argument,
     delimiter_option,
     flag,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say,
     several,
     table_source,
     takes,
-    verbose_option,
     wrong_options,
 )
 from fuzzytree.files import check_place, write_atomically
@@ -35,7 +33,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 
 
-class BenchOptions:
+class BenchOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -84,9 +82,6 @@ class BenchOptions:
     )
     is_full: bool = flag("--full", "List variants that are slower and less exact, too.")
     delimiter: str | None = delimiter_option
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("bench", short_help="Measure error against run time.")

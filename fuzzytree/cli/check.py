@@ -7,26 +7,24 @@ from collections.abc import Sequence
 import click
 
 from fuzzytree.cli.console import (
+    FullResultOptions,
     allow_loss_option,
     answer_result,
     argument,
     data_option,
     delimiter_option,
     flag,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     rows_only_option,
     runtimes_option,
     table_source,
     takes,
-    verbose_option,
     wrong_options,
 )
 
 
-class CheckOptions:
+class CheckOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -45,9 +43,6 @@ class CheckOptions:
         "--run-code", "Run a program file although its text differs from a new one."
     )
     allow_loss: bool = allow_loss_option
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command(

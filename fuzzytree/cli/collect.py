@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 import click
 
 from fuzzytree.cli.console import (
+    ResultOptions,
     answer_json,
     argument,
     delimiter_option,
     ignore_option,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say_rows,
     table_source,
     takes,
@@ -34,7 +33,7 @@ STATE = ".state"
 """How the name of a state's file ends."""
 
 
-class CollectOptions:
+class CollectOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     parts: Sequence[str] = argument("PART...", nargs=-1, required=True)
@@ -61,8 +60,6 @@ class CollectOptions:
         choices=["drop", "refuse"],
     )
     delimiter: str | None = delimiter_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("collect", short_help="Collect what learning needs of parts of a table.")

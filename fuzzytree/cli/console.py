@@ -75,7 +75,7 @@ def takes(
 ) -> Callable[[Callable[[Record], Code]], Callable[..., Code]]:
     """Give a command the options that a class has as attributes, as one object.
 
-    Attributes of a base class come first.
+    Attributes of a base class come last.
 
     Example:
         >>> class Words:
@@ -96,9 +96,7 @@ def takes(
             vars(options).update(values)
             return function(options)
 
-        parameters = [
-            one for base in record.__mro__[::-1] for one in vars(base).items()
-        ]
+        parameters = [one for base in record.__mro__ for one in vars(base).items()]
         for name, parameter in reversed(parameters):
             if isinstance(parameter, functools.partial):
                 parameter(name)(command)
@@ -107,9 +105,24 @@ def takes(
     return decorate
 
 
-quiet_option = flag("--quiet", "Print errors only.")
-json_option = flag("--json", "Print the whole result as JSON to stdout.")
 verbose_option = flag("--verbose", "Print every part of the result, not only counts.")
+json_option = flag("--json", "Print the whole result as JSON to stdout.")
+quiet_option = flag("--quiet", "Print errors only.")
+
+
+class ResultOptions:
+    """The options of a verb that has a result; they stand last in its help."""
+
+    as_json: bool = json_option
+    quiet: bool = quiet_option
+
+
+class FullResultOptions(ResultOptions):
+    """The options of a verb whose result is shortened unless all of it is wanted."""
+
+    verbose: bool = verbose_option
+
+
 delimiter_option = option(
     "--delimiter CHARACTER",
     "Character between the cells of a CSV file; by default from its first line.",

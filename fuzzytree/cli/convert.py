@@ -12,14 +12,13 @@ import click
 import msgspec
 
 from fuzzytree.cli.console import (
+    FullResultOptions,
     answer_bytes,
     answer_json,
     argument,
     flag,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say,
     say_first,
     say_rows,
@@ -27,7 +26,6 @@ from fuzzytree.cli.console import (
     several,
     standard_input,
     takes,
-    verbose_option,
     wrong_options,
 )
 from fuzzytree.cli.representation import (
@@ -55,7 +53,7 @@ if TYPE_CHECKING:
     from fuzzytree.numerics import Certificate
 
 
-class ConvertOptions:
+class ConvertOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     source: str = argument("IN")
@@ -78,9 +76,6 @@ class ConvertOptions:
     allow_loss: bool = flag(
         "--allow-loss", "Write the file although the conversion loses information."
     )
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("convert", short_help="Convert a model from one format to another.")

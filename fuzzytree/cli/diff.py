@@ -8,23 +8,21 @@ import click
 
 from fuzzytree.cli.audit_options import limits_of
 from fuzzytree.cli.console import (
+    FullResultOptions,
     allow_loss_option,
     answer_result,
     argument,
     delimiter_option,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     several,
     table_source,
     takes,
-    verbose_option,
     wrong_options,
 )
 
 
-class DiffOptions:
+class DiffOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     old: str = argument("OLD")
@@ -40,9 +38,6 @@ class DiffOptions:
     )
     delimiter: str | None = delimiter_option
     allow_loss: bool = allow_loss_option
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command(

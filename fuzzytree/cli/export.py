@@ -5,13 +5,11 @@ from __future__ import annotations
 import click
 
 from fuzzytree.cli.console import (
+    FullResultOptions,
     argument,
     flag,
-    json_option,
     option,
-    quiet_option,
     takes,
-    verbose_option,
     wrong_options,
 )
 from fuzzytree.cli.convert import carry, read_source
@@ -24,7 +22,7 @@ from fuzzytree.cli.representation import (
 from fuzzytree.model import Conjunction, Kind, ModelKind
 
 
-class ExportOptions:
+class ExportOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -63,9 +61,6 @@ class ExportOptions:
     allow_loss: bool = flag(
         "--allow-loss", "Write the file although the format loses information."
     )
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("export", short_help="Write a model in another format.")

@@ -14,21 +14,19 @@ import msgspec
 
 from fuzzytree.cli.collect import STATE
 from fuzzytree.cli.console import (
+    FullResultOptions,
     answer_bytes,
     answer_json,
     argument,
     delimiter_option,
     flag,
     ignore_option,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say_rows,
     several,
     table_source,
     takes,
-    verbose_option,
     wrong_options,
 )
 from fuzzytree.cli.convert import next_check
@@ -54,7 +52,7 @@ Lines = list[tuple[str, str, str]]
 Progress = Callable[[str, float], None]
 
 
-class LearnOptions:
+class LearnOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     tables: Sequence[str] = argument("TABLE", nargs=-1, required=True)
@@ -84,9 +82,6 @@ class LearnOptions:
         "--repeated", "Count the rows of a state twice that is part of two others."
     )
     delimiter: str | None = delimiter_option
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
     mode: Any = option(
         "--mode",
         "Learner: the default one, or that of the paper exactly.",

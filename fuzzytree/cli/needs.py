@@ -8,20 +8,18 @@ from typing import TYPE_CHECKING
 import click
 
 from fuzzytree.cli.console import (
+    FullResultOptions,
     answer,
     answer_json,
     argument,
     data_option,
     delimiter_option,
-    json_option,
     option,
     progress_bar,
-    quiet_option,
     say,
     say_rows,
     table_source,
     takes,
-    verbose_option,
     wrong_options,
 )
 from fuzzytree.files import check_place
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
     from fuzzytree.model import Use
 
 
-class NeedsOptions:
+class NeedsOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -57,9 +55,6 @@ class NeedsOptions:
         type=click.FloatRange(min=0.0, min_open=True),
     )
     delimiter: str | None = delimiter_option
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("needs", short_help="Report what a model needs, and leave out the rest.")

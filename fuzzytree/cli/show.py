@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import click
 
 from fuzzytree.cli.console import (
+    ResultOptions,
     answer,
     answer_json,
     argument,
-    json_option,
     option,
-    quiet_option,
     say,
     takes,
     wrong_options,
@@ -23,15 +22,13 @@ if TYPE_CHECKING:
     from fuzzytree.model import Coverage, Document, Reading
 
 
-class ShowOptions:
+class ShowOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
     picture: str | None = option(
         "--picture FILE", "Picture of the tree to write, as .svg or .png."
     )
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("show", short_help="Show a model and its rules.")

@@ -7,24 +7,22 @@ from collections.abc import Sequence
 import click
 
 from fuzzytree.cli.console import (
+    FullResultOptions,
     answer_result,
     argument,
     data_option,
     delimiter_option,
     flag,
-    json_option,
     progress_bar,
-    quiet_option,
     runtimes_option,
     several,
     table_source,
     takes,
-    verbose_option,
     wrong_options,
 )
 
 
-class StabilityOptions:
+class StabilityOptions(FullResultOptions):
     """The arguments and options of the verb."""
 
     model: str = argument("MODEL")
@@ -35,9 +33,6 @@ class StabilityOptions:
     runtimes: Sequence[str] = runtimes_option
     is_full: bool = flag("--rows", "The same as --verbose.")
     delimiter: str | None = delimiter_option
-    verbose: bool = verbose_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("stability", short_help="Check that a model is numerically stable.")

@@ -10,9 +10,7 @@ from fuzzytree.cli import (
     answer,
     answer_json,
     argument,
-    json_option,
     option,
-    quiet_option,
     rows_only_option,
     say,
     takes,
@@ -38,8 +36,6 @@ class TactileCheckOptions(SensorOptions):
         default=0.0,
     )
     rows_only: bool = rows_only_option
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("check", short_help="Compare files of frames with their model.")

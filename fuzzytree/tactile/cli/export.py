@@ -14,9 +14,7 @@ from fuzzytree.cli import (
     answer_bytes,
     answer_json,
     argument,
-    json_option,
     option,
-    quiet_option,
     say,
     say_rows,
     setting,
@@ -55,8 +53,6 @@ class TactileExportOptions(SensorOptions):
         "Option (repeat): outputs, reject, opset, ir, plain of graphs; "
         "name, reject of C.",
     )
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("export", short_help="Write one file from raw frame to class.")

@@ -16,9 +16,7 @@ from fuzzytree.cli import (
     answer_bytes,
     answer_json,
     argument,
-    json_option,
     option,
-    quiet_option,
     say_rows,
     takes,
     wrong_options,
@@ -52,8 +50,6 @@ class TactileFeaturesOptions(FramesOptions):
         "--label ARRAY", "Array of FRAMES with the classes.", default="label"
     )
     output: str | None = option("-o --output FILE", "CSV file to write; `-` is stdout.")
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("features", short_help="Turn frames into a table of features.")

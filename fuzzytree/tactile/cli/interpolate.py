@@ -13,9 +13,7 @@ from fuzzytree.cli import (
     answer_json,
     argument,
     flag,
-    json_option,
     option,
-    quiet_option,
     say_rows,
     takes,
     wrong_options,
@@ -59,8 +57,6 @@ class TactileInterpolateOptions(FramesOptions):
         "Picture of a frame (.svg, .png), or values of all frames (.npz).",
         required=True,
     )
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("interpolate", short_help="Interpolate frames; a picture or numbers.")

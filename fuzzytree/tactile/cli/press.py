@@ -13,12 +13,11 @@ import click
 import msgspec
 
 from fuzzytree.cli import (
+    ResultOptions,
     answer_bytes,
     answer_json,
     argument,
-    json_option,
     option,
-    quiet_option,
     say_rows,
     setting,
     several,
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.simulation.physics import PhysicsSettings, Simulated
 
 
-class TactilePressOptions:
+class TactilePressOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     name: str = argument("OBJECT")
@@ -48,8 +47,6 @@ class TactilePressOptions:
         "--set NAME=VALUE",
         "Number of the simulator (repeat); see docs/explanation/simulator.md.",
     )
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("press", short_help="Press objects on a simulated sensor.")

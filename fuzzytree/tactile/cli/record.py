@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from fuzzytree.cli import (
+    ResultOptions,
     answer_json,
     argument,
     flag,
-    json_option,
     option,
-    quiet_option,
     say,
     say_rows,
     takes,
@@ -40,7 +39,7 @@ End = Literal["frames", "seconds", "told", "port"]
 _LOOK_S = 0.1
 
 
-class TactileRecordOptions:
+class TactileRecordOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     board: str = argument("BOARD.yaml")
@@ -54,8 +53,6 @@ class TactileRecordOptions:
     )
     force: bool = flag("--force", "Replace FILE if it exists.")
     no_wait: bool = flag("--no-wait", "End when the port goes away.")
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("record", short_help="Record the frames of a board in a file.")

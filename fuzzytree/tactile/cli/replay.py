@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 import click
 
 from fuzzytree.cli import (
+    ResultOptions,
     answer,
     answer_json,
     argument,
     flag,
-    json_option,
     option,
-    quiet_option,
     say,
     say_rows,
     takes,
@@ -33,7 +32,7 @@ _LOOK_S = 0.1
 _LAST_S = 0.2  # for the reader of a port to take the last bytes
 
 
-class TactileReplayOptions:
+class TactileReplayOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     recording: str = argument("FILE")
@@ -48,8 +47,6 @@ class TactileReplayOptions:
         "Speed of --to-port as a multiple of the recorded one; default 1.",
         type=click.FloatRange(0.0, min_open=True),
     )
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("replay", short_help="Summarise a recording, or play it again.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli import option, say_rows, wrong_options
+from fuzzytree.cli import ResultOptions, option, say_rows, wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.model import Model
@@ -21,7 +21,7 @@ _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
 data_option = option("--data FRAMES", "Frames to check with, beside generated ones.")
 
 
-class FramesOptions:
+class FramesOptions(ResultOptions):
     """The options that say whose frames a file holds."""
 
     board: str | None = option("--board FILE", "File of the board.")

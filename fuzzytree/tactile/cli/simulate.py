@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 import click
 
 from fuzzytree.cli import (
+    ResultOptions,
     answer,
     answer_json,
     argument,
     flag,
-    json_option,
     option,
-    quiet_option,
     say_rows,
     several,
     takes,
@@ -32,7 +31,7 @@ ALL = "all"
 _LOOK_S = 0.05
 
 
-class TactileSimulateOptions:
+class TactileSimulateOptions(ResultOptions):
     """The arguments and options of the verb."""
 
     board: str = argument("BOARD.yaml")
@@ -59,8 +58,6 @@ class TactileSimulateOptions:
     frames: int | None = option(
         "--frames N", "Number of frames to send.", type=click.IntRange(1)
     )
-    as_json: bool = json_option
-    quiet: bool = quiet_option
 
 
 @click.command("simulate", short_help="Simulate a board on a new port.")
