@@ -210,7 +210,7 @@ def _word(name: str) -> str:
 def _values(system: FuzzySystem) -> Floats:
     chance = np.random.default_rng(0)
     columns = []
-    for one in system.inputs:
+    for one in system.variables:
         marks = [m for label in one.terms for m in _marks(label.function)]
         columns.append(chance.uniform(min(marks), max(marks), ROWS))
     return np.array(columns)
@@ -228,7 +228,7 @@ def _marks(curve: Curve) -> list[float]:
 
 def _table(system: FuzzySystem, rounds: int, folder: Path) -> Iterator[str]:
     values = _values(system)
-    rows = [dict(zip(system.columns, row, strict=True)) for row in values.T.tolist()]
+    rows = [dict(zip(system.inputs, row, strict=True)) for row in values.T.tolist()]
     right = np.array([infer(system, row).outputs[0] for row in rows])
     found: dict[str, Engine] = {}
     absent: list[str] = []
@@ -416,7 +416,7 @@ def _pyfuzzylite(system: FuzzySystem, _: Path) -> Engine:
 def _ferrifuzz(system: FuzzySystem, _: Path) -> Engine:
     ff = importlib.import_module("ferrifuzz")
     made = ff.FuzzySystem(defuzz_method="weighted_average", clamp_inputs=False)
-    for one in system.inputs:
+    for one in system.variables:
         low, high = _range(one)
         variable = ff.Variable(one.name, low, high)
         for label in one.terms:
@@ -438,7 +438,7 @@ def _ferrifuzz(system: FuzzySystem, _: Path) -> Engine:
         made.add_rule(_sentence(rule, " AND ", " OR ", "{} IS {}"))
 
     def many(values: Floats) -> Floats:
-        given = dict(zip(system.columns, values, strict=True))
+        given = dict(zip(system.inputs, values, strict=True))
         found: Floats = np.asarray(made.compute_batch(given)[output.name])
         return found
 
@@ -448,7 +448,7 @@ def _ferrifuzz(system: FuzzySystem, _: Path) -> Engine:
 def _simpful(system: FuzzySystem, _: Path) -> Engine:
     sf = importlib.import_module("simpful")
     made = sf.FuzzySystem(show_banner=False)
-    for one in system.inputs:
+    for one in system.variables:
         low, high = _range(one)
         sets = [_simpful_set(sf, label, low, high) for label in one.terms]
         variable = sf.LinguisticVariable(sets, universe_of_discourse=[low, high])
@@ -464,7 +464,7 @@ def _simpful(system: FuzzySystem, _: Path) -> Engine:
     )
 
     def single(row: Sequence[float]) -> float:
-        for name, value in zip(system.columns, row, strict=True):
+        for name, value in zip(system.inputs, row, strict=True):
             made.set_variable(name, value)
         found: float = made.Sugeno_inference([output.name])[output.name]
         return found
@@ -495,7 +495,7 @@ def _simpful_set(sf: Any, label: Term, low: float, high: float) -> Any:
 def _skfuzzy(system: FuzzySystem, _: Path) -> Engine:
     control = importlib.import_module("skfuzzy.control")
     inputs = {}
-    for one in system.inputs:
+    for one in system.variables:
         low, high = _range(one)
         knots = {m for label in one.terms for m in _marks(label.function)}
         grid = np.unique([*np.linspace(low, high, 1001), *knots])
@@ -514,7 +514,7 @@ def _skfuzzy(system: FuzzySystem, _: Path) -> Engine:
     simulation = control.ControlSystemSimulation(control.ControlSystem(rules))
 
     def many(values: Floats) -> Floats:
-        for name, column in zip(system.columns, values, strict=True):
+        for name, column in zip(system.inputs, values, strict=True):
             simulation.input[name] = column
         simulation.compute()
         found: Floats = simulation.output[output.name]

@@ -199,7 +199,7 @@ def _system_text(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
     yield _USE + _DECLARE
     yield "typedef double name_real;\n\n"
     count = len(system.outputs) + activations * len(system.rules)
-    yield f"#define NAME_INPUTS {len(system.columns)}u\n"
+    yield f"#define NAME_INPUTS {len(system.inputs)}u\n"
     yield f"#define NAME_OUTPUTS {count}u\n"
     yield SYSTEM_TYPES + _DEFINE
     yield _checks(DOUBLE, is_arithmetic=True)
@@ -297,8 +297,7 @@ def _heading(model: Document) -> Iterator[str]:
     title = title_of(model, f'"{remark(model.name)}"')
     yield f"/* {title}. Written by fuzzytree.\n"
     yield f" * Fingerprint: {fingerprint(model)}\n *\n * Inputs, in order:\n"
-    columns = model.columns if isinstance(model, FuzzySystem) else model.inputs
-    inputs = [one for one in model.variables if one.name in columns]
+    inputs = [one for one in model.variables if not one.parts]
     for place, variable in enumerate(inputs):
         yield f" *   x[{place}] {_described(variable)}\n"
     if isinstance(model, FuzzySystem):

@@ -416,7 +416,7 @@ def system_selftest(system: FuzzySystem, *, activations: bool) -> Iterator[str]:
     Outputs must be equal, or as near as functions of different libraries allow.
     """
     examples = _examples(system, activations=activations)
-    inputs, outputs = max(len(system.columns), 1), len(examples[0][1])
+    inputs, outputs = max(len(system.inputs), 1), len(examples[0][1])
     yield "\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n"
     yield "\n/* Bits of the inputs, the outputs and their largest errors; the status.\n"
     yield " * Errors are allowed only where a mathematical library is called. */\n"

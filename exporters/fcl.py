@@ -165,13 +165,13 @@ def _naming(system: FuzzySystem, words: FclWords) -> _FclNames:
         )
 
     blocks = [one.name or f"block_{k}" for k, one in enumerate(system.blocks, 1)]
-    variables = named([one.name for one in system.variables])
+    variables = named([one.name for one in system.all_variables])
     return _FclNames(
         title=named([system.name], variables.accepted.values())[system.name],
         variables=variables,
         labels={
             one.name: named([label.name for label in one.terms])
-            for one in system.variables
+            for one in system.all_variables
         },
         blocks=tuple(named([name])[name] for name in blocks),
     )
@@ -210,7 +210,7 @@ def _refused(system: FuzzySystem, words: FclWords) -> FuzzySystem:
                 blocks[k - 1] = speakable(block)
             except LossError as error:
                 reasons.append(f"rule block {k}: {error}")
-    if any(rule.when is None for rule in system.rules) and not system.inputs:
+    if any(rule.when is None for rule in system.rules) and not system.variables:
         reasons.append("a rule without a condition needs an input to test")
     refuse(system.name, "fcl", reasons)
     return replace(system, blocks=tuple(blocks))
@@ -220,7 +220,7 @@ def _text(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator[st
     """Yield the lines of a file."""
     yield f"FUNCTION_BLOCK {names.title}"
     yield "VAR_INPUT"
-    for one in system.inputs:
+    for one in system.variables:
         yield f"  {names.variables[one.name]} : REAL;"
         if words.name == "jfuzzylogic":
             yield from _range(one, words)
@@ -229,7 +229,7 @@ def _text(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator[st
     for output in system.outputs:
         yield f"  {names.variables[output.name]} : REAL;"
     yield "END_VAR"
-    for one in system.inputs:
+    for one in system.variables:
         yield f"FUZZIFY {names.variables[one.name]}"
         if words.name == "fuzzylite":
             yield from _range(one, words)
@@ -238,8 +238,8 @@ def _text(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator[st
     for output in system.outputs:
         yield from _defuzzify(output, names, words)
     always = ""
-    if system.inputs:
-        always = f"{names.variables[system.inputs[0].name]} is any"
+    if system.variables:
+        always = f"{names.variables[system.variables[0].name]} is any"
     for block, name in zip(system.blocks, names.blocks, strict=True):
         outputs = {one.output for rule in block.rules for one in rule.then}
         norm = accu_of(system, outputs, words) if has_accu(words) else None
@@ -288,11 +288,11 @@ def _defuzzify(
 def _remarks(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
     yield from names.remarks(system)
-    if any(one.unit for one in system.variables) or system.note:
+    if any(one.unit for one in system.all_variables) or system.note:
         yield "units and the note of the system have no place"
     if any(rule.name for rule in system.rules):
         yield "names of rules have no place"
-    ranged = [one.name for one in system.inputs if one.low is not None]
+    ranged = [one.name for one in system.variables if one.low is not None]
     if ranged and words.name in ("portable", "iec"):
         yield f"ranges of inputs have no place: of {', '.join(map(repr, ranged[:5]))}"
     if words.is_lower:

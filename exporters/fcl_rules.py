@@ -45,15 +45,15 @@ def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
     """
     rules = [rule for block in system.blocks for rule in block.rules]
     is_needed = any(rule.when is None for rule in rules)
-    if words.has_hedges or not is_needed or not system.inputs:
+    if words.has_hedges or not is_needed or not system.variables:
         return system
-    first = system.inputs[0]
+    first = system.variables[0]
     name = unlike("always", [label.name for label in first.terms])
     label = Term(name, ALWAYS)
     always = Proposition(first.name, (name,))
     return replace(
         system,
-        inputs=(replace(first, terms=(*first.terms, label)), *system.inputs[1:]),
+        variables=(replace(first, terms=(*first.terms, label)), *system.variables[1:]),
         blocks=tuple(
             replace(
                 block,
@@ -210,7 +210,7 @@ def norm_losses(block: RuleBlock, number: int, words: FclWords) -> Iterator[str]
 def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
     """Yield what outputs depend on and the dialect cannot express."""
     default = DEFUZZIFIERS[words.name]
-    for one in system.inputs:
+    for one in system.variables:
         if one.clips:
             yield Loss(f"input {one.name!r}", "its values are not clamped to its range")
     for output in system.outputs:
@@ -253,7 +253,7 @@ def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
     """Return whether some rule concludes an output for every row."""
     constants = {
         (one.name, label.name)
-        for one in system.inputs
+        for one in system.variables
         for label in one.terms
         if set(getattr(label.function, "degrees", ())) == {1.0}
     }
@@ -343,13 +343,13 @@ def check_list(document: RuleBase | FuzzySystem) -> str:
 
 
 def _lines(system: FuzzySystem) -> Iterator[str]:
-    variables = system.variables
+    variables = system.all_variables
     labels = [label for one in variables for label in one.terms]
     rules = system.rules
     yield "data check list (IEC 61131-7)"
-    yield f"inputs: {len(system.inputs)}"
+    yield f"inputs: {len(system.variables)}"
     yield f"outputs: {len(system.outputs)}"
-    yield f"terms of an input: {_span(len(one.terms) for one in system.inputs)}"
+    yield f"terms of an input: {_span(len(one.terms) for one in system.variables)}"
     yield f"terms of an output: {_span(len(one.terms) for one in system.outputs)}"
     points = [
         len(one.function.values) for one in labels if isinstance(one.function, Points)
@@ -452,7 +452,7 @@ def _beyond_extension(system: FuzzySystem, labels: list[Term]) -> Iterator[str]:
     }
     if hedges - {"not"}:
         yield "hedges"
-    if any(one.parts for one in system.inputs):
+    if any(one.parts for one in system.variables):
         yield "inputs that are combined"
     if any(output.defuzzifier.method == "weighted sum" for output in system.outputs):
         yield "weighted sums"

@@ -122,8 +122,8 @@ def as_points(
 
 def unspeakable(system: FuzzySystem, words: FclWords) -> Iterator[str]:
     """Yield the terms that a dialect has no words for."""
-    names = {one.name: one.name for one in system.variables}
-    for variable in system.variables:
+    names = {one.name: one.name for one in system.all_variables}
+    for variable in system.all_variables:
         for label in variable.terms:
             if term_text(variable, label, words, names) is None:
                 kind = type(label.function).__name__
@@ -138,7 +138,7 @@ def plain_linear(system: FuzzySystem) -> FuzzySystem:
         if not isinstance(label.function, Linear):
             return label
         total: Expression = Number(0.0)
-        pairs = zip(label.function.weights, system.columns, strict=True)
+        pairs = zip(label.function.weights, system.inputs, strict=True)
         parts = [Call("*", (Number(weight), Name(name))) for weight, name in pairs]
         if parts:
             total = parts[0]

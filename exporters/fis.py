@@ -122,7 +122,7 @@ def write(
         system = model
     system, lost = flattened(system)
     losses += lost
-    if any(one.height != 1.0 for v in system.variables for one in v.terms):
+    if any(one.height != 1.0 for v in system.all_variables for one in v.terms):
         system, lost = pointed(system, 1e-6)
         losses += lost
         system = without_heights(system, "FIS", losses)
@@ -146,7 +146,7 @@ def write(
 def _naming(system: FuzzySystem, terms: FisTerms) -> FileNames:
     labels = {**terms.labels, **{one.name: one.terms for one in system.outputs}}
     return FileNames(
-        NameMap.of([one.name for one in system.variables], reserved=_RESERVED),
+        NameMap.of([one.name for one in system.all_variables], reserved=_RESERVED),
         {
             name: NameMap.of([one.name for one in own], reserved=_RESERVED)
             for name, own in labels.items()
@@ -216,7 +216,7 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             yield Loss(where, what)
         if dialect == "fuzzylite":
             yield from fuzzylite_losses(output)
-    for variable in system.variables:
+    for variable in system.all_variables:
         if variable.clips and dialect != "fuzzylite":
             what = "values are not moved into the range"
             yield Loss(f"variable {variable.name!r}", what)
@@ -321,13 +321,13 @@ def _text(
         "Name": f"'{names.system[system.name]}'",
         "Type": "'sugeno'" if is_weighted else "'mamdani'",
         "Version": "2.0",
-        "NumInputs": str(len(system.inputs)),
+        "NumInputs": str(len(system.variables)),
         "NumOutputs": str(len(system.outputs)),
         "NumRules": str(len(lines)),
         **{key: f"'{word}'" for key, word in _methods(system, dialect).items()},
     }
     blocks = [[f"# {comment}" for comment in comments], _section("System", head)]
-    for number, one in enumerate(system.inputs, 1):
+    for number, one in enumerate(system.variables, 1):
         labels = terms.labels[one.name]
         blocks.append(_variable(f"Input{number}", one, labels, names, dialect))
     for number, output in enumerate(system.outputs, 1):
@@ -338,7 +338,7 @@ def _text(
         blocks.append(block)
     rows = [_rule(line, system) for line in lines]
     blocks.append(["[Rules]", *rows])
-    if any(one.low is None or one.high is None for one in system.inputs):
+    if any(one.low is None or one.high is None for one in system.variables):
         remarks.append("the range of an input is unknown; all numbers lie in it")
     if dialect == "octave":
         remarks.append(
@@ -397,7 +397,7 @@ def _range(
 
 
 def _rule(line: FisRule, system: FuzzySystem) -> str:
-    codes = " ".join(line.codes.get(one.name, "0") for one in system.inputs)
+    codes = " ".join(line.codes.get(one.name, "0") for one in system.variables)
     concluded = " ".join(line.concluded.get(one.name, "0") for one in system.outputs)
     connection = 2 if line.is_or else 1
     return f"{codes}, {concluded} ({line.weight!r}) : {connection}"

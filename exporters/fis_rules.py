@@ -54,8 +54,8 @@ class FisTerms:
     def __init__(self, system: FuzzySystem, dialect: Dialect, tolerance: float) -> None:
         self.system, self.tolerance = system, tolerance
         self.dialect: Dialect = dialect
-        self.inputs = {one.name: one for one in system.inputs}
-        self.labels = {one.name: [*one.terms] for one in system.inputs}
+        self.inputs = {one.name: one for one in system.variables}
+        self.labels = {one.name: [*one.terms] for one in system.variables}
         self.losses: list[Loss] = []
         self._made: dict[Condition, tuple[str, str]] = {}
 

@@ -134,10 +134,10 @@ def write(
 
 def _naming(system: FuzzySystem) -> FileNames:
     return FileNames(
-        _accepted([one.name for one in system.variables]),
+        _accepted([one.name for one in system.all_variables]),
         {
             one.name: _accepted([label.name for label in one.terms])
-            for one in system.variables
+            for one in system.all_variables
         },
     )
 
@@ -180,7 +180,7 @@ def _speakable(system: FuzzySystem) -> tuple[RuleBlock, ...]:
             blocks.append(speakable(block))
         except LossError as error:
             reasons.append(str(error))
-    for variable in system.variables:
+    for variable in system.all_variables:
         for label in variable.terms:
             if _term_text(variable, label, {}) is None:
                 where = f"term {label.name!r} of {variable.name!r}"
@@ -203,7 +203,7 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
     yield f"Engine: {_line(system.name)}".rstrip()
     if system.note:
         yield f"  description: {_line(system.note)}".rstrip()
-    for one in system.inputs:
+    for one in system.variables:
         yield f"InputVariable: {names.variables[one.name]}"
         yield from _common(one)
         yield from _terms(one, names)
@@ -219,7 +219,9 @@ def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
         yield "  lock-previous: false"
         yield from _terms(output, names)
     # One with terms: pyfuzzylite takes a variable without them for none.
-    variable = next((one for one in system.variables if one.terms), system.outputs[0])
+    variable = next(
+        (one for one in system.all_variables if one.terms), system.outputs[0]
+    )
     always = f"{names.variables[variable.name]} is any"
     for block in system.blocks:
         yield f"RuleBlock: {_line(block.name)}".rstrip()
@@ -271,12 +273,12 @@ def _remarks(system: FuzzySystem, names: FileNames) -> Iterator[str]:
     texts = [system.name, system.note, *(block.name for block in system.blocks)]
     if any(_line(text) != text for text in texts):
         yield "names of the system and of blocks, and its note, became single lines"
-    units = [one.name for one in system.variables if one.unit]
+    units = [one.name for one in system.all_variables if one.unit]
     if units:
         yield f"units have no place: of {', '.join(map(repr, units[:5]))}" + (
             ", ..." if len(units) > 5 else ""
         )
-    fine = [one.name for one in system.variables if _is_fine(one)]
+    fine = [one.name for one in system.all_variables if _is_fine(one)]
     if fine:
         yield (
             "fuzzylite 6 treats values within 1e-6 as equal, and terms have corners "

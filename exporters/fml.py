@@ -129,12 +129,12 @@ class _Ids(FileNames, frozen=True):
 
 
 def _naming(system: FuzzySystem, rules: FmlRules) -> _Ids:
-    variables = _ids(one.name for one in system.variables)
+    variables = _ids(one.name for one in system.all_variables)
     labels = {
         one.name: _ids(
             label.name for label in (*one.terms, *rules.made.get(one.name, ()))
         )
-        for one in system.variables
+        for one in system.all_variables
     }
     title = _ids([system.name], variables.accepted.values())
     return _Ids(variables, labels, title)
@@ -151,7 +151,7 @@ def _with_known_curves(
 ) -> tuple[FuzzySystem, tuple[Loss, ...]]:
     """Return a system whose curves FML has; a height is in its points."""
     has_heights = any(
-        label.height != 1.0 for one in system.variables for label in one.terms
+        label.height != 1.0 for one in system.all_variables for label in one.terms
     )
     if has_heights:
         refuse_singletons(system, "fml with the heights of terms")
@@ -192,7 +192,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
             )
         if output.aggregation not in FML_SNORMS.values():
             yield Loss(where, f"FML has no {output.aggregation}; MAX stands for it")
-    for variable in system.variables:
+    for variable in system.all_variables:
         if variable.clips:
             what = "values are not moved into the range"
             yield Loss(f"variable {variable.name!r}", what)
@@ -207,7 +207,7 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
 
 
 def _root(system: FuzzySystem, rules: FmlRules, names: _Ids) -> XmlElement:
-    inputs = [_input(one, rules, names) for one in system.inputs]
+    inputs = [_input(one, rules, names) for one in system.variables]
     outputs = [_output(output, names) for output in system.outputs]
     bases: list[XmlElement] = []
     number = 0

@@ -105,7 +105,7 @@ class FmlRules:
         self._system = system
         self._kinds = {one.name: _kind(one) for one in system.outputs}
         self._taken = {
-            one.name: [label.name for label in one.terms] for one in system.inputs
+            one.name: [label.name for label in one.terms] for one in system.variables
         }
         reasons: list[str] = []
         number = 0
@@ -130,7 +130,7 @@ class FmlRules:
             for name, kind in self._kinds.items()
             if kind == "mixed"
         ]
-        if len(system.variables) < 2:
+        if len(system.all_variables) < 2:
             reasons.append("FML needs at least two variables")
         if not self.bases and not reasons:
             reasons.append("FML needs at least one rule")

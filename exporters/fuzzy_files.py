@@ -57,7 +57,7 @@ class FileNames(msgspec.Struct, frozen=True):
 
     def remarks(self, system: FuzzySystem) -> list[str]:
         """Return a remark on the changed names, if there are any."""
-        text = changes_text(self.changed(), [one.name for one in system.inputs])
+        text = changes_text(self.changed(), [one.name for one in system.variables])
         return [text] if text else []
 
 
@@ -77,9 +77,9 @@ def with_labels(
     change: Callable[[Variable | SystemOutput], Iterable[Term]],
 ) -> FuzzySystem:
     """Return a system whose variables have other terms."""
-    inputs = tuple(replace(v, terms=tuple(change(v))) for v in system.inputs)
+    inputs = tuple(replace(v, terms=tuple(change(v))) for v in system.variables)
     outputs = tuple(replace(v, terms=tuple(change(v))) for v in system.outputs)
-    return replace(system, inputs=inputs, outputs=outputs)
+    return replace(system, variables=inputs, outputs=outputs)
 
 
 def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySystem:

@@ -120,8 +120,8 @@ def _doors(model: Document) -> tuple[str, ...]:
 
 def _body(model: Document) -> Iterator[str]:
     yield START
-    inputs = model.inputs if isinstance(model, FuzzySystem) else model.variables
-    yield from table("INPUTS", (_entry_of(one) for one in inputs if not one.parts))
+    inputs = (_entry_of(one) for one in model.variables if not one.parts)
+    yield from table("INPUTS", inputs)
     match model:
         case FuzzyTree():
             yield from _classes(model)

@@ -219,9 +219,9 @@ def require(package: str, purpose: str) -> None:
 
 
 def _columns(model: Model | FuzzySystem, signature: Signature) -> tuple[str, ...]:
-    if isinstance(model, FuzzySystem) or signature == "all":
-        return model.columns
-    return model.inputs
+    if isinstance(model, FuzzySystem) or signature == "needed":
+        return model.inputs
+    return model.columns
 
 
 def _model_proto(

@@ -54,7 +54,7 @@ def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
     facts = {p.key.removeprefix("fuzzytree."): p.value for p in result.metadata_props}
     versions = {entry.domain: entry.version for entry in result.opset_import}
     columns = json.loads(facts["columns"])
-    needed = model.columns if isinstance(model, FuzzySystem) else model.inputs
+    needed = model.inputs
     try:
         fresh = write_onnx(
             model,

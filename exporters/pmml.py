@@ -113,7 +113,7 @@ def write(
 
 def _written_system(system: FuzzySystem) -> Written:
     """Return a system: its program, and a model that hands on the first output."""
-    taken = {one.name for one in system.variables}
+    taken = {one.name for one in system.all_variables}
     system_fields = SystemFields(system, taken)
     first, *others = system.outputs
     result = unlike("result", taken)
@@ -125,7 +125,7 @@ def _written_system(system: FuzzySystem) -> Written:
     predictor = element("NumericPredictor", name=result, coefficient="1")
     model = element(
         "RegressionModel",
-        schema(system.columns, first.name),
+        schema(system.inputs, first.name),
         *([element("Output", *outputs)] if outputs else []),
         element("RegressionTable", predictor, intercept="0"),
         modelName=system.name,
@@ -138,7 +138,7 @@ def _written_system(system: FuzzySystem) -> Written:
         *system_fields.fields,
         derived(result, system_fields.outputs[0]),
     )
-    data = element("DataDictionary", *_columns(system.inputs), target)
+    data = element("DataDictionary", *_columns(system.variables), target)
     header = _heading(system, {"fingerprint": fingerprint(system)})
     content = _content(header, data, dictionary, model)
     remark = "exp, powers and the like are good to a few last digits"

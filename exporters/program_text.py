@@ -265,7 +265,7 @@ def system_examples(
     for row, bounds in zip(rows, every, strict=True):
         answer = infer(system, row)
         result = answer.outputs + (answer.activations if activations else ())
-        operands = [row[name] for name in system.columns]
+        operands = [row[name] for name in system.inputs]
         yield operands, result, bounds, int(answer.status)
 
 

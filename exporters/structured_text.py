@@ -284,13 +284,11 @@ def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Writt
     program = from_system(system)
     taken = [f"{c}{k}" for c in "vbot" for k in range(len(program.steps))]
     given = name or system.name
-    variables = [*system.columns, *(one.name for one in system.outputs)]
+    variables = [*system.inputs, *(one.name for one in system.outputs)]
     names = identifiers(variables, [*_FIXED, *taken])
     block = identifiers([given], [*_FIXED, *taken, *names.accepted.values()])[given]
-    inputs = [names[one] for one in system.columns]
-    steps = SystemSteps(
-        program, dict(zip(system.columns, inputs, strict=True)), numbers
-    )
+    inputs = [names[one] for one in system.inputs]
+    steps = SystemSteps(program, dict(zip(system.inputs, inputs, strict=True)), numbers)
     lacking = [*steps.lacking(), *_formulas(system)]
     if lacking:
         raise LossError(
@@ -323,7 +321,7 @@ def _written_system(system: FuzzySystem, numbers: StNumbers, name: str) -> Writt
 
 def _formulas(system: FuzzySystem) -> Iterator[str]:
     """Yield what is wrong with formulas: what may have an infinite result."""
-    for variable in system.variables:
+    for variable in system.all_variables:
         for label in variable.terms:
             if isinstance(label.function, Formula):
                 text = text_of(label.function.expression)
@@ -334,7 +332,7 @@ def _formulas(system: FuzzySystem) -> Iterator[str]:
 def _system_interface(
     system: FuzzySystem, names: NameMap, numbers: StNumbers
 ) -> Iterator[str]:
-    columns = [one for one in system.inputs if not one.parts]
+    columns = [one for one in system.variables if not one.parts]
     yield from block_of("VAR_INPUT", list(_declared(columns, names, numbers)))
     yield "VAR_OUTPUT\n"
     yield from _declared(system.outputs, names, numbers)

@@ -136,7 +136,8 @@ def _names(model: Document) -> Iterator[tuple[str, str]]:
     if not isinstance(model, FuzzySystem):
         yield from (("class", name) for name in model.classes)
         yield from (("column", name) for name in model.columns)
-    for variable in model.variables:
+    outputs = model.outputs if isinstance(model, FuzzySystem) else ()
+    for variable in model.variables + outputs:
         yield "variable", variable.name
         yield "unit", variable.unit
         yield from (("term", term.name) for term in variable.terms)
@@ -275,8 +276,8 @@ def _system(system: FuzzySystem) -> dict[str, Entry]:
     entries = _head(system, "system")
     if system.note:
         entries["note"] = system.note
-    if system.inputs:
-        entries["inputs"] = [*map(_variable, system.inputs)]
+    if system.variables:
+        entries["variables"] = [*map(_variable, system.variables)]
     entries["outputs"] = [*map(_output, system.outputs)]
     entries["blocks"] = [*map(_block, system.blocks)]
     entries["semantics"] = {
@@ -292,7 +293,7 @@ def _system_losses(system: FuzzySystem) -> Iterator[Loss]:
     if len(system.note) > LONGEST_NOTE:
         text = f"{len(system.note)} characters are more than {LONGEST_NOTE}"
         yield Loss("the note", text)
-    for variable in system.variables:
+    for variable in system.all_variables:
         for label in variable.terms:
             if isinstance(label.function, Formula) and not _is_readable(label.function):
                 where = f"term {label.name!r} of {variable.name!r}"

@@ -93,7 +93,7 @@ for form in all_formats():
         print(form.name, "written")
         continue
     back = ft.load(path)
-    has_curve = near.function in [label.function for label in back.inputs[0].terms]
+    has_curve = near.function in [label.function for label in back.variables[0].terms]
     has_norm = back.blocks[0].conjunction == norm
     if has_curve and has_norm and form.name in ("yaml", "fll"):
         answers = [infer(back, row).outputs for row in rows]

@@ -143,7 +143,7 @@ def test_rows_are_drawn_from_the_ranges_themselves() -> None:
     wide = replace(LOW, function=Trapezoid(-100.0, 0.0, 1.0, 100.0))
     system = system_of(Proposition("a", ("low",)))
     inputs = tuple(replace(one, terms=(wide, THIN, NEVER)) for one in INPUTS)
-    rows = range_rows(replace(system, inputs=inputs), 50)
+    rows = range_rows(replace(system, variables=inputs), 50)
     assert all(0.0 <= value <= 1.0 for row in rows for value in row.values())
 
 

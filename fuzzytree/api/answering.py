@@ -233,7 +233,7 @@ def _answering_system(
     execute = result.load_system(system, activations=with_strengths)
     names = tuple(one.name for one in system.outputs)
     return _answering_numbers(
-        execute, system.columns, (), names, is_parallel=result.is_reentrant
+        execute, system.inputs, (), names, is_parallel=result.is_reentrant
     )
 
 

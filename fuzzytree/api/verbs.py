@@ -303,8 +303,8 @@ def _rows(
     result = [
         *batches(
             data,
-            model.columns if isinstance(model, FuzzySystem) else model.inputs,
-            trained=() if is_system else model.columns,
+            model.inputs,
+            trained=() if is_system else model.inputs,
             name=name,
             with_others=with_others,
         )

@@ -104,7 +104,7 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
     """
     everywhere = {
         (one.name, label.name)
-        for one in system.inputs
+        for one in system.variables
         for label in one.terms
         if label.height == 1.0 and _is_everywhere(label.function)
     }
@@ -140,9 +140,9 @@ def _settled(system: FuzzySystem) -> FuzzySystem:
         replace(
             one, terms=tuple(x for x in one.terms if (one.name, x.name) not in idle)
         )
-        for one in system.inputs
+        for one in system.variables
     )
-    return replace(system, inputs=inputs, blocks=blocks)
+    return replace(system, variables=inputs, blocks=blocks)
 
 
 def _is_everywhere(curve: Curve) -> bool:
@@ -261,6 +261,8 @@ def canonical_form(model: Document) -> Document:
         True
     """
     terms = {one.name: one.terms for one in model.variables}
+    if isinstance(model, FuzzySystem):
+        terms |= {one.name: one.terms for one in model.outputs}
     sets = model.sets if isinstance(model, FuzzyTree) else ()
     classes = () if isinstance(model, FuzzySystem) else model.classes
     names = _NewNames(
@@ -354,7 +356,7 @@ def _renamed_system(part: Any, names: _NewNames) -> Any:
     match part:
         case FuzzySystem():
             blocks = tuple(_block(one, part, names) for one in part.blocks)
-            return FuzzySystem("m", new(part.inputs), new(part.outputs), blocks)
+            return FuzzySystem("m", new(part.variables), new(part.outputs), blocks)
         case SystemOutput(name=name, defuzzifier=how):
             is_free = how.is_weighted and not part.clips
             return replace(

@@ -69,7 +69,7 @@ class CheckedSystem:
         self.model = model
         run = run_system(model, activations=True)
         probes, self.coverage = _probes(model, run, limit)
-        self.rows = row_set(model.columns, probes, data)
+        self.rows = row_set(model.inputs, probes, data)
         self.program = from_system(model, activations=True)
         self.native = run(self.rows.values)
         self.forms, self.outcomes = {"system": model}, {"system": self.native}
@@ -162,7 +162,7 @@ class CheckedSystem:
         if fault is None:
             yield counted("file", title, "the system", 1, ())
             return
-        counts = [(len(one.columns), len(one.outputs)) for one in (system, other)]
+        counts = [(len(one.inputs), len(one.outputs)) for one in (system, other)]
         if counts[0] != counts[1]:
             fault = (
                 f"it computes {counts[1][1]} outputs from {counts[1][0]} inputs, and "
@@ -186,7 +186,7 @@ class CheckedSystem:
         outputs = tuple(one.name for one in self.model.outputs)
         if (
             file.run_system is not None
-            and file.inputs == self.model.columns
+            and file.inputs == self.model.inputs
             and file.names == outputs
         ):
             return None
@@ -341,6 +341,6 @@ def _fired(run: SystemRun, values: FloatArray) -> BoolArray:
 
 def _values(system: FuzzySystem, rows: Sequence[Row]) -> FloatArray:
     """Return rows as an array of shape (columns, rows)."""
-    names = system.columns
+    names = system.inputs
     table = np.array([[row[name] for row in rows] for name in names], np.float64)
     return table.reshape(len(names), len(rows))

@@ -125,7 +125,7 @@ def _facts(found: Reading) -> dict[str, object]:
         "fingerprint": fingerprint(model),
     }
     if isinstance(model, FuzzySystem):
-        facts["inputs"] = model.columns
+        facts["inputs"] = model.inputs
         facts["outputs"] = [one.name for one in model.outputs]
         facts["rules"] = report.system_rule_facts(model)
     else:

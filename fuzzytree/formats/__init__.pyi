@@ -54,7 +54,6 @@ from .skfuzzy import from_skfuzzy as from_skfuzzy
 from .sklearn import from_sklearn as from_sklearn
 from .text_files import LONGEST_NAME as LONGEST_NAME
 from .text_files import FileMistake as FileMistake
-from .text_files import in_system as in_system
 from .text_files import report as report
 from .text_files import split_lines as split_lines
 from .words import in_words as in_words

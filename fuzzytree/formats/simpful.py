@@ -66,7 +66,7 @@ def from_simpful(system: object, *, name: str = "simpful system") -> FuzzySystem
         >>> washer.set_crisp_output_value("long", 60.0)
          * Detected Sugeno model type
         >>> washer.add_rules(["IF (dirt IS high) THEN (time IS long)"])
-        >>> from_simpful(washer).columns
+        >>> from_simpful(washer).inputs
         ('dirt',)
     """
     if not _is_of_simpful(system, "FuzzySystem"):

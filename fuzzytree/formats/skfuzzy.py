@@ -62,7 +62,7 @@ def from_skfuzzy(system: object, *, name: str = "scikit-fuzzy system") -> FuzzyS
         >>> food.automf(3), tip.automf(3)
         (None, None)
         >>> rule = control.Rule(food["good"], tip["good"])
-        >>> from_skfuzzy(control.ControlSystem([rule])).columns
+        >>> from_skfuzzy(control.ControlSystem([rule])).inputs
         ('food',)
     """
     source: Any = system

@@ -235,7 +235,7 @@ PositionGroup = tuple[Position, Iterable[Position]]
 
 
 def positions_of(
-    inputs: Iterable[PositionGroup],
+    variables: Iterable[PositionGroup],
     outputs: Iterable[PositionGroup],
     blocks: Iterable[PositionGroup],
 ) -> Positions:
@@ -245,7 +245,7 @@ def positions_of(
         >>> list(positions_of([], [], [((3, 1), [(4, 7)])]))
         [('blocks', 0), ('blocks', 0, 'rules', 0)]
     """
-    groups = (("inputs", "terms", inputs), ("outputs", "terms", outputs))
+    groups = (("variables", "terms", variables), ("outputs", "terms", outputs))
     positions: Positions = {}
     for field, inner, some in (*groups, ("blocks", "rules", blocks)):
         for k, (head, parts) in enumerate(some):
@@ -280,27 +280,9 @@ def locating(positions: Callable[[], Positions], facts: str | None) -> Locate:
                 path = rules[numbers[number]]
             case ("variables", int(number), *rest):
                 place = places[number]
-                path = () if place is None else in_system(("variables", place, *rest))
+                path = () if place is None else ("variables", place, *rest)
             case _:
                 pass
         return _find(known(), path)
 
     return locate
-
-
-def in_system(path: Path) -> Path:
-    """Return where the system of a rule base holds what this holds at a path.
-
-    Example:
-        >>> in_system(("variables", 0, "terms", 2)), in_system(("rules", 1))
-        (('inputs', 0, 'terms', 2), ('blocks', 0, 'rules', 1))
-    """
-    match path:
-        case ("variables", int(place), "terms", *rest):
-            return ("inputs", place, "terms", *rest)
-        case ("variables", *rest):
-            return ("inputs", *rest)
-        case ("rules", *rest):
-            return ("blocks", 0, "rules", *rest)
-        case _:
-            return path

@@ -174,7 +174,7 @@ class FuzzySystem(Value, frozen=True):
 
     Attributes:
         name: For people and files.
-        inputs: The inputs; combinations stand after their columns.
+        variables: Inputs and combinations; a combination stands after its inputs.
         outputs: The outputs.
         blocks: Run in order; conditions may use an output after it was concluded.
         note: For people.
@@ -184,7 +184,7 @@ class FuzzySystem(Value, frozen=True):
     """
 
     name: str
-    inputs: tuple[Variable, ...]
+    variables: tuple[Variable, ...]
     outputs: tuple[SystemOutput, ...]
     blocks: tuple[RuleBlock, ...]
     note: str = ""
@@ -194,14 +194,14 @@ class FuzzySystem(Value, frozen=True):
         refuse(_system_mistakes(self))
 
     @property
-    def columns(self) -> tuple[str, ...]:
+    def inputs(self) -> tuple[str, ...]:
         """The names of the columns that the system needs, in order."""
-        return tuple(one.name for one in self.inputs if not one.parts)
+        return tuple(one.name for one in self.variables if not one.parts)
 
     @property
-    def variables(self) -> tuple[Variable | SystemOutput, ...]:
-        """The inputs, then the outputs."""
-        return (*self.inputs, *self.outputs)
+    def all_variables(self) -> tuple[Variable | SystemOutput, ...]:
+        """The inputs and combinations, then the outputs."""
+        return (*self.variables, *self.outputs)
 
     @property
     def rules(self) -> tuple[SystemRule, ...]:
@@ -213,7 +213,7 @@ class FuzzySystem(Value, frozen=True):
         return summary(
             "FuzzySystem",
             rules=len(self.rules),
-            inputs=len(self.columns),
+            inputs=len(self.inputs),
             outputs=len(self.outputs),
         )
 
@@ -237,10 +237,10 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
         yield ("blocks",), "a system needs at least one rule"
     yield from _variable_name_mistakes(system)
     known: dict[str, bool] = {}
-    nameable = dict.fromkeys(one.name for one in system.inputs)
-    count = len(system.columns)
-    for position, one in enumerate(system.inputs):
-        path: Path = ("inputs", position)
+    nameable = dict.fromkeys(one.name for one in system.variables)
+    count = len(system.inputs)
+    for position, one in enumerate(system.variables):
+        path: Path = ("variables", position)
         yield from input_mistakes(path, one, known)
         yield from _term_mistakes(path, one, count, nameable)
         if one.clips and one.low is None and one.high is None:
@@ -262,10 +262,10 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
 def _variable_name_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     """Yield what is wrong with the names of variables; no two of them are equal."""
     places: list[Path] = [
-        *(("inputs", position) for position in range(len(system.inputs))),
+        *(("variables", position) for position in range(len(system.variables))),
         *(("outputs", position) for position in range(len(system.outputs))),
     ]
-    names = [one.name for one in system.variables]
+    names = [one.name for one in system.all_variables]
     for path, text in name_mistakes((), "variable", names):
         yield places[int(path[-1])], text
     for place, name in zip(places, names, strict=True):
@@ -398,7 +398,7 @@ def _width_mistakes(
 def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     terms: Terms = {
         one.name: dict.fromkeys(label.name for label in one.terms)
-        for one in system.variables
+        for one in system.all_variables
     }
     outputs = {one.name: one for one in system.outputs}
     concludable: Terms = {name: terms[name] for name in outputs}

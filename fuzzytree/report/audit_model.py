@@ -88,10 +88,10 @@ def _cards(
 
 def _in_words(model: Audited, name: str) -> list[str]:
     """Return the terms of a variable in words."""
-    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
+    variables = model.variables
     own = next(one for one in variables if one.name == name)
     return [
-        f"{term.name}: {curve_text(term.function, model.columns)}"
+        f"{term.name}: {curve_text(term.function, model.inputs)}"
         for term in own.terms[:_MOST_TERMS]
     ]
 

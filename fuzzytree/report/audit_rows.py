@@ -50,7 +50,7 @@ def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: AuditRows) -> Data:
     count = rows.values.shape[1]
     variables: tuple[Variable, ...]
     if isinstance(model, FuzzySystem):
-        variables = model.inputs
+        variables = model.variables
         classes: tuple[str, ...] = ()
     else:
         variables, classes = model.variables, model.classes

@@ -92,7 +92,7 @@ def axes_of(
     model: FuzzyTree | RuleBase | FuzzySystem, domain: Domain
 ) -> dict[str, Axis]:
     """Return every input and combination of a model as it is drawn, by name."""
-    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
+    variables = model.variables
     axes: dict[str, Axis] = {}
     for axis in map(_axis, variables):
         side = domain.side(axis.name)

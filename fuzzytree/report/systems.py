@@ -55,9 +55,9 @@ def document_text(model: Document) -> str:
         'tree, 1 node, 2 leaves, depth 1, 1 input, 3 classes'
     """
     if isinstance(model, FuzzySystem):
-        terms = sum(len(one.terms) for one in model.variables)
+        terms = sum(len(one.terms) for one in model.all_variables)
         return (
-            f"fuzzy system, {counted(len(model.columns), 'input')}, "
+            f"fuzzy system, {counted(len(model.inputs), 'input')}, "
             f"{counted(len(model.outputs), 'output')}, "
             f"{counted(len(model.rules), 'rule')}, {counted(terms, 'term')}"
         )
@@ -72,10 +72,10 @@ def document_facts(model: Document) -> dict[str, object]:
         return {
             "carrier": "system",
             "name": model.name,
-            "inputs": model.columns,
+            "inputs": model.inputs,
             "outputs": tuple(one.name for one in model.outputs),
             "rules": len(model.rules),
-            "terms": sum(len(one.terms) for one in model.variables),
+            "terms": sum(len(one.terms) for one in model.all_variables),
         }
     is_tree = isinstance(model, FuzzyTree)
     rules = model.leaves if isinstance(model, FuzzyTree) else model.rules
@@ -94,7 +94,7 @@ def system_lines(system: FuzzySystem) -> Iterator[str]:
     yield f"{system.name}: {document_text(system)}"
     if system.note:
         yield from (f"note     {line}" for line in system.note.splitlines())
-    yield f"inputs   {len(system.columns)}: {', '.join(system.columns) or 'none'}"
+    yield f"inputs   {len(system.inputs)}: {', '.join(system.inputs) or 'none'}"
     names = ", ".join(one.name for one in system.outputs)
     yield f"outputs  {len(system.outputs)}: {names}"
     yield "answers  missing value: nan"
@@ -103,12 +103,12 @@ def system_lines(system: FuzzySystem) -> Iterator[str]:
         yield ""
         yield from _block_lines(block, start)
         start += len(block.rules)
-    for one in system.inputs:
+    for one in system.variables:
         yield ""
-        yield from _input_lines(one, system.columns)
+        yield from _input_lines(one, system.inputs)
     for output in system.outputs:
         yield ""
-        yield from _output_lines(output, system.columns)
+        yield from _output_lines(output, system.inputs)
 
 
 def system_rule_facts(system: FuzzySystem) -> list[dict[str, object]]:

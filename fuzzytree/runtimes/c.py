@@ -173,7 +173,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
     count = outputs + activations * len(system.rules)
 
     def run(values: FloatArray) -> SystemOutcome:
-        inputs = np.ascontiguousarray(checked(values, system.columns))
+        inputs = np.ascontiguousarray(checked(values, system.inputs))
         rows = inputs.shape[1]
         result, status = np.empty((count, rows)), np.empty(rows, np.int64)
         infer(_at(inputs), rows, _at(result), _at(status))

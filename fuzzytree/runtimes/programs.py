@@ -210,7 +210,7 @@ def run_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRu
     outputs, rules = len(system.outputs), len(system.rules)
 
     def run(values: FloatArray) -> SystemOutcome:
-        results = run_program(plan, checked(values, system.columns))
+        results = run_program(plan, checked(values, system.inputs))
         return SystemOutcome(
             results[:outputs],
             results[-1].astype(np.int64),

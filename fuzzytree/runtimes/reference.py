@@ -37,7 +37,7 @@ def load(model: Model) -> Run:
 
 def infer_rows(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
     """Return a function that infers rows one after another."""
-    names = system.columns
+    names = system.inputs
 
     def run(values: FloatArray) -> SystemOutcome:
         table = checked(values, names).T.tolist()

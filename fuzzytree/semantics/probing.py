@@ -200,7 +200,7 @@ def range_rows(system: FuzzySystem, count: int, *, seed: int = 0) -> list[Row]:
     """
     chance = random.Random(seed)
     ranges = {name: _hull(values) for name, values in _system_points(system).items()}
-    for one in system.inputs:
+    for one in system.variables:
         if not one.parts and one.low is not None and one.high is not None:
             ranges[one.name] = one.low, one.high
     return [
@@ -220,10 +220,10 @@ class Aim:
     def __init__(self, system: FuzzySystem, *, seed: int = 0) -> None:
         self._chance = random.Random(seed)
         self._points = _system_points(system)
-        self._inputs = {one.name: one for one in system.inputs}
+        self._inputs = {one.name: one for one in system.variables}
         self._curves = {
             (one.name, label.name): label.function
-            for one in system.inputs
+            for one in system.variables
             for label in one.terms
         }
         self._known: dict[tuple[str, frozenset[_Wish]], tuple[float, float]] = {}
@@ -317,8 +317,8 @@ def _wishes(
 
 def _system_points(system: FuzzySystem) -> dict[str, list[float]]:
     """Return the landmarks of each column; of combinations, those of their parts."""
-    points: dict[str, list[float]] = {name: [] for name in system.columns}
-    for one in system.inputs:
+    points: dict[str, list[float]] = {name: [] for name in system.inputs}
+    for one in system.variables:
         ends = [end for end in (one.low, one.high) if end is not None]
         own = [value for label in one.terms for value in numbers_of(label.function)]
         inner = [a + 0.5 * (b - a) for a, b in itertools.pairwise(sorted(set(own)))]

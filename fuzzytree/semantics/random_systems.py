@@ -101,7 +101,7 @@ def random_rows(system: FuzzySystem, seed: int, count: int) -> list[dict[str, fl
         [['x1', 'x2', 'x3']]
     """
     chance = random.Random(seed)
-    columns = [one for one in system.inputs if not one.parts]
+    columns = [one for one in system.variables if not one.parts]
     rows: list[dict[str, float]] = []
     for _ in range(count):
         row: dict[str, float] = {}

@@ -230,9 +230,9 @@ def _singletons() -> FuzzySystem:
 def _curved(curve: Curve) -> FuzzySystem:
     system = _sugeno()
     heat = replace(
-        system.inputs[0], terms=(system.inputs[0].terms[0], Term("high", curve))
+        system.variables[0], terms=(system.variables[0].terms[0], Term("high", curve))
     )
-    return replace(system, inputs=(heat, system.inputs[1]))
+    return replace(system, variables=(heat, system.variables[1]))
 
 
 def _several_outputs() -> FuzzySystem:
@@ -256,8 +256,8 @@ def _default() -> FuzzySystem:
 
 def _clipped() -> FuzzySystem:
     system = _sugeno()
-    inputs = tuple(replace(one, clips=True) for one in system.inputs)
-    return replace(system, inputs=inputs)
+    inputs = tuple(replace(one, clips=True) for one in system.variables)
+    return replace(system, variables=inputs)
 
 
 SAMPLES: Mapping[str, Callable[[], Document]] = {

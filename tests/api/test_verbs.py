@@ -203,7 +203,7 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
             rules,
             system,
             ft.run(rules, ROWS),
-            ft.run(system, np.zeros((4, len(system.columns)))),
+            ft.run(system, np.zeros((4, len(system.inputs)))),
             result,
             ft.audit(TREE, selection=ft.AuditSelection(select=["FT501"])),
             written,

@@ -125,7 +125,7 @@ def test_very_very_is_very_twice() -> None:
         ramp = Term("low", Points((0.0, 1.0), (0.0, 1.0)))
         rule = SystemRule(Proposition("x", ("low",), hedges), (Conclusion("y", "one"),))
         return replace(
-            _system(), inputs=(Variable("x", (ramp,)),), blocks=(RuleBlock((rule,)),)
+            _system(), variables=(Variable("x", (ramp,)),), blocks=(RuleBlock((rule,)),)
         )
 
     assert canonical_form(asking("very very")) == canonical_form(asking("very", "very"))

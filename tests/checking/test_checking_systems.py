@@ -109,7 +109,7 @@ def test_a_file_with_other_names_agrees() -> None:
 
 def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
     system = washer()
-    (dirt,) = system.inputs
+    (dirt,) = system.variables
     key = Term("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
     (block,) = system.blocks
     rules = (
@@ -118,7 +118,7 @@ def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
     )
     other = replace(
         system,
-        inputs=(replace(dirt, terms=(*dirt.terms, key)),),
+        variables=(replace(dirt, terms=(*dirt.terms, key)),),
         blocks=(replace(block, rules=rules),),
     )
     agreement = check(system, other, limit=50)
@@ -182,9 +182,9 @@ def shifted(system: FuzzySystem, by: float) -> FuzzySystem:
 
 def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> None:
     system = washer()
-    (soaked,) = system.inputs
+    (soaked,) = system.variables
     bell = replace(soaked, terms=(Term("dirty", Gaussian(0.0, 1.5)),))
-    system = replace(system, inputs=(bell,))
+    system = replace(system, variables=(bell,))
     data = np.array([[0.3, 1.0, 2.5]])
     agreement = check(system, shifted(system, 1e-9), limit=50, data=data)
     one = about(agreement, "file 1", "rows")
@@ -196,13 +196,13 @@ def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> No
 def test_rows_on_an_edge_are_counted_beside_the_table() -> None:
     # The rule passes from the very degree of dirt 1 on.
     system = washer()
-    (soaked,) = system.inputs
+    (soaked,) = system.variables
     bell = replace(soaked, terms=(Term("dirty", Gaussian(0.0, 1.5)),))
     edge = math.exp(-0.5 * (1.0 / 1.5) ** 2)
     only = Activation("threshold", threshold=edge)
     (block,) = system.blocks
     blocks = (replace(block, activation=only),)
-    system = replace(system, inputs=(bell,), blocks=blocks)
+    system = replace(system, variables=(bell,), blocks=blocks)
     other = shifted(system, 1e-15)
     agreement = check(
         system, other, limit=1, data=np.array([[1.0, 0.5]]), runtimes=["native"]

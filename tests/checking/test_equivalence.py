@@ -67,7 +67,7 @@ def test_no_sample_is_like_another() -> None:
 def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> None:
     always = all_samples()["a conclusion without a condition"]
     assert isinstance(always, FuzzySystem)
-    heat, damp = always.inputs
+    heat, damp = always.variables
     label = Term("always", Trapezoid(None, 0.0, 0.0, None))
     block = always.blocks[0]
 
@@ -78,7 +78,7 @@ def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> N
         )
         return replace(
             always,
-            inputs=(replace(heat, terms=(*heat.terms, label)), damp),
+            variables=(replace(heat, terms=(*heat.terms, label)), damp),
             blocks=(replace(block, rules=rules),),
         )
 

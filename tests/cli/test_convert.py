@@ -478,7 +478,7 @@ def test_a_system_answers_the_same_in_python_and_on_the_command_line(
 ) -> None:
     system = random_system(seed)
     ft.save(system, "any.yaml")
-    rows = [",".join(system.columns), *(",".join(["0.5"] * 3) for _ in range(2)), ",,"]
+    rows = [",".join(system.inputs), *(",".join(["0.5"] * 3) for _ in range(2)), ",,"]
     Path("rows.csv").write_text("\n".join(rows) + "\n", "utf-8")
     code, out, err = call("run", "any.yaml", "rows.csv")
     assert code == 0

@@ -164,7 +164,7 @@ def test_the_class_has_the_type_of_the_labels(
 def test_the_outputs_of_a_system_are_doubles_with_null(call: Call) -> None:
     system = random_system(3)
     ft.save(system, "system.yaml")
-    rows = {name: [0.5, None] for name in system.columns}
+    rows = {name: [0.5, None] for name in system.inputs}
     pq.write_table(pa.table(rows), "rows.parquet")
     words = ("run", "system.yaml", "rows.parquet", "--quiet", "-o", "out.parquet")
     assert call(*words)[0] == 0

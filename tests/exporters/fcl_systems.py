@@ -44,7 +44,7 @@ def tamed(system: FuzzySystem, dialect: Dialect) -> FuzzySystem:
     """Return a system without what FCL has no place for, whatever the dialect."""
     inputs = tuple(
         replace(one, clips=False, terms=_curved(one.terms, dialect))
-        for one in system.inputs
+        for one in system.variables
         if not one.parts
     )
     known = {one.name for one in inputs} | {one.name for one in system.outputs}

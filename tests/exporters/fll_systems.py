@@ -34,12 +34,12 @@ def plain_system(seed: int, *, outputs: int = 2, rules: int = 8) -> FuzzySystem:
     system = random_system(
         seed, outputs=outputs, rules=rules, has_odd_names=seed % 2 == 0
     )
-    columns = len(system.inputs)
+    columns = len(system.variables)
     return replace(
         system,
-        inputs=tuple(
+        variables=tuple(
             replace(one, parts=(), terms=tuple(_label(x, columns) for x in one.terms))
-            for one in system.inputs
+            for one in system.variables
         ),
         outputs=tuple(
             replace(

@@ -127,10 +127,10 @@ def test_the_scores_of_a_file_decide_as_the_rules_do(
         for _ in range(40):
             row = {name: chance.uniform(-3.0, 3.0) for name in rules.inputs}
             expected = evaluate(rules, row)
-            values = input_values(as_system(rules).inputs, row)
+            values = input_values(as_system(rules).variables, row)
             flat = flattened(as_system(rules))[0]
-            given = [values[name] for name in flat.columns]
-            named = dict(zip(system.columns, given, strict=True))
+            given = [values[name] for name in flat.inputs]
+            named = dict(zip(system.inputs, given, strict=True))
             answer = winner(rules, infer(system, named).outputs)
             if kind == "relative":
                 assert answer == expected.label
@@ -144,9 +144,9 @@ def test_the_scores_of_a_file_decide_as_the_rules_do(
 def _plain(system: FuzzySystem) -> FuzzySystem:
     """Return a system without what no answer depends on and FCL has no place for."""
     blocks = tuple(_plain_block(one) for one in system.blocks)
-    inputs = tuple(replace(one, unit="") for one in system.inputs)
+    inputs = tuple(replace(one, unit="") for one in system.variables)
     outputs = tuple(replace(one, unit="") for one in system.outputs)
-    return replace(system, inputs=inputs, outputs=outputs, blocks=blocks, note="")
+    return replace(system, variables=inputs, outputs=outputs, blocks=blocks, note="")
 
 
 def _plain_block(block: RuleBlock) -> RuleBlock:
@@ -188,7 +188,7 @@ def test_a_file_without_losses_reads_as_a_system_of_equal_answers(
     assert isinstance(again, FuzzySystem)
     for row in random_rows(system, 1, 30):
         ours = infer(system, row).outputs
-        named = dict(zip(again.columns, row.values(), strict=True))
+        named = dict(zip(again.inputs, row.values(), strict=True))
         theirs = infer(again, named).outputs
         assert all(
             a == b or (math.isnan(a) and math.isnan(b))
@@ -211,7 +211,7 @@ def test_random_systems_are_written_alike_or_refused_with_reasons(
         again = read_fcl(content, "x.fcl").model
         assert isinstance(again, FuzzySystem)
         for row in random_rows(system, seed, 5):
-            named = dict(zip(again.columns, row.values(), strict=True))
+            named = dict(zip(again.inputs, row.values(), strict=True))
             ours, theirs = infer(system, row).outputs, infer(again, named).outputs
             for a, b in zip(ours, theirs, strict=True):
                 assert a == pytest.approx(b, rel=1e-12, nan_ok=True)
@@ -345,7 +345,7 @@ def test_numbers_that_an_accu_of_others_would_join_are_a_loss() -> None:
 
 def test_names_avoid_the_words_of_every_dialect() -> None:
     system = _with_default(_sample("Sugeno, numbers"))
-    first, second = system.inputs
+    first, second = system.variables
     renamed = (replace(first, name="sum"), replace(second, name="Größe (mm)"))
 
     def changed(condition: Condition | None) -> Condition | None:
@@ -366,10 +366,10 @@ def test_names_avoid_the_words_of_every_dialect() -> None:
         )
         for block in system.blocks
     )
-    written = write(replace(system, inputs=renamed, blocks=blocks))
+    written = write(replace(system, variables=renamed, blocks=blocks))
     again = read_fcl(written.content, "x.fcl").model
     assert isinstance(again, FuzzySystem)
-    assert again.columns == ("sum_", "Grosse_mm")
+    assert again.inputs == ("sum_", "Grosse_mm")
     assert any("'sum' is sum_" in one for one in written.remarks)
 
 
@@ -390,9 +390,9 @@ def test_the_check_list_reports_the_class_of_conformance() -> None:
     edge = Points((0.0, 1.0), (0.0, 1.0))
     inputs = tuple(
         replace(one, terms=tuple(replace(label, function=edge) for label in one.terms))
-        for one in basic.inputs
+        for one in basic.variables
     )
-    basic = replace(basic, inputs=inputs, outputs=outputs)
+    basic = replace(basic, variables=inputs, outputs=outputs)
     assert check_list(basic).splitlines()[0] == "data check list (IEC 61131-7)"
     assert "class: Basic" in check_list(basic)
     assert "operators: AND minimum, ACCU maximum\n" in check_list(basic)

@@ -230,7 +230,7 @@ def test_scores_read_back_are_within_the_bounds_of_the_losses(
         renamed = {
             new: row[old]
             for new, old in zip(
-                system.columns, (v.name for v in rules.variables), strict=True
+                system.inputs, (v.name for v in rules.variables), strict=True
             )
         }
         expected = evaluate(rules, row)
@@ -384,7 +384,9 @@ def test_an_input_that_is_tested_twice_becomes_a_term_with_a_bound() -> None:
     ]
     again = read_fis(written.content, "s.fis").model
     assert isinstance(again, FuzzySystem)
-    assert again.inputs[0].terms[2].function == Points((1.0, 1.5, 2.0), (0.0, 0.5, 0.0))
+    assert again.variables[0].terms[2].function == Points(
+        (1.0, 1.5, 2.0), (0.0, 0.5, 0.0)
+    )
 
 
 @pytest.mark.parametrize(
@@ -508,7 +510,7 @@ def test_combinations_become_inputs_and_linear_conclusions_give_them_no_weight()
     written = write(rules, allow_loss=True)
     again = read_fis(written.content, "r.fis").model
     if isinstance(again, FuzzySystem):
-        assert len(again.columns) == len(flat.columns)
+        assert len(again.inputs) == len(flat.inputs)
 
 
 def test_points_are_a_loss_where_standard_curves_are_required() -> None:

@@ -236,7 +236,7 @@ SIDE = Side(1.0, (0.5,))
 def test_what_is_lost_is_listed_and_refused() -> None:
     system = replace(
         TANK,
-        inputs=(
+        variables=(
             Variable("a", (Term("low", LR(0.0, SIDE, SIDE)),)),
             Variable("b", parts=(Part("a", 2.0, 0.5),)),
         ),
@@ -284,7 +284,7 @@ def test_words_are_reserved_in_small_letters_only() -> None:
     inputs = tuple(Variable(name) for name in ("X", "Min", "and", "très", "tres"))
     rule = SystemRule(None, (Conclusion("valve", "shut"),))
     blocks = (replace(TANK.blocks[0], rules=(rule,)),)
-    system = replace(TANK, inputs=inputs, blocks=blocks, outputs=TANK.outputs[:1])
+    system = replace(TANK, variables=inputs, blocks=blocks, outputs=TANK.outputs[:1])
     lines = write(system).content.decode().splitlines()
     names = [line.split(": ")[1] for line in lines if line.startswith("InputV")]
     assert names == ["X", "Min", "and_", "tres_2", "tres"]
@@ -358,9 +358,9 @@ def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
     )
     system = replace(
         TANK,
-        inputs=(
+        variables=(
             Variable("water level", (Term("low", STEPS),)),
-            TANK.inputs[1],
+            TANK.variables[1],
         ),
         blocks=(RuleBlock((rule,)),),
     )
@@ -369,7 +369,7 @@ def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
     assert f"term: low Discrete {points}\n" in text
     model = read_fll(text.encode(), "s.fll").model
     assert isinstance(model, FuzzySystem)
-    assert model.inputs[0].terms[0].function == STEPS
+    assert model.variables[0].terms[0].function == STEPS
 
 
 MIXED: list[Curve] = [
@@ -431,7 +431,7 @@ def test_a_random_system_without_losses_answers_alike_when_it_is_read(
     model = read_fll(written.content, "r.fll").model
     assert isinstance(model, FuzzySystem)
     for row in random_rows(system, seed, 5):
-        given = dict(zip(model.columns, row.values(), strict=True))
+        given = dict(zip(model.inputs, row.values(), strict=True))
         ours, theirs = infer(system, row), infer(model, given)
         assert theirs.activations == ours.activations
         assert theirs.outputs == pytest.approx(ours.outputs, rel=1e-11, nan_ok=True)

@@ -52,7 +52,7 @@ def test_the_file_says_what_it_is() -> None:
     facts = {one.key: one.value for one in found.metadata_props}
     assert facts["fuzzytree.carrier"] == "system"
     assert facts["fuzzytree.fingerprint"] == fingerprint(SYSTEM)
-    assert json.loads(facts["fuzzytree.columns"]) == list(SYSTEM.columns)
+    assert json.loads(facts["fuzzytree.columns"]) == list(SYSTEM.inputs)
     assert json.loads(facts["fuzzytree.names"]) == [o.name for o in SYSTEM.outputs]
     assert {one.domain for one in found.opset_import} == {""}
     assert [one.name for one in found.graph.output] == ["outputs", "status"]
@@ -121,7 +121,7 @@ def test_an_opened_file_runs() -> None:
     opened = open_onnx(content, "s.onnx")
     assert (opened.representation, opened.names) == ("system", ("y1", "y2"))
     rows = random_rows(SYSTEM, 0, 50)
-    values = np.array([[row[name] for row in rows] for name in SYSTEM.columns])
+    values = np.array([[row[name] for row in rows] for name in SYSTEM.inputs])
     assert opened.run_system is not None
     found = opened.run_system(values)
     right = infer_rows(SYSTEM, activations=True)(values)

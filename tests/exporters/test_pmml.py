@@ -267,8 +267,8 @@ def test_a_system_has_the_references_bits(seed: int) -> None:
     system = random_system(seed)
     file = File(write(system).content)
     rows = random_rows(system, seed, 6)
-    rows.append(rows[0] | {system.columns[0]: math.nan})
-    rows.append(rows[0] | {system.columns[-1]: math.inf})
+    rows.append(rows[0] | {system.inputs[0]: math.nan})
+    rows.append(rows[0] | {system.inputs[-1]: math.inf})
     for row in rows:
         expected = infer(system, row).outputs
         for found, number in zip(file.numbers(row), expected, strict=True):

@@ -206,8 +206,8 @@ def test_a_file_in_the_manner_of_the_standard_is_read_over_several_lines() -> No
     system = reading.model
     assert isinstance(system, FuzzySystem)
     assert system.name == "Washer"
-    assert system.columns == ("dirt", "load")
-    assert system.inputs[0].terms[1].function == Points((0.0, 10.0), (0.0, 1.0))
+    assert system.inputs == ("dirt", "load")
+    assert system.variables[0].terms[1].function == Points((0.0, 10.0), (0.0, 1.0))
     minutes = system.outputs[0]
     assert minutes.terms[0].function == Singleton(20.0)
     assert (minutes.low, minutes.high, minutes.default) == (0.0, 90.0, 5.0)
@@ -251,10 +251,10 @@ def test_a_file_of_fuzzylite_is_read_line_by_line() -> None:
     system = reading.model
     assert isinstance(system, FuzzySystem)
     assert system.name == "dimmer of mine"
-    dark, bright = system.inputs[0].terms
+    dark, bright = system.variables[0].terms
     assert (dark.function, dark.height) == (Trapezoid(0.0, 0.25, 0.25, 0.5), 0.75)
     assert bright.function == SCurve(0.75, 0.5)
-    assert (system.inputs[0].low, system.inputs[0].high) == (0.0, None)
+    assert (system.variables[0].low, system.variables[0].high) == (0.0, None)
     power = system.outputs[0]
     assert power.defuzzifier.samples == 100
     assert (power.aggregation, power.default) == ("einstein sum", None)
@@ -316,13 +316,13 @@ def test_a_file_of_jfuzzylogic_is_read_with_its_shapes_and_defaults() -> None:
     reading = _read(JFUZZYLOGIC)
     system = reading.model
     assert isinstance(system, FuzzySystem)
-    curves = [label.function for label in system.inputs[0].terms]
+    curves = [label.function for label in system.variables[0].terms]
     assert curves == [
         Trapezoid(0.0, 2.0, 2.0, 4.0),
         Trapezoid(2.0, 4.0, 6.0, 8.0),
         Sigmoid(7.0, 4.0),
     ]
-    assert (system.inputs[0].low, system.inputs[0].high) == (0.0, 10.0)
+    assert (system.variables[0].low, system.variables[0].high) == (0.0, 10.0)
     tip = system.outputs[0]
     assert (tip.low, tip.high) == (1.0, 20.0)  # 5 - 4 deviations, and 20
     assert tip.aggregation == "sum"
@@ -384,7 +384,7 @@ def test_a_file_of_pyit2fls_is_read_with_its_hundred_values() -> None:
 )
 def test_a_curve_is_read(text: str, curve: Curve) -> None:
     given = STANDARD.replace("(2, 0) (6, 1)", text)
-    assert _system(given).inputs[1].terms[0].function == curve
+    assert _system(given).variables[1].terms[0].function == curve
 
 
 def test_functions_of_jfuzzylogic_are_written_in_capitals_and_log_is_to_ten() -> None:

@@ -87,9 +87,9 @@ def read(text: str, dialect: Dialect | None = None) -> FuzzySystem:
 
 def test_a_sugeno_system_is_read_whole() -> None:
     system = read(SUGENO)
-    assert system.columns == ("food", "service")
-    assert system.inputs[0].terms[0].function == Trapezoid(-1.0, 0.0, 2.0, 4.0)
-    assert system.inputs[1].terms[0].function == SCurve(6.0, 3.0)
+    assert system.inputs == ("food", "service")
+    assert system.variables[0].terms[0].function == Trapezoid(-1.0, 0.0, 2.0, 4.0)
+    assert system.variables[1].terms[0].function == SCurve(6.0, 3.0)
     (output,) = system.outputs
     assert output.terms[1].function == Linear((1.0, 0.5), 2.0)
     assert output.defuzzifier == Defuzzifier("weighted average")
@@ -324,7 +324,7 @@ def test_a_rule_without_an_antecedent_is_always_true_or_reported_as_left_out() -
 def test_names_that_stand_twice_are_renamed_and_reported() -> None:
     text = SUGENO.replace("'service'", "'food'").replace("'fair'", "'small'")
     found = read_fis(text.encode(), "tip.fis")
-    assert found.model.columns == ("food", "food 2")
+    assert found.model.inputs == ("food", "food 2")
     assert found.remarks[1:3] == (
         "input 2 is called 'food' like another; here it is 'food 2'",
         "term MF2 of 'tip %' is called 'small'; here it is 'small 2'",
@@ -439,7 +439,7 @@ def test_thousands_of_terms_of_one_name_are_read_quickly() -> None:
     start, _, rest = SUGENO.partition("MF1='slow'")
     text = start.replace("NumMFs=1\n", "") + many + rest.partition("\n")[2]
     began = time.process_time()
-    assert len(read(text).inputs[1].terms) == 20_000
+    assert len(read(text).variables[1].terms) == 20_000
     assert time.process_time() - began < 5.0
     with pytest.raises(ReadError, match="lines are more than the 60,000 that are read"):
         read(text + "1 1, 1 (1) : 1\n" * 60_000)

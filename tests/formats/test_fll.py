@@ -107,7 +107,7 @@ def test_every_word_of_a_file_is_in_the_system() -> None:
         "fuzzylite 6 answers NaN",
     )
     assert (system.name, system.note) == ("tipper", "what to give")
-    assert system.inputs == (
+    assert system.variables == (
         Variable(
             "service",
             (
@@ -228,7 +228,7 @@ def test_every_class_of_terms_has_its_curve(text: str, curve: Curve) -> None:
 def term_of(text: str, head: str = "") -> Term:
     file = f"InputVariable: a\n term: t {text}\nOutputVariable: b\n {head}\n"
     file += "defuzzifier: WeightedSum\n term: one Constant 1"
-    return system_of(with_rule(file, "b is one")).inputs[0].terms[0]
+    return system_of(with_rule(file, "b is one")).variables[0].terms[0]
 
 
 def output_of(term: str, defuzzifier: str) -> Term:
@@ -396,7 +396,7 @@ def test_names_are_cleaned_as_the_engines_do() -> None:
     ]
     reading = read_fll("\n".join(lines).encode(), "names.fll")
     assert isinstance(reading.model, FuzzySystem)
-    assert reading.model.columns == ("forearm",)
+    assert reading.model.inputs == ("forearm",)
     assert reading.model.rules[0].when == Proposition("forearm", ("1st.one",))
     assert reading.remarks == (
         "the name 'fore arm' is read as 'forearm', as the engines do",

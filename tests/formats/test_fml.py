@@ -87,9 +87,9 @@ def read(text: str) -> FuzzySystem:
 
 def test_a_sugeno_system_is_read_whole() -> None:
     system = read(TIPPER)
-    assert system.columns == ("food", "service")
-    assert system.inputs[0].unit == "points"
-    assert [label.name for label in system.inputs[0].terms] == ["bad", "good"]
+    assert system.inputs == ("food", "service")
+    assert system.variables[0].unit == "points"
+    assert [label.name for label in system.variables[0].terms] == ["bad", "good"]
     (output,) = system.outputs
     assert output.default == 3.0
     assert output.terms[0].function == Singleton(5.0)
@@ -132,7 +132,7 @@ def test_every_shape(shape: str, curve: Curve) -> None:
     given = " ".join(f'param{k}="{n}"' for k, n in enumerate(numbers, 1))
     old = '<gaussianShape param1="0" param2="2"/>'
     system = read(TIPPER.replace(old, f"<{name} {given}/>"))
-    assert system.inputs[1].terms[0].function == curve
+    assert system.variables[1].terms[0].function == curve
 
 
 def points(method: str) -> str:
@@ -143,7 +143,7 @@ def points(method: str) -> str:
 
 def test_points_are_joined_by_lines_and_other_ways_are_a_loss() -> None:
     curve = Points((1.0, 2.0), (0.5, 1.0))
-    assert read(points("linear")).inputs[1].terms[0].function == curve
+    assert read(points("linear")).variables[1].terms[0].function == curve
     found = read_fml(points("spline").encode(), "tip.xml")
     assert [loss.what for loss in found.losses] == [
         "points joined by spline are joined by lines here"

@@ -94,8 +94,8 @@ def test_a_file_has_the_inputs_that_rules_use_and_no_row_is_outside_their_ranges
     form: str, name: str, by_sklearn: bool
 ) -> None:
     rules, table = _learnt(name, by_sklearn=by_sklearn)
-    inputs = as_system(rules).inputs
-    used = flattened(as_system(rules))[0].columns
+    inputs = as_system(rules).variables
+    used = flattened(as_system(rules))[0].inputs
     assert set(used) == {one.name for one in rules.variables if one.terms}
     columns = [f"x{k}" for k in range(table.shape[1])]
     rows = [
@@ -110,7 +110,7 @@ def test_a_file_has_the_inputs_that_rules_use_and_no_row_is_outside_their_ranges
         content = written.content.replace(b'"fuzzytree":1', b'"fuzzytree":0')
         system = format_.read(content, "model").model
         assert isinstance(system, FuzzySystem)
-        for one, name in zip(system.inputs, used, strict=True):
+        for one, name in zip(system.variables, used, strict=True):
             values = [row[name] for row in rows]
             assert one.low is None or one.low <= min(values)
             assert one.high is None or max(values) <= one.high

@@ -139,7 +139,7 @@ def spots_of(
         ("rule", rule, rule_path(model, number))
         for number, rule in enumerate(system.rules, 1)
     ]
-    for one in system.variables if system is model else system.inputs:
+    for one in system.all_variables if system is model else system.variables:
         parts += [
             ("term", label.name, term_path(model, TermName(one.name, label.name)))
             for label in one.terms
@@ -177,8 +177,10 @@ def said(kind: str, rule: SystemRule, text: str, model: Document) -> bool:
     if kind == "fis":
         numbers = re.findall(r"-?[0-9.]+", text.partition("(")[0])
         assert isinstance(model, FuzzySystem)
-        columns = [one.name for one in model.variables]
-        terms = [["any", *(label.name for label in v.terms)] for v in model.variables]
+        columns = [one.name for one in model.all_variables]
+        terms = [
+            ["any", *(label.name for label in v.terms)] for v in model.all_variables
+        ]
         found = {
             (columns[k], terms[k][int(abs(float(n)))])
             for k, n in enumerate(numbers)
@@ -221,15 +223,15 @@ def test_each_rule_and_term_stands_where_it_is_said_to(
     [
         ("tip.fll", FLL, ("blocks", 1, "rules", 0), (27, 13)),
         ("tip.fll", FLL, ("blocks", 1), (25, 12)),
-        ("tip.fll", FLL, ("inputs", 0, "terms", 1), (8, 11)),
+        ("tip.fll", FLL, ("variables", 0, "terms", 1), (8, 11)),
         ("tip.fis", FIS, ("blocks", 0, "rules", 1), (28, 3)),
-        ("tip.fis", FIS, ("inputs", 0, "terms", 0), (17, 5)),
-        ("tip.fis", FIS, ("inputs", 1), (7, 1)),
+        ("tip.fis", FIS, ("variables", 0, "terms", 0), (17, 5)),
+        ("tip.fis", FIS, ("variables", 1), (7, 1)),
         ("tip.fcl", FCL, ("blocks", 0, "rules", 1), (11, 47)),
-        ("tip.fcl", FCL, ("inputs", 0, "terms", 0), (6, 28)),
+        ("tip.fcl", FCL, ("variables", 0, "terms", 0), (6, 28)),
         ("tip.fcl", FCL, ("outputs", 0), (3, 12)),
         ("tip.fml", FML, ("blocks", 1, "rules", 0), (14, 41)),
-        ("tip.fml", FML, ("inputs", 0, "terms", 1), (7, 5)),
+        ("tip.fml", FML, ("variables", 0, "terms", 1), (7, 5)),
         ("tip.fml", FML, ("name",), None),
     ],
 )

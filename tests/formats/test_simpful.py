@@ -102,7 +102,7 @@ def answers(system: Any, rows: FloatArray, names: tuple[str, ...]) -> FloatArray
 
 def rows_for(system: FuzzySystem, count: int) -> FloatArray:
     draw = np.random.default_rng(0)
-    return draw.uniform(-1.5, 3.5, (count, len(system.columns)))
+    return draw.uniform(-1.5, 3.5, (count, len(system.inputs)))
 
 
 @pytest.mark.one_in(4)
@@ -116,7 +116,7 @@ def test_a_sugeno_system_answers_as_simpful_does(seed: int) -> None:
     # An average passes on what its weights are off, divided by their sum.
     degrees = np.maximum(found.activations.sum(axis=0), 1e-300)
     allowed = 2 * 12.0 * len(ours.rules) * DEGREE / degrees
-    off = np.abs(found["o"] - answers(theirs, rows, ours.columns))
+    off = np.abs(found["o"] - answers(theirs, rows, ours.inputs))
     assert np.all(off <= allowed)
     assert np.median(allowed) < 1e-10  # what is allowed decides something
 
@@ -132,7 +132,7 @@ def test_a_mamdani_system_answers_as_simpful_does(seed: int) -> None:
     highest = np.maximum(found.activations.max(axis=0), 1e-300)
     # Two sums of 1,000 numbers, and degrees off by DEGREE at each of them.
     allowed = 2_000 * EPSILON + 1_000 * DEGREE / highest
-    off = np.abs(found["o"] - answers(theirs, rows, ours.columns))
+    off = np.abs(found["o"] - answers(theirs, rows, ours.inputs))
     assert np.all(off <= allowed)
     assert np.median(allowed) < 1e-9
 

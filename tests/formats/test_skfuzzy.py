@@ -134,9 +134,9 @@ def test_a_system_answers_as_its_simulation_does(seed: int) -> None:
     theirs = random_control(seed)
     ours = ft.from_skfuzzy(theirs)
     draw = np.random.default_rng(seed)
-    rows = draw.uniform(-2.0, 9.0, (100, len(ours.columns)))
+    rows = draw.uniform(-2.0, 9.0, (100, len(ours.inputs)))
     found = ft.run(ours, rows)
-    off = np.abs(found["o"] - simulated(theirs, rows, ours.columns))
+    off = np.abs(found["o"] - simulated(theirs, rows, ours.inputs))
     bound = allowed(ours, found)
     assert np.all(off <= bound)
     assert np.median(bound) < 1e-9  # what is allowed decides something
@@ -145,7 +145,7 @@ def test_a_system_answers_as_its_simulation_does(seed: int) -> None:
 def test_the_tipper_gives_the_number_of_its_documentation() -> None:
     theirs = tipper()
     rows = np.array([[6.5, 9.8]])
-    assert ft.from_skfuzzy(theirs).columns == ("quality", "service")
+    assert ft.from_skfuzzy(theirs).inputs == ("quality", "service")
     found = float(ft.run(theirs, rows)["o"][0])
     assert found == pytest.approx(19.847607361963192, abs=26 * 25 * EPSILON)
     simulation = control.ControlSystemSimulation(theirs)

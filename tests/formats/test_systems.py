@@ -79,7 +79,7 @@ def test_numbers_keep_all_their_digits_and_the_sign_of_zero() -> None:
 
 def test_the_example_typed_by_hand_means_what_it_says() -> None:
     system = system_of(TIPPER)
-    service, food = system.inputs
+    service, food = system.variables
     assert [label.name for label in service.terms] == ["poor", "good", "excellent"]
     assert (food.name, food.unit, food.clips) == ("food quality", "points", True)
     assert system.rules[2].when == Or(
@@ -163,10 +163,12 @@ def test_a_system_that_yaml_cannot_hold_is_not_written() -> None:
     deep: Expression = Name("x1")
     for _ in range(MOST_LEVELS - 1):
         deep = Call("+", (Number(1.0), deep))
-    first = replace(whole.inputs[0], terms=(Term("deep", Formula(deep)),))
+    first = replace(whole.variables[0], terms=(Term("deep", Formula(deep)),))
     rule = SystemRule(None, (Conclusion("y1", whole.outputs[0].terms[0].name),))
     text = refusal(
-        replace(whole, inputs=(first, *whole.inputs[1:]), blocks=(RuleBlock((rule,)),))
+        replace(
+            whole, variables=(first, *whole.variables[1:]), blocks=(RuleBlock((rule,)),)
+        )
     )
     assert text == (
         "cannot write random 8 as yaml: term 'deep' of 'x1': its formula is too long "
@@ -192,14 +194,14 @@ def hostile() -> dict[str, str]:
         return "".join(f"  - if: ['{one}']\n    then: y is one\n" for one in sentences)
 
     count = 4000
-    inputs = "inputs:\n" + "".join(
+    inputs = "variables:\n" + "".join(
         f"- {{name: v{k}, terms: [{{name: low, at least: {k}}}]}}\n"
         for k in range(count)
     )
-    formulas = "inputs:\n- name: a\n  terms:\n" + "".join(
+    formulas = "variables:\n- name: a\n  terms:\n" + "".join(
         f"  - {{name: t{k}, formula: w{k} + sine(x)}}\n" for k in range(count)
     )
-    names = "inputs:\n- name: a\n  terms:\n" + "".join(
+    names = "variables:\n- name: a\n  terms:\n" + "".join(
         f"  - {{name: t{k}, formula: w{k} + x}}\n" for k in range(count)
     )
     return {
@@ -229,7 +231,7 @@ def hostile() -> dict[str, str]:
         + rules(" and ".join(["y is one"] * 9000) + " and")
         + tail,
         "a deep formula": head
-        + "inputs:\n- name: a\n  terms:\n  - {name: t, formula: '"
+        + "variables:\n- name: a\n  terms:\n  - {name: t, formula: '"
         + "-" * 9000
         + "1'}\n"
         + output
@@ -291,7 +293,7 @@ def test_a_damaged_system_gives_a_read_error_or_a_system(seed: int) -> None:
 def test_a_hedge_of_two_words_is_written_with_a_hyphen() -> None:
     hedges: tuple[Hedge, ...] = ("very very", "cube root")
     system = random_system(0, rules=1)
-    variable: Variable | SystemOutput = system.inputs[0]
+    variable: Variable | SystemOutput = system.variables[0]
     when = Proposition(variable.name, (variable.terms[0].name,), hedges)
     block = replace(system.blocks[0], rules=(replace(system.rules[0], when=when),))
     text = write(replace(system, blocks=(block,))).content.decode()

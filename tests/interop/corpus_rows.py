@@ -117,7 +117,7 @@ def _case(corpus: Corpus, name: str, path: Path) -> Case:
     model = reading.model
     assert isinstance(model, FuzzySystem)
     chance = random.Random(name)
-    ranges = [(one.low or 0.0, one.high or 1.0) for one in model.inputs]
+    ranges = [(one.low or 0.0, one.high or 1.0) for one in model.variables]
     rows = [[chance.uniform(*ends) for ends in ranges] for _ in range(ROWS)]
     return Case(name, path, content, reading, model, rows)
 
@@ -208,7 +208,7 @@ def printed_table(case: Case) -> Table | None:
     lines = path.read_text().splitlines()
     numbers = [tuple(map(float, line.split())) for line in lines[1:] if line.strip()]
     kept = numbers[:: max(1, len(numbers) // 100)]
-    count = len(case.model.inputs)
+    count = len(case.model.variables)
     grids = [_grid([row[k] for row in numbers]) for k in range(count)]
     rows = [[grids[k][row[k]] for k in range(count)] for row in kept]
     return Table(rows, [row[count:] for row in kept])
@@ -279,7 +279,7 @@ def _with_samples(output: SystemOutput, samples: int) -> SystemOutput:
 
 def answers_of(model: FuzzySystem, rows: Outputs) -> list[tuple[float, ...]]:
     """Return our answers to rows."""
-    names = model.columns
+    names = model.inputs
     return [infer(model, dict(zip(names, row, strict=True))).outputs for row in rows]
 
 

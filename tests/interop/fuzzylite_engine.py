@@ -151,6 +151,6 @@ def file_rows(
 ) -> list[list[float]]:
     """Return the values of the inputs of a rule base's file, in their order."""
     system = as_system(rules)
-    columns = flattened(system)[0].columns
-    values = (input_values(system.inputs, row) for row in rows)
+    columns = flattened(system)[0].inputs
+    values = (input_values(system.variables, row) for row in rows)
     return [[row[name] for name in columns] for row in values]

@@ -201,13 +201,13 @@ def alike(system: FuzzySystem) -> FuzzySystem:
     outputs = tuple(map(_output_alike, system.outputs))
     inputs = tuple(
         replace(one, terms=tuple(map(_looked_at, one.terms)))
-        for one in system.inputs
+        for one in system.variables
         if not one.parts
     )
     first = inputs[0].name
     known = {one.name for one in inputs} | {one.name for one in outputs}
     blocks = tuple(_block_alike(block, first, known) for block in system.blocks)
-    return replace(system, inputs=inputs, outputs=outputs, blocks=blocks)
+    return replace(system, variables=inputs, outputs=outputs, blocks=blocks)
 
 
 def _looked_at(label: Term) -> Term:
@@ -301,14 +301,14 @@ def engine(system: FuzzySystem) -> fl.Engine:
     import fuzzylite as fl
 
     made = fl.Engine(system.name)
-    for one in system.inputs:
+    for one in system.variables:
         variable = fl.InputVariable(
             one.name,
             minimum=-math.inf if one.low is None else one.low,
             maximum=math.inf if one.high is None else one.high,
             lock_range=one.clips,
         )
-        variable.terms = _terms(one.terms, system.columns)
+        variable.terms = _terms(one.terms, system.inputs)
         made.input_variables.append(variable)
     for output in system.outputs:
         how = getattr(fl, DEFUZZIFIERS[output.defuzzifier.method])()
@@ -323,7 +323,7 @@ def engine(system: FuzzySystem) -> fl.Engine:
             aggregation=norm(output.aggregation),
             defuzzifier=how,
         )
-        concluded.terms = _terms(output.terms, system.columns)
+        concluded.terms = _terms(output.terms, system.inputs)
         made.output_variables.append(concluded)
     for held in made.variables:
         for made_term in held.terms:

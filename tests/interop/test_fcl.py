@@ -220,7 +220,7 @@ def _mamdani() -> FuzzySystem:
     made = replace(pointy, outputs=outputs, blocks=blocks)
     assert all(
         isinstance(label.function, Points)
-        for one in made.variables
+        for one in made.all_variables
         for label in one.terms
     )
     return made
@@ -245,7 +245,7 @@ def test_a_mamdani_file_of_the_standard_answers_alike_in_pyit2fls(
     for row in random_rows(system, 5, 40):
         ours = infer(alike, row)
         is_covered = ours.outputs != (0.0,) and max(ours.activations) > 0.0
-        ends = zip(system.inputs, row.values(), strict=True)
+        ends = zip(system.variables, row.values(), strict=True)
         if not is_covered or not all(_is_within(one, x) for one, x in ends):
             continue
         _, values = engine.evaluate(dict(row))

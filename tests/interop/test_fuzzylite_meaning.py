@@ -58,8 +58,9 @@ def alike(system: FuzzySystem) -> FuzzySystem:
     system = pyfuzzylite_engine.alike(system)
     return replace(
         system,
-        inputs=tuple(
-            replace(one, terms=tuple(map(_label, one.terms))) for one in system.inputs
+        variables=tuple(
+            replace(one, terms=tuple(map(_label, one.terms)))
+            for one in system.variables
         ),
         outputs=tuple(map(_output, system.outputs)),
         blocks=tuple(map(_block, system.blocks)),
@@ -119,14 +120,14 @@ def test_random_systems_answer_as_fuzzylite_6(
     compared = systems = 0
     for seed in range(250):
         system = random_system(seed, formulas="none")
-        if any(one.parts for one in system.inputs):
+        if any(one.parts for one in system.variables):
             continue
         system = alike(system)
         written = write(system, allow_loss=True)
         if written.losses:
             continue
         rows = random_rows(system, seed, 6)
-        values = [[row[name] for name in system.columns] for row in rows]
+        values = [[row[name] for name in system.inputs] for row in rows]
         answers = run_program(engine, written.content, values, tmp_path)
         assert answers.rules == len(system.rules)
         systems += 1

@@ -351,8 +351,8 @@ def test_compiled_systems_have_the_references_numbers(program: Need, name: str) 
     system = SYSTEMS[name]
     rows = system_probes(system, limit=200)
     assert len(rows) >= 20
-    values = np.array([[row[column] for row in rows] for column in system.columns])
-    values = values.reshape(len(system.columns), len(rows))
+    values = np.array([[row[column] for row in rows] for column in system.inputs])
+    values = values.reshape(len(system.inputs), len(rows))
     found = load_system(system, activations=True)(values)
     assert found.activations is not None
     assert len(found.activations) == len(system.rules)

@@ -58,7 +58,7 @@ Array = np.typing.NDArray[np.float64]
 
 def answered(model: Document, rows: Sequence[Row]) -> Array:
     """Return what node makes of rows: of shape (rows, numbers for each)."""
-    inputs = model.columns if isinstance(model, FuzzySystem) else model.inputs
+    inputs = model.inputs
     values = np.array([[row[name] for row in rows] for name in inputs], np.float64)
     values = values.reshape(len(inputs), len(rows))
     classes = () if isinstance(model, FuzzySystem) else model.classes
@@ -167,8 +167,8 @@ def test_node_has_the_numbers_of_every_system_within_derived_bounds(
     for name, system in systems(kind).items():
         rows = system_probes(system, limit=60)
         found = answered(system, rows)
-        values = np.array([[row[n] for row in rows] for n in system.columns])
-        values = values.reshape(len(system.columns), len(rows))
+        values = np.array([[row[n] for row in rows] for n in system.inputs])
+        values = values.reshape(len(system.inputs), len(rows))
         kept = from_system(system, activations=True)
         order = [
             place

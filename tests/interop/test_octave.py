@@ -53,7 +53,7 @@ def system_of(content: bytes) -> FuzzySystem:
 def ours(content: bytes, rows: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
     system = system_of(content)
     return [
-        infer(system, dict(zip(system.columns, row, strict=True))).outputs
+        infer(system, dict(zip(system.inputs, row, strict=True))).outputs
         for row in rows
     ]
 
@@ -160,7 +160,7 @@ def test_random_systems_answer_alike_in_fuzzylite(
         assert run.rules == len(system.rules)
         kinds.add(system.outputs[0].defuzzifier.is_weighted)
         for row, usual, theirs in zip(rows, run.outputs, nearly, strict=True):
-            inference = infer(system, dict(zip(system.columns, row, strict=True)))
+            inference = infer(system, dict(zip(system.inputs, row, strict=True)))
             if any(0.0 < one < WEAK for one in inference.activations):
                 continue
             sizes = [1.0, *(x for x in map(abs, inference.outputs) if x == x)]
@@ -192,7 +192,7 @@ def test_random_systems_answer_alike_in_octave(program: Need, tmp_path: Path) ->
         system = system_of(content)
         assert found[name].rules <= len(system.rules)
         for row, theirs in zip(rows, found[name].rows, strict=True):
-            inference = infer(system, dict(zip(system.columns, row, strict=True)))
+            inference = infer(system, dict(zip(system.inputs, row, strict=True)))
             if any(map(math.isnan, inference.outputs)):
                 continue  # Octave stops, or answers 0 / 0
             sizes = [1.0, *map(abs, inference.outputs)]

@@ -69,7 +69,7 @@ def graphs() -> Iterator[tuple[str, Document, dict[str, Any]]]:
 def rows_of(model: Document) -> FloatArray:
     if isinstance(model, FuzzySystem):
         rows = system_probes(model, limit=300)
-        found = [[row[name] for name in model.columns] for row in rows]
+        found = [[row[name] for name in model.inputs] for row in rows]
     else:
         rows = probes(model, limit=2_000)
         found = [[row[name] for name in model.inputs] for row in rows]

@@ -102,7 +102,7 @@ def test_models_of_all_kinds_answer_alike_with_missing_and_infinite_values(
 
 def system_rows(system: FuzzySystem) -> list[dict[str, float]]:
     rows = random_rows(system, 1, 40)
-    for name in system.columns:
+    for name in system.inputs:
         for value in (math.nan, math.inf, -math.inf):
             rows.append(rows[0] | {name: value})
     return rows

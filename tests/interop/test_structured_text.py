@@ -157,11 +157,11 @@ def system_gaps(system: FuzzySystem, rows: Sequence[Row]) -> tuple[int, int]:
     inputs = block.sections.get("VAR_INPUT", [])
     *outputs, _, _ = block.sections["VAR_OUTPUT"]
     program = from_system(system)
-    values = np.array([[row[name] for row in rows] for name in system.columns])
-    bounds = error_bounds(program, values.reshape(len(system.columns), len(rows))).T
+    values = np.array([[row[name] for row in rows] for name in system.inputs])
+    bounds = error_bounds(program, values.reshape(len(system.inputs), len(rows))).T
     count = exact = 0
     for row, allowed in zip(rows, bounds.tolist(), strict=True):
-        given = dict(zip(inputs, (row[n] for n in system.columns), strict=True))
+        given = dict(zip(inputs, (row[n] for n in system.inputs), strict=True))
         found, right = block(**given), infer(system, row)
         assert found["status"] == int(right.status) or max(allowed) > 0.0, row
         for number, (name, meant) in enumerate(
@@ -212,7 +212,7 @@ def test_systems_in_real_are_near_those_in_double(library: Need) -> None:
         block = Block(write(system, dtype="float32").content)
         inputs, worst = block.sections["VAR_INPUT"], 0.0
         for number in range(40):
-            row = dict.fromkeys(system.columns, number / 4.0)
+            row = dict.fromkeys(system.inputs, number / 4.0)
             found = block(**dict(zip(inputs, row.values(), strict=True)))
             right = infer(system, row)
             assert found["status"] == right.status
@@ -293,7 +293,7 @@ def test_a_grammar_of_others_takes_every_model(library: Need) -> None:
         except LossError:
             refused.append(title)
             continue
-        inputs = model.columns if isinstance(model, FuzzySystem) else model.inputs
+        inputs = model.inputs
         assert len(block.sections.get("VAR_INPUT", [])) == len(inputs), title
         if isinstance(model, FuzzySystem):
             assert len(block.sections["VAR_OUTPUT"]) == len(model.outputs) + 2, title
@@ -322,5 +322,5 @@ def test_blark_parses_it_and_finds_its_variables(library: Need, name: str) -> No
         for item in section.items
         for variable in item.variables
     ]
-    inputs = model.columns if isinstance(model, FuzzySystem) else model.inputs
+    inputs = model.inputs
     assert len(declared) == len(inputs)

@@ -75,16 +75,16 @@ def mistakes(**changes: object) -> list[tuple[tuple[str | int, ...], str]]:
 
 def test_a_whole_system_names_its_columns_variables_and_rules() -> None:
     mix = Variable("mix", parts=(Part("a", 2.0),))
-    found = replace(WHOLE, inputs=(INPUT, mix))
-    assert found.columns == ("a",)
-    assert [one.name for one in found.variables] == ["a", "mix", "y"]
+    found = replace(WHOLE, variables=(INPUT, mix))
+    assert found.inputs == ("a",)
+    assert [one.name for one in found.all_variables] == ["a", "mix", "y"]
     assert found.rules == (RULE,)
 
 
 def test_all_mistakes_of_a_system_are_reported_at_once() -> None:
     assert mistakes(
         name="",
-        inputs=(
+        variables=(
             replace(INPUT, low=2.0, high=1.0),
             Variable("", (LOW, LOW), clips=True),
             Variable("mix", parts=(Part("b", 0.0),)),
@@ -96,20 +96,20 @@ def test_all_mistakes_of_a_system_are_reported_at_once() -> None:
     ) == [
         (("name",), "a system needs a name"),
         (("outputs", 1), "variable 'a' stands twice"),
-        (("inputs", 1, "name"), "a variable needs a name"),
+        (("variables", 1, "name"), "a variable needs a name"),
         (
-            ("inputs", 0, "low"),
+            ("variables", 0, "low"),
             "the range of 'a' starts at 2.0 and ends below it, at 1.0",
         ),
-        (("inputs", 1, "terms", 1), "term of '' 'low' stands twice"),
-        (("inputs", 1), "input '' is clipped to a range that it lacks"),
+        (("variables", 1, "terms", 1), "term of '' 'low' stands twice"),
+        (("variables", 1), "input '' is clipped to a range that it lacks"),
         (
-            ("inputs", 2, "parts", 0, "input"),
+            ("variables", 2, "parts", 0, "input"),
             "combination 'mix' needs input 'b', which does not stand before it; there "
             "is a, ",
         ),
         (
-            ("inputs", 2, "parts", 0, "weight"),
+            ("variables", 2, "parts", 0, "weight"),
             "the weight of 'b' in 'mix' must be finite and not 0, not 0.0",
         ),
         (("outputs", 0, "default"), "the default of 'y' must be finite"),
@@ -323,7 +323,7 @@ def test_a_formula_names_inputs_earlier_outputs_and_x() -> None:
     blocks = concluding("made")
     assert replace(WHOLE, outputs=fine, blocks=blocks).outputs == fine
     found = mistakes(
-        inputs=(replace(INPUT, terms=(labelled(Formula(Name("y"))),)),),
+        variables=(replace(INPUT, terms=(labelled(Formula(Name("y"))),)),),
         outputs=(output("y", Name("y")), output("z", Name("yy"))),
         blocks=blocks,
     )
@@ -336,11 +336,11 @@ def test_a_formula_names_inputs_earlier_outputs_and_x() -> None:
 
 def test_x_is_either_a_variable_or_the_value_itself() -> None:
     named = replace(INPUT, name="x")
-    assert replace(WHOLE, inputs=(named,), blocks=concluding("one")).columns == ("x",)
+    assert replace(WHOLE, variables=(named,), blocks=concluding("one")).inputs == ("x",)
     formula = replace(named, terms=(labelled(Formula(Name("x"))),))
-    assert mistakes(inputs=(formula,), blocks=concluding("one")) == [
+    assert mistakes(variables=(formula,), blocks=concluding("one")) == [
         (
-            ("inputs", 0, "terms", 0),
+            ("variables", 0, "terms", 0),
             "term 'made' of 'x': 'x' is a variable, and in a formula it is the value "
             "itself",
         )
@@ -352,7 +352,7 @@ def test_a_linear_term_is_a_weighted_number_with_a_weight_for_each_column() -> N
     line = labelled(Linear((1.0,)))
     fine = replace(WEIGHTED, terms=(line,))
     blocks = concluding("made")
-    assert replace(WHOLE, inputs=(INPUT, mix), outputs=(fine,), blocks=blocks)
+    assert replace(WHOLE, variables=(INPUT, mix), outputs=(fine,), blocks=blocks)
     two = replace(WEIGHTED, terms=(labelled(Linear((1.0, 2.0))),))
     curve = replace(CENTROID, name="z", terms=(line,))
     found = mistakes(outputs=(two, curve), blocks=blocks)
@@ -364,10 +364,10 @@ def test_a_linear_term_is_a_weighted_number_with_a_weight_for_each_column() -> N
 
 @pytest.mark.parametrize("height", [0.0, -1.0, 1.5, math.nan])
 def test_a_height_lies_above_0_and_at_most_at_1(height: float) -> None:
-    found = mistakes(inputs=(replace(INPUT, terms=(replace(LOW, height=height),)),))
+    found = mistakes(variables=(replace(INPUT, terms=(replace(LOW, height=height),)),))
     assert found == [
         (
-            ("inputs", 0, "terms", 0),
+            ("variables", 0, "terms", 0),
             f"term 'low' of 'a': the height must lie in (0, 1], not {height!r}",
         )
     ]

@@ -310,7 +310,7 @@ def test_a_system_has_its_terms_and_the_rules_as_they_are_audited(seed: int) -> 
     audit = audit_of(rule_base(), (), form="system")
     text = Outline(page(audit, system)).text
     assert "fuzzytree audit of a fuzzy system" in text
-    for one in system.inputs:
+    for one in system.variables:
         assert one.name in text
 
 

@@ -548,7 +548,7 @@ def test_the_oldest_onnxruntime_runs_systems(tmp_path: Path) -> None:
         except LossError:  # a function that onnxruntime lacks
             continue
         rows = random_rows(system, seed, 30)
-        table = np.array([[row[name] for name in system.columns] for row in rows])
+        table = np.array([[row[name] for name in system.inputs] for row in rows])
         name = f"{seed}.onnx"
         (tmp_path / name).write_bytes(content)
         values[name] = table

@@ -74,11 +74,11 @@ def test_activations_are_absent_unless_requested() -> None:
 def test_every_runtime_gives_the_numbers_of_the_inference(seed: int) -> None:
     system = random_system(seed, formulas="none")
     rows = random_rows(system, seed, count=20)
-    table = np.array([[row[name] for name in system.columns] for row in rows])
+    table = np.array([[row[name] for name in system.inputs] for row in rows])
     right = np.array([infer(system, row).outputs for row in rows]).T
-    result = ft.run(system, table, columns=system.columns, runtime="reference")
+    result = ft.run(system, table, columns=system.inputs, runtime="reference")
     assert np.array_equal(result.values, right, equal_nan=True)
-    native = ft.run(system, table, columns=system.columns)
+    native = ft.run(system, table, columns=system.inputs)
     assert np.allclose(native.values, right, rtol=1e-9, equal_nan=True)
     assert native.activations is not None
     assert native.activations.shape == (len(system.rules), 20)
@@ -96,7 +96,7 @@ def test_a_runtime_that_runs_no_systems_says_so() -> None:
 def test_every_part_of_a_system_is_shown(seed: int) -> None:
     system = random_system(seed)
     shown = "\n".join(system_lines(system))
-    for one in system.variables:
+    for one in system.all_variables:
         assert f"\n{one.name}" in shown
         for label in one.terms:
             assert f"  {label.name}" in shown
@@ -107,7 +107,7 @@ def test_every_part_of_a_system_is_shown(seed: int) -> None:
 def test_reasons_tell_what_fired_and_what_did_not() -> None:
     system = SYSTEMS[0]
     table = np.array([[1.0, 1.0], [5.0, 9.9], [math.nan, 1.0], [3.0, 20.0]])
-    result = ft.run(system, table, columns=system.columns)
+    result = ft.run(system, table, columns=system.inputs)
     reasons = system_reasons(system, result)
     assert reasons[0] == ("rule 1 (1): IF heat is low and damp is dry THEN fan is slow")
     assert reasons[1].startswith("rule 2 (0.25): IF heat is high")

@@ -37,8 +37,8 @@ RUNTIMES = [
 
 
 def values_of(system: FuzzySystem, rows: list[dict[str, float]]) -> np.ndarray:
-    table = [[row[name] for row in rows] for name in system.columns]
-    return np.array(table, np.float64).reshape(len(system.columns), len(rows))
+    table = [[row[name] for row in rows] for name in system.inputs]
+    return np.array(table, np.float64).reshape(len(system.inputs), len(rows))
 
 
 def formula_system(expression: Expression) -> FuzzySystem:

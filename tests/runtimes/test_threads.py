@@ -12,7 +12,6 @@ import pytest
 from fuzzytree import tables
 from fuzzytree.api.answering import prepare_answering
 from fuzzytree.exporters.onnx import write_onnx
-from fuzzytree.model.system import FuzzySystem
 from fuzzytree.runtimes.native import load
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.runtimes.predictions import joined
@@ -35,7 +34,7 @@ MODELS: dict[str, tuple[Document | OnnxModel, str | None]] = {
 
 
 def _table(model: Document | OnnxModel) -> np.ndarray[tuple[int, int]]:
-    inputs = model.columns if isinstance(model, FuzzySystem) else model.inputs
+    inputs = model.inputs
     table = np.random.default_rng(0).normal(size=(ROWS, len(inputs)))
     table[::97, 0], table[5::89, -1] = np.nan, np.inf
     return table

@@ -199,7 +199,7 @@ def test_names_that_a_target_changed_come_back_by_their_places(
     system = as_system(rules, scores)
     flat, losses = flattened(system)
     assert bool(losses) == any(v.parts for v in rules.variables)
-    names = {one.name: f"v{k}" for k, one in enumerate(flat.variables)}
+    names = {one.name: f"v{k}" for k, one in enumerate(flat.all_variables)}
 
     def renamed(condition: Condition | None) -> Condition | None:
         match condition:
@@ -239,7 +239,7 @@ def test_names_that_a_target_changed_come_back_by_their_places(
     )
     changed = FuzzySystem(
         "other",
-        tuple(map(labelled, flat.inputs)),  # type: ignore[arg-type]
+        tuple(map(labelled, flat.variables)),  # type: ignore[arg-type]
         tuple(map(labelled, flat.outputs)),  # type: ignore[arg-type]
         (block,),
     )
@@ -276,10 +276,12 @@ def changes(system: FuzzySystem) -> Iterator[FuzzySystem]:
     last = block.rules[-1]
     negated = replace(last, when=Not(last.when or Proposition("force", ("low",))))
     yield replace(system, blocks=(replace(block, rules=(*block.rules[:-1], negated)),))
-    one, *rest = system.inputs
-    yield replace(system, inputs=(replace(one, clips=True, low=0.0, high=0.5), *rest))
+    one, *rest = system.variables
+    yield replace(
+        system, variables=(replace(one, clips=True, low=0.0, high=0.5), *rest)
+    )
     half = replace(one.terms[0], height=0.5)
-    yield replace(system, inputs=(replace(one, terms=(half, *one.terms[1:])), *rest))
+    yield replace(system, variables=(replace(one, terms=(half, *one.terms[1:])), *rest))
     output, *more = system.outputs
     half = replace(output.terms[-1], function=Singleton(0.5))
     labels = (*output.terms[:-1], half)

@@ -193,7 +193,7 @@ def washer(curve: Curve, output: Curve, method: str) -> FuzzySystem:
 def test_terms_of_inputs_and_of_looked_at_outputs_become_points() -> None:
     system = washer(Gaussian(0.0, 1.0), Trapezoid(0.0, 0.5, 0.5, 1.0), "centroid")
     found, losses = pointed(system, 1e-3)
-    label = found.inputs[0].terms[0]
+    label = found.variables[0].terms[0]
     assert isinstance(label.function, Points)
     assert label.height == 0.5
     expected = Points((0.0, 0.5, 1.0), (0.0, 1.0, 0.0))

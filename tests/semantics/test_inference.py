@@ -408,7 +408,7 @@ def test_a_weight_multiplies_the_degree_and_a_rule_of_weight_0_never_fires() -> 
 
 
 def test_a_height_multiplies_the_degree() -> None:
-    low = replace(system([rule(A_UP)]), inputs=(
+    low = replace(system([rule(A_UP)]), variables=(
         Variable("a", (replace(UP, height=0.5),)), Variable("b", (UP, DOWN)),
     ))  # fmt: skip
     assert infer(low, {"a": 0.5, "b": 0.0}).activations == (0.25,)
@@ -681,7 +681,7 @@ def test_inputs_are_moved_into_their_range_before_anything_else() -> None:
     assert [infer(subject, {"a": a}).outputs[0] for a in (0.0, 0.3, 9.0)] == [
         *(0.25, 0.3, 0.5)
     ]
-    open_above = replace(subject, inputs=(replace(clamped, high=None), mix))
+    open_above = replace(subject, variables=(replace(clamped, high=None), mix))
     assert infer(open_above, {"a": 9.0}).outputs == (9.0,)
 
 
@@ -697,8 +697,8 @@ def test_an_answer_is_moved_into_its_range_and_so_is_the_default() -> None:
 @pytest.mark.parametrize("value", [NAN, INF, -INF])
 def test_a_row_without_a_value_makes_everything_nan(value: float) -> None:
     subject = system([rule(A_UP)], default=3.0)
-    clamped = replace(subject.inputs[1], low=0.0, high=1.0, clips=True)
-    subject = replace(subject, inputs=(subject.inputs[0], clamped))
+    clamped = replace(subject.variables[1], low=0.0, high=1.0, clips=True)
+    subject = replace(subject, variables=(subject.variables[0], clamped))
     found = infer(subject, {"a": 0.5, "b": value})
     assert math.isnan(found.outputs[0])
     assert math.isnan(found.activations[0])
@@ -708,7 +708,9 @@ def test_a_row_without_a_value_makes_everything_nan(value: float) -> None:
 def test_a_combination_that_overflows_is_missing() -> None:
     subject = system([rule(A_UP)])
     mix = Variable("mix", (UP,), parts=(Part("a", 1e300),))
-    subject = replace(subject, inputs=(*subject.inputs, mix), outputs=subject.outputs)
+    subject = replace(
+        subject, variables=(*subject.variables, mix), outputs=subject.outputs
+    )
     assert infer(subject, {"a": 1.0, "b": 0.0}).status == Status.DECIDED
     assert infer(subject, {"a": 1e300, "b": 0.0}).status == Status.MISSING
 
@@ -720,7 +722,7 @@ def test_a_column_without_a_value_is_a_key_error() -> None:
 
 def test_a_degree_that_is_nan_activates_nothing() -> None:
     root = Variable("a", (Term("up", Formula(parse("sqrt(x)"))),))
-    subject = replace(system([rule(A_UP), rule(B_UP)]), inputs=(
+    subject = replace(system([rule(A_UP), rule(B_UP)]), variables=(
         root, Variable("b", (UP,)),
     ))  # fmt: skip
     found = infer(subject, {"a": -1.0, "b": 0.5})
@@ -736,7 +738,7 @@ def test_nothing_fails_on_any_system_and_any_row(seed: int) -> None:
     chance = random.Random(seed)
     extreme = (1e308, -1e308, 5e-324, -0.0, 0.0, 1e16)
     rows += [
-        {name: chance.choice(extreme) for name in subject.columns} for _ in range(9)
+        {name: chance.choice(extreme) for name in subject.inputs} for _ in range(9)
     ]
     for row in rows:
         found = infer(subject, row)
@@ -749,7 +751,7 @@ def test_random_systems_show_everything_that_a_system_can_have() -> None:
     seen: set[str] = set()
     for seed in range(100):
         subject = random_system(seed)
-        for variable in subject.variables:
+        for variable in subject.all_variables:
             seen |= {type(label.function).__name__ for label in variable.terms}
         for output in subject.outputs:
             how = output.defuzzifier
@@ -814,7 +816,7 @@ def test_a_combination_is_of_values_within_their_ranges() -> None:
     clamped = Variable("a", (UP,), low=0.0, high=0.5, clips=True)
     mix = Variable("mix", (UP,), parts=(Part("a", 2.0, 0.25), Part("b", 1.0)))
     subject = system([rule(B_UP)])
-    subject = replace(subject, inputs=(clamped, Variable("b", (UP,)), mix))
+    subject = replace(subject, variables=(clamped, Variable("b", (UP,)), mix))
     block = RuleBlock((rule(Proposition("mix", ("up",))),))
     subject = replace(subject, blocks=(block,))
     found = infer(subject, {"a": 9.0, "b": 0.125})

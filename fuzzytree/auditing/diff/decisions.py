@@ -38,7 +38,6 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.codes import audit_answer
-from fuzzytree.auditing.findings.domains import inputs_of
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
     AuditSettings,
@@ -99,7 +98,7 @@ class RulePair(msgspec.Struct, frozen=True, eq=False):
 
 def all_inputs(old: Document, new: Document) -> tuple[str, ...]:
     """Return the columns that either of two models needs, the old ones first."""
-    return tuple(dict.fromkeys((*inputs_of(old), *inputs_of(new))))
+    return tuple(dict.fromkeys((*old.inputs, *new.inputs)))
 
 
 def union(old: Document, new: Document) -> RuleBase:

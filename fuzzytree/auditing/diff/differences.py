@@ -21,12 +21,11 @@ from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, limited
 from fuzzytree.auditing.findings.audit import source_of
-from fuzzytree.auditing.findings.domains import domain_of, inputs_of
+from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.errors import ReadError
-from fuzzytree.formats import in_system
 from fuzzytree.model import (
     Document,
     FuzzySystem,
@@ -47,7 +46,7 @@ def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) ->
     Raises:
         ReadError: If no input of one is an input of the other.
     """
-    one, other = inputs_of(old), inputs_of(new)
+    one, other = old.inputs, new.inputs
     if one and other and not set(one) & set(other):
         raise ReadError(
             f"{names[1]}: has no input in common with {names[0]}: it uses "
@@ -83,7 +82,7 @@ def joined_domain(
     for model in (old, new):
         own_rows = None
         if rows is not None:
-            places = [inputs.index(name) for name in inputs_of(model)]
+            places = [inputs.index(name) for name in model.inputs]
             own_rows = AuditRows(rows.name, rows.values[places])
         for side in domain_of(model, rows=own_rows, limited=limits).sides:
             known = sides.get(side.variable)
@@ -127,7 +126,7 @@ def difference(
         ReadError: If one decides and the other gives numbers.
 
     Example:
-        >>> from fuzzytree.auditing.findings.domains import domain_of, inputs_of
+        >>> from fuzzytree.auditing.findings.domains import domain_of
         >>> from fuzzytree.testing import random_tree
         >>> tree = random_tree(1, combinations=0)
         >>> difference(tree, tree, domain=domain_of(tree)).verdict
@@ -222,6 +221,6 @@ def _path(model: Document, path: Path) -> Path:
         case FuzzyTree() if path[0] == "rules":
             return ("leaves", *path[1:])
         case FuzzySystem():  # that stands for rules
-            return in_system(path)
+            return ("blocks", 0, *path) if path[:1] == ("rules",) else path
         case _:
             return path

@@ -74,7 +74,7 @@ def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None
     how = one.defuzzifier
     if not how.is_weighted or output in joined_outputs(system):
         raise NotExactError(output)
-    values = _values(system.inputs, point)
+    values = _values(system.variables, point)
     total = weight = Fraction(0)
     is_number = False
     for block in system.blocks:
@@ -143,7 +143,7 @@ def _linear(label: Term, system: FuzzySystem) -> _Sum | None:
         case Singleton(value=value):
             return {}, Fraction(value)
         case Linear(weights=weights, offset=offset):
-            pairs = zip(system.columns, weights, strict=True)
+            pairs = zip(system.inputs, weights, strict=True)
             return {name: Fraction(w) for name, w in pairs if w}, Fraction(offset)
         case _:
             return None
@@ -172,7 +172,7 @@ def _at(
         case Proposition(variable=name, term=label, hedges=hedges):
             if label is None:
                 return _hedged(hedges, Fraction(0))  # the last, `any`, makes 1 of it
-            term = _named(_named(system.inputs, name).terms, label)
+            term = _named(_named(system.variables, name).terms, label)
             shape = shape_of(term.function)
             if shape is None:
                 raise NotExactError(name)
@@ -254,7 +254,7 @@ def _moved(
 
 def _is_small(system: FuzzySystem) -> bool:
     """Return whether no degree of a condition is above 1."""
-    curves = [label.function for one in system.inputs for label in one.terms]
+    curves = [label.function for one in system.variables for label in one.terms]
     norms = {block.disjunction for block in system.blocks}
     return "sum" not in norms and not any(isinstance(one, Formula) for one in curves)
 
@@ -281,7 +281,7 @@ def _move(
 def _weights(system: FuzzySystem, label: Term) -> _Sum | None:
     """Return the number of a label as a sum of columns that no range clamps."""
     known = _linear(label, system)
-    clipped = {one.name for one in system.inputs if one.clips}
+    clipped = {one.name for one in system.variables if one.clips}
     return None if known is None or clipped & {*known[0]} else known
 
 

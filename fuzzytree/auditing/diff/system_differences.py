@@ -40,7 +40,7 @@ def draft_system_changes(old: FuzzySystem, new: FuzzySystem) -> Iterator[Draft]:
         yield Draft(
             "name", "the note has changed", "never", here, here, is_harmless=True
         )
-    yield from _variable_drafts("input", old.inputs, new.inputs)
+    yield from _variable_drafts("input", old.variables, new.variables)
     yield from _variable_drafts("output", old.outputs, new.outputs)
     yield from _block_drafts(old.blocks, new.blocks)
 

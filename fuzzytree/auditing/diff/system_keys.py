@@ -108,12 +108,12 @@ class _Read:
         self.outputs = {one.name: one for one in system.outputs}
         self.labels = {
             (one.name, label.name): label
-            for one in system.variables
+            for one in system.all_variables
             for label in one.terms
         }
         self.known: dict[tuple[str, str], Hashable] = {}
         self.sources: dict[str, Hashable] = {}
-        for one in system.inputs:
+        for one in system.variables:
             self.sources[one.name] = self._source(one)
         formulas = [
             label.function.expression
@@ -193,7 +193,7 @@ class _Read:
             names = dict.fromkeys(names_in(curve.expression))
             key = (curve, *(self.sources.get(name) for name in names))
         if isinstance(curve, Linear):
-            pairs = zip(self.system.columns, curve.weights, strict=True)
+            pairs = zip(self.system.inputs, curve.weights, strict=True)
             key = (curve.offset, *((n, w, self.sources[n]) for n, w in pairs if w))
         return key, label.height
 

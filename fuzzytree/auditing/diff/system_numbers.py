@@ -134,7 +134,7 @@ def _hows(pair: SystemPair) -> dict[str, _Alike | None]:
 
 
 def _proved(pair: SystemPair, where: str, how: str) -> AuditAnswer:
-    if {*pair.old.columns} != {*pair.new.columns}:
+    if {*pair.old.inputs} != {*pair.new.inputs}:
         where += ", where no value is missing"
     facts = {"where": where}
     return audit_answer("FT801.numbers-alike", "decisions", Proved(how), facts=facts)
@@ -267,7 +267,7 @@ class _Differences:
         numbers: list[FloatArray] = []
         pair = self.pair
         for system, run in zip((pair.old, pair.new), self.runs, strict=True):
-            rows = values[[pair.columns.index(name) for name in system.columns]]
+            rows = values[[pair.columns.index(name) for name in system.inputs]]
             known = [one.name for one in system.outputs]
             numbers.append(run(rows).outputs[[known.index(n) for n in self.outputs]])
         return numbers

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Literal
 
-from fuzzytree.model import Document, FuzzySystem, Part, Value, Variable, name_choice
+from fuzzytree.model import Document, Part, Value, Variable, name_choice
 
 Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
 """The origin of a side: the range in the model, the smallest and largest value of the
@@ -60,8 +60,7 @@ def limited(
     Raises:
         ValueError: If a variable is unknown, or ends are swapped or not finite.
     """
-    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
-    names = [variable.name for variable in variables]
+    names = [variable.name for variable in model.variables]
     for name, (low, high) in limits.items():
         if name not in names:
             raise ValueError(

@@ -22,7 +22,7 @@ from fuzzytree.auditing.findings.codes import (
     audit_answer,
 )
 from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
-from fuzzytree.auditing.findings.domains import domain_of, inputs_of
+from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import (
     locations_of,
     with_ids,
@@ -100,7 +100,7 @@ def audit(
     check_settings(settings)
     wanted = chosen_codes(selection.select, selection.ignore)
     if row is not None:
-        _check_row(row, inputs_of(model))
+        _check_row(row, model.inputs)
     viewed = view(model, domain or domain_of(model))
     progress = _Progress([*viewed.declined], {})
     if viewed.rules is not None:

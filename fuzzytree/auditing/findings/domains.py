@@ -19,7 +19,6 @@ from fuzzytree.model import (
     Document,
     FloatArray,
     Formula,
-    FuzzySystem,
     FuzzyTree,
     Linear,
     Points,
@@ -92,11 +91,6 @@ def domain_of(
             "\n".join(faults[:_MOST_FAULTS] + (more if faults[_MOST_FAULTS:] else []))
         )
     return Domain(tuple(sides))
-
-
-def inputs_of(model: Document) -> tuple[str, ...]:
-    """Return the columns that a model needs, in its order."""
-    return model.columns if isinstance(model, FuzzySystem) else model.inputs
 
 
 def _declared(axis: _Axis, values: FloatArray | None) -> DomainSide:
@@ -193,16 +187,15 @@ class _Axis(msgspec.Struct, frozen=True):
 def _axes(model: Document) -> Iterator[_Axis]:
     """Yield the inputs of a model, in its order."""
     curves: dict[str, list[Curve]] = {}
-    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
-    for one in variables:
+    for one in model.variables:
         curves[one.name] = [term.function for term in one.terms]
     for fitted in model.sets if isinstance(model, FuzzyTree) else ():
         curves[fitted.variable] += [term.function for term in fitted.terms]
-    summed = {part.input for one in variables for part in one.parts}
+    summed = {part.input for one in model.variables for part in one.parts}
     every = itertools.chain.from_iterable(curves.values())
     if any(isinstance(curve, Formula | Linear) for curve in every):
         summed = {*curves}  # which they may name
-    for one in variables:
+    for one in model.variables:
         if not one.parts:
             own = curves[one.name]
             ends = tuple(end for curve in own for end in _ends(curve))

@@ -83,20 +83,17 @@ def term_path(model: Document, label: TermName) -> Path:
     for path, variable, terms in _terms_in(model):
         if variable == label.variable and label.term in terms:
             return (*path, terms.index(label.term))
-    return ("inputs",) if isinstance(model, FuzzySystem) else ("variables",)
+    return ("variables",)
 
 
 def _terms_in(model: Document) -> Iterator[tuple[Path, str, list[str]]]:
     """Yield where a model has terms, the variable, and their names."""
-    if isinstance(model, FuzzySystem):
-        for position, one in enumerate(model.variables):
-            k, labels = position - len(model.inputs), [term.name for term in one.terms]
-            field: Path = ("inputs", position) if k < 0 else ("outputs", k)
-            yield (*field, "terms"), one.name, labels
-        return
     for k, variable in enumerate(model.variables):
         terms = [term.name for term in variable.terms]
         yield ("variables", k, "terms"), variable.name, terms
+    for k, output in enumerate(model.outputs if isinstance(model, FuzzySystem) else ()):
+        terms = [term.name for term in output.terms]
+        yield ("outputs", k, "terms"), output.name, terms
     for k, fitted in enumerate(model.sets if isinstance(model, FuzzyTree) else ()):
         terms = [term.name for term in fitted.terms]
         yield ("sets", k, "terms"), fitted.variable, terms

@@ -106,7 +106,7 @@ class SystemTerms:
 def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Interval | None]:
     """Return the values of each input on a domain, None where they are not known."""
     ranges: dict[str, Interval | None] = {}
-    for one in system.inputs:
+    for one in system.variables:
         needed = [part.input for part in one.parts] or [one.name]
         ranges[one.name] = None
         if all(domain.side(name) is not None for name in needed):
@@ -127,7 +127,7 @@ def terms_of(
         for rule in system.rules
         for key in {(one.variable, one.term) for one in questions(rule.when)}
     )
-    for one in system.inputs:
+    for one in system.variables:
         plain[one.name] = {}
         for label in one.terms:
             is_moved = bool(one.parts) and one.clips

@@ -101,7 +101,7 @@ def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
 def _own_terms(subject: Subject, variable: Variable) -> Iterator[Term]:
     """Yield the terms of a variable that the system has."""
     assert subject.system is not None  # nothing else has bounds
-    for one in subject.system.inputs:
+    for one in subject.system.variables:
         if one.name == variable.name:
             names = {label.name for label in one.terms}
             yield from (term for term in variable.terms if term.name in names)
@@ -237,8 +237,8 @@ def _inventory(
     system = subject.system
     if system is not None and subject.policy.decision == "all":
         return (
-            [(one.name, label.name) for one in system.inputs for label in one.terms],
-            [one.name for one in system.inputs],
+            [(one.name, label.name) for one in system.variables for label in one.terms],
+            [one.name for one in system.variables],
             [
                 (question.variable, question.term or "")
                 for block in system.blocks

@@ -111,7 +111,7 @@ def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
         rules = RuleBase(
             system.name,
             tuple(dict.fromkeys(rule.then for rule in taken.rules)),
-            tuple(terms.variable(one) for one in system.inputs),
+            tuple(terms.variable(one) for one in system.variables),
             tuple(taken.rules),
             Semantics(conjunction),
         )
@@ -144,7 +144,7 @@ def _conjunction(system: FuzzySystem) -> Conjunction:
 
 def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[AuditAnswer]]:
     """Return the domain within the ranges that inputs are moved into."""
-    clipped = {one.name: one for one in system.inputs if one.clips and not one.parts}
+    clipped = {one.name: one for one in system.variables if one.clips and not one.parts}
     sides: list[DomainSide] = []
     answers: list[AuditAnswer] = []
     for side in domain.sides:

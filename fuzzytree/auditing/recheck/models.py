@@ -142,16 +142,12 @@ class Model:
             self.places += _places(block["rules"])
         self.term_places: dict[tuple[str, str], Place] = {}
         for one in (
-            o
-            for k in ("variables", "inputs", "outputs", "sets")
-            for o in top.get(k, [])
+            o for k in ("variables", "outputs", "sets") for o in top.get(k, [])
         ):
             terms, of = one.get("terms", []), one.get("name", one.get("variable"))
             for term, place in zip(terms, _places(terms), strict=False):
                 self.term_places.setdefault((of, term["name"]), place)
-        variables = [
-            _variable(one) for one in top.get("variables") or top.get("inputs") or []
-        ]
+        variables = [_variable(one) for one in top.get("variables", [])]
         self.variables = {one.name: one for one in variables}
         once([one.name for one in variables])
         self.labels = [(v.name, term) for v in variables for term in v.curves]
@@ -461,7 +457,7 @@ NEEDED = {
 OPTIONAL = {
     "rule base": "variables, columns, terms",
     "tree": "variables, columns, nodes, sets",
-    "system": "inputs, note",
+    "system": "variables, note",
 }
 
 SHAPES = {

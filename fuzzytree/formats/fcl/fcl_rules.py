@@ -270,9 +270,9 @@ def without_questions(system: FuzzySystem) -> FuzzySystem:
     The writer makes them test whether the first input is `any`, or its last term, which
     it adds.
     """
-    if not system.inputs:
+    if not system.variables:
         return system
-    first = system.inputs[0]
+    first = system.variables[0]
     proposition: Condition = Proposition(first.name, (), ("any",))
     if first.terms and first.terms[-1].function == ALWAYS:
         proposition = Proposition(first.name, (first.terms[-1].name,))
@@ -295,4 +295,4 @@ def without_questions(system: FuzzySystem) -> FuzzySystem:
         )
         for block in system.blocks
     )
-    return replace(system, inputs=(first, *system.inputs[1:]), blocks=blocks)
+    return replace(system, variables=(first, *system.variables[1:]), blocks=blocks)

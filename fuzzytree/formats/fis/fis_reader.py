@@ -89,7 +89,7 @@ def read_fis(content: bytes, name: str, *, dialect: Dialect | None = None) -> Re
         ...          "MF1='good':'linsmf',[0 10]", "[Output1]", "Name='tip %'",
         ...          "Range=[0 30]", "NumMFs=1", "MF1='much':'constant',[25]",
         ...          "[Rules]", "1, 1 (1) : 1"]
-        >>> read_fis("\n".join(lines).encode(), "tip.fis").model.columns
+        >>> read_fis("\n".join(lines).encode(), "tip.fis").model.inputs
         ('food',)
     """
     notes = ReaderNotes()

@@ -139,7 +139,7 @@ _SAFE = frozenset({*_TRUTHS, "lt", "gt", "*", "/", "^", "min", "max"})
 
 
 def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
-    curves = [label.function for one in system.variables for label in one.terms]
+    curves = [label.function for one in system.all_variables for label in one.terms]
     calls = list(_calls(curves))
     used = {call.function for call in calls}
     if "%" in used:
@@ -157,7 +157,7 @@ def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
             "formulas: what is not 0 is true for 'and', 'or' and 'not', as in "
             "pyfuzzylite; in fuzzylite 6 only 1 is true"
         )
-    degrees = [label.function for one in system.inputs for label in one.terms]
+    degrees = [label.function for one in system.variables for label in one.terms]
     formulas = [one.expression for one in degrees if isinstance(one, Formula)]
     if any({*names_in(one)} - {"x"} for one in formulas):
         yield "formulas: fuzzylite 6 knows no variables in those of inputs' terms"

@@ -70,7 +70,7 @@ def read_fll(content: bytes, name: str) -> Reading:
         ...          "OutputVariable: tip", "  defuzzifier: WeightedAverage",
         ...          "  term: much Constant 25", "RuleBlock:",
         ...          "  rule: if food is good then tip is much"]
-        >>> read_fll("\n".join(lines).encode(), "tip.fll").model.columns
+        >>> read_fll("\n".join(lines).encode(), "tip.fll").model.inputs
         ('food',)
     """
     notes = ReaderNotes()

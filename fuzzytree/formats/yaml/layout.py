@@ -473,7 +473,7 @@ class SystemHead(FileRecord, frozen=True, kw_only=True):
 class SystemFile(SystemHead, frozen=True, kw_only=True):
     """A fuzzy system of fuzzytree."""
 
-    inputs: tuple[VariableOfModel, ...] = ()
+    variables: tuple[VariableOfModel, ...] = ()
     outputs: Annotated[tuple[OutputOfSystem, ...], Meta(min_length=1)]
     blocks: tuple[BlockOfSystem, ...]
     semantics: SystemSemantics

@@ -51,7 +51,7 @@ def read_system(
     broken: set[Path] = set()
     inputs = variables_at(
         kept,
-        "inputs",
+        "variables",
         layout.VariableOfModel,
         file_mistakes,
         lambda path, one: values.variable(path, one, mistakes),

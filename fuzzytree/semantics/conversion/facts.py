@@ -260,7 +260,7 @@ def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
         if not all(0 <= k < len(sizes) for k in propositions):
             return False
         needed += sum(sizes[k] for k in propositions) if propositions else 1
-    if len(_places(facts)) != len(system.inputs):
+    if len(_places(facts)) != len(system.variables):
         return False
     result = sum(1 for rule in system.rules for _ in questions(rule.when))
     return needed <= result + 2 * len(facts.rules) + 1
@@ -269,7 +269,7 @@ def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
 def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | None:
     """Return the curves of each input's first labels, as terms, if all are shapes."""
     results: list[list[Term]] = []
-    for one, count in zip(system.inputs, counts, strict=True):
+    for one, count in zip(system.variables, counts, strict=True):
         terms: list[Term] = []
         for label in one.terms[:count]:
             shape = shape_of(label.function)
@@ -343,13 +343,13 @@ def _recognised(system: FuzzySystem) -> RuleBase | None:
     output, block = system.outputs[0], system.blocks[0]
     default = output.default
     is_number = default is None or default in range(1, len(output.terms) + 1)
-    curves = _shapes(system, [len(one.terms) for one in system.inputs])
+    curves = _shapes(system, [len(one.terms) for one in system.variables])
     if not is_number or curves is None:
         return None
     classes = tuple(label.name for label in output.terms)
     variables = tuple(
         Variable(one.name, tuple(terms), one.unit, one.low, one.high, one.parts)
-        for one, terms in zip(system.inputs, curves, strict=True)
+        for one, terms in zip(system.variables, curves, strict=True)
     )
     is_product = block.conjunction == "product" and any(
         isinstance(rule.when, And) for rule in block.rules
@@ -408,14 +408,14 @@ def _plain(system: FuzzySystem, *, has_default: bool) -> object:
         system: The system.
         has_default: Whether a default can answer; of scores some rule always fires.
     """
-    places = {one.name: k for k, one in enumerate(system.variables)}
+    places = {one.name: k for k, one in enumerate(system.all_variables)}
     labels = {
         one.name: {label.name: k for k, label in enumerate(one.terms)}
-        for one in system.variables
+        for one in system.all_variables
     }
     inputs = [
         ([(shape_of(label.function), label.height) for label in one.terms], one.clips)
-        for one in system.inputs
+        for one in system.variables
     ]
     outputs = [
         (

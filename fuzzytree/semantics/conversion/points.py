@@ -110,8 +110,8 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def _pointed_system(system: FuzzySystem, change: _Change) -> FuzzySystem:
-    inputs = change.variables(system.inputs)
-    return replace(system, inputs=inputs, outputs=change.variables(system.outputs))
+    inputs = change.variables(system.variables)
+    return replace(system, variables=inputs, outputs=change.variables(system.outputs))
 
 
 class _Change:

@@ -220,7 +220,7 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
         >>> block = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
         >>> inputs = Variable("a"), Variable("b"), mixed
         >>> flat, losses = flattened(FuzzySystem("s", inputs, (output,), (block,)))
-        >>> flat.columns
+        >>> flat.inputs
         ('mix',)
         >>> losses[0].what
         "it is an input, to be given as 2.0 * ('a' - 0.5) + -1.0 * ('b' - 0.0)"
@@ -233,18 +233,18 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
                 f"{p.weight!r} * ({p.input!r} - {p.centre!r})" for p in one.parts
             ),
         )
-        for one in system.inputs
+        for one in system.variables
         if one.parts
     )
     if not losses:
         return system, ()
     return replace(
         system,
-        inputs=tuple(replace(one, parts=()) for one in _kept(system)),
+        variables=tuple(replace(one, parts=()) for one in _kept(system)),
         outputs=tuple(
             replace(
                 one,
-                terms=tuple(_widened(label, system.inputs) for label in one.terms),
+                terms=tuple(_widened(label, system.variables) for label in one.terms),
             )
             for one in system.outputs
         ),
@@ -253,11 +253,11 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
 
 def _kept(system: FuzzySystem) -> Iterator[Variable]:
     """Yield the inputs that something other than a combination uses."""
-    summed = {part.input for one in system.inputs for part in one.parts}
+    summed = {part.input for one in system.variables for part in one.parts}
     used = {one.variable for r in system.rules for one in questions(r.when)}
-    curves = [label.function for one in system.variables for label in one.terms]
+    curves = [label.function for one in system.all_variables for label in one.terms]
     is_computed = any(isinstance(curve, Linear | Formula) for curve in curves)
-    for one in system.inputs:
+    for one in system.variables:
         if one.terms or one.name not in summed or one.name in used or is_computed:
             yield one
 

@@ -106,7 +106,7 @@ def infer(system: FuzzySystem, row: Mapping[str, float]) -> Inference:
         >>> infer(system, {"dirt": 5.0}).outputs
         (30.0,)
     """
-    values = input_values(system.inputs, row)
+    values = input_values(system.variables, row)
     count = len(system.rules)
     if not all(map(math.isfinite, values.values())):
         nothing = (math.nan,) * len(system.outputs)
@@ -177,11 +177,11 @@ class _Run:
 
     def __init__(self, system: FuzzySystem, values: Mapping[str, float]) -> None:
         self.values = values
-        self.columns = system.columns
+        self.columns = system.inputs
         self.outputs = {one.name: one for one in system.outputs}
         self.labels = {
             (variable.name, label.name): label
-            for variable in system.variables
+            for variable in system.all_variables
             for label in variable.terms
         }
         self.degrees: dict[tuple[str, str], float] = {}

@@ -112,14 +112,14 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
             shown = make.where(known, degree, nothing)
             results.append(result_of("activation", str(rule), shown))
     results.append(result_of("status", "status", _status(make, known, numbers)))
-    return make.program(system.name, system.columns, tuple(results))
+    return make.program(system.name, system.inputs, tuple(results))
 
 
 def _values(make: Maker, system: FuzzySystem) -> tuple[Place, dict[str, Place]]:
     """Return whether all values are finite, and each input's value in its range."""
     results: list[Place] = []
     values: dict[str, Place] = {}
-    for one in system.inputs:
+    for one in system.variables:
         with make.topic(one.name):
             value = _combined(make, one, values) if one.parts else make.input(one.name)
             make.titled(value, one.name)
@@ -181,11 +181,11 @@ class _Run:
     ) -> None:
         self.make = make
         self.values = make.names = values
-        self.columns = system.columns
+        self.columns = system.inputs
         self.outputs = {one.name: one for one in system.outputs}
         self.labels = {
             (variable.name, label.name): label
-            for variable in system.variables
+            for variable in system.all_variables
             for label in variable.terms
         }
         self.activations: list[Place] = []

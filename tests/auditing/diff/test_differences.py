@@ -409,8 +409,8 @@ def test_systems_are_compared_by_their_numbers() -> None:
     found = results(one, fewer)
     assert (found.verdict, found.ok) == ("changed", False)
     assert ("breaking", "rule 1 was removed") in sentences(found)
-    moved = replace(one.inputs[0], unit="kN", high=9.0)
-    found = results(one, replace(one, inputs=(moved, *one.inputs[1:])))
+    moved = replace(one.variables[0], unit="kN", high=9.0)
+    found = results(one, replace(one, variables=(moved, *one.variables[1:])))
     assert (found.verdict, found.ok) == ("equal", True)
     assert sentences(found) == [
         ("non-breaking", "the high of 'force' is 9.0, and was 5.0"),
@@ -436,7 +436,7 @@ def test_models_of_different_inputs_are_not_compared() -> None:
 
 def test_numbers_are_not_compared_with_classes() -> None:
     system = random_system(2)
-    name = system.columns[0]
+    name = system.inputs[0]
     rules = RuleBase(
         "b", ("x",), (Variable(name, low=0.0, high=1.0),), (Rule((), "x"),)
     )

@@ -113,9 +113,9 @@ def test_what_no_number_depends_on_leaves_the_operations_the_same() -> None:
     other = with_rules(system, ONE, replace(TWO, name="second"), THREE)
     never = rule(Proposition("food", ("bad",)), "high", weight=0.0)
     other = with_rules(other, *other.blocks[0].rules, never)
-    wide = replace(other.inputs[0], unit="points", high=11.0)
-    service = replace(other.inputs[1], terms=other.inputs[1].terms[::-1])
-    other = replace(other, name="b", note="new", inputs=(service, wide))
+    wide = replace(other.variables[0], unit="points", high=11.0)
+    service = replace(other.variables[1], terms=other.variables[1].terms[::-1])
+    other = replace(other, name="b", note="new", variables=(service, wide))
     found = results(system, other)
     assert (found.verdict, found.ok) == ("equal", True)
     (answer,) = found.answers
@@ -141,9 +141,9 @@ def test_rules_in_another_order_are_alike_but_for_rounding() -> None:
 def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
     points = Term("bad", Points((2.0, 6.0), (1.0, 0.0)))
     long = Term("bad", Points((2.0, 4.0, 6.0), (1.0, 0.5, 0.0)))
-    one = replace(tipper().inputs[0], terms=(points, tipper().inputs[0].terms[1]))
+    one = replace(tipper().variables[0], terms=(points, tipper().variables[0].terms[1]))
     other = replace(one, terms=(long, one.terms[1]))
-    service = tipper().inputs[1]
+    service = tipper().variables[1]
     old, new = (tipper(inputs=(each, service)) for each in (one, other))
     assert operation_keys(old) != operation_keys(new)
     assert results(old, new).answers[0].state == Proved(
@@ -152,7 +152,7 @@ def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
 
 
 def test_a_range_that_holds_the_domain_moves_no_value() -> None:
-    food, service = tipper().inputs
+    food, service = tipper().variables
     bounds = tipper(inputs=(replace(food, clips=True), service))
     found = results(tipper(), bounds)
     assert (found.verdict, found.ok) == ("equal", True)
@@ -167,7 +167,7 @@ def test_a_range_that_holds_the_domain_moves_no_value() -> None:
 
 
 def test_columns_of_one_model_alone_are_reported() -> None:
-    more = (*tipper().inputs, Variable("music", (), low=0.0, high=1.0))
+    more = (*tipper().variables, Variable("music", (), low=0.0, high=1.0))
     found = results(tipper(), tipper(inputs=more))
     assert found.answers[0].sentence == (
         "both systems compute alike, where no value is missing"
@@ -221,8 +221,8 @@ def test_a_constant_that_is_changed_back_is_no_difference() -> None:
 
 def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
     wide = Term("bad", Trapezoid(0.0, 0.0, 3.0, 7.0))
-    food = replace(tipper().inputs[0], terms=(wide, tipper().inputs[0].terms[1]))
-    found = results(tipper(), tipper(inputs=(food, tipper().inputs[1])))
+    food = replace(tipper().variables[0], terms=(wide, tipper().variables[0].terms[1]))
+    found = results(tipper(), tipper(inputs=(food, tipper().variables[1])))
     (bound,) = (a.state for a in found.answers if isinstance(a.state, Bracket))
     assert bound.high == 25.0  # from 0, the default, to 25
     assert 0.0 < bound.low < 25.0
@@ -233,8 +233,8 @@ def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
     labels = (*tipper().outputs[0].terms, Term("top", Singleton(30.0)))
     output = replace(tipper().outputs[0], terms=labels)
     sliver = Term("sliver", Trapezoid(5.0, 5.0 + 1e-12, 5.0 + 2e-12, 5.0 + 3e-12))
-    food = replace(tipper().inputs[0], terms=(*tipper().inputs[0].terms, sliver))
-    old = tipper(inputs=(food, tipper().inputs[1]), outputs=(output,))
+    food = replace(tipper().variables[0], terms=(*tipper().variables[0].terms, sliver))
+    old = tipper(inputs=(food, tipper().variables[1]), outputs=(output,))
     new = with_rules(
         old, ONE, TWO, THREE, rule(Proposition("food", ("sliver",)), "top")
     )
@@ -246,11 +246,11 @@ def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
 
 
 def test_numbers_without_fractions_are_shown_as_they_are_computed() -> None:
-    bell = replace(tipper().inputs[0], terms=(
+    bell = replace(tipper().variables[0], terms=(
         Term("bad", Gaussian(0.0, 2.0)),
-        tipper().inputs[0].terms[1]))  # fmt: skip
-    old = tipper(inputs=(bell, tipper().inputs[1]))
-    new = tipper(inputs=old.inputs, numbers={"low": 6.0})
+        tipper().variables[0].terms[1]))  # fmt: skip
+    old = tipper(inputs=(bell, tipper().variables[1]))
+    new = tipper(inputs=old.variables, numbers={"low": 6.0})
     witness = results(old, new).answers[0]
     assert isinstance(witness.state, Witness)
     assert witness.sentence.endswith("as the reference computes it")
@@ -366,9 +366,9 @@ def altered(system: FuzzySystem, chance: random.Random) -> FuzzySystem:
         moved = replace(output, terms=(first, *output.terms[1:]))
         return replace(system, outputs=(moved, *system.outputs[1:]))
     elif kind == 3:
-        queries, *others = system.inputs
+        queries, *others = system.variables
         labels = tuple(replace(label, height=0.5) for label in queries.terms)
-        return replace(system, inputs=(replace(queries, terms=labels), *others))
+        return replace(system, variables=(replace(queries, terms=labels), *others))
     changed = replace(block, rules=tuple(rules))
     return replace(system, blocks=(changed, *system.blocks[1:]))
 

@@ -267,7 +267,7 @@ def test_a_wrong_row_is_one_sentence(row: dict[str, float], message: str) -> Non
 @pytest.mark.parametrize("seed", [3, 5])
 def test_a_system_is_audited_as_a_view(seed: int) -> None:
     system = random_system(seed)
-    box = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in system.columns))
+    box = Domain(tuple(DomainSide(name, 0.0, 1.0) for name in system.inputs))
     found = audit(
         Material(system), domain=box, selection=AuditSelection(select=["FT4", "FT5"])
     )

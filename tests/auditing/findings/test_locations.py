@@ -96,7 +96,7 @@ def test_each_rule_of_a_system_is_found_over_all_blocks(seed: int) -> None:
 def test_each_label_of_a_system_is_found(seed: int) -> None:
     system: FuzzySystem = random_system(seed)
     file = written(system)
-    for one in system.variables:
+    for one in system.all_variables:
         for label in one.terms:
             path = term_path(system, TermName(one.name, label.name))
             assert "name:" in text_at(file, file.place(path))

@@ -241,8 +241,8 @@ def test_a_height_is_carried_where_no_degree_is_rounded() -> None:
         (lines, 0.7, None),
     ):
         system = system_of(block_of(A_LOW))
-        one = replace(system.inputs[0], terms=(Term("low", curve, height),))
-        found = view(replace(system, inputs=(one, system.inputs[1])), BOX)
+        one = replace(system.variables[0], terms=(Term("low", curve, height),))
+        found = view(replace(system, variables=(one, system.variables[1])), BOX)
         assert found.rules is not None
         assert (found.bounds is not None) is (expected is None)
         if expected is not None:
@@ -312,7 +312,7 @@ def test_random_systems_are_as_strong_as_their_views_within_rounding() -> None:
         chance = random.Random(seed)
         row = {
             one.name: chance.uniform(one.low or 0.0, one.high or 1.0)
-            for one in system.inputs
+            for one in system.variables
             if not one.parts
         }
         right = infer(system, row).activations

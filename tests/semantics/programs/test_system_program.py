@@ -64,10 +64,10 @@ def test_a_program_has_the_bits_of_the_inference(seed: int) -> None:
     rows = random_rows(system, seed, 8)
     special = {
         name: SPECIAL[(seed + place) % len(SPECIAL)]
-        for place, name in enumerate(system.columns)
+        for place, name in enumerate(system.inputs)
     }
     one = dict(rows[0])
-    one[system.columns[0]] = SPECIAL[seed % len(SPECIAL)]
+    one[system.inputs[0]] = SPECIAL[seed % len(SPECIAL)]
     assert_equal(system, [*rows, special, one])
 
 
