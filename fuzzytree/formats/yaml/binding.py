@@ -359,9 +359,9 @@ def variables_at(
     kept: Entries,
     key: str,
     kind: type[R],
-    mistakes: list[FileMistake],
-    build: Callable[[Path, R], V],
+    build: Callable[[Path, R, list[Mistake]], V],
     bare: Callable[[str, Sequence[str]], V],
+    mistakes: tuple[list[FileMistake], list[Mistake]],
     broken: set[Path],
 ) -> tuple[V, ...] | None:
     """Return the variables under a key; None if it is no list or a name is unknown.
@@ -370,12 +370,12 @@ def variables_at(
     that what speaks of it can be checked.
     `build` makes a variable of its path and record, `bare` one of names alone.
     """
-    bound = records_at(kept, key, kind, mistakes)
+    bound = records_at(kept, key, kind, mistakes[0])
     variables: list[V] = []
     for position, one in enumerate(bound or ()):
         path: Path = (key, position)
         if one is not None:
-            variables.append(build(path, one))
+            variables.append(build(path, one, mistakes[1]))
             continue
         names = _names(kept[key], position)
         if names is None:

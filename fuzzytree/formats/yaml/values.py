@@ -13,14 +13,21 @@ from fuzzytree.formats.formulas import FormulaError, parse
 from fuzzytree.formats.text_files import MOST_SHOWN
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.binding import shortened
-from fuzzytree.formats.yaml.conditions import SentenceError, parse_condition
+from fuzzytree.formats.yaml.conditions import (
+    SentenceError,
+    parse_conclusions,
+    parse_condition,
+)
 from fuzzytree.model import (
     LR,
+    Activation,
+    And,
     Band,
     Binary,
     Branch,
     Condition,
     Curve,
+    Defuzzifier,
     Formula,
     Leaf,
     Mistake,
@@ -28,12 +35,15 @@ from fuzzytree.model import (
     Part,
     Path,
     Points,
+    RuleBlock,
     Semantics,
     Sets,
     Shape,
     Side,
     Sigmoid,
     SystemCurve,
+    SystemOutput,
+    SystemRule,
     Term,
     Trapezoid,
     Variable,
@@ -56,9 +66,29 @@ def variable(
     )
 
 
-def bare(names: Sequence[str]) -> tuple[Term, ...]:
-    """Return terms of which only the names are known."""
-    return tuple(Term(name, Band()) for name in names)
+def bare_variable(name: str, terms: Sequence[str]) -> Variable:
+    """Return a variable of which only names are known."""
+    return Variable(name, tuple(Term(one, Band()) for one in terms))
+
+
+def output(
+    path: Path, one: layout.OutputOfSystem, mistakes: list[Mistake]
+) -> SystemOutput:
+    """Return an output of a system."""
+    low, high, clips = range_of(one.range)
+    how = Defuzzifier(one.defuzzifier, one.samples, one.grid)
+    labels = terms(path, one.terms, mistakes)
+    return SystemOutput(
+        *(one.name, labels, low, high, how, one.aggregation, one.default),
+        clips=clips,
+        unit=one.unit or "",
+    )
+
+
+def bare_output(name: str, terms: Sequence[str]) -> SystemOutput:
+    """Return an output of which only names are known."""
+    labels = bare_variable(name, terms).terms
+    return SystemOutput(name, labels, None, None, Defuzzifier("weighted sum"))
 
 
 def range_of(
@@ -179,6 +209,40 @@ def conditions(
                 where = (*path, "when", index)
                 mistakes.append((where, f"{shortened(text)}: {error}"))
     return [one for text in sentences if (one := known.get(text)) is not None]
+
+
+def system_rule(
+    path: Path,
+    one: layout.RuleOfSystem | None,
+    known: dict[str, Condition | None],
+    mistakes: list[Mistake],
+) -> SystemRule | None:
+    """Return a rule of a system, or None if it is broken."""
+    if one is None or len(mistakes) >= MOST_SHOWN:
+        return None
+    parts = conditions(path, one.if_, known, mistakes)
+    when = And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else None
+    try:
+        then = parse_conclusions(one.then)
+    except SentenceError as error:
+        mistakes.append(((*path, "then"), f"{shortened(one.then)}: {error}"))
+        return None
+    return SystemRule(when, then, one.weight, one.name or "")
+
+
+def block(head: layout.BlockHead | None, rules: tuple[SystemRule, ...]) -> RuleBlock:
+    """Return a block; a broken one has operators that are never wrong."""
+    if head is None:
+        return RuleBlock(rules, "minimum", "maximum", "minimum")
+    how = head.activation
+    return RuleBlock(
+        rules,
+        head.and_,
+        head.or_,
+        head.implication,
+        Activation(how.method, how.count, how.threshold, how.relation),
+        head.name or "",
+    )
 
 
 def leaf(one: layout.End) -> Leaf:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final, TypeVar
 
 from fuzzytree.errors import InvalidModelError
@@ -12,9 +12,11 @@ from fuzzytree.formats.text_files import MOST_SHOWN, FileMistake, report
 from fuzzytree.formats.yaml import layout, values
 from fuzzytree.formats.yaml.binding import (
     Entries,
+    bind,
     entries,
     find,
     located,
+    not_a_list,
     record,
     record_at,
     records_at,
@@ -22,11 +24,12 @@ from fuzzytree.formats.yaml.binding import (
     variables_at,
 )
 from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
-from fuzzytree.formats.yaml.nodes import MappingNode, Node, Scalar, compose
-from fuzzytree.formats.yaml.system_reader import read_system
+from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
 from fuzzytree.model import (
+    Conclusion,
     Condition,
     Document,
+    FuzzySystem,
     FuzzyTree,
     Mistake,
     Path,
@@ -34,6 +37,9 @@ from fuzzytree.model import (
     Reading,
     Rule,
     RuleBase,
+    RuleBlock,
+    SystemOutput,
+    SystemRule,
     Variable,
     naming_mistakes,
     node_mistakes,
@@ -123,13 +129,13 @@ def _rule_base(root: MappingNode, file_mistakes: list[FileMistake]) -> RuleBase 
     head = record(kept, layout.RuleBaseHead, file_mistakes)
     semantics = record_at(kept, "semantics", layout.RuleSemantics, file_mistakes)
     bound = records_at(kept, "rules", layout.RuleOfModel, file_mistakes)
-    known = _variables(kept, root, file_mistakes)
-    if head is None or bound is None or known is None:
-        return None
-    variables, broken = known
+    broken: set[Path] = set()
     mistakes: list[Mistake] = []
-    rules = _rules(bound, head.classes[0], mistakes)
+    variables = _variables(kept, (file_mistakes, mistakes), broken)
+    rules = _rules(bound or [], head.classes[0] if head else "", mistakes)
     file_mistakes += located(root, mistakes)
+    if head is None or bound is None or variables is None:
+        return None
     return _built(
         lambda: RuleBase(
             name=head.name,
@@ -174,20 +180,20 @@ def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | No
     questions = records_at(kept, "nodes", layout.NodeOfTree, file_mistakes)
     ends = records_at(kept, "leaves", layout.End, file_mistakes)
     groups = records_at(kept, "sets", layout.SetsOfVariable, file_mistakes)
-    known = _variables(kept, root, file_mistakes)
+    broken: set[Path] = set()
+    wrong: list[Mistake] = []
+    variables = _variables(kept, (file_mistakes, wrong), broken)
     if questions is not None and ends is not None:
-        file_mistakes += located(root, [*_number_mistakes(questions, ends)])
-    if head is None or known is None:
-        return None
-    variables, broken = known
+        wrong += _number_mistakes(questions, ends)
     nodes, leaves, fitted = _whole(questions), _whole(ends), _whole(groups)
     tree_nodes = tuple(map(values.node, nodes or ()))
-    wrong: list[Mistake] = []
     sets = tuple(
         values.sets(("sets", place), one, wrong)
         for place, one in enumerate(fitted or ())
     )
     file_mistakes += located(root, wrong)
+    if head is None or variables is None:
+        return None
     meaning = values.semantics(semantics)
     if nodes is None or leaves is None or fitted is None or broken:
         of_nodes = node_mistakes(
@@ -215,7 +221,77 @@ def _tree(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzyTree | No
     )  # fmt: skip
 
 
-M = TypeVar("M", RuleBase, FuzzyTree)
+def _system(root: MappingNode, file_mistakes: list[FileMistake]) -> FuzzySystem | None:
+    kept = entries(root, layout.SystemFile, file_mistakes)
+    head = record(kept, layout.SystemHead, file_mistakes)
+    record_at(kept, "semantics", layout.SystemSemantics, file_mistakes)
+    broken: set[Path] = set()
+    mistakes: list[Mistake] = []
+    both = file_mistakes, mistakes
+    variables = _variables(kept, both, broken)
+    outputs = variables_at(
+        *(kept, "outputs", layout.OutputOfSystem, values.output, values.bare_output),
+        both,
+        broken,
+    )
+    blocks = _blocks(kept, both, broken, _spare(outputs or ()))
+    file_mistakes += located(root, mistakes)
+    if head is None or variables is None or outputs is None or blocks is None:
+        return None
+    return _built(
+        lambda: FuzzySystem(head.name, variables, outputs, blocks, head.note or ""),
+        root, file_mistakes, broken,
+    )  # fmt: skip
+
+
+def _spare(outputs: Sequence[SystemOutput]) -> SystemRule | None:
+    """Return a rule that is always right, to stand in the place of a broken one."""
+    for output in outputs:
+        for label in output.terms:
+            return SystemRule(None, (Conclusion(output.name, label.name),))
+    return None
+
+
+def _blocks(
+    kept: Entries,
+    mistakes: tuple[list[FileMistake], list[Mistake]],
+    broken: set[Path],
+    spare: SystemRule | None,
+) -> tuple[RuleBlock, ...] | None:
+    """Return the blocks; a broken one has operators that are never wrong.
+
+    In the place of a broken rule stands the spare one; None is returned without it.
+    """
+    file_mistakes, wrong = mistakes
+    node = kept.get("blocks")
+    if not isinstance(node, ListNode):
+        if node is not None:
+            not_a_list(node, "blocks", file_mistakes)
+        return None
+    blocks: list[RuleBlock] = []
+    known: dict[str, Condition | None] = {}
+    for position, item in enumerate(node.items):
+        if not isinstance(item, MappingNode):
+            bind(item, layout.BlockOfSystem, file_mistakes)
+            return None
+        own = entries(item, layout.BlockOfSystem, file_mistakes)
+        head = record(own, layout.BlockHead, file_mistakes)
+        bound = records_at(own, "rules", layout.RuleOfSystem, file_mistakes)
+        rules: list[SystemRule] = []
+        for index, one in enumerate(bound or ()):
+            path: Path = ("blocks", position, "rules", index)
+            rule = values.system_rule(path, one, known, wrong)
+            if rule is None:
+                broken.add(path)
+                rule = spare
+            if rule is None:
+                return None
+            rules.append(rule)
+        blocks.append(values.block(head, tuple(rules)))
+    return tuple(blocks)
+
+
+M = TypeVar("M", RuleBase, FuzzyTree, FuzzySystem)
 
 
 def _built(
@@ -237,7 +313,7 @@ _READERS: Final[
 ] = {
     "rule base": _rule_base,
     "tree": _tree,
-    "system": read_system,
+    "system": _system,
 }
 
 
@@ -248,22 +324,14 @@ def _whole(items: list[R | None] | None) -> list[R] | None:
 
 
 def _variables(
-    kept: Entries, root: Node, mistakes: list[FileMistake]
-) -> tuple[tuple[Variable, ...], set[Path]] | None:
-    """Return the variables and which are broken; None if names cannot be known."""
-    broken: set[Path] = set()
-    found: list[Mistake] = []
-    variables = variables_at(
-        kept,
-        "variables",
-        layout.VariableOfModel,
-        mistakes,
-        lambda path, one: values.variable(path, one, found),
-        lambda name, terms: Variable(name, values.bare(terms)),
-        broken,
-    )
-    mistakes += located(root, found)
-    return None if variables is None else (variables, broken)
+    kept: Entries,
+    mistakes: tuple[list[FileMistake], list[Mistake]],
+    broken: set[Path],
+) -> tuple[Variable, ...] | None:
+    """Return the inputs and combinations; None if names cannot be known."""
+    kind, bare = layout.VariableOfModel, values.bare_variable
+    make = values.variable
+    return variables_at(kept, "variables", kind, make, bare, mistakes, broken)
 
 
 def _number_mistakes(
