@@ -22,7 +22,7 @@ import functools
 import itertools
 import math
 import operator
-from bisect import bisect_right
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple, TypeVar
@@ -50,6 +50,7 @@ MOST_CHOICES: Final = 2_000
 _DEEPEST: Final = 4  # halvings of levels for axes that share inputs
 _DEEPEST_ENCLOSED: Final = 7  # where degrees are enclosed
 _TRIES: Final = 16  # levels between two critical ones
+_KEPT: Final = 1 << 12  # levels of an axis whose cells are kept
 _PLACES: Final = 12  # of an axis with a curve that rules share
 
 T = TypeVar("T")
@@ -170,7 +171,8 @@ class LevelAxis:
         for number, groups in enumerate(self.propositions):
             self.kinds[groups] = self.kinds.get(groups, 0) | 1 << number
         self.is_exact = all(element.is_exact for element in self.elements)
-        self._known: dict[int, tuple[Cell, ...]] = {}
+        self._coded = [tuple(map(_coded, element)) for element in self.elements]
+        self._known: dict[tuple[Fraction, Fraction, bool, bool], list[Cell]] = {}
         self._by_elements: dict[tuple[int, int, int], tuple[int, int, int]] = {}
         self._functions: dict[Propositions, Between] = {}
 
@@ -213,17 +215,14 @@ class LevelAxis:
         is_exact = all(self.elements[i].is_exact for group in groups for i in group)
         return Between(lower, lower if is_exact else joined(1))
 
-    def between_own(self, level: Fraction) -> tuple[Cell, ...]:
-        """Return the cells at a level that is not critical; places may be others'.
+    def between_own(self, place: int) -> Sequence[Cell]:
+        """Return the cells between two critical levels of this axis.
 
-        Their bits are those at the level, their parts those at another one between the
-        same critical levels of this axis.
+        `place`: the number of the upper one. The bits are those at all levels between,
+        the parts those at one of them.
         """
-        place = bisect_right(self.levels, level)
-        if place not in self._known:
-            middle = (self.levels[place - 1] + self.levels[place]) / 2
-            self._known[place] = tuple(self.cells(middle, middle))
-        return self._known[place]
+        middle = (self.levels[place - 1] + self.levels[place]) / 2
+        return self.cells(middle, middle)
 
     def cells(
         self,
@@ -240,39 +239,46 @@ class LevelAxis:
         all single values at which something changes are among the cells, and neighbours
         stay apart; else only those where a function jumps.
         """
+        key = reached, kept, is_sure, has_points
+        if key not in self._known:
+            if len(self._known) >= _KEPT:
+                self._known.clear()
+            cells = self._cells(reached, kept, is_sure)
+            self._known[key] = cells if has_points else _merged(cells)
+        return self._known[key]
+
+    def _cells(self, reached: Fraction, kept: Fraction, is_sure: bool) -> list[Cell]:
         checkpoint()
-        high = [e.lower if is_sure else e.upper for e in self.elements]
-        low = [e.upper if is_sure else e.lower for e in self.elements]
+        lower, upper = ([coded[side] for coded in self._coded] for side in (0, 1))
+        high, low = (lower, upper) if is_sure else (upper, lower)
         is_one = reached == kept and self.is_exact
-        events: list[tuple[Fraction, int, int, int, int]] = []
+        events: list[tuple[float, Fraction, int, int, int, int]] = []
         for side, level, every in ((0, reached, high), (1, kept, low)):
             if side and is_one:
                 continue
             for element, lines in enumerate(every):
                 found = _changes(lines, level)
-                events += ((x, side, element, at, then) for x, at, then in found)
-        events.sort(key=_place_of)
+                events += ((f, x, side, element, at, then) for f, x, at, then in found)
+        events.sort()
         # Of the elements, as bits: those at the level or above it, and those above it.
         at_least, above, masks = [0, 0], [0, 0], (0, 0, 0)
         kept_side = 0 if is_one else 1
         result: list[Cell] = []
-        for x, group in itertools.groupby(events, _place_of):
+        for (_, x), group in itertools.groupby(events, _place_of):
             changed = [*group]
             if result:
                 last = AxisStretch(result[-1].part.high, x)
                 result.append(Cell(last, *masks))
-            for kind in (3, 4):  # at the place itself, and after it
+            for kind in (4, 5):  # at the place itself, and after it
                 for event in changed:
-                    side, bit, sign = event[1], 1 << event[2], event[kind]
+                    side, bit, sign = event[2], 1 << event[3], event[kind]
                     at_least[side] = at_least[side] & ~bit | (bit if sign >= 0 else 0)
                     above[side] = above[side] & ~bit | (bit if sign > 0 else 0)
                 masks = self._masks(at_least[0], at_least[kept_side], above[kept_side])
-                if kind == 3:
+                if kind == 4:
                     part = AxisStretch(x, x, is_open=False)
                     result.append(Cell(part, *masks))
-        if self.is_open:
-            result = result[1:]
-        return result if has_points else _merged(result)
+        return result[1:] if self.is_open else result
 
     def _masks(self, up: int, down: int, above: int) -> tuple[int, int, int]:
         """Return which rules reach, are below and are at a level, by elements.
@@ -302,31 +308,60 @@ class LevelAxis:
         )
 
 
-def _place_of(event: tuple[Fraction, int, int, int, int]) -> Fraction:
-    return event[0]
+class _Coded(NamedTuple):
+    """Lines ready for many levels: each height once, places as doubles as well."""
+
+    places: tuple[tuple[float, Fraction], ...]
+    heights: tuple[Fraction, ...]
+    at: tuple[int, ...]  # numbers of heights
+    after: tuple[int, ...]
+    before: tuple[int, ...]
+    per_height: tuple[Fraction, ...]  # how far a line goes while it rises by 1
 
 
-def _changes(lines: Lines, level: Fraction) -> Iterator[tuple[Fraction, int, int]]:
+def _coded(lines: Lines) -> _Coded:
+    heights = {height: number for number, height in enumerate(lines.values)}
+    at, after, before = (
+        tuple(heights[height] for height in of)
+        for of in (lines.at, lines.after, lines.before)
+    )
+    per_height = (
+        (b - a) / (q - p) if p != q else ZERO for a, b, p, q in lines.pieces()
+    )
+    places = tuple((float(x), x) for x in lines.x)
+    return _Coded(places, (*heights,), at, after, before, tuple(per_height))
+
+
+def _place_of(
+    event: tuple[float, Fraction, int, int, int, int],
+) -> tuple[float, Fraction]:
+    return event[:2]
+
+
+def _changes(
+    lines: _Coded, level: Fraction
+) -> Iterator[tuple[float, Fraction, int, int]]:
     """Yield where a function changes its side of a level: there, and after it.
 
-    The first and the last place are among them.
+    The first and the last place are among them. A place is a double and a fraction, as
+    doubles are faster to sort.
     """
+    sides = [(height > level) - (height < level) for height in lines.heights]
     last, end = None, len(lines.after)
-    for place, x in enumerate(lines.x):
-        at = lines.at[place]
-        here = (at > level) - (at < level)
-        if place == end:
-            yield x, here, here
+    for number, (near, x) in enumerate(lines.places):
+        here = sides[lines.at[number]]
+        if number == end:
+            yield near, x, here, here
             return
-        p, q = lines.after[place], lines.before[place]
-        first, then = (p > level) - (p < level), (q > level) - (q < level)
+        first, then = sides[lines.after[number]], sides[lines.before[number]]
         after = first or then
         if last is None or here != last or after != last:
-            yield x, here, after
+            yield near, x, here, after
         last = after
         if first * then < 0:
-            a, b = x, lines.x[place + 1]
-            yield a + (b - a) * (level - p) / (q - p), 0, then
+            rise = level - lines.heights[lines.after[number]]
+            place = x + rise * lines.per_height[number]
+            yield float(place), place, 0, then
             last = then
 
 
@@ -372,6 +407,20 @@ class Sides(NamedTuple):
     rivals: int
 
 
+class LevelRange(NamedTuple):
+    """Two neighbouring critical levels.
+
+    Attributes:
+        low: The lower one.
+        high: The upper one.
+        places: For each axis the number of its own first critical level above them.
+    """
+
+    low: Fraction
+    high: Fraction
+    places: tuple[int, ...]
+
+
 class Levels:
     """The rules of an arrangement under the minimum, at levels."""
 
@@ -406,10 +455,17 @@ class Levels:
 
     # --- are all kept apart at some level
 
-    def ranges(self) -> list[tuple[Fraction, Fraction]]:
-        """Return neighbouring critical levels, those far apart first."""
-        pairs = zip(self.levels, self.levels[1:], strict=False)
-        return sorted(pairs, key=lambda ends: (ends[0] - ends[1], -ends[0]))
+    @functools.cached_property
+    def ranges(self) -> tuple[LevelRange, ...]:
+        """Neighbouring critical levels, those far apart first."""
+        places = [0] * len(self.axes)
+        every: list[LevelRange] = []
+        for low, high in itertools.pairwise(self.levels):
+            for number, axis in enumerate(self.axes):
+                place = places[number]
+                places[number] = place + (axis.levels[place] == low)
+            every.append(LevelRange(low, high, tuple(places)))
+        return tuple(sorted(every, key=lambda one: (one.low - one.high, -one.low)))
 
     def apart(self, sides: Sides, clock: Clock) -> Iterator[tuple[Fraction, Fraction]]:
         """Yield ranges of levels at which cells keep rivals below, and none of ours.
@@ -418,25 +474,25 @@ class Levels:
         """
         known: dict[tuple[int, ...], bool] = {}
         families: dict[tuple[int, int], tuple[int, ...]] = {}
-        for low, high in self.ranges():
-            level = (low + high) / 2
-            key = tuple(bisect_right(axis.levels, level) for axis in self.axes)
-            if key not in known:
-                for place in enumerate(key):
+        for low, high, places in self.ranges:
+            if places not in known:
+                for place in enumerate(places):
                     if place not in families:
-                        families[place] = self._below(place[0], sides, level)
-                every = [families[place] for place in enumerate(key)]
-                known[key] = joint_choice(every, sides.rivals, clock) is not None
-            if known[key]:
+                        families[place] = self._below(place[0], sides, place[1])
+                every = [families[place] for place in enumerate(places)]
+                known[places] = joint_choice(every, sides.rivals, clock) is not None
+            if known[places]:
                 yield low, high
 
-    def _below(self, axis: int, sides: Sides, level: Fraction) -> tuple[int, ...]:
+    def _below(self, axis: int, sides: Sides, place: int) -> tuple[int, ...]:
         """Return the largest sets of rivals that an axis keeps below a level."""
-        cells = self.axes[axis].between_own(level)
+        cells = self.axes[axis].between_own(place)
         return maximal(c.below & sides.rivals for c in cells if _keeps(c, sides))
 
-    def _is_apart(self, sides: Sides, level: Fraction, clock: Clock) -> bool:
-        families = [self._below(axis, sides, level) for axis in range(len(self.axes))]
+    def _is_apart(self, sides: Sides, places: Sequence[int], clock: Clock) -> bool:
+        families = [
+            self._below(axis, sides, place) for axis, place in enumerate(places)
+        ]
         return joint_choice(families, sides.rivals, clock) is not None
 
     def at_least(self, clock: Clock) -> tuple[Fraction, Fraction]:
@@ -447,14 +503,12 @@ class Levels:
         count = len(self.base.rules.rules)
         sides = Sides(0, (1 << count) - 1)
         if self.is_exact:
-            first, last = 0, len(self.levels) - 1
-            while first < last:  # the range in which it first succeeds
-                middle = (first + last) // 2
-                level = (self.levels[middle] + self.levels[middle + 1]) / 2
-                if self._is_apart(sides, level, clock):
-                    last = middle
-                else:
-                    first = middle + 1
+            rising = sorted(self.ranges)
+
+            def is_apart(one: LevelRange) -> bool:
+                return self._is_apart(sides, one.places, clock)
+
+            first = bisect_left(rising, True, key=is_apart)  # where it first succeeds
             return self.levels[first], self.levels[first]
         return self._first(sides, clock, False), self._first(sides, clock, True)
 
@@ -648,17 +702,19 @@ class Levels:
         """
         mine, goal = _union(1 << one for one in ours), strict | weak
         sides = Sides(mine, goal)
-        for low, high in self.ranges():
-            level = (low + high) / 2
+        for low, high, places in self.ranges:
             families: list[set[int]] = []
             for number, axis in enumerate(self.axes):
                 clock.check()
                 if axis.ends[0] == axis.ends[1]:
                     continue
-                pivots = self._pivots(number, bisect_right(axis.levels, level), mine)
+                pivots = self._pivots(number, places[number], mine)
                 dones = {cell.below | cell.level & weak for cell in pivots}
                 if dones and not families:
-                    families = [self._kept(axis, level, sides) for axis in self.axes]
+                    families = [
+                        self._kept(*one, sides)
+                        for one in zip(self.axes, places, strict=True)
+                    ]
                 for done in maximal(mask & goal for mask in dones):
                     every = [*families]
                     every[number] = {done}
@@ -671,9 +727,9 @@ class Levels:
                             )
         yield from self._flat(ours, strict, weak, clock)
 
-    def _kept(self, axis: LevelAxis, level: Fraction, sides: Sides) -> set[int]:
+    def _kept(self, axis: LevelAxis, place: int, sides: Sides) -> set[int]:
         """Return what parts of an axis with an interior keep below a level."""
-        cells = _inner(axis.between_own(level))
+        cells = _inner(axis.between_own(place))
         return {cell.below for cell in cells if _keeps(cell, sides)}
 
     def _pivots(self, number: int, place: int, mine: int) -> list[Cell]:

@@ -7,7 +7,7 @@ that is claimed was evaluated in fractions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import Final, NamedTuple
@@ -164,11 +164,11 @@ def _at_levels(
 
     if not levels.axes:
         return question.accept(_middle(question.base)), False
-    ranges = [(ZERO, ONE)]
+    ranges: Iterable[tuple[Fraction, Fraction]] = [(ZERO, ONE)]
     if question.ceiling is not None:
         ranges = [(question.ceiling, question.ceiling)]
     elif levels.is_exact:
-        ranges = [*levels.apart(sides, clock)]
+        ranges = levels.apart(sides, clock)
     for ends in ranges:
         found, is_left = levels.search(sides, ends, clock, count, question.accept)
         if found is not None:
