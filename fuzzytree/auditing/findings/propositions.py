@@ -53,6 +53,7 @@ MOST_SHOWN: Final = 100
 """The most propositions that matter that are listed one by one."""
 
 _MOST_STRENGTHS = 1 << 24  # of all rules with and without each proposition, at all rows
+_MOST_BOXES = 500  # for one proposition; proofs took 50
 _MOST_TRIED = 4  # rows that are evaluated in fractions for one proposition
 
 
@@ -137,7 +138,9 @@ def _state(
     if witness is not None:
         return witness
     shorter = one.of(subject.rules)
-    turn = partial(equivalence, subject.rules, shorter, subject.domain)
+    turn = partial(
+        equivalence, subject.rules, shorter, subject.domain, most=_MOST_BOXES
+    )
     state = slices.run(left, turn)
     if isinstance(state, Witness):
         point = point_of(state.point)
