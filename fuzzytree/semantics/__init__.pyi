@@ -29,6 +29,7 @@ from .crisp_regions import grid as grid
 from .crisp_regions import grid_size as grid_size
 from .crisp_regions import node_faults as node_faults
 from .crisp_regions import node_points as node_points
+from .enclosing import Enclosed as Enclosed
 from .enclosing import Interval as Interval
 from .enclosing import Jet as Jet
 from .enclosing import degree_bounds as degree_bounds

@@ -10,18 +10,33 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
 
-from fuzzytree.auditing.engine.pieces import ONE, ZERO
-from fuzzytree.model import LR, Band, MembershipFunction, Points, checkpoint
-from fuzzytree.numerics import exact_degree, outwards
-from fuzzytree.semantics import degree_bounds, jet
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, RuleCurve
+from fuzzytree.model import (
+    LR,
+    Band,
+    Curve,
+    Hedge,
+    MembershipFunction,
+    N,
+    Numbers,
+    Points,
+    checkpoint,
+    hedged,
+)
+from fuzzytree.numerics import degree_between, exact_degree, outwards
+from fuzzytree.semantics import Enclosed, Interval, Jet, degree_bounds, jet
 
-_BLOCKS: Final = 4  # between two knots of a curve; each with one bound of its bend
-_PARTS: Final = 4  # of a block; each with two lines around the curve
+APART: Final = Fraction(1, 1 << 10)
+"""How far two lines around a function are apart at most, where their number allows."""
+
+_MOST_BLOCKS: Final = 256  # between two knots of a curve; each with a bound of its bend
+_PARTS: Final = 8  # of a block at most; each with two lines around the curve
+_MORE: Final = 1 + Fraction(1, 1 << 20)  # for what rounding takes
 _GRID: Final = 1 << 32  # bounds are multiples of 1 by this
 
 
@@ -49,9 +64,10 @@ class Lines(NamedTuple):
         place = bisect_left(self.x, x)
         if self.x[place] == x:
             return self.at[place]
-        return _on(self.x[place - 1], self.x[place], *self._ends(place - 1), x)
+        return _on(self.x[place - 1], self.x[place], *self.ends(place - 1), x)
 
-    def _ends(self, piece: int) -> tuple[Fraction, Fraction]:
+    def ends(self, piece: int) -> tuple[Fraction, Fraction]:
+        """Return the values that a line, by number, has at its two ends."""
         return self.after[piece], self.before[piece]
 
     @property
@@ -118,6 +134,25 @@ def constant(value: Fraction, low: Fraction, high: Fraction) -> Lines:
     return Lines((low, high), (value, value), (value,), (value,))
 
 
+class Hedged(MembershipFunction, frozen=True, tag="hedged"):
+    """A membership function times a height, and what hedges make of that.
+
+    The last hedge is the first to act.
+    """
+
+    function: MembershipFunction
+    height: float
+    hedges: tuple[Hedge, ...]
+
+    def degree(self, n: Numbers[N], x: N) -> N:
+        """Return the degree at a value."""
+        return hedged(n, self.hedges, self.height * self.function.degree(n, x))
+
+    def knots(self) -> tuple[float, ...]:
+        """Return where the function changes its formula."""
+        return self.function.knots()
+
+
 @functools.lru_cache(maxsize=1 << 12)
 def lines_of(function: MembershipFunction, low: Fraction, high: Fraction) -> Between:
     """Return the degrees of a membership function between two ends as lines.
@@ -149,50 +184,184 @@ def _straight(
     return 2 * p - q, 2 * q - p
 
 
+class _Chord(NamedTuple):
+    """A line of one side of a function, from one place to another."""
+
+    a: Fraction
+    b: Fraction
+    p: Fraction  # its values there
+    q: Fraction
+
+
 def _enclosed(function: MembershipFunction, knots: Sequence[Fraction]) -> Between:
-    x = [knots[0]]
-    rest: list[tuple[Fraction, Fraction]] = []  # what chords are off by at most
-    for a, b in itertools.pairwise(knots):
-        for block in range(_BLOCKS):
-            first, last = (a + (b - a) * (block + k) / _BLOCKS for k in (0, 1))
-            off = _off(function, first, last)
-            x += (first + (last - first) * k / _PARTS for k in range(1, _PARTS + 1))
-            rest += [off] * _PARTS if off else [(ONE, ONE)] * _PARTS
-    at = [_degree(function, value) for value in x]
-    sides: tuple[list[Fraction], ...] = ([], [], [], [])
-    for place, (below, above) in enumerate(rest):
+    blocks = [
+        one for a, b in itertools.pairwise(knots) for one in _blocks(function, a, b)
+    ]
+    degrees = {x: _degree(function, x) for x in knots}
+    sides: tuple[list[_Chord], list[_Chord]] = ([], [])
+    for block in blocks:
+        for a, b in block.parts:
+            checkpoint()
+            ends = _limit(function, a, 1), _limit(function, b, -1)
+            degrees.setdefault(b, ends[1])
+            chords = _chords(block, (a, b), ends)
+            for side, chord in zip(sides, chords, strict=True):
+                side.append(chord)
+    least = min((block.range[0] for block in blocks), default=ZERO)
+    limits = min(least, *(low for low, _ in degrees.values())), ONE
+    lower, upper = (
+        _line(
+            [*_held(chords, limit, max if side == 0 else min)],
+            {x: bounds[side] for x, bounds in degrees.items()},
+        )
+        for side, (chords, limit) in enumerate(zip(sides, limits, strict=True))
+    )
+    knots = sorted({*lower.x, *upper.x})
+    return Between(_with_knots(lower, knots), _with_knots(upper, knots))
+
+
+class _Block(NamedTuple):
+    """Neighbouring parts of an axis, with one bound of a function's bend."""
+
+    parts: tuple[tuple[Fraction, Fraction], ...]
+    bend: tuple[Fraction, Fraction] | None
+    range: tuple[Fraction, Fraction]  # bounds of all values strictly inside
+
+    def off(self, length: Fraction) -> tuple[Fraction, Fraction]:
+        """Return by how much a function is below and above the chord of a part.
+
+        Between a and b it is the chord less f''(y) (x - a) (b - x) / 2 for some y, and
+        the product is at most a quarter of the square of b - a.
+        """
+        assert self.bend is not None
+        low, high = self.bend
+        share = length**2 / 8
+        return (
+            _rounded(max(high, ZERO) * share)[1],
+            _rounded(max(-low, ZERO) * share)[1],
+        )
+
+    @property
+    def apart(self) -> Fraction:
+        """How far its two lines are apart at most."""
+        low, high = self.range
+        if self.bend is None:
+            return high - low
+        length = max(b - a for a, b in self.parts)
+        return min(sum(self.off(length), ZERO), high - low)
+
+
+def _blocks(function: MembershipFunction, a: Fraction, b: Fraction) -> Iterator[_Block]:
+    """Yield blocks from one knot to the next, halved until both lines are near."""
+    todo, count = [(a, b)], 0
+    while todo:
         checkpoint()
-        (p, q), (r, s) = at[place], at[place + 1]
-        ends = p - below, r - below, q + above, s + above
-        if below == above == 1:  # nothing is known of the bend
-            least, most = _range(function, x[place], x[place + 1])
-            ends = least, least, most, most
-        for side, value in zip(sides, ends, strict=True):
-            side.append(value)
-    lower, upper = (tuple(one[k] for one in at) for k in (0, 1))
-    return Between(
-        Lines(tuple(x), lower, tuple(sides[0]), tuple(sides[1])),
-        Lines(tuple(x), upper, tuple(sides[2]), tuple(sides[3])),
+        first, last = todo.pop()
+        block = _block(function, first, last)
+        middle = Fraction(float((first + last) / 2))
+        count += 1
+        if block.apart <= APART or count > _MOST_BLOCKS or not first < middle < last:
+            yield block
+        else:
+            todo += [(middle, last), (first, middle)]
+
+
+def _block(function: MembershipFunction, a: Fraction, b: Fraction) -> _Block:
+    known = jet(function, outwards(a)[0], outwards(b)[1])
+    range_ = _within(known.value.low, known.value.high)
+    if range_[0] == range_[1] or not math.isfinite(known.bend.size):
+        return _Block(((a, b),), None, range_)
+    bend = Fraction(known.bend.low), Fraction(known.bend.high)
+    off = max(bend[1], ZERO) + max(-bend[0], ZERO)
+    needed = math.ceil((b - a) * Fraction(math.sqrt(off / APART / 8)) * _MORE)
+    count = min(max(needed, 1), _PARTS)
+    inner = (Fraction(float(a + (b - a) * k / count)) for k in range(1, count))
+    places = sorted({a, b, *(x for x in inner if a < x < b)})
+    return _Block((*itertools.pairwise(places),), bend, range_)
+
+
+def _chords(
+    block: _Block,
+    part: tuple[Fraction, Fraction],
+    ends: tuple[tuple[Fraction, Fraction], tuple[Fraction, Fraction]],
+) -> tuple[_Chord, _Chord]:
+    """Return a part's line from below and from above, by bounds at both ends."""
+    (p, r), (q, s) = ends
+    low, high = block.range
+    level = _Chord(*part, low, low), _Chord(*part, high, high)
+    if block.bend is None:
+        return level
+    below, above = block.off(part[1] - part[0])
+    if below + above > high - low:
+        return level
+    return _Chord(*part, p - below, q - below), _Chord(*part, r + above, s + above)
+
+
+def _held(
+    chords: Sequence[_Chord],
+    limit: Fraction,
+    pick: Callable[[Fraction, Fraction], Fraction],
+) -> Iterator[_Chord]:
+    """Yield lines that a limit holds; they meet it at doubles, on the safe side."""
+    for a, b, p, q in chords:
+        first, last = pick(p, limit), pick(q, limit)
+        if (first == p) == (last == q) or limit in (p, q):
+            yield _Chord(a, b, first, last)
+            continue
+        exact = a + (b - a) * (limit - p) / (q - p)
+        x = Fraction(outwards(exact)[0 if first == p else 1])
+        x = min(max(x, a), b)
+        if a < x:
+            yield _Chord(a, x, first, limit)
+        if x < b:
+            yield _Chord(x, b, limit, last)
+
+
+def _line(chords: Sequence[_Chord], degrees: Mapping[Fraction, Fraction]) -> Lines:
+    x = (*(one.a for one in chords), chords[-1].b)
+    at = (degrees.get(one.a, one.p) for one in chords)
+    return Lines(
+        x,
+        (*at, degrees[x[-1]]),
+        tuple(one.p for one in chords),
+        tuple(one.q for one in chords),
     )
 
 
-def _off(
-    function: MembershipFunction, a: Fraction, b: Fraction
-) -> tuple[Fraction, Fraction] | None:
-    """Return by how much a function is below and above the chords of a block's parts.
+def _with_knots(lines: Lines, x: Sequence[Fraction]) -> Lines:
+    """Return the same function with more knots."""
+    if len(x) == len(lines.x):
+        return lines
+    after: list[Fraction] = []
+    before: list[Fraction] = []
+    for a, b in itertools.pairwise(x):
+        place = bisect_right(lines.x, a) - 1
+        ends = lines.x[place], lines.x[place + 1], *lines.ends(place)
+        after.append(_on(*ends, a))
+        before.append(_on(*ends, b))
+    return Lines((*x,), tuple(map(lines.value, x)), tuple(after), tuple(before))
 
-    Between a and b it is the chord less f''(y) (x - a) (b - x) / 2 for some y, and the
-    product is at most a quarter of the square of b - a. None if nothing is known.
+
+def _limit(
+    function: MembershipFunction, x: Fraction, to: int
+) -> tuple[Fraction, Fraction]:
+    """Return bounds of the limit at a place, from the right (1) or the left (-1).
+
+    Polynomial functions have exact ones. Of the others some jump, but from 0 to 1.
     """
-    bend = jet(function, outwards(a)[0], outwards(b)[1]).bend
-    if not math.isfinite(bend.size):
-        return None
-    share = ((b - a) / _PARTS) ** 2 / 8
-    off = (
-        _rounded(max(Fraction(one), ZERO) * share)[1] for one in (bend.high, -bend.low)
-    )
-    below, above = off
-    return None if max(below, above) >= 1 else (below, above)
+    if isinstance(function, Hedged):
+        return _changed(function, _limit(function.function, x, to))
+    if isinstance(function, LR | Band | Points):
+        curve = RuleCurve(function)
+        return _rounded(curve.degree_after(x) if to > 0 else curve.degree(x))
+    at = _degree(function, x)
+    if x != Fraction(float(x)):
+        return at
+    ends = sorted((float(x), math.nextafter(float(x), to * math.inf)))
+    near = jet(function, *ends).value
+    if near.high - float(at[0]) < 0.5 and float(at[1]) - near.low < 0.5:
+        return at  # it does not jump
+    return _within(near.low, near.high)
 
 
 def _rounded(value: Fraction) -> tuple[Fraction, Fraction]:
@@ -204,20 +373,29 @@ def _rounded(value: Fraction) -> tuple[Fraction, Fraction]:
 def _degree(function: MembershipFunction, x: Fraction) -> tuple[Fraction, Fraction]:
     if isinstance(function, LR):
         return _rounded(exact_degree(function, x))
-    known = degree_bounds(function, x)
-    return _within(known.low, known.high)
+    if isinstance(function, Hedged):
+        return _changed(function, _degree(function.function, x))
+    known = None
+    if (
+        isinstance(function, Curve) and float(x) in function.knots()
+    ):  # where it may be 0 or 1 exactly
+        known = degree_between(function, x)
+    low, high = known or degree_bounds(function, x)
+    return _within(low, high)
 
 
-def _range(
-    function: MembershipFunction, a: Fraction, b: Fraction
+def _changed(
+    function: Hedged, known: tuple[Fraction, Fraction]
 ) -> tuple[Fraction, Fraction]:
-    known = jet(function, outwards(a)[0], outwards(b)[1]).value
-    return _within(known.low, known.high)
+    """Return what becomes of bounds of a degree."""
+    near = Jet(Interval(outwards(known[0])[0], outwards(known[1])[1]))
+    algebra = Enclosed(is_open=False)
+    return _within(*hedged(algebra, function.hedges, function.height * near).value)
 
 
-def _within(low: float, high: float) -> tuple[Fraction, Fraction]:
+def _within(low: float | Fraction, high: float | Fraction) -> tuple[Fraction, Fraction]:
     """Return bounds of a degree as fractions of few digits, from 0 to 1."""
-    ends = Fraction(min(max(low, 0.0), 1.0)), Fraction(max(min(high, 1.0), 0.0))
+    ends = Fraction(min(max(low, 0), 1)), Fraction(max(min(high, 1), 0))
     return _rounded(ends[0])[0], _rounded(ends[1])[1]
 
 

@@ -24,7 +24,6 @@ from fuzzytree.auditing.findings.curve_bounds import (
     as_points,
     curve_bounds,
     gap,
-    hedged_bounds,
     scale,
 )
 from fuzzytree.auditing.findings.records import AuditAnswer, TermName
@@ -54,12 +53,12 @@ class SystemTerms:
     def __init__(
         self,
         plain: Mapping[str, Mapping[str, Shape]],
-        bounds: Mapping[Name, CurveBounds] | None = None,
-        ranges: Mapping[str, Interval | None] | None = None,
+        bounds: Mapping[Name, CurveBounds],
+        labels: Mapping[Name, SystemLabel],
+        ranges: Mapping[str, Interval | None],
     ) -> None:
-        self.plain = plain
-        self.bounds = bounds or {}
-        self.ranges = ranges or {}
+        self.plain, self.bounds = plain, bounds
+        self.labels, self.ranges = labels, ranges
         self.hedged_terms: dict[Name, CurveBounds] = {}
 
     def knows(self, variable: str, term: str) -> bool:
@@ -79,9 +78,8 @@ class SystemTerms:
         Returns:
             None if there are no lines between which it is.
         """
-        lines = self.pointed(variable, term)
-        for hedge in reversed(hedges):
-            lines = lines and hedged_bounds(lines, hedge)
+        label, of = self.labels[variable, term], self.ranges[variable]
+        lines = curve_bounds(label.function, of, label.height, tuple(hedges))
         if lines is None:
             return None
         name = " ".join((*hedges, term))
@@ -142,7 +140,8 @@ def terms_of(
             few = {0: "no rule uses it", 1: "1 rule uses it"}
             users = few.get(count, f"{count} rules use it")
             answers.append(_answer(one, label, lines, ranges[one.name], users))
-    return SystemTerms(plain, bounds, ranges), tuple(answers)
+    labels = {(one.name, of.name): of for one in system.variables for of in one.terms}
+    return SystemTerms(plain, bounds, labels, ranges), tuple(answers)
 
 
 def _shape(label: SystemLabel) -> Shape | None:
@@ -160,8 +159,7 @@ def _between(label: SystemLabel, of: Interval | None) -> CurveBounds | None:
     shape = shape_of(label.function)
     if shape is not None and any(shape.mistakes()):
         return None
-    lines = curve_bounds(label.function, of)
-    return lines and (lines if label.height == 1.0 else scale(lines, label.height))
+    return curve_bounds(label.function, of, label.height)
 
 
 def _answer(

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.arrangement import arrange
 from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.bounded_arrangement import BoundedArrangement
@@ -179,10 +180,10 @@ def test_a_weighted_curve_of_polynomials_is_bounded_by_lines() -> None:
 
 
 def test_a_weight_on_a_curve_without_points_is_declined() -> None:
-    narrow = Flank(5e-324, (0.5,), 2.0)
+    side = Flank(1.0, (0.5,), 2.0)
     rules: Rules = ((A, "big", 0.5), (A, "big", 1.0))
-    system = system_of(rules, low=LR(1.0, narrow, narrow))
-    found = view(system, domain_of(system))
+    system = system_of(rules, low=LR(1.0, side, side))
+    found = view(system, Domain(()))
     assert found.numbers == (2,)
     assert [one.sentence for one in found.declined if one.code == "FTD07"] == [
         "rule 1 is left out: the curve of 'low' of 'a' has no points to be weighted"

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import pytest
 
+from fuzzytree.auditing.engine.lines import APART
 from fuzzytree.auditing.findings.curve_bounds import (
-    HALF_GAP,
     CurveBounds,
     complement,
     curve_bounds,
@@ -96,7 +96,7 @@ def test_a_curve_is_nowhere_beyond_its_lines_and_never_far_from_them(
     found = curve_bounds(curve, OF)
     assert found is not None
     assert not beyond(curve, found, 4)
-    assert 0 < gap(found, OF) <= 2 * HALF_GAP * (1 + 2**-19)
+    assert 0 < gap(found, OF) <= 2 * APART  # of two neighbours
 
 
 @pytest.mark.heavy
