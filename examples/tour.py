@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import fuzzytree as ft
-from fuzzytree.report.text import tree_lines
+from fuzzytree.report.models import tree_lines
 from fuzzytree.runtimes.table import find_runtime
 from fuzzytree.tables import batches, read_table
 

@@ -67,7 +67,7 @@ def command(options: ShowOptions) -> None:
     if options.as_json:
         answer_json({**_facts(found), "coverage": coverage})
     else:
-        answer("\n".join(_lines(found.model)))
+        answer("\n".join(report.model_lines(found.model)))
 
 
 def _coverage(model: Document) -> Coverage | None:
@@ -104,15 +104,6 @@ def _draw(model: Document, picture: str, *, quiet: bool) -> None:
     say(f"wrote    {picture}", quiet=quiet)
 
 
-def _lines(model: Document) -> list[str]:
-    from fuzzytree.model import FuzzySystem
-    from fuzzytree.report import model_lines, system_lines
-
-    if isinstance(model, FuzzySystem):
-        return [*system_lines(model)]
-    return [*model_lines(model)]
-
-
 def _facts(found: Reading) -> dict[str, object]:
     import msgspec
 
@@ -120,19 +111,15 @@ def _facts(found: Reading) -> dict[str, object]:
     from fuzzytree.model import FuzzySystem, fingerprint, kind_of
 
     model = found.model
-    facts: dict[str, object] = {
+    outputs = {}
+    if isinstance(model, FuzzySystem):
+        outputs = {"outputs": [one.name for one in model.outputs]}
+    return {
         "carrier": kind_of(model),
         "fingerprint": fingerprint(model),
-    }
-    if isinstance(model, FuzzySystem):
-        facts["inputs"] = model.inputs
-        facts["outputs"] = [one.name for one in model.outputs]
-        facts["rules"] = report.system_rule_facts(model)
-    else:
-        facts["inputs"] = model.inputs
-        facts["rules"] = report.rule_facts(model)
-    return {
-        **facts,
+        "inputs": model.inputs,
+        **outputs,
+        "rules": report.rule_facts(model),
         "losses": found.losses,
         "remarks": found.remarks,
         "model": msgspec.to_builtins(model),

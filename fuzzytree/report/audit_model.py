@@ -11,11 +11,11 @@ from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
 from fuzzytree.report.drawing import Axis
 from fuzzytree.report.markup import Markup
+from fuzzytree.report.models import curve_text, rule_text, sum_text, tree_lines
 from fuzzytree.report.parts import MOST_LINES, MOST_RULES, part
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, tree_picture
-from fuzzytree.report.systems import curve_text, rule_text, sum_text
-from fuzzytree.report.text import counted, number, tree_lines
+from fuzzytree.report.text import counted, number
 
 Audited = FuzzyTree | RuleBase | FuzzySystem
 
@@ -79,7 +79,7 @@ def _cards(
     for place, axis in enumerate(axes[:MOST_VARIABLES]):
         lines = _in_words(model, axis.name)
         if axis.parts:
-            said = sum_text(axis.parts, is_whole=False)
+            said = sum_text(axis.parts)
             lines.append(f"{axis.name} = {said}")
         if axis.undrawn:
             lines.append(f"not drawn: {', '.join(axis.undrawn)}")

@@ -8,9 +8,8 @@ from fuzzytree.auditing import Audit
 from fuzzytree.model import Agreement, FuzzySystem, FuzzyTree, RuleBase
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.report.markup import Markup
+from fuzzytree.report.models import head_lines, model_lines, term_lines
 from fuzzytree.report.parts import part
-from fuzzytree.report.systems import system_lines
-from fuzzytree.report.text import head_lines, model_lines, term_lines
 
 
 def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
@@ -21,14 +20,10 @@ def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
         >>> model_html(random_tree(1)).startswith("<pre>")
         True
     """
-    match model:
-        case FuzzySystem():
-            return _lines(system_lines(model))
-        case FuzzyTree():
-            return _lines(model_lines(model))
-        case RuleBase():
-            terms = _lines(term_lines(model.variables))
-            return part("rule_base", _lines(head_lines(model)), model, terms)
+    if not isinstance(model, RuleBase):
+        return _lines(model_lines(model))
+    terms = _lines(term_lines(model.variables))
+    return part("rule_base", _lines(head_lines(model)), model, terms)
 
 
 def agreement_html(agreement: Agreement) -> Markup:

@@ -10,9 +10,9 @@ from fuzzytree.model import FuzzyTree, Node
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import LETTER, cut
 from fuzzytree.report.markup import Markup, mark
+from fuzzytree.report.models import sum_text, taken
 from fuzzytree.report.pictures import Picture, picture
-from fuzzytree.report.systems import sum_text
-from fuzzytree.report.text import counted, number, taken
+from fuzzytree.report.text import counted, number
 
 MOST_LEAVES = 200
 """Of a tree that is drawn; the page prints a larger one as an outline."""
@@ -96,7 +96,7 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Picture:
     said = _size_text(tree) if title is None else title
     used = {node.variable for node in tree.nodes}
     notes = [
-        f"{one.name} = {sum_text(one.parts, is_whole=False)}"
+        f"{one.name} = {sum_text(one.parts)}"
         for one in tree.variables
         if one.parts and one.name in used
     ]

@@ -533,11 +533,9 @@ service, 0 to 10
   poor       gaussian: mean 0, deviation 1.5
   good       gaussian: mean 5, deviation 1.5
   excellent  gaussian: mean 10, deviation 1.5
-
 food, 0 to 10
   rancid     1 from 0 to 1, rises from 0 at 0, falls to 0 at 3
   delicious  1 from 9 to 10, rises from 0 at 7, falls to 0 at 10
-
 tip, 0 to 30
   weighted average; no rule: nan
   cheap     5

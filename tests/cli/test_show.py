@@ -9,7 +9,7 @@ import pytest
 
 from fuzzytree.model.rulebase import LR, Band, Points, Shape, Side, fingerprint
 from fuzzytree.model.tree import FuzzyTree, Leaf
-from fuzzytree.report.text import model_lines, shape_text
+from fuzzytree.report.models import curve_text, model_lines
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
@@ -134,7 +134,7 @@ def test_every_leaf_and_rule_of_a_tree_is_shown(seed: int) -> None:
     ],
 )
 def test_a_curve_is_described_in_words(shape: Shape, text: str) -> None:
-    assert shape_text(shape) == text
+    assert curve_text(shape) == text
 
 
 @pytest.mark.parametrize("name", ["grip.svg", "grip.SVG"])

@@ -12,7 +12,7 @@ import fuzzytree as ft
 from fuzzytree.api.answering import prepare_answering
 from fuzzytree.errors import LossError
 from fuzzytree.model import FuzzySystem
-from fuzzytree.report.systems import system_lines, system_reasons
+from fuzzytree.report.models import model_lines, system_reasons
 from fuzzytree.runtimes.predictions import Outputs, joined
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.random_systems import random_rows, random_system
@@ -95,7 +95,7 @@ def test_a_runtime_that_runs_no_systems_says_so() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_every_part_of_a_system_is_shown(seed: int) -> None:
     system = random_system(seed)
-    shown = "\n".join(system_lines(system))
+    shown = "\n".join(model_lines(system))
     for one in system.all_variables:
         assert f"\n{one.name}" in shown
         for label in one.terms:

@@ -1,0 +1,484 @@
+"""Models as plain text: a tree with its branches, rules as sentences, terms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import msgspec
+
+from fuzzytree.formats import conclusions_text, condition_text, text_of
+from fuzzytree.model import (
+    LR,
+    Activation,
+    Band,
+    Binary,
+    Branch,
+    Curve,
+    Document,
+    Formula,
+    FuzzySystem,
+    FuzzyTree,
+    Leaf,
+    Linear,
+    Node,
+    Part,
+    Points,
+    RuleBase,
+    RuleBlock,
+    Semantics,
+    Side,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    SystemOutput,
+    SystemRule,
+    Trapezoid,
+    Variable,
+    intervals,
+    kind_of,
+    sentence,
+)
+from fuzzytree.report.text import aligned, counted, number
+from fuzzytree.runtimes import Facts, OnnxModel, Outputs
+from fuzzytree.semantics import Status, rules_from_tree
+
+_MOST_PAIRS = 6  # points that a line of text shows one by one
+_MOST_PARTS = 12  # of a combination, where it must fit into a line
+
+
+def model_lines(model: Document) -> Iterator[str]:
+    """Yield a model as a person reads it: head, tree, rules, terms."""
+    yield from head_lines(model)
+    if isinstance(model, FuzzySystem):
+        start = 1
+        for block in model.blocks:
+            yield ""
+            yield from _block_lines(block, start)
+            start += len(block.rules)
+        yield ""
+        yield from term_lines(model.all_variables, model.inputs)
+        return
+    yield ""
+    if isinstance(model, FuzzyTree):
+        yield from tree_lines(model)
+        yield ""
+    rules = _as_rules(model).rules
+    width = len(str(len(rules)))
+    for position, rule in enumerate(rules, 1):
+        rows = f"  {counted(rule.support, 'row')}" if rule.support is not None else ""
+        yield f"{position:{width}}. {sentence(rule)}{rows}"
+    yield ""
+    yield from term_lines(model.variables)
+
+
+def _as_rules(model: FuzzyTree | RuleBase) -> RuleBase:
+    """Return a rule base as it is, and the relative rules of a tree."""
+    return rules_from_tree(model) if isinstance(model, FuzzyTree) else model
+
+
+def rule_facts(model: Document) -> list[dict[str, object]]:
+    """Return the rules for programs: number, sentence, and class and rows or weight."""
+    if isinstance(model, FuzzySystem):
+        return [
+            {"number": k, "text": rule_text(rule), "weight": rule.weight}
+            for k, rule in enumerate(model.rules, 1)
+        ]
+    return [
+        {"number": k, "text": sentence(r), "class": r.then, "rows": r.support}
+        for k, r in enumerate(_as_rules(model).rules, 1)
+    ]
+
+
+def document_text(model: Document) -> str:
+    """Return what a model is and how large, in a line.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> document_text(random_tree(1, leaves=2))
+        'tree, 1 node, 2 leaves, depth 1, 1 input, 3 classes'
+    """
+    if isinstance(model, FuzzySystem):
+        return (
+            f"fuzzy system, {counted(len(model.inputs), 'input')}, "
+            f"{counted(len(model.outputs), 'output')}, "
+            f"{counted(len(model.rules), 'rule')}, {counted(_terms(model), 'term')}"
+        )
+    inputs = counted(len(model.inputs), "input")
+    classes = counted(len(model.classes), "class", "classes")
+    return f"{kind_text(model)}, {inputs}, {classes}"
+
+
+def document_facts(model: Document) -> dict[str, object]:
+    """Return the same for programs: kind, name, inputs, answers, counts."""
+    facts: dict[str, object] = {
+        "carrier": kind_of(model),
+        "name": model.name,
+        "inputs": model.inputs,
+    }
+    if isinstance(model, FuzzySystem):
+        facts["outputs"] = tuple(one.name for one in model.outputs)
+    else:
+        facts["classes"] = model.classes
+    rules = model.leaves if isinstance(model, FuzzyTree) else model.rules
+    return {**facts, "rules": len(rules), "terms": _terms(model)}
+
+
+def _terms(model: Document) -> int:
+    count = sum(len(one.terms) for one in model.variables)
+    outputs = model.outputs if isinstance(model, FuzzySystem) else ()
+    return count + sum(len(one.terms) for one in outputs)
+
+
+def onnx_facts(model: OnnxModel) -> dict[str, object]:
+    """Return what an ONNX file says about itself, by the names of the JSON."""
+    fields = msgspec.structs.fields(Facts)
+    return {one.encode_name: getattr(model, one.name) for one in fields}
+
+
+def fact_lines(facts: Mapping[str, object]) -> list[str]:
+    """Return facts as aligned lines."""
+    rows: list[tuple[str, str]] = []
+    for name, value in facts.items():
+        if isinstance(value, Semantics):
+            rows += [
+                (k, str(getattr(value, k) or "no class"))
+                for k in value.__struct_fields__
+            ]
+        elif isinstance(value, tuple):
+            rows.append((name, ", ".join(map(str, value))))
+        else:
+            shown = "representation" if name == "carrier" else name
+            rows.append((shown, str(value)))
+    return aligned(rows)
+
+
+def head_lines(model: Document) -> Iterator[str]:
+    """Yield what a model is, what it needs, and what it answers."""
+    if isinstance(model, FuzzySystem):
+        yield f"{model.name}: {document_text(model)}"
+        yield from (f"note     {line}" for line in model.note.splitlines())
+        yield f"inputs   {len(model.inputs)}: {', '.join(model.inputs) or 'none'}"
+        names = ", ".join(one.name for one in model.outputs)
+        yield f"outputs  {len(model.outputs)}: {names}"
+        yield "answers  missing value: nan"
+        return
+    fuzzy = "fuzzy " if isinstance(model, FuzzyTree) else ""
+    yield f"{model.name}: {fuzzy}{kind_text(model)}"
+    of = f" of {len(model.columns)} columns" if model.columns else ""
+    yield f"inputs   {len(model.inputs)}{of}: {', '.join(model.inputs) or 'none'}"
+    yield f"classes  {len(model.classes)}: {', '.join(model.classes)}"
+    semantics = model.semantics
+    answers = f"missing value: {semantics.missing or 'no class'}"
+    if isinstance(model, RuleBase):
+        answers += f"; no rule fires: {semantics.uncovered or 'no class'}"
+        answers += f"; AND is {semantics.conjunction}; the first of the strongest wins"
+    yield f"answers  {answers}"
+
+
+def kind_text(model: FuzzyTree | RuleBase) -> str:
+    """Return what a model is and how large."""
+    if isinstance(model, FuzzyTree):
+        sizes = f"{counted(len(model.leaves), 'leaf', 'leaves')}, depth {depth(model)}"
+        return f"tree, {counted(len(model.nodes), 'node')}, {sizes}"
+    kind = f"{model.kind} " if model.kind else ""
+    return f"{kind}rule base, {counted(len(model.rules), 'rule')}"
+
+
+def depth(tree: FuzzyTree) -> int:
+    """Return how many nodes the longest path of a tree has."""
+    depths = [0] * (len(tree.nodes) + 1)
+    for position in range(len(tree.nodes), 0, -1):
+        below = [depths[b.node] for b in tree.nodes[position - 1].branches if b.node]
+        depths[position] = 1 + max(below, default=0)
+    return depths[1] if tree.nodes else 0
+
+
+def tree_lines(tree: FuzzyTree) -> Iterator[str]:
+    """Yield a tree drawn with its branches, each with the values that it takes."""
+    if not tree.nodes:
+        yield _leaf_text(1, tree.leaves[0])
+        return
+    parts = {v.name: len(v.parts) for v in tree.variables}
+    yield _node_text(tree.nodes[0], parts)
+    todo = _branches(tree.nodes[0], "")
+    while todo:
+        node, position, indent = todo.pop()
+        branch = node.branches[position]
+        is_last = position == len(node.branches) - 1
+        corner, rail = ("└─ ", "   ") if is_last else ("├─ ", "│  ")
+        text = f"{' or '.join(branch.terms)} ({taken(node, position)})"
+        yield f"{indent}{corner}{text}: {_end_text(tree, branch, parts)}"
+        if branch.node is not None:
+            todo += _branches(tree.nodes[branch.node - 1], indent + rail)
+
+
+def _branches(node: Node, indent: str) -> list[tuple[Node, int, str]]:
+    return [(node, k, indent) for k in reversed(range(len(node.branches)))]
+
+
+def _end_text(tree: FuzzyTree, branch: Branch, parts: dict[str, int]) -> str:
+    if branch.node is not None:
+        return _node_text(tree.nodes[branch.node - 1], parts)
+    position = branch.leaf or 1
+    return _leaf_text(position, tree.leaves[position - 1])
+
+
+def _node_text(node: Node, parts: dict[str, int]) -> str:
+    count = parts[node.variable]
+    return f"{node.variable}?" + (f"  ({count} inputs)" if count else "")
+
+
+def _leaf_text(position: int, leaf: Leaf) -> str:
+    shape = f" ({leaf.pattern})" if leaf.pattern not in ("", leaf.label) else ""
+    rows = f"  {counted(leaf.support, 'row')}" if leaf.support is not None else ""
+    return f"{leaf.label}{shape}  [{position}]{rows}"
+
+
+def taken(node: Node, position: int, most: str = "<=") -> str:
+    """Return the values that a branch takes, such as `<= 2.5` or `1 to 2`."""
+    values: list[str] = []
+    for (low, high), owner in zip(intervals(node), node.owners, strict=True):
+        if owner != position:
+            continue
+        if low is None:
+            values.append(f"{most} {number(high)}" if high is not None else "any")
+        elif high is None:
+            values.append(f"> {number(low)}")
+        else:
+            values.append(f"> {number(low)} to {number(high)}")
+    return " or ".join(values)
+
+
+def term_lines(
+    variables: Sequence[Variable | SystemOutput], columns: Sequence[str] = ()
+) -> Iterator[str]:
+    """Yield each variable with its unit and range, and its terms with their numbers.
+
+    `columns` are the inputs of a fuzzy system, which linear terms multiply.
+    """
+    for one in variables:
+        parts = one.parts if isinstance(one, Variable) else ()
+        if not one.terms and not parts and isinstance(one, Variable):
+            continue
+        yield one.name + _span_text(one)
+        for position, line in enumerate(_summands(parts)):
+            lead = f"  {line}" if position else f"= {line.replace('+', ' ', 1)}"
+            yield f"  {lead}"
+        if isinstance(one, SystemOutput):
+            yield f"  {_answer_text(one)}"
+        heights = [
+            "" if term.height == 1.0 else f", times {number(term.height)}"
+            for term in one.terms
+        ]
+        yield from aligned(
+            (f"  {term.name}", f"{curve_text(term.function, columns)}{times}")
+            for term, times in zip(one.terms, heights, strict=True)
+        )
+
+
+def _span_text(one: Variable | SystemOutput) -> str:
+    """Return the unit and the range of a variable, to stand behind its name."""
+    unit = f", in {one.unit}" if one.unit else ""
+    if one.low is None or one.high is None:
+        return unit
+    clipped = ", clipped" if one.clips else ""
+    return f"{unit}, {number(one.low)} to {number(one.high)}{clipped}"
+
+
+def sum_text(parts: Sequence[Part]) -> str:
+    """Return the first summands of a combination of columns in a line.
+
+    Example:
+        >>> sum_text((Part("a", 2.0, 1.0), Part("b", -0.5, 0.0)))
+        '2 * (a - 1) - 0.5 * b'
+    """
+    more = len(parts) - _MOST_PARTS
+    rest = [f"+ {counted(more, 'more input')}"] if more > 0 else []
+    return " ".join([*_summands(parts[:_MOST_PARTS]), *rest]).removeprefix("+ ")
+
+
+def _summands(parts: Sequence[Part]) -> Iterator[str]:
+    for part in parts:
+        centre = "-" if part.centre >= 0 else "+"
+        shifted = f"({part.input} {centre} {number(abs(part.centre))})"
+        inner = shifted if part.centre else part.input
+        yield f"{'-' if part.weight < 0 else '+'} {number(abs(part.weight))} * {inner}"
+
+
+def system_reasons(system: FuzzySystem, outputs: Outputs) -> list[str]:
+    """Return, for each row, the rules that were activated, each with its degree."""
+    texts = [rule_text(rule) for rule in system.rules]
+    if outputs.activations is None:
+        return [""] * len(outputs)
+    rows = zip(outputs.activations.T.tolist(), outputs.status.tolist(), strict=True)
+    return [_reason(texts, degrees, status) for degrees, status in rows]
+
+
+def _reason(texts: Sequence[str], degrees: Sequence[float], status: int) -> str:
+    if status == Status.MISSING:
+        return "a value is missing or not finite"
+    fired = [
+        f"rule {k} ({number(degree)}): {text}"
+        for k, (text, degree) in enumerate(zip(texts, degrees, strict=True), 1)
+        if degree > 0.0
+    ]
+    return "; ".join(fired) or "no rule fires"
+
+
+def _block_lines(block: RuleBlock, start: int) -> Iterator[str]:
+    name = f" {block.name}" if block.name else ""
+    facts = [
+        f"AND is {block.conjunction}" if block.conjunction else "",
+        f"OR is {block.disjunction}" if block.disjunction else "",
+        f"THEN is {block.implication}" if block.implication else "",
+        _activation_text(block.activation),
+    ]
+    yield f"rules{name}: {'; '.join(filter(None, facts))}"
+    width = len(str(start + len(block.rules) - 1))
+    for position, rule in enumerate(block.rules, start):
+        yield f"{position:{width}}. {rule_text(rule)}"
+
+
+def _activation_text(how: Activation) -> str:
+    match how.method:
+        case "general":
+            return "all rules"
+        case "proportional":
+            return "all rules, in proportion"
+        case "threshold":
+            return f"rules of degree {how.relation} {number(how.threshold)}"
+        case "first" | "last":
+            least = f" of degree >= {number(how.threshold)}" if how.threshold else ""
+            return f"the {how.method} {counted(how.count, 'rule')}{least}"
+        case "highest" | "lowest":
+            return f"the {counted(how.count, 'rule')} of {how.method} degree"
+
+
+def rule_text(rule: SystemRule) -> str:
+    """Return a rule of a fuzzy system as people read it.
+
+    Example:
+        >>> from fuzzytree.model import Conclusion, Not, Proposition
+        >>> hot = Proposition("water", ("hot",), ("very",))
+        >>> rule_text(SystemRule(Not(hot), (Conclusion("power", "low"),), weight=0.5))
+        'IF not (water is very hot) THEN power is low  (weight 0.5)'
+    """
+    ends = conclusions_text(rule.then)
+    weight = "" if rule.weight == 1.0 else f"  (weight {number(rule.weight)})"
+    name = f"  ({rule.name})" if rule.name else ""
+    if rule.when is None:
+        return f"ALWAYS {ends}{weight}{name}"
+    return f"IF {condition_text(rule.when)} THEN {ends}{weight}{name}"
+
+
+_GRIDS = {
+    "middle": "in the middle of equal pieces",
+    "ends": "from end to end",
+    "half ends": "from end to end, by the trapezoidal rule",
+    "lines": "from end to end, joined by lines",
+}
+
+
+def _answer_text(one: SystemOutput) -> str:
+    """Return how an output's number is made of what the rules conclude."""
+    how = one.defuzzifier
+    facts: list[str] = [how.method]
+    if not how.is_weighted:
+        facts = [f"{how.method} {_samples_text(one)}"]
+    if one.aggregation:
+        facts.append(f"joined by {one.aggregation}")
+    default = "nan" if one.default is None else number(one.default)
+    return "; ".join([*facts, f"no rule: {default}"])
+
+
+def _samples_text(one: SystemOutput) -> str:
+    how = one.defuzzifier
+    single = sum(isinstance(label.function, Singleton) for label in one.terms)
+    if single and single == len(one.terms):
+        return "of its singletons"
+    text = f"at {how.samples} values {_GRIDS[how.grid]}"
+    return f"{text} and at its singletons" if single else text
+
+
+def curve_text(curve: Curve, columns: Sequence[str] = ()) -> str:
+    """Return a curve in words and numbers.
+
+    Example:
+        >>> curve_text(Trapezoid(0.0, 1.0, 1.0, 3.0))
+        '1 at 1, rises from 0 at 0, falls to 0 at 3'
+        >>> curve_text(Band(high=1.0, right=3.0))
+        '1 up to 1, falls to 0 at 3'
+        >>> from fuzzytree.model import Gaussian
+        >>> curve_text(Gaussian(mean=2.0, deviation=0.5))
+        'gaussian: mean 2, deviation 0.5'
+    """
+    match curve:
+        case Band(low=low, high=high, left=left, right=right):
+            return _plateau_text(low, high, left, right, "above")
+        case Trapezoid(a=a, b=b, c=c, d=d):
+            low, high = None if a is None else b, None if d is None else c
+            return _plateau_text(low, high, a, d, "from")
+        case LR(mean=mean, left=below, right=above):
+            apart = "" if below == above else f" below, {_side_text(above)} above"
+            return f"1 at {number(mean)}, spread {_side_text(below)}{apart}"
+        case Points(values=values, degrees=degrees):
+            pairs = [
+                f"({number(v)}, {number(d)})"
+                for v, d in zip(values, degrees, strict=True)
+            ]
+            if len(pairs) > _MOST_PAIRS:
+                return f"{len(pairs)} points from {pairs[0]} to {pairs[-1]}"
+            return f"line through {', '.join(pairs)}"
+        case Singleton(value=value):
+            return number(value)
+        case Linear(weights=weights, offset=offset):
+            named = zip(weights, columns, strict=False)
+            terms = [f"{number(weight)} * {name}" for weight, name in named]
+            return " + ".join([*terms, number(offset)])
+        case Formula(expression=expression):
+            return text_of(expression)
+        case Binary(start=start, is_above=is_above):
+            return f"1 {'from' if is_above else 'up to'} {number(start)}, else 0"
+        case (
+            SigmoidDifference(first=first, second=second)
+            | SigmoidProduct(first=first, second=second)
+        ):
+            inner = f"{curve_text(first)}; {curve_text(second)}"
+            return f"{type(curve).__struct_config__.tag} of {inner}"
+        case _:
+            facts = [
+                f"{field.replace('_', ' ')} {number(getattr(curve, field))}"
+                for field in curve.__struct_fields__
+            ]
+            return f"{type(curve).__struct_config__.tag}: {', '.join(facts)}"
+
+
+def _plateau_text(
+    low: float | None,
+    high: float | None,
+    left: float | None,
+    right: float | None,
+    since: str,
+) -> str:
+    """Return where a curve is 1, and where it rises and falls beside that."""
+    if low is None:
+        edge = "1 everywhere" if high is None else f"1 up to {number(high)}"
+    elif high is None:
+        edge = f"1 {since} {number(low)}"
+    elif low == high:
+        edge = f"1 at {number(low)}"
+    else:
+        edge = f"1 from {number(low)} to {number(high)}"
+    rises = "" if low is None else _flank_text(low, left, "rises from")
+    falls = "" if high is None else _flank_text(high, right, "falls to")
+    return ", ".join(filter(None, (edge, rises, falls)))
+
+
+def _flank_text(edge: float, end: float | None, verb: str) -> str:
+    if end is None:
+        return f"0 beyond {number(edge)}"
+    return f"{verb} 0 at {number(end)}"
+
+
+def _side_text(side: Side) -> str:
+    return f"{number(side.spread)} (0 from {number(side.reach)} spreads)"
