@@ -1,4 +1,4 @@
-"""`fuzzytree recheck`: check an audit by independent code."""
+"""`fuzzytree recheck`: check an audit or a comparison by independent code."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from fuzzytree.cli.console import answer
 @click.command("recheck", short_help="Check an audit independently.")
 @click.argument("audit", metavar="AUDIT")
 @click.argument("model", metavar="MODEL")
-def command(audit: str, model: str) -> int:
+@click.argument("new", metavar="[NEW]", required=False)
+def command(audit: str, model: str, new: str | None) -> int:
     """Check AUDIT, the JSON of an audit, against MODEL, the YAML file that it is of.
+
+    With NEW, AUDIT is the JSON of `fuzzytree diff MODEL NEW`.
 
     Everything is read, evaluated and decided again by code that imports nothing else
     of fuzzytree and runs alone; `python -m fuzzytree.auditing.recheck` is the same.
@@ -21,7 +24,7 @@ def command(audit: str, model: str) -> int:
     from fuzzytree.errors import ReadError
 
     try:
-        report = recheck_files(audit, model)
+        report = recheck_files(audit, model, *([new] if new else []))
     except CannotRunError as error:
         raise ReadError(str(error)) from error
     answer("\n".join(report.lines()))

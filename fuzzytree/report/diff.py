@@ -67,14 +67,16 @@ def diff_verdict(difference: Difference) -> str:
     What is not proved is said not to be.
     """
     counts = _counts_text(difference.changes)
+    is_proved = any(state_word(one.state) == "PROVED" for one in difference.answers)
+    equal = "decisions are proved equal" if is_proved else "decisions are equal"
     match difference.verdict:
         case "changed":
             what = "outputs" if difference.old.form == "system" else "decisions"
             return f"{what} have changed; {counts}"
         case "equal" if not difference.changes:
-            return "decisions are proved equal, and nothing else has changed"
+            return f"{equal}, and nothing else has changed"
         case "equal":
-            return f"decisions are proved equal; {counts}"
+            return f"{equal}; {counts}"
         case "open":
             return (
                 "no row was found that is classified differently, and it is NOT proved "

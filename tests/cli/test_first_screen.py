@@ -33,7 +33,7 @@ FIRST_LINES = {
     "audit wine.yaml": "8 findings: 2 warnings, 6 notes; ",
     "audit wine.yaml --data t.csv --target cultivar": "8 findings: 2 warnings, 6 ",
     "diff wine.yaml bad.yaml": "decisions have changed; ",
-    "explain": "31 codes; `fuzzytree explain CODE` explains one",
+    "explain": "32 codes; `fuzzytree explain CODE` explains one",
     "explain FT203": "FT203 tree and raw rules differ (warning",
     "recheck audit.json wine.yaml": "the audit is right as far as it was checked",
     "bench wine.yaml --budget 6 --rows 1 --threads 1 --only native": "",

@@ -8,7 +8,13 @@ from typing import Final, Literal, NamedTuple, TypeVar
 import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Computed,
+    Declined,
+    Proved,
+    Witness,
+)
 from fuzzytree.auditing.findings.records import (
     AuditAnswer,
     AuditSettings,
@@ -108,15 +114,15 @@ class Difference(Value, frozen=True):
 
     @property
     def verdict(self) -> Verdict:
-        """Whether decisions are proved equal, known to change, or neither."""
+        """Whether decisions are shown to be equal, known to change, or neither."""
         if any(one.is_finding for one in self.answers):
             return "changed"
-        proved = any(
-            isinstance(one.state, Proved) and one.subject == "decisions"
+        equal = any(
+            isinstance(one.state, Proved | Computed) and one.subject == "decisions"
             for one in self.answers
         )
         unsure = any(isinstance(one.state, Bracket | Declined) for one in self.answers)
-        return "equal" if proved and not unsure else "open"
+        return "equal" if equal and not unsure else "open"
 
     @property
     def ok(self) -> bool:

@@ -20,12 +20,14 @@ from fuzzytree.auditing.diff.system_differences import draft_system_changes
 from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, DomainSide, limited
-from fuzzytree.auditing.findings.audit import source_of
+from fuzzytree.auditing.findings.audit import TWICE_S, decided_twice, source_of
 from fuzzytree.auditing.findings.domains import domain_of
 from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
 from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.recheck import undecided_difference
 from fuzzytree.errors import ReadError
+from fuzzytree.exporters import find_format
 from fuzzytree.model import (
     Document,
     FuzzySystem,
@@ -162,7 +164,7 @@ def difference(
         )
         for model, file in zip(both, files, strict=True)
     )
-    return Difference(
+    result = Difference(
         version(),
         one,
         other,
@@ -173,6 +175,21 @@ def difference(
         tuple(sorted(changes, key=lambda change: order[change.grade])),
         tuple(answers),
     )
+    return _proved_twice(result, both, Clock(min(TWICE_S, settings.budget_s / 4)))
+
+
+def _proved_twice(
+    result: Difference, models: tuple[Document, Document], clock: Clock
+) -> Difference:
+    """Return a comparison in which PROVED is only what the re-checker decides too."""
+
+    def weak() -> Mapping[int, str]:
+        old, new = (find_format("yaml").write(model).content for model in models)
+        facts = result.to_json().encode()
+        return undecided_difference(facts, old, new, lambda: clock.is_over)
+
+    answers = decided_twice(result.answers, weak)
+    return msgspec.structs.replace(result, answers=answers)
 
 
 def _rule_pair(

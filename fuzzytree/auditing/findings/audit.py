@@ -55,10 +55,11 @@ from fuzzytree.model import (
 
 FamilyFunction = Callable[[Subject], Iterator[AuditAnswer]]
 
+TWICE_S = 3.0
+"""The most seconds in which proofs are decided again."""
 
 _OF_A_ROW = "FT204"
 _LATE = "FTD03"
-_TWICE_S = 3.0  # for deciding proofs again
 _TOO_LARGE = "it needs more memory than there is"
 
 
@@ -131,7 +132,7 @@ def audit(
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     result = msgspec.json.decode(msgspec.json.encode(result), type=Audit)
-    left = min(_TWICE_S, settings.budget_s / 4)
+    left = min(TWICE_S, settings.budget_s / 4)
     late = clock if clock and clock.is_over else Clock(left)
     is_class = viewed.policy.decision == "strongest" and model is viewed.system
     whole = viewed.rules if is_class and viewed.rules is not None else model
@@ -142,27 +143,43 @@ def audit(
 def _proved_twice(result: Audit, model: Document, clock: Clock) -> Audit:
     """Return an audit in which PROVED is only what the re-checker decides as well.
 
-    What it decides otherwise is reported as FT901. The model is written anew, so
-    nothing stands where it does in the user's file.
+    The model is written anew, so nothing stands where it does in the user's file.
     """
     moved = (msgspec.structs.replace(one, places=()) for one in result.answers)
     bare = msgspec.structs.replace(result, file=None, answers=tuple(moved))
-    try:
-        if clock.is_over:
-            raise CannotRunError("the budget was spent")
+
+    def weak() -> Mapping[int, str]:
         content = find_format("yaml").write(model).content
-        weak = undecided(msgspec.json.encode(bare), content, lambda: clock.is_over)
+        return undecided(msgspec.json.encode(bare), content, lambda: clock.is_over)
+
+    answers = decided_twice(result.answers, weak)
+    return msgspec.structs.replace(result, answers=answers)
+
+
+def decided_twice(
+    answers: Sequence[AuditAnswer], weak: Callable[[], Mapping[int, str]]
+) -> tuple[AuditAnswer, ...]:
+    """Return answers of which those that are not decided again are COMPUTED.
+
+    What the re-checker decides otherwise is reported as FT901.
+
+    Args:
+        answers: The answers.
+        weak: Returns by its position what is wrong with each PROVED answer that is
+            not decided again, or an empty text.
+    """
+    try:
+        places = weak()
     except (LossError, CannotRunError):
-        every = enumerate(result.answers)
-        weak = {place: "" for place, one in every if isinstance(one.state, Proved)}
-    answers, refuted = [*result.answers], list[AuditAnswer]()
-    for place, why in weak.items():
-        one = answers[place]
+        every = enumerate(answers)
+        places = {n: "" for n, one in every if isinstance(one.state, Proved)}
+    result, refuted = [*answers], list[AuditAnswer]()
+    for place, why in places.items():
+        one = result[place]
         assert isinstance(one.state, Proved)
-        answers[place] = msgspec.structs.replace(one, state=Computed(one.state.how))
+        result[place] = msgspec.structs.replace(one, state=Computed(one.state.how))
         refuted += [_refuted(one, why)] if why else []
-    answers = sorted((*answers, *refuted), key=lambda one: one.code)
-    return msgspec.structs.replace(result, answers=tuple(answers))
+    return tuple(sorted((*result, *refuted), key=lambda one: one.code))
 
 
 def _refuted(answer: AuditAnswer, why: str) -> AuditAnswer:

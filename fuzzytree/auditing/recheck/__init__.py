@@ -1,6 +1,7 @@
 """Check an audit again without the engine that made it: `recheck AUDIT MODEL`.
 
     python -m fuzzytree.auditing.recheck audit.json model.yaml
+    python -m fuzzytree.auditing.recheck diff.json old.yaml new.yaml
 
 This folder needs Python 3.11 and nothing else, and imports nothing of the rest of
 fuzzytree: copy it, read it, run it alone (docs/how-to/recheck.md). It reads the audit
@@ -11,7 +12,7 @@ all of that is listed; 2: it could not be run.
 Read it in this order: how files become records and models (`records`, `yaml`,
 `sentences_of_rules`, `models`); degrees (`curves`); the one question (`cells`, and
 `boxes` for products); what a check needs (`case`); the checks (`deciding`, `checks`)
-and how they end (`outcomes`).
+and how they end (`outcomes`). `two_models` checks what `diff` says.
 """
 
 from __future__ import annotations
@@ -21,7 +22,12 @@ from pathlib import Path
 from typing import Any
 
 from fuzzytree.auditing.recheck.case import Case
-from fuzzytree.auditing.recheck.checks import check_answer, check_files, check_head
+from fuzzytree.auditing.recheck.checks import (
+    UNCHECKED,
+    check_answer,
+    check_files,
+    check_head,
+)
 from fuzzytree.auditing.recheck.deciding import without
 from fuzzytree.auditing.recheck.models import Model
 from fuzzytree.auditing.recheck.outcomes import (
@@ -38,9 +44,21 @@ from fuzzytree.auditing.recheck.records import (
     built,
     read_json,
 )
+from fuzzytree.auditing.recheck.two_models import (
+    recheck_difference,
+    undecided_difference,
+)
 from fuzzytree.auditing.recheck.yaml import MOST_BYTES
 
-__all__ = ["CannotRunError", "Report", "recheck", "recheck_files", "undecided"]
+__all__ = [
+    "CannotRunError",
+    "Report",
+    "recheck",
+    "recheck_difference",
+    "recheck_files",
+    "undecided",
+    "undecided_difference",
+]
 
 
 def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
@@ -51,14 +69,14 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     Raises:
         CannotRunError: If one of them cannot be read.
     """
-    facts, case = _read(audit, model, names, Limit())
-    report = Report()
-    report.codes = [one.code for one in case.audit.answers]
+    facts, result, case = _read(audit, model, names, Limit())
+    report = Report(UNCHECKED)
+    report.codes = [one.code for one in case.answers]
     try:
         check_files(case, report, facts, model, names[1])
-        check_head(case, report)
+        check_head(result, case, report)
         _name_shorter(case)
-        for number, answer in enumerate(case.audit.answers, 1):
+        for number, answer in enumerate(case.answers, 1):
             check_answer(case, report, answer, number)
     except (DoesNotHoldError, UndecidedError) as error:
         report.wrong.append(str(error))
@@ -84,21 +102,21 @@ def undecided(
     Raises:
         CannotRunError: If the model cannot be read.
     """
-    _, case = _read(audit, model, ("the audit", "model.yaml"), Limit(is_late))
+    _, _, case = _read(audit, model, ("the audit", "model.yaml"), Limit(is_late))
     result: dict[int, str] = {}
     _name_shorter(case)
-    for place, answer in enumerate(case.audit.answers):
+    for place, answer in enumerate(case.answers):
         if isinstance(answer.state, Proved):
             report = Report()
             check_answer(case, report, answer, place + 1)
             if not report.counts["answers PROVED, decided again"]:
-                result[place] = "; ".join(report.wrong).partition("): ")[2]
+                result[place] = report.first
     return result
 
 
 def _read(
     audit: bytes, model: bytes, names: tuple[str, str], limit: Limit
-) -> tuple[dict[str, Any], Case]:
+) -> tuple[dict[str, Any], Audit, Case]:
     facts = read_json(audit, names[0])
     result: Audit = built(Audit, facts, names[0])
     left_out = [
@@ -110,27 +128,30 @@ def _read(
         raise CannotRunError(f"{names[0]}: {text}")
     if any(side.is_open for side in result.domain.sides):
         raise CannotRunError(f"{names[0]}: a domain with an open side is not checked")
-    return facts, Case(result, whole, limit)
+    return facts, result, Case(result, whole, limit)
 
 
 def _name_shorter(case: Case) -> None:
     """Name the rules without a proposition that answers are about."""
-    for position, answer in enumerate(case.audit.answers):
+    for position, answer in enumerate(case.answers):
         if answer.message == "FT107.irrelevant":
             case.shorter[position] = without(case, answer)
 
 
-def recheck_files(audit: str, model: str) -> Report:
-    """Check an audit's file against a model's file.
+def recheck_files(*names: str) -> Report:
+    """Check an audit's file against a model's, or a comparison's against two.
 
     Raises:
         CannotRunError: If one of them cannot be read.
     """
     contents: list[bytes] = []
-    for name in (audit, model):
+    for name in names:
         try:
             with Path(name).open("rb") as file:
                 contents.append(file.read(MOST_BYTES + 1))
         except OSError as error:
             raise CannotRunError(f"{name}: {error.strerror or error}") from error
-    return recheck(contents[0], contents[1], (audit, model))
+    if len(names) == 2:
+        return recheck(contents[0], contents[1], (names[0], names[1]))
+    diff, old, new = contents
+    return recheck_difference(diff, old, new, (names[0], names[1], names[2]))

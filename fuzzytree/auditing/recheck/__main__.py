@@ -9,14 +9,15 @@ from fuzzytree.auditing.recheck import CannotRunError, recheck_files
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Check the two files that are named, and print the report."""
-    if len(arguments) != 2:
+    """Check the files that are named, and print the report."""
+    if len(arguments) not in (2, 3):
         sys.stderr.write(
             "usage: python -m fuzzytree.auditing.recheck AUDIT.json MODEL.yaml\n"
+            "       python -m fuzzytree.auditing.recheck DIFF.json OLD.yaml NEW.yaml\n"
         )
         return 2
     try:
-        report = recheck_files(arguments[0], arguments[1])
+        report = recheck_files(*arguments)
     except CannotRunError as error:
         sys.stderr.write(f"{error}\n")
         return 2

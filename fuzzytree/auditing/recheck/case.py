@@ -33,6 +33,7 @@ from fuzzytree.auditing.recheck.records import (
     Audit,
     Claim,
     Coordinate,
+    Difference,
     Span,
     Witness,
     fraction,
@@ -48,7 +49,7 @@ Extra = Mapping[Proposition, Proposition]
 
 
 class Case:
-    """An audit and its model.
+    """An audit, or a comparison, and a model of it.
 
     Attributes:
         sides: The sides of the domain by name.
@@ -58,13 +59,15 @@ class Case:
         shorter: By the position of an answer of FT107, the rule that it is about.
     """
 
-    def __init__(self, audit: Audit, model: Model, limit: Limit) -> None:
-        self.audit, self.model, self.rules = audit, model, model.rules
-        self.sides = {side.variable: side for side in audit.domain.sides}
+    def __init__(self, facts: Audit | Difference, model: Model, limit: Limit) -> None:
+        self.model, self.rules, self.limit = model, model.rules, limit
+        self.settings, self.answers = facts.settings, facts.answers
+        self.file = facts.file if isinstance(facts, Audit) else None
+        sides = {side.variable: side for side in facts.domain.sides}
+        self.sides = {n: side for n, side in sides.items() if n in model.variables}
         self.is_free = not any(v.parts for v in model.variables.values())
         self.numbers = range(1, len(self.rules.rules) + 1)
         self.shorter: dict[int, Rule] = {}
-        self.limit = limit
         self._strengths: dict[tuple[object, ...], list[Between]] = {}
         self._cells: dict[int, Cells | UndecidedError] = {}
 
@@ -114,7 +117,7 @@ class Case:
 
     def coded(self, start: str) -> list[Answer]:
         """Return the answers whose message begins so."""
-        return [one for one in self.audit.answers if one.message.startswith(start)]
+        return [one for one in self.answers if one.message.startswith(start)]
 
     # --- what can be
 
@@ -129,9 +132,9 @@ class Case:
             has_twice = any(len({*rule.when}) < len(rule.when) for rule in rules)
             if self.rules.is_product and has_twice:
                 raise UndecidedError("a product in which one degree stands twice")
-            settings = self.audit.settings
+            settings = self.settings
             levels = {Fraction(settings.epsilon), Fraction(settings.level)}
-            for one in self.audit.answers:
+            for one in self.answers:
                 levels.update(
                     Fraction(m.value)
                     for m in one.measures
@@ -233,7 +236,7 @@ class Case:
         """The strengths of all rules at witnesses and other points of the domain."""
         points = [
             {c.input: fraction(c.exact) for c in one.state.point}
-            for one in self.audit.answers
+            for one in self.answers
             if isinstance(one.state, Witness)
         ]
         points = [p for p in points if p.keys() == {*self.inputs} and self.is_within(p)]
@@ -272,18 +275,8 @@ class Case:
         return all(side.low <= values[n] <= side.high for n, side in self.sides.items())
 
     def point_of(self, coordinates: Sequence[Coordinate]) -> dict[str, Fraction]:
-        """Return a point of the domain whose digits are one number each."""
-        point: dict[str, Fraction] = {}
-        for one in coordinates:
-            value = fraction(one.exact)
-            near = float(value)
-            hexed = near.hex() if Fraction(near) == value else None
-            text = (
-                f"{one.input!r}: the decimal or hexadecimal digits are not {one.exact}"
-            )
-            require((repr(near), hexed) == (one.decimal, one.hex), text)
-            require(one.input not in point, f"{one.input!r} stands twice in the point")
-            point[one.input] = value
+        """Return a point of the domain with a value of every input."""
+        point = values_of(coordinates)
         is_whole = point.keys() == {*self.inputs}
         require(is_whole, "the point does not have a value of every input")
         require(self.is_within(point), "the point lies outside the domain")
@@ -379,6 +372,20 @@ class Case:
         if claim.kind == "below":
             return most[1] == level == 0 or less(most, (level, level))
         return least[0] >= level or not less(least, (level, level))
+
+
+def values_of(coordinates: Sequence[Coordinate]) -> dict[str, Fraction]:
+    """Return a point whose digits are one number each."""
+    point: dict[str, Fraction] = {}
+    for one in coordinates:
+        value = fraction(one.exact)
+        near = float(value)
+        hexed = near.hex() if Fraction(near) == value else None
+        text = f"{one.input!r}: the decimal or hexadecimal digits are not {one.exact}"
+        require((repr(near), hexed) == (one.decimal, one.hex), text)
+        require(one.input not in point, f"{one.input!r} stands twice in the point")
+        point[one.input] = value
+    return point
 
 
 FIELDS = {

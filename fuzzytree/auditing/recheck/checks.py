@@ -20,20 +20,20 @@ from fuzzytree.auditing.recheck.deciding import (
 )
 from fuzzytree.auditing.recheck.models import ZERO
 from fuzzytree.auditing.recheck.outcomes import (
-    MOST_STEPS,
-    DoesNotHoldError,
     Report,
     UndecidedError,
     require,
 )
 from fuzzytree.auditing.recheck.records import (
     Answer,
+    Audit,
     Bracket,
     Computed,
     Declined,
     Policy,
     Proved,
     Sampled,
+    Source,
     Span,
     Witness,
     fraction,
@@ -68,6 +68,13 @@ NOT_ASKED = ("FT801", "FT802", "FT901")
 """Codes that no audit must answer or list."""
 
 
+UNCHECKED = (
+    "the version, the hash of the model's content, the table, how many rows and how "
+    "long, how proofs were made, why something is open or left out, ids, the commands"
+)
+"""What of an audit is read and compared with nothing."""
+
+
 def digest_of(facts: Mapping[str, Any]) -> str:
     """Return the SHA-256 of an audit's canonical JSON, with an empty digest."""
     whole = dict(facts) | {"digest": ""}
@@ -83,16 +90,20 @@ def check_files(
 ) -> None:
     """Check the digest of an audit's facts, and the SHA-256 of the model's file."""
     digest = digest_of(facts)
-    report.expect(case.audit.digest == digest, f"the digest is {digest}")
+    report.expect(facts["digest"] == digest, f"the digest is {digest}")
+    check_source(report, case.file, model, name)
+
+
+def check_source(report: Report, file: Source | None, model: bytes, name: str) -> None:
+    """Check the SHA-256 of a model's file."""
     sha = hashlib.sha256(model).hexdigest()
-    if case.audit.file is not None:
-        text = f"the SHA-256 of {name} is {sha}, and not that of the audited file"
-        report.expect(case.audit.file.sha256 == sha, text)
+    text = f"the SHA-256 of {name} is {sha}, and not that of the audited file"
+    report.expect(file is None or file.sha256 == sha, text)
 
 
-def check_head(case: Case, report: Report) -> None:
+def check_head(audit: Audit, case: Case, report: Report) -> None:
     """Check what stands before the answers, and what they are as a whole."""
-    audit, model, expect = case.audit, case.model, report.expect
+    model, expect = case.model, report.expect
     expect(audit.form == model.form, f"the form of the model is {model.form!r}")
     expect(audit.model == model.name, f"the model's name is {model.name!r}")
     decides: Literal["strongest", "all"] = (
@@ -109,7 +120,7 @@ def check_head(case: Case, report: Report) -> None:
     expect(1 <= settings.rows <= 10**7, "the setting rows is not in 1 to 10,000,000")
     expect(0 <= settings.seed < 2**32, "the setting seed is not in 0 to 2**32 - 1")
     expect(0 < settings.budget_s <= 1e9, "the budget is not in (0, 1e9] seconds")
-    _domain(case, report)
+    _domain(audit, case, report)
     ids = {one.id for one in audit.answers if one.is_finding}
     known = sorted(ids.intersection(audit.accepted))
     expect([*audit.accepted] == known, "a finding is accepted that there is not")
@@ -117,14 +128,14 @@ def check_head(case: Case, report: Report) -> None:
     text = "the numbers of rules in the file are not those of the system"
     expect(audit.numbers == (() if is_plain else tuple(model.numbers)), text)
     expect(audit.rows > 0 or audit.data is None, "a table is named without rows")
-    _questions(case, report)
+    _questions(audit, case, report)
     report.counts["facts about the audit"] += 12
 
 
-def _domain(case: Case, report: Report) -> None:
+def _domain(audit: Audit, case: Case, report: Report) -> None:
     expect, variables = report.expect, case.model.variables
     order = [name for name in variables if name in case.sides]
-    is_plain = [side.variable for side in case.audit.domain.sides] == order
+    is_plain = [side.variable for side in audit.domain.sides] == order
     expect(is_plain, "the domain's sides are not those of variables, in order")
     for name, side in case.sides.items():
         text = f"the side of {name!r}"
@@ -143,9 +154,9 @@ def _domain(case: Case, report: Report) -> None:
         require(bool(one.parts) or name in case.sides, text)
 
 
-def _questions(case: Case, report: Report) -> None:
+def _questions(audit: Audit, case: Case, report: Report) -> None:
     """Check that every code has all its answers or is listed as left out."""
-    audit, expect = case.audit, report.expect
+    expect = report.expect
     codes = [one.code for one in audit.answers]
     expect(codes == sorted(codes), "the answers are not in the order of their codes")
     ends = [
@@ -213,31 +224,17 @@ def _questions(case: Case, report: Report) -> None:
 
 def check_answer(case: Case, report: Report, answer: Answer, number: int) -> None:
     """Check everything about an answer."""
-    where = f"answer {number} ({answer.code}, {answer.subject:.60})"
-    case.limit.left = MOST_STEPS
-    try:
-        _words(case, report, answer)
+    with report.answer(number, answer, case.limit):
+        check_message(answer)
+        _words(case, answer)
+        report.counts["sentences written again"] += 1
         _names(case, report, answer)
         check_spans(case, answer.region)
         _state(case, report, answer)
-    except DoesNotHoldError as error:
-        report.wrong.append(f"{where}: {error}")
-    except (
-        LookupError,
-        ArithmeticError,
-        ValueError,
-        TypeError,
-        AttributeError,
-        AssertionError,
-    ):
-        report.wrong.append(f"{where}: it names what there is not")
-    except UndecidedError as error:
-        state = type(answer.state).__name__.upper()
-        report.undecided[state, str(error)].append(number - 1)
 
 
-def _words(case: Case, report: Report, answer: Answer) -> None:
-    """Check the message of an answer, its severity, its facts and its sentence."""
+def check_message(answer: Answer) -> None:
+    """Check the message of an answer, its severity and its sentence."""
     require(answer.message in MESSAGES, "no answer has this message")
     code, grade = answer.message.partition(".")[0], MESSAGES[answer.message].grade
     if code == "FTD":
@@ -248,6 +245,11 @@ def _words(case: Case, report: Report, answer: Answer) -> None:
     require(
         (answer.is_finding, answer.severity) == wanted, f"it is a finding of {grade}"
     )
+    require(answer.sentence == sentence_of(answer), "its sentence says something else")
+
+
+def _words(case: Case, answer: Answer) -> None:
+    """Check the subject of an answer, and its facts."""
     is_share = answer.code == "FT701" and answer.message != "FT701.rule"
     if is_share and isinstance(answer.state, Sampled):
         is_hit = answer.state.hits > 0 and not answer.subject.endswith("points")
@@ -256,7 +258,7 @@ def _words(case: Case, report: Report, answer: Answer) -> None:
     if answer.code == "FT107" and "proposition" in answer.facts:
         wanted_subject = "{rule}, {proposition!r}".format(**answer.facts)
     if answer.message in ("FT301.weak", "FT301.reaches"):
-        wanted_subject = f"cover of {case.audit.settings.epsilon:g}"
+        wanted_subject = f"cover of {case.settings.epsilon:g}"
     if answer.message.startswith("FT301.gap"):
         gaps = [one.id for one in case.coded("FT301.gap")]
         wanted_subject = f"gap {gaps.index(answer.id) + 1}"
@@ -267,8 +269,6 @@ def _words(case: Case, report: Report, answer: Answer) -> None:
         require(
             not is_known or known[name] == fact, f"{name}: it is {known.get(name)!r}"
         )
-    require(answer.sentence == sentence_of(answer), "its sentence says something else")
-    report.counts["sentences written again"] += 1
 
 
 SUBJECTS = {
@@ -289,7 +289,7 @@ SUBJECTS = {
 
 def _known_facts(case: Case, answer: Answer) -> dict[str, Any]:
     """Return what the facts of an answer must be, by their names."""
-    settings, model = case.audit.settings, case.model
+    settings, model = case.settings, case.model
     is_system = model.form == "system"
     known: dict[str, Any] = {
         **{
@@ -359,7 +359,7 @@ def _names(case: Case, report: Report, answer: Answer) -> None:
             text = f"{measure.name}: {measure.exact:.60} is not {measure.value!r}"
             require(float(fraction(measure.exact)) == measure.value, text)
             report.counts["exact measures"] += 1
-    if case.audit.file is None:
+    if case.file is None:
         require(not answer.places, "a place in no file")
         return
     own = [model.numbers[n - 1] for n in answer.rules]
@@ -370,7 +370,7 @@ def _names(case: Case, report: Report, answer: Answer) -> None:
     entries = [(place.line, place.column) for place in answer.places]
     is_there = entries in ([*dict.fromkeys(wanted)], [])
     require(is_there, "its rules and terms stand elsewhere")
-    is_file = all(place.file == case.audit.file.name for place in answer.places)
+    is_file = all(place.file == case.file.name for place in answer.places)
     require(is_file, "a place that is not in the audited file")
 
 
@@ -416,14 +416,14 @@ def _state(case: Case, report: Report, answer: Answer) -> None:
             case.check_point(report, state.point, state.claims)
         raise UndecidedError("a bracket is not computed again here")
     else:
-        _sample(state)
+        check_sample(state)
         raise UndecidedError("a sample is not drawn again here")
 
 
-def _sample(state: Sampled) -> None:
+def check_sample(state: Sampled) -> None:
+    """Check that an interval is Wilson's."""
     require(0 <= state.hits <= state.rows and state.rows > 0, "no share of rows")
     require(0.0 < state.confidence < 1.0, "a confidence outside (0, 1)")
-    # Wilson's interval
     z = NormalDist().inv_cdf((1.0 + state.confidence) / 2.0)
     share, bottom = state.hits / state.rows, 1.0 + z * z / state.rows
     middle = (share + z * z / (2 * state.rows)) / bottom
@@ -502,7 +502,7 @@ def _shows_lead(case: Case, answer: Answer, state: Witness) -> None:
     rivals = [every[n - 1][1] for n in case.rivals(number)]
     lead = every[number - 1][1] - max(rivals, default=ZERO)
     entry = answer.measure("largest lead, at least")
-    is_so = entry >= case.audit.settings.lead and lead >= Fraction(entry)
+    is_so = entry >= case.settings.lead and lead >= Fraction(entry)
     require(is_so, "the rule does not lead by so much there")
 
 
@@ -519,7 +519,7 @@ def _shows_need(case: Case, answer: Answer, state: Witness) -> None:
 
 
 def _shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
-    level = Fraction(case.audit.settings.level)
+    level = Fraction(case.settings.level)
     met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
     is_high = any(fraction(claim.level) >= level for claim in met)
     require(is_high, "it is not claimed that both reach the level")
@@ -566,7 +566,7 @@ def _shows_region(case: Case, answer: Answer, state: Witness) -> None:
 def _shows_gap(case: Case, answer: Answer, state: Witness) -> None:
     """Check the claim that every rule is low enough."""
     is_weak = answer.message == "FT301.weak"
-    level = Fraction(case.audit.settings.epsilon) if is_weak else ZERO
+    level = Fraction(case.settings.epsilon) if is_weak else ZERO
     below = [c for c in state.claims if c.kind == "below"]
     met = [c for c in below if {*c.rules} == {*case.numbers}]
     is_low = any(fraction(claim.level) <= level for claim in met)

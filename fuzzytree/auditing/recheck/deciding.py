@@ -303,7 +303,7 @@ def irrelevant(case: Case, answer: Answer) -> None:
     It does where it wins and a rule of another class was above all of its own class;
     or where no rule fired; it may where it ties with a later rule of another class.
     """
-    position = case.audit.answers.index(answer)
+    position = case.answers.index(answer)
     rest = len(case.numbers) + 1 + [*case.shorter].index(position)
     (number,) = answer.rules
     own, rivals = case.own(case.then(number)), case.rivals(number)
@@ -328,7 +328,7 @@ def never_fires_at_all(case: Case, answer: Answer) -> None:
 
 def apart(case: Case, answer: Answer) -> None:
     """Check that no pair without a finding reaches the level together."""
-    level = Fraction(case.audit.settings.level)
+    level = Fraction(case.settings.level)
     listed = {one.rules for one in case.coded("FT201.") if one.rules}
     rest = [
         p
@@ -379,7 +379,7 @@ def fires(case: Case, answer: Answer) -> None:
 
 def reaches(case: Case, answer: Answer) -> None:
     """Check that some rule reaches epsilon everywhere, and how little is least."""
-    epsilon = Fraction(case.audit.settings.epsilon)
+    epsilon = Fraction(case.settings.epsilon)
     is_less = case.beats((), case.numbers, high=epsilon)
     require(not is_less, "there are points at which every rule is below epsilon")
     least_cover(case, answer)
@@ -484,7 +484,7 @@ def height(case: Case, variable: Variable, term: str) -> Interval:
 
 def heights(case: Case, answer: Answer) -> None:
     """Check that the findings are the terms that do not reach the level."""
-    level = Fraction(case.audit.settings.level)
+    level = Fraction(case.settings.level)
     listed = {tuple(one.terms[0]) for one in case.coded("FT401.") if one.terms}
     every = {
         (v.name, t): v
@@ -507,7 +507,7 @@ def low_term(case: Case, answer: Answer) -> None:
     """Check the height of a term that does not reach the level."""
     variable = case.model.variables[answer.terms[0].variable]
     low, high = height(case, variable, answer.terms[0].term)
-    require(high < Fraction(case.audit.settings.level), "the term reaches the level")
+    require(high < Fraction(case.settings.level), "the term reaches the level")
     is_empty = answer.message == "FT401.empty"
     require(not low if is_empty else bool(high), "it is empty, or is not")
     if is_empty and high:
@@ -637,7 +637,7 @@ def shared_areas(case: Case) -> dict[tuple[tuple[str, str], ...], Interval | Non
 
 def overlaps(case: Case, answer: Answer) -> None:
     """Check that the findings are the pairs of terms that share so much area."""
-    limit, shares = Fraction(case.audit.settings.overlap), shared_areas(case)
+    limit, shares = Fraction(case.settings.overlap), shared_areas(case)
     listed = {tuple(map(tuple, one.terms)) for one in case.coded("FT403.") if one.terms}
     known = {key: one for key, one in shares.items() if one is not None}
     rest = [one for key, one in known.items() if key not in listed]
@@ -655,7 +655,7 @@ def overlaps(case: Case, answer: Answer) -> None:
 def overlap(case: Case, answer: Answer) -> None:
     """Check the share of their area that two terms have in common."""
     share = shared_areas(case)[tuple((name, term) for name, term in answer.terms)]
-    limit = Fraction(case.audit.settings.overlap)
+    limit = Fraction(case.settings.overlap)
     require(
         share is not None and share[1] + ROUNDED >= limit,
         "they are easy to distinguish",

@@ -89,6 +89,7 @@ class Model:
     """A rule base, a tree or a fuzzy system, as its audit sees it.
 
     Attributes:
+        facts: What the file holds.
         form: What an audit calls it.
         rules: The rules; of a tree the relative ones, of a system its ways.
         raw: The raw rules of a tree.
@@ -130,7 +131,7 @@ class Model:
         ):
             raise CannotRunError("its meaning is not known")
         keys(top, f"format, kind, name, semantics, {NEEDED[kind]}", OPTIONAL[kind])
-        self.name, self.kind = str(top["name"]), kind
+        self.name, self.kind, self.facts = str(top["name"]), kind, top
         self.raw: Rules | None = None
         self.nodes: list[Facts] = []
         self.paths: list[Steps] = []

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 
 class CannotRunError(ValueError):
@@ -53,24 +55,19 @@ class Limit:
             raise UndecidedError("the time is over")
 
 
-UNCHECKED = (
-    "the version, the hash of the model's content, the table, how many rows and how "
-    "long, how proofs were made, why something is open or left out, ids, the commands"
-)
-"""What of an audit is read and compared with nothing."""
-
-
 class Report:
     """The results of a re-check.
 
     Attributes:
+        unchecked: What is read and compared with nothing.
         wrong: What does not hold, a sentence each.
         counts: How often each kind of check was made.
         undecided: The positions of the answers not decided again, by state and reason.
         codes: The code of each answer.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, unchecked: str = "") -> None:
+        self.unchecked = unchecked
         self.wrong: list[str] = []
         self.counts = Counter[str]()
         self.undecided = defaultdict[tuple[str, str], list[int]](list)
@@ -80,6 +77,33 @@ class Report:
         """Note what does not hold, unless it is so."""
         if not is_so:
             self.wrong.append(otherwise)
+
+    @property
+    def first(self) -> str:
+        """What is wrong first, without its place; empty if nothing is."""
+        return self.wrong[0].partition("): ")[2] if self.wrong else ""
+
+    @contextmanager
+    def answer(self, number: int, answer: Any, limit: Limit) -> Generator[None]:
+        """Note what does not hold of an answer, or is undecided, with its place."""
+        where = f"answer {number} ({answer.code}, {answer.subject:.60})"
+        limit.left = MOST_STEPS
+        try:
+            yield
+        except DoesNotHoldError as error:
+            self.wrong.append(f"{where}: {error}")
+        except UndecidedError as error:
+            kind = type(answer.state).__name__.upper()
+            self.undecided[kind, str(error)].append(number - 1)
+        except (
+            LookupError,
+            ArithmeticError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            AssertionError,
+        ):
+            self.wrong.append(f"{where}: it names what there is not")
 
     def lines(self) -> Iterator[str]:
         """Yield the report, line by line."""
@@ -99,4 +123,4 @@ class Report:
             size = f" ({len(numbers)} answers)" if len(numbers) > 1 else ""
             codes = dict.fromkeys(self.codes[number] for number in numbers)
             yield f"  {', '.join(codes)}{size}: {why}"
-        yield f"read, and compared with nothing: {UNCHECKED}"
+        yield f"read, and compared with nothing: {self.unchecked}"

@@ -195,6 +195,41 @@ class Audit(NamedTuple):
     format: Literal["fuzzytree-audit/1"]
 
 
+class ComparedModel(NamedTuple):
+    name: str
+    form: str
+    fingerprint: str
+    file: Source | None
+
+
+class Change(NamedTuple):
+    grade: Literal["breaking", "non-breaking", "cosmetic"]
+    is_proved: bool
+    part: str
+    sentence: str
+    old_rules: tuple[int, ...]
+    new_rules: tuple[int, ...]
+    measures: tuple[Measure, ...]
+    old: Place | None
+    new: Place | None
+    code: Literal["FT802"]
+
+
+class Difference(NamedTuple):
+    ok: bool
+    verdict: Literal["equal", "changed", "open"]
+    version: str
+    old: ComparedModel
+    new: ComparedModel
+    data: Source | None
+    rows: int
+    domain: Domain
+    settings: Settings
+    changes: tuple[Change, ...]
+    answers: tuple[Answer, ...]
+    format: Literal["fuzzytree-diff/1"]
+
+
 def fraction(text: str | None) -> Fraction:
     """Return a number that is written as `p/q` in lowest terms, or as `p`."""
     if text is None or not re.fullmatch("-?[0-9]{1,4000}(/[0-9]{1,4000})?", text):

@@ -76,5 +76,8 @@ def test_alone_it_reports_what_is_wrong(tmp_path: Path) -> None:
 
 def test_alone_it_prints_its_usage(tmp_path: Path) -> None:
     ran = alone(tmp_path, "audit.json")
-    usage = "usage: python -m fuzzytree.auditing.recheck AUDIT.json MODEL.yaml\n"
+    usage = (
+        "usage: python -m fuzzytree.auditing.recheck AUDIT.json MODEL.yaml\n"
+        "       python -m fuzzytree.auditing.recheck DIFF.json OLD.yaml NEW.yaml\n"
+    )
     assert (ran.returncode, ran.stdout, ran.stderr) == (2, "", usage)
